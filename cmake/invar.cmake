@@ -1,0 +1,40 @@
+# invar_library and invar_test: every target of ours goes through these two, so that warnings are errors everywhere.
+
+set(INVAR_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wold-style-cast
+    -Wnon-virtual-dtor -Woverloaded-virtual -Wuseless-cast -Wdouble-promotion -Werror)
+
+# -ffp-contract=off keeps simulated time repeatable bit for bit across CPUs.
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+add_compile_options(-ffp-contract=off)
+
+set(INVAR_SANITIZE "" CACHE STRING "sanitizers to build with, for example address,undefined or thread")
+if(INVAR_SANITIZE)
+  add_compile_options(-fsanitize=${INVAR_SANITIZE} -fno-omit-frame-pointer -g)
+  add_link_options(-fsanitize=${INVAR_SANITIZE})
+endif()
+
+# invar_library(room SOURCES ... HEADERS ... [PUBLIC targets] [PRIVATE targets]) makes invar::room in namespace folder.
+function(invar_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;HEADERS;PUBLIC;PRIVATE" ${ARGN})
+  add_library(invar_${name} STATIC)
+  add_library(invar::${name} ALIAS invar_${name})
+  set_target_properties(invar_${name} PROPERTIES EXPORT_NAME ${name})
+  target_sources(invar_${name} PRIVATE ${ARG_SOURCES}
+    PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARG_HEADERS})
+  target_compile_options(invar_${name} PRIVATE ${INVAR_WARNINGS})
+  target_link_libraries(invar_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+endfunction()
+
+# invar_test(name SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s]) makes one gtest program; each TEST is one ctest entry.
+function(invar_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(test_${name} ${ARG_SOURCES})
+  target_compile_options(test_${name} PRIVATE ${INVAR_WARNINGS})
+  target_compile_definitions(test_${name} PRIVATE INVAR_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data"
+    INVAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" INVAR_PROGRAM="${CMAKE_BINARY_DIR}/bin/invar")
+  target_link_libraries(test_${name} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest GTest::gtest_main)
+  gtest_discover_tests(test_${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
+endfunction()

@@ -1,0 +1,239 @@
+#include "core/recording/table.hpp"
+
+#include <zlib.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "core/base/contract.hpp"
+#include "core/base/unit.hpp"
+
+namespace invar::recording {
+
+namespace {
+
+constexpr double missing = std::numeric_limits<double>::quiet_NaN();
+
+std::string read_all(const std::filesystem::path& file) {
+  if (std::filesystem::is_directory(file)) throw InputError{file.string(), "is a folder", "name a CSV file"};
+  const std::unique_ptr<gzFile_s, int (*)(gzFile)> stream{gzopen(file.c_str(), "rb"),
+                                                          gzclose};  // reads plain files too
+  if (!stream) throw InputError{file.string(), "cannot be read", "check the path and its permissions"};
+  std::string text;
+  std::string block(1U << 18U, '\0');
+  for (;;) {
+    const int got = gzread(stream.get(), block.data(), static_cast<unsigned>(block.size()));
+    if (got < 0) throw InputError{file.string(), "is damaged (gzip cannot unpack it)", "copy the file again"};
+    if (got == 0) break;
+    text.append(block, 0, static_cast<std::size_t>(got));
+  }
+  int status = 0;
+  gzerror(stream.get(), &status);
+  if (status == Z_BUF_ERROR)
+    throw InputError{file.string(), "is cut off (gzip ends early)", "copy the file again"};
+  return text;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+/// The cells of one line; a comma inside double quotes does not separate.
+void split(std::string_view line, std::vector<std::string_view>& cells) {
+  cells.clear();
+  bool quoted = false;
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i <= line.size(); ++i) {
+    if (i < line.size() && line[i] == '"') quoted = !quoted;
+    if (i == line.size() || (line[i] == ',' && !quoted)) {
+      cells.push_back(trimmed(line.substr(begin, i - begin)));
+      begin = i + 1;
+    }
+  }
+}
+
+std::optional<double> number(std::string_view cell) {
+  if (cell.empty()) return missing;
+  if (cell.front() == '+') cell.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (error == std::errc::result_out_of_range) return std::nullopt;
+  if (error == std::errc{} && end == cell.data() + cell.size()) return value;
+  std::string lower{cell};
+  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  if (lower == "nan" || lower == "na" || lower == "null") return missing;
+  return std::nullopt;
+}
+
+Column header(std::string_view cell, const std::string& where) {
+  Column column;
+  const auto open = cell.find('[');
+  column.name = std::string{trimmed(cell.substr(0, open))};
+  if (open != std::string_view::npos) {
+    const auto close = cell.find(']', open);
+    if (close == std::string_view::npos)
+      throw InputError{where + ": column `" + std::string{cell} + "`", "the unit's bracket is not closed",
+                       "write `" + column.name + " [unit]`"};
+    column.unit = std::string{trimmed(cell.substr(open + 1, close - open - 1))};
+    if (!parse_unit(column.unit))
+      throw InputError{where + ": column `" + std::string{cell} + "`", "`" + column.unit + "` is no unit",
+                       "write an SI unit such as [m], [s], [degC] or [rad]"};
+  }
+  if (column.name.empty()) throw InputError{where, "a column has no name", "write `name [unit]`"};
+  return column;
+}
+
+}  // namespace
+
+Table Table::read(const std::filesystem::path& file, const std::vector<std::string>& text_columns) {
+  const std::string text = read_all(file);
+  std::string_view rest = text;
+  if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
+  if (rest.find('\0') != std::string_view::npos)
+    throw InputError{file.string(), "is not a text file", "name a CSV file"};
+  Table table;
+  table.file = file;
+  std::vector<std::string_view> cells;
+  std::vector<bool> is_text;
+  std::size_t line_number = 0;
+  while (!rest.empty()) {
+    const auto end = rest.find('\n');
+    const std::string_view line = rest.substr(0, end);
+    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
+    ++line_number;
+    if (trimmed(line).empty()) continue;
+    const std::string where = file.string() + ":" + std::to_string(line_number);
+    split(line, cells);
+    if (table.columns.empty()) {
+      std::set<std::string> names;
+      for (const auto cell : cells) {
+        table.columns.push_back(header(cell, where));
+        if (!names.insert(table.columns.back().name).second)
+          throw InputError{where, "column `" + table.columns.back().name + "` stands twice",
+                           "keep one of them"};
+        is_text.push_back(std::find(text_columns.begin(), text_columns.end(), table.columns.back().name) !=
+                          text_columns.end());
+      }
+      continue;
+    }
+    if (cells.size() != table.columns.size())
+      throw InputError{where,
+                       "this row has " + std::to_string(cells.size()) + " cells, the header " +
+                           std::to_string(table.columns.size()),
+                       "give every row one cell a column (an empty one where a value is missing)"};
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      Column& column = table.columns[i];
+      const auto value = number(cells[i]);
+      if (is_text[i]) {
+        column.texts.emplace_back(cells[i]);
+        column.values.push_back(value.value_or(missing));
+        continue;
+      }
+      if (!value)
+        throw InputError{where + ": column `" + column.name + "`",
+                         "`" + std::string{cells[i]} + "` is not a number",
+                         "write a number, or leave the cell empty"};
+      column.values.push_back(*value);
+    }
+  }
+  if (table.columns.empty())
+    throw InputError{file.string(), "is empty", "begin with a header `name [unit],...`"};
+  if (table.rows() == 0)
+    throw InputError{file.string(), "has a header but no rows", "add the readings below it"};
+  return table;
+}
+
+void Table::write(const std::filesystem::path& target) const {
+  std::string text;
+  for (const Column& column : columns) {
+    if (&column != &columns.front()) text += ',';
+    text += column.name;
+    if (!column.unit.empty()) text += " [" + column.unit + "]";
+  }
+  text += '\n';
+  char digits[40];
+  for (std::size_t row = 0; row < rows(); ++row) {
+    for (const Column& column : columns) {
+      if (&column != &columns.front()) text += ',';
+      if (!column.texts.empty()) {
+        text += column.texts[row];
+      } else if (const double value = column.values[row]; std::isinf(value)) {
+        text += value > 0 ? "inf" : "-inf";
+      } else if (!std::isnan(value)) {
+        text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+      }
+    }
+    text += '\n';
+  }
+  std::filesystem::path temporary = target;
+  temporary += ".part";
+  const bool compress = target.extension() == ".gz";
+  const gzFile stream = gzopen(temporary.c_str(), compress ? "wb6" : "wbT");
+  bool written = stream != nullptr;
+  for (std::size_t at = 0; written && at < text.size();) {
+    const auto size = static_cast<unsigned>(std::min<std::size_t>(text.size() - at, 1U << 20U));
+    written = gzwrite(stream, text.data() + at, size) == static_cast<int>(size);
+    at += size;
+  }
+  if (stream != nullptr && gzclose(stream) != Z_OK) written = false;
+  if (!written) {
+    std::filesystem::remove(temporary);
+    throw InputError{target.string(), "cannot be written",
+                     "check the folder, its permissions and the space left"};
+  }
+  std::filesystem::rename(temporary, target);
+}
+
+std::size_t Table::rows() const { return columns.empty() ? 0 : columns.front().values.size(); }
+bool Table::has(std::string_view name) const { return find(name) != nullptr; }
+
+const Column* Table::find(std::string_view name) const {
+  const auto found =
+      std::find_if(columns.begin(), columns.end(), [&](const Column& c) { return c.name == name; });
+  return found == columns.end() ? nullptr : &*found;
+}
+
+std::vector<double> Table::in(std::string_view name, std::string_view unit) const {
+  const Column* column = find(name);
+  if (column == nullptr) {
+    std::string have;
+    for (const Column& c : columns) have += (have.empty() ? "" : ", ") + c.name;
+    throw InputError{file.string(), "column `" + std::string{name} + "` is missing (there are: " + have + ")",
+                     "add `" + std::string{name} + " [" + std::string{unit} + "]`"};
+  }
+  std::vector<double> values = column->values;
+  if (column->unit.empty()) return values;
+  const auto convert = conversion(column->unit, unit);
+  if (!convert)
+    throw InputError{file.string() + ": column `" + column->name + " [" + column->unit + "]`",
+                     "`" + column->unit + "` does not measure the same as " + std::string{unit},
+                     "write the column in " + std::string{unit}};
+  for (double& value : values) value = (*convert)(value);
+  return values;
+}
+
+std::optional<std::vector<double>> Table::optionally_in(std::string_view name, std::string_view unit) const {
+  if (!has(name)) return std::nullopt;
+  return in(name, unit);
+}
+
+void Table::add(std::string name, std::string unit, std::vector<double> values) {
+  INVAR_EXPECTS(columns.empty() || values.size() == rows(), name, values.size(), rows());
+  columns.push_back({std::move(name), std::move(unit), std::move(values), {}});
+}
+
+void Table::add_texts(std::string name, std::vector<std::string> texts) {
+  INVAR_EXPECTS(columns.empty() || texts.size() == rows(), name, texts.size(), rows());
+  columns.push_back({std::move(name), "", std::vector<double>(texts.size(), missing), std::move(texts)});
+}
+
+}  // namespace invar::recording

@@ -1,0 +1,51 @@
+// Table: columns of numbers with units, read from and written to CSV (plain or gzip).
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/fault.hpp"
+
+namespace invar::recording {
+
+struct Column {
+  std::string name;
+  std::string unit;            // as written in the header; empty when none was
+  std::vector<double> values;  // NaN where a cell is empty or says nan
+  std::vector<std::string>
+      texts;  // filled only for a column that is not all numbers (a line's name, an image's)
+};
+
+/// A header `name [unit]` a column, then one row a sample. All columns have the same length.
+class Table {
+ public:
+  /// Throws InputError (file, row, column, what is wrong, how to mend it) when the file cannot be read, has
+  /// no header or no rows, a row has another number of cells, a name stands twice, a unit is none, or a cell
+  /// of a number column is no number. Columns named in `text_columns` may hold texts; any other may not.
+  static Table read(const std::filesystem::path& file, const std::vector<std::string>& text_columns = {});
+
+  /// Writes through a temporary file beside it, so that nothing half-written is left; `.gz` compresses. 17
+  /// digits.
+  void write(const std::filesystem::path& file) const;
+
+  [[nodiscard]] std::size_t rows() const;
+  [[nodiscard]] bool has(std::string_view name) const;
+  [[nodiscard]] const Column* find(std::string_view name) const;
+  /// The column in `unit` (a column without a unit counts as in `unit` already). Throws InputError when it is
+  /// missing or its unit measures something else.
+  [[nodiscard]] std::vector<double> in(std::string_view name, std::string_view unit) const;
+  /// The same where the column may be absent.
+  [[nodiscard]] std::optional<std::vector<double>> optionally_in(std::string_view name,
+                                                                 std::string_view unit) const;
+
+  void add(std::string name, std::string unit, std::vector<double> values);
+  void add_texts(std::string name, std::vector<std::string> texts);
+
+  std::vector<Column> columns;
+  std::filesystem::path file;  // where it was read from, for messages
+};
+
+}  // namespace invar::recording

@@ -1,0 +1,74 @@
+#include "core/recording/table.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+
+namespace invar::recording {
+namespace {
+
+using ::testing::HasSubstr;
+
+class TableTest : public ::testing::Test {
+ protected:
+  TableTest() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "invar-table-XXXXXX").string();
+    folder = mkdtemp(pattern.data());
+  }
+  ~TableTest() override { std::filesystem::remove_all(folder); }
+  TableTest(const TableTest&) = delete;
+  TableTest& operator=(const TableTest&) = delete;
+
+  std::filesystem::path make(const std::string& text) const {
+    std::ofstream{folder / "in.csv"} << text;
+    return folder / "in.csv";
+  }
+  static std::string fault_of(const std::filesystem::path& file) {
+    try {
+      Table::read(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+  std::filesystem::path folder;
+};
+
+TEST_F(TableTest, ReadsUnitsEmptyCellsAndTextColumns) {
+  const auto table = Table::read(make("line,x [mm],t [s]\nA,1.5,0\nB,,1e-3\n"), {"line"});
+  EXPECT_EQ(table.rows(), 2U);
+  EXPECT_EQ(table.find("line")->texts[1], "B");
+  EXPECT_DOUBLE_EQ(table.in("x", "m")[0], 1.5e-3);
+  EXPECT_TRUE(std::isnan(table.in("x", "m")[1]));
+  EXPECT_FALSE(table.optionally_in("missing", "m").has_value());
+}
+
+TEST_F(TableTest, WritesWhatItReadsBackExactly) {
+  Table table;
+  table.add("x", "m", {0.1, 1.0 / 3.0, -2e-300});
+  for (const char* name : {"out.csv", "out.csv.gz"}) {
+    table.write(folder / name);
+    EXPECT_EQ(Table::read(folder / name).in("x", "m"), table.columns[0].values);
+  }
+}
+
+TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
+  EXPECT_THAT(fault_of(make("x [m],y [m]\n1,2\n3\n")), HasSubstr("in.csv:3: this row has 1 cells"));
+  EXPECT_THAT(fault_of(make("x [m]\n1\nabc\n")), HasSubstr("in.csv:3: column `x`: `abc` is not a number"));
+  EXPECT_THAT(fault_of(make("x [furlong]\n1\n")), HasSubstr("`furlong` is no unit"));
+  EXPECT_THAT(fault_of(make("x,x\n1,2\n")), HasSubstr("stands twice"));
+  EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
+  EXPECT_THAT(fault_of(make("")), HasSubstr("is empty"));
+  EXPECT_THAT(fault_of(folder / "none.csv"), HasSubstr("cannot be read"));
+}
+
+TEST_F(TableTest, SaysWhichColumnIsMissingOrMeasuresSomethingElse) {
+  const auto table = Table::read(make("x [s]\n1\n"));
+  EXPECT_THROW((void)table.in("y", "m"), InputError);
+  EXPECT_THROW((void)table.in("x", "m"), InputError);
+}
+
+}  // namespace
+}  // namespace invar::recording

@@ -1,0 +1,14 @@
+// A subcommand of `invar`: one file in tools/commands/ defines one of these; tools/main.cpp lists them.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace invar::tools {
+
+/// Each adds its subcommand (options, help with an example, callback) to the program. Callbacks throw
+/// InputError for what the user must mend (exit 2) and CLI::RuntimeError(status) to end with another status.
+void add_about(CLI::App& program);
+void add_calibrate(CLI::App& program);
+void add_predict(CLI::App& program);
+
+}  // namespace invar::tools

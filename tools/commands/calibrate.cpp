@@ -1,0 +1,15 @@
+// `invar calibrate`: the group; each kind is a file of its own.
+#include "tools/commands/calibrate.hpp"
+
+#include "tools/command.hpp"
+
+namespace invar::tools {
+
+void add_calibrate(CLI::App& program) {
+  auto* group =
+      program.add_subcommand("calibrate", "Identify an error from measurements and write its compensation");
+  group->require_subcommand(1);
+  group->footer("Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result");
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,53 @@
+// `invar predict`: evaluates any compensation model on a table of inputs.
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "tools/command.hpp"
+#include "tools/commands/calibrate.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+const std::map<std::string, Predict>& kinds() {
+  static const std::map<std::string, Predict> table{};
+  return table;
+}
+
+struct Options {
+  std::filesystem::path model;
+  std::filesystem::path inputs;
+  std::filesystem::path output;
+};
+
+void predict(const Options& options) {
+  const auto model = config::Yaml::load(options.model);
+  model.root().integer("invar_compensation", 1, 1);
+  const std::string kind = model.root().text("kind");
+  const auto found = kinds().find(kind);
+  if (found == kinds().end()) {
+    std::string known;
+    for (const auto& [name, function] : kinds()) known += (known.empty() ? "" : ", ") + name;
+    throw InputError{model.root()["kind"].where(), "`" + kind + "` is no kind of compensation",
+                     "use one of: " + known};
+  }
+  const auto inputs = recording::Table::read(options.inputs, {"run", "line"});
+  found->second(model, inputs).write(options.output);
+}
+
+}  // namespace
+
+void add_predict(CLI::App& program) {
+  auto* command = program.add_subcommand("predict", "Evaluate a compensation model on a table of inputs");
+  command->footer(
+      "Example: invar predict --model result/compensation.yaml --inputs points.csv --output predicted.csv");
+  auto options = std::make_shared<Options>();
+  command->add_option("--model", options->model, "compensation.yaml of any kind")->required();
+  command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz")->required();
+  command->add_option("--output", options->output, "table to write: one row per input row")->required();
+  command->callback([options] { predict(*options); });
+}
+
+}  // namespace invar::tools

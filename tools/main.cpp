@@ -1,0 +1,35 @@
+// invar: the one program that people type; its subcommands stand in tools/commands/, one a file.
+#include <exception>
+#include <iostream>
+
+#include "core/base/fault.hpp"
+#include "tools/command.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App program{
+      "Invar: a component framework for industrial cells that must place things to the micrometre.", "invar"};
+  program.require_subcommand(1);
+  program.set_version_flag("--version", "invar " INVAR_VERSION);
+  invar::tools::add_about(program);
+  invar::tools::add_calibrate(program);
+  invar::tools::add_predict(program);
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::RuntimeError& end) {
+    return end.get_exit_code();
+  } catch (const CLI::ParseError& error) {
+    // Help and version come this way too, with status 0; every real fault of the call is status 2.
+    if (error.get_exit_code() == 0) return program.exit(error);
+    std::cerr << "invar: " << error.what() << "; see `invar --help`\n";
+    return 2;
+  } catch (const invar::InputError& error) {
+    std::cerr << error.what();
+    if (const auto more = error.faults().size() - 1; more > 0) std::cerr << " (and " << more << " more)";
+    std::cerr << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "invar: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

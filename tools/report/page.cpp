@@ -1,0 +1,153 @@
+#include "tools/report/page.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+
+#include "core/base/fault.hpp"
+
+namespace invar::report {
+
+namespace {
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+  static constexpr char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    unsigned block = 0;
+    for (std::size_t k = 0; k < 3; ++k) block = block << 8U | (i + k < bytes.size() ? bytes[i + k] : 0U);
+    for (std::size_t k = 0; k < 4; ++k)
+      out += i + k <= bytes.size() ? alphabet[block >> (18U - 6U * k) & 63U] : '=';
+  }
+  return out;
+}
+
+constexpr const char* style = R"(
+:root{--ink:#1c2733;--soft:#5b6875;--line:#dfe4ea;--good:#1d7a46;--bad:#b3261e;--warn:#9a6700}
+body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Helvetica,Arial,sans-serif;color:var(--ink);max-width:1180px;
+margin:2rem auto;padding:0 1.2rem;background:#fff}
+h1{font-size:1.7rem;margin:0}h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bottom:1px solid var(--line);padding-bottom:.2rem}
+.sub{color:var(--soft);margin:.2rem 0 1rem}.callout{border-left:5px solid var(--soft);background:#f5f7f9;padding:.7rem 1rem;
+margin:.8rem 0;font-size:1.06rem}.callout.good{border-color:var(--good)}.callout.bad{border-color:var(--bad)}
+.callout.warn{border-color:var(--warn)}table{border-collapse:collapse;margin:.6rem 0;font-size:.93rem}
+th,td{padding:.28rem .8rem;text-align:left;border-bottom:1px solid var(--line);font-variant-numeric:tabular-nums}
+th{color:var(--soft);font-weight:600}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0}
+figure svg,figure img{max-width:100%;height:auto}figcaption{color:var(--soft);font-size:.9rem}
+pre{background:#f5f7f9;padding:.8rem;overflow-x:auto;font-size:.86rem})";
+
+}  // namespace
+
+Page::Page(std::string title, std::string subtitle)
+    : title_{std::move(title)}, subtitle_{std::move(subtitle)} {}
+
+void Page::heading(const std::string& text) { html("<h2>" + escaped(text) + "</h2>"); }
+void Page::paragraph(const std::string& text) { html("<p>" + escaped(text) + "</p>"); }
+void Page::callout(const std::string& text, const std::string& kind) {
+  html("<div class=\"callout " + escaped(kind) + "\">" + escaped(text) + "</div>");
+}
+void Page::preformatted(const std::string& text) { html("<pre>" + escaped(text) + "</pre>"); }
+void Page::html(const std::string& text) { parts_.push_back({text, {}, ""}); }
+
+void Page::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
+  std::string out = "<table><thead><tr>";
+  for (const auto& cell : header) out += "<th>" + escaped(cell) + "</th>";
+  out += "</tr></thead><tbody>";
+  for (const auto& row : rows) {
+    out += "<tr>";
+    for (const auto& cell : row) out += "<td>" + escaped(cell) + "</td>";
+    out += "</tr>";
+  }
+  html(out + "</tbody></table>");
+}
+
+void Page::plot(Plot plot, const std::string& caption) { plots({std::move(plot)}, caption); }
+void Page::plots(std::vector<Plot> plots, const std::string& caption) {
+  parts_.push_back({"", std::move(plots), caption});
+}
+
+void Page::image(const std::vector<unsigned char>& bytes, const std::string& mime,
+                 const std::string& caption) {
+  html("<figure><img alt=\"" + escaped(caption) + "\" src=\"data:" + mime + ";base64," + base64(bytes) +
+       "\"><figcaption>" + escaped(caption) + "</figcaption></figure>");
+}
+
+void Page::write(const std::filesystem::path& file) const {
+  std::vector<Plot> all;
+  for (const Part& part : parts_) all.insert(all.end(), part.plots.begin(), part.plots.end());
+  const auto drawings = draw(all);
+  std::filesystem::path temporary = file;
+  temporary += ".part";
+  std::ofstream out{temporary, std::ios::binary};
+  out << "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+         "content=\"width=device-width\"><title>"
+      << escaped(title_) << "</title><style>" << style << "</style></head><body><h1>" << escaped(title_)
+      << "</h1>";
+  if (!subtitle_.empty()) out << "<div class=\"sub\">" << escaped(subtitle_) << "</div>";
+  std::size_t next = 0;
+  for (const Part& part : parts_) {
+    out << part.html;
+    if (part.plots.empty()) continue;
+    out << "<div class=\"row\">";
+    for (std::size_t i = 0; i < part.plots.size(); ++i) out << "<figure>" << drawings[next++] << "</figure>";
+    out << "</div>";
+    if (!part.caption.empty()) out << "<figcaption>" << escaped(part.caption) << "</figcaption>";
+  }
+  out << "</body></html>\n";
+  out.close();
+  if (!out) {
+    std::filesystem::remove(temporary);
+    throw InputError{file.string(), "cannot be written",
+                     "check the folder, its permissions and the space left"};
+  }
+  std::filesystem::rename(temporary, file);
+}
+
+std::string number(double value, int digits) {
+  if (std::isnan(value)) return "-";
+  std::array<char, 64> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.*g", digits, value);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+std::string si(double value, const std::string& unit, int digits) {
+  struct Prefix {
+    double factor;
+    const char* name;
+  };
+  static constexpr Prefix prefixes[] = {{1e-9, "n"}, {1e-6, "u"}, {1e-3, "m"},
+                                        {1.0, ""},   {1e3, "k"},  {1e6, "M"}};
+  const Prefix* best = &prefixes[3];
+  if (value != 0.0 && std::isfinite(value)) {
+    best = &prefixes[0];
+    for (const Prefix& prefix : prefixes)
+      if (std::abs(value) >= 0.9995 * prefix.factor) best = &prefix;
+  }
+  return number(value / best->factor, digits) + " " + best->name + unit;
+}
+
+}  // namespace invar::report

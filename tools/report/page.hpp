@@ -1,0 +1,52 @@
+// Page: a self-contained HTML report, built from top to bottom.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tools/report/plot.hpp"
+
+namespace invar::report {
+
+/// Texts are plain and are escaped here. Plots are drawn together when the page is written.
+class Page {
+ public:
+  explicit Page(std::string title, std::string subtitle = "");
+
+  void heading(const std::string& text);
+  void paragraph(const std::string& text);
+  /// A line that stands out: the verdict, the one number. `kind` is "good", "bad", "warn" or "plain".
+  void callout(const std::string& text, const std::string& kind = "plain");
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  void plot(Plot plot, const std::string& caption = "");
+  /// Plots side by side where the window is wide enough.
+  void plots(std::vector<Plot> plots, const std::string& caption = "");
+  /// A PNG or JPEG file's bytes, embedded.
+  void image(const std::vector<unsigned char>& bytes, const std::string& mime,
+             const std::string& caption = "");
+  void preformatted(const std::string& text);
+  /// HTML that the caller made and escaped.
+  void html(const std::string& text);
+
+  /// Draws the plots and writes the file through a temporary one. Throws InputError when it cannot be
+  /// written.
+  void write(const std::filesystem::path& file) const;
+
+ private:
+  struct Part {
+    std::string html;
+    std::vector<Plot> plots;
+    std::string caption;
+  };
+  std::string title_;
+  std::string subtitle_;
+  std::vector<Part> parts_;
+};
+
+/// "12.3" with the given number of significant digits; "-" for NaN.
+std::string number(double value, int digits = 3);
+/// A value with its unit in the handiest prefix: si(4.1e-6, "m") is "4.1 um".
+std::string si(double value, const std::string& unit, int digits = 3);
+
+}  // namespace invar::report

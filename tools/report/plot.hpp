@@ -1,0 +1,43 @@
+// Plot: what to draw; gnuplot draws it as SVG.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/range.hpp"
+
+namespace invar::report {
+
+/// One curve, cloud, band or grid in a plot. NaN breaks a line.
+struct Series {
+  enum class Style { line, dashed, points, steps, band, bars, vectors, heat };
+  std::string label;  // empty: not in the key
+  Style style = Style::line;
+  std::vector<double> x;
+  std::vector<double> y;
+  std::vector<double> u;  // band: upper edge; vectors: x part; heat: the value
+  std::vector<double> v;  // vectors: y part
+  std::string colour;     // "#rrggbb"; empty: the next of the palette
+};
+
+struct Plot {
+  std::string title;
+  std::string x_label;  // with its unit: "x [mm]"
+  std::string y_label;
+  std::vector<Series> series;
+  std::optional<Range> x_range;
+  std::optional<Range> y_range;
+  bool equal_axes = false;
+  bool log_x = false;
+  bool log_y = false;
+  int width = 720;   // px
+  int height = 360;  // px
+};
+
+/// One <svg> element a plot, in order, drawn by one gnuplot process. Long lines are thinned to about 4000
+/// points by their local extremes, so that a peak is never lost. Throws std::runtime_error when gnuplot is
+/// missing or fails.
+std::vector<std::string> draw(const std::vector<Plot>& plots);
+
+}  // namespace invar::report
