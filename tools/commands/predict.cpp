@@ -24,7 +24,7 @@ struct Options {
 
 void predict(const Options& options) {
   const auto model = config::Yaml::load(options.model);
-  model.root().integer("invar_compensation", 1, 1);
+  (void)model.root().integer("invar_compensation", 1, 1);
   const std::string kind = model.root().text("kind");
   const auto found = kinds().find(kind);
   if (found == kinds().end()) {
