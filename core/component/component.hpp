@@ -1,0 +1,85 @@
+// Component: the unit that an engineer writes. It has ports and parameters and is stepped; it owns no thread
+// and no clock.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/base/time.hpp"
+
+namespace invar {
+
+class Port;
+class InputPort;
+
+/// One call of a component's step.
+struct Tick {
+  Instant now;  // of the executor's clock (monotonic or simulated), at the nominal start of this cycle
+  double period = 0.0;      // s, nominal
+  std::uint64_t cycle = 0;  // counts every period since the executor started, skipped ones too
+};
+
+/// The states of the OMG RTC / ROS 2 lifecycle; core/component/lifecycle.hpp has the transitions.
+enum class LifecycleState : std::uint8_t { unconfigured, inactive, active, finalized, error };
+
+/// Derive, declare `struct Parameters` with `describe`, declare ports as members, write `step`. The
+/// constructor takes `const Parameters&`, which outlives the component: keep the reference to see changes
+/// made while running.
+class Component {
+ public:
+  Component() = default;
+  virtual ~Component() = default;
+  Component(const Component&) = delete;
+  Component& operator=(const Component&) = delete;
+
+  /// unconfigured -> inactive. May allocate, open files and connections, throw InputError. Not on the loop's
+  /// thread.
+  virtual void configure() {}
+  /// inactive -> active, on the thread that steps, directly before the first step. Must be bumpless: setpoint
+  /// := measured. Real-time where the executor is.
+  virtual void activate() {}
+  /// The work of one period. Real-time where the executor is: neither allocates, locks, throws, logs nor
+  /// waits.
+  virtual void step(const Tick& tick) noexcept = 0;
+  /// active -> inactive, on the thread that steps. Afterwards the outputs get their safe values.
+  virtual void deactivate() noexcept {}
+  /// inactive or error -> unconfigured: give back what configure took. Not on the loop's thread.
+  virtual void cleanup() noexcept {}
+  /// An input with a deadline is older than that while active, called once a period on the thread that steps.
+  /// True: the component deals with it itself (the stage stops under control); false: it goes to error at
+  /// once.
+  virtual bool input_lost(const InputPort& input, const Tick& tick) noexcept;
+  /// A parameter declared `while_running` was changed, on the thread that steps, between two steps.
+  /// Real-time.
+  virtual void parameters_changed() noexcept {}
+
+  /// From step: this component cannot go on. It goes to error after this step, its outputs to their safe
+  /// values. `why` must be a literal. Real-time.
+  void fail(const char* why) noexcept { failure_ = why; }
+  [[nodiscard]] const char* failure() const noexcept { return failure_; }
+  void clear_failure() noexcept { failure_ = nullptr; }
+
+  /// The name in the deployment ("stage_x"). Set before configure.
+  std::string name;
+  /// Numeric identity of the cell and of this component, for the keys of its samples. Set before configure.
+  std::uint32_t cell = 0;
+  std::uint32_t id = 0;
+
+  [[nodiscard]] const std::vector<Port*>& ports() const { return ports_; }
+  /// The time of the current step.
+  [[nodiscard]] Instant now() const noexcept { return now_; }
+  /// By the executor, before each step and transition.
+  void set_now(Instant now) noexcept { now_ = now; }
+
+ private:
+  friend class Port;
+  std::vector<Port*> ports_;
+  Instant now_;
+  const char* failure_ = nullptr;
+};
+
+}  // namespace invar
+
+#include "core/component/port.hpp"

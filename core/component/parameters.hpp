@@ -1,0 +1,176 @@
+// Parameters: declared once by `describe`; reading, checking, documenting and changing them follow from it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/config/yaml.hpp"
+
+namespace invar {
+
+/// Whether a parameter may change while the component runs.
+enum class Changeable : bool { no, while_running };
+inline constexpr Changeable while_running = Changeable::while_running;
+
+/// One row of a component's documentation, and the handle by which a number is changed while running.
+struct ParameterInfo {
+  std::string path;  // "trajectory.velocity"
+  std::string type;  // number, whole number, flag, text, file, list
+  std::string unit;
+  Range range;
+  std::string description;
+  bool required = false;
+  std::string otherwise;  // the default, as text
+  bool changeable = false;
+  double* number = nullptr;  // changeable numbers only
+};
+
+namespace detail {
+struct Probe {
+  template <class... Arguments>
+  void operator()(Arguments&&...) {}
+};
+}  // namespace detail
+
+/// A struct with `void describe(auto& p)` is a group of parameters.
+template <class T>
+concept Described = requires(T& group, detail::Probe& probe) {
+  group.describe(probe);
+};
+
+/// The visitor that reads parameters from a cell file. In `describe`:
+///   p(cutoff, "cutoff", "Hz", Range{0.1, 450.0}, "-3 dB corner", while_running);   a double with its unit
+///   and bounds p(count, "count", 1, 64, "readings a point");                                  std::int64_t
+///   with bounds p(enabled, "enabled", "..."); p(map, "map", "...");                            bool,
+///   std::string, std::filesystem::path p(limits, "limits", "N", "...") std::vector<double> or Range with
+///   unit p(trajectory, "trajectory", "..."); p(lines, "lines", "...");                  a described group; a
+///   vector of them
+/// std::optional<T> may be absent; everything else keeps the default of the struct where the file says
+/// nothing.
+class ParameterReader {
+ public:
+  explicit ParameterReader(config::Node node, std::filesystem::path folder = {})
+      : node_{std::move(node)}, folder_{std::move(folder)} {}
+
+  void operator()(double& value, std::string_view name, std::string_view unit, Range range, std::string_view,
+                  Changeable = Changeable::no) {
+    if (node_.has(name)) value = node_[name].as_number(unit, range);
+  }
+  void operator()(std::optional<double>& value, std::string_view name, std::string_view unit, Range range,
+                  std::string_view, Changeable = Changeable::no) {
+    if (node_.has(name)) value = node_[name].as_number(unit, range);
+  }
+  void operator()(std::int64_t& value, std::string_view name, std::int64_t lower, std::int64_t upper,
+                  std::string_view) {
+    if (node_.has(name)) value = node_[name].as_integer(lower, upper);
+  }
+  void operator()(bool& value, std::string_view name, std::string_view) {
+    if (node_.has(name)) value = node_[name].as_flag();
+  }
+  void operator()(std::string& value, std::string_view name, std::string_view) {
+    if (node_.has(name)) value = node_[name].as_text();
+  }
+  /// Relative paths count from the cell file's folder. That the file exists is checked here.
+  void operator()(std::filesystem::path& value, std::string_view name, std::string_view);
+  void operator()(std::vector<double>& value, std::string_view name, std::string_view unit,
+                  std::string_view) {
+    if (node_.has(name)) value = node_[name].as_numbers(unit);
+  }
+  void operator()(Range& value, std::string_view name, std::string_view unit, std::string_view) {
+    if (node_.has(name)) value = node_[name].as_range(unit);
+  }
+  void operator()(std::vector<std::string>& value, std::string_view name, std::string_view) {
+    if (node_.has(name)) value = node_[name].as_texts();
+  }
+  template <Described Group>
+  void operator()(Group& group, std::string_view name, std::string_view) {
+    if (!node_.has(name)) return;
+    ParameterReader inner{node_[name], folder_};
+    group.describe(inner);
+  }
+  template <Described Group>
+  void operator()(std::optional<Group>& group, std::string_view name, std::string_view text) {
+    if (!node_.has(name)) return;
+    (*this)(group.emplace(), name, text);
+  }
+  template <Described Group>
+  void operator()(std::vector<Group>& groups, std::string_view name, std::string_view) {
+    if (!node_.has(name)) return;
+    groups.clear();
+    for (const auto& child : node_[name].children()) {
+      ParameterReader inner{child, folder_};
+      groups.emplace_back().describe(inner);
+    }
+  }
+
+  /// For checks between parameters, inside `describe`: if (p.reading()) ... p.node().fault("...", "...").
+  [[nodiscard]] const config::Node& node() const { return node_; }
+  static constexpr bool reading() { return true; }
+
+ private:
+  config::Node node_;
+  std::filesystem::path folder_;
+};
+
+/// The visitor that documents parameters and finds the handles of those that may change while running.
+class ParameterLister {
+ public:
+  explicit ParameterLister(std::vector<ParameterInfo>& list, std::string prefix = "")
+      : list_{list}, prefix_{std::move(prefix)} {}
+
+  void operator()(double& value, std::string_view name, std::string_view unit, Range range,
+                  std::string_view description, Changeable changeable = Changeable::no);
+  void operator()(std::optional<double>& value, std::string_view name, std::string_view unit, Range range,
+                  std::string_view description, Changeable changeable = Changeable::no);
+  void operator()(std::int64_t& value, std::string_view name, std::int64_t lower, std::int64_t upper,
+                  std::string_view description);
+  void operator()(bool& value, std::string_view name, std::string_view description);
+  void operator()(std::string& value, std::string_view name, std::string_view description);
+  void operator()(std::filesystem::path& value, std::string_view name, std::string_view description);
+  void operator()(std::vector<double>& value, std::string_view name, std::string_view unit,
+                  std::string_view description);
+  void operator()(Range& value, std::string_view name, std::string_view unit, std::string_view description);
+  void operator()(std::vector<std::string>& value, std::string_view name, std::string_view description);
+  template <Described Group>
+  void operator()(Group& group, std::string_view name, std::string_view) {
+    ParameterLister inner{list_, prefix_ + std::string{name} + "."};
+    group.describe(inner);
+  }
+  template <Described Group>
+  void operator()(std::optional<Group>& group, std::string_view name, std::string_view description) {
+    if (group) {
+      (*this)(*group, name, description);
+    } else {
+      Group example;
+      const auto first = list_.size();
+      (*this)(example, name, description);
+      for (auto i = first; i < list_.size(); ++i) list_[i].number = nullptr;
+    }
+  }
+  template <Described Group>
+  void operator()(std::vector<Group>& groups, std::string_view name, std::string_view description) {
+    if (groups.empty()) {
+      Group example;
+      const auto first = list_.size();
+      (*this)(example, std::string{name} + "[]", description);
+      for (auto i = first; i < list_.size(); ++i) list_[i].number = nullptr;
+    }
+    for (std::size_t i = 0; i < groups.size(); ++i)
+      (*this)(groups[i], std::string{name} + "[" + std::to_string(i) + "]", description);
+  }
+  static constexpr bool reading() { return false; }
+
+ private:
+  ParameterInfo& add(std::string_view name, const char* type, std::string_view description);
+  std::vector<ParameterInfo>& list_;
+  std::string prefix_;
+};
+
+}  // namespace invar

@@ -1,0 +1,218 @@
+// Ports: how a component reads and writes samples without knowing where they come from or go to.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <typeindex>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/component/channel.hpp"
+
+namespace invar {
+
+class Component;
+
+/// What every port has. A port is a member of its component and registers itself there. Set-up only, except
+/// where said.
+class Port {
+ public:
+  enum class Direction { input, inbox, output };
+
+  Port(Component& owner, std::string_view name, Direction direction, std::type_index type);
+  virtual ~Port() = default;
+  Port(const Port&) = delete;
+  Port& operator=(const Port&) = delete;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] Direction direction() const { return direction_; }
+  /// The C++ type of its samples; core/dds finds the wire type by it.
+  [[nodiscard]] std::type_index type() const { return type_; }
+  [[nodiscard]] Component& owner() const { return owner_; }
+
+  /// The name of the QoS profile: declared by the component, overridden by the deployment.
+  std::string profile;
+  /// The full topic, "cell/<cell>/<component>/<port>" or what the deployment connects it to; empty:
+  /// unconnected.
+  std::string topic;
+
+ private:
+  Component& owner_;
+  std::string name_;
+  Direction direction_;
+  std::type_index type_;
+};
+
+/// How an input is declared.
+struct InputOptions {
+  /// Unconnected is a fault of the deployment unless the input is optional.
+  bool optional = false;
+  /// Zero: none. Otherwise, when the newest sample is older than this while the component is active, the
+  /// executor takes the component to its safe state (Component::input_lost).
+  Duration deadline{};
+  std::string_view profile = "realtime";
+};
+
+/// What an executor and a transport need of an input, whatever its type.
+class InputPort : public Port {
+ public:
+  InputPort(Component& owner, std::string_view name, Direction direction, std::type_index type,
+            InputOptions options)
+      : Port{owner, name, direction, type}, options_{options} {
+    profile = options.profile;
+  }
+
+  [[nodiscard]] const InputOptions& options() const { return options_; }
+  /// When the newest sample arrived, in the clock of the owner's executor; Instant{INT64_MIN} before the
+  /// first. Any thread.
+  [[nodiscard]] Instant arrived() const noexcept { return {arrived_ns_.load(std::memory_order_acquire)}; }
+  [[nodiscard]] std::uint64_t received() const noexcept { return received_.load(std::memory_order_relaxed); }
+
+ protected:
+  void mark(Instant now) noexcept {
+    arrived_ns_.store(now.ns, std::memory_order_release);
+    received_.fetch_add(1, std::memory_order_relaxed);
+  }
+
+ private:
+  InputOptions options_;
+  std::atomic<std::int64_t> arrived_ns_{INT64_MIN};
+  std::atomic<std::uint64_t> received_{0};
+};
+
+/// What takes the samples of an output: an input of this process, or a transport. Called on the writer's
+/// thread; must be real-time when the writer is.
+template <class T>
+using Sink = std::function<void(const T& sample, Instant now)>;
+
+/// The latest sample of a signal. Real-time.
+template <class T>
+class Input final : public InputPort {
+ public:
+  Input(Component& owner, std::string_view name, InputOptions options = {})
+      : InputPort{owner, name, Direction::input, typeid(T), options} {}
+
+  /// The newest sample, or nullptr when none arrived yet; stays valid and unchanged until the next call.
+  const T* latest() noexcept { return channel_.read(); }
+  /// Time since the newest sample arrived; a very long time when there is none.
+  [[nodiscard]] Duration age(Instant now) const noexcept {
+    const Instant at = arrived();
+    return at.ns == INT64_MIN ? Duration{INT64_MAX} : now - at;
+  }
+
+  /// From the one thread that feeds this input.
+  void accept(const T& sample, Instant now) noexcept {
+    channel_.write(sample);
+    mark(now);
+  }
+
+ private:
+  Latest<T> channel_;
+};
+
+/// Every sample in order, for commands and events. Real-time. Several sources may feed it, each through its
+/// own lane.
+template <class T>
+class Inbox final : public InputPort {
+ public:
+  Inbox(Component& owner, std::string_view name, InputOptions options = {.profile = "command"},
+        std::size_t capacity = 64)
+      : InputPort{owner, name, Direction::inbox, typeid(T), options}, capacity_{capacity} {}
+
+  /// The next sample, oldest first within a lane; false when there is none.
+  bool take(T& sample) noexcept {
+    for (auto& lane : lanes_)
+      if (lane->pop(sample)) return true;
+    return false;
+  }
+  /// Samples refused because this component did not take them in time. Any thread.
+  [[nodiscard]] std::uint64_t lost() const noexcept {
+    std::uint64_t sum = 0;
+    for (const auto& lane : lanes_) sum += lane->lost();
+    return sum;
+  }
+
+  /// Set-up only: a lane for one more feeding thread; valid as long as the port.
+  [[nodiscard]] Sink<T> add_lane() {
+    lanes_.push_back(std::make_unique<Ring<T>>(capacity_));
+    Ring<T>* lane = lanes_.back().get();
+    return [this, lane](const T& sample, Instant now) {
+      lane->push(sample);
+      mark(now);
+    };
+  }
+
+ private:
+  std::size_t capacity_;
+  std::vector<std::unique_ptr<Ring<T>>> lanes_;
+};
+
+/// What an executor needs of an output, whatever its type.
+class OutputPort : public Port {
+ public:
+  OutputPort(Component& owner, std::string_view name, std::type_index type, std::string_view qos)
+      : Port{owner, name, Direction::output, type} {
+    profile = qos;
+  }
+  /// Writes the declared safe value, where there is one. Real-time.
+  virtual void write_safe_value() noexcept = 0;
+  /// Set-up only: joins an input of the same type in this process; false when the types differ.
+  virtual bool connect(InputPort& input) = 0;
+  [[nodiscard]] std::uint64_t written() const noexcept { return written_.load(std::memory_order_relaxed); }
+
+ protected:
+  void count() noexcept { written_.fetch_add(1, std::memory_order_relaxed); }
+
+ private:
+  std::atomic<std::uint64_t> written_{0};
+};
+
+/// A signal, event or command that the component gives. Real-time where its sinks are.
+template <class T>
+class Output final : public OutputPort {
+ public:
+  Output(Component& owner, std::string_view name, std::string_view qos = "realtime")
+      : OutputPort{owner, name, typeid(T), qos} {}
+
+  void write(const T& sample) noexcept;
+  /// Set-up: what is written when the component fails or is deactivated (zero force, heater off).
+  void set_safe_value(const T& sample) { safe_ = std::make_unique<T>(sample); }
+  void write_safe_value() noexcept override {
+    if (safe_) write(*safe_);
+  }
+
+  bool connect(InputPort& input) override {
+    if (input.type() != type()) return false;
+    if (input.direction() == Direction::input) {
+      auto* latest = static_cast<Input<T>*>(&input);
+      add_sink([latest](const T& sample, Instant now) { latest->accept(sample, now); });
+    } else {
+      add_sink(static_cast<Inbox<T>*>(&input)->add_lane());
+    }
+    return true;
+  }
+  /// Set-up only.
+  void add_sink(Sink<T> sink) { sinks_.push_back(std::move(sink)); }
+
+ private:
+  std::vector<Sink<T>> sinks_;
+  std::unique_ptr<T> safe_;
+};
+
+}  // namespace invar
+
+#include "core/component/component.hpp"
+
+namespace invar {
+
+template <class T>
+void Output<T>::write(const T& sample) noexcept {
+  count();
+  const Instant now = owner().now();
+  for (const auto& sink : sinks_) sink(sample, now);
+}
+
+}  // namespace invar
