@@ -1,0 +1,147 @@
+#include "core/config/cell.hpp"
+
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+namespace invar::config {
+
+namespace {
+
+/// Names become topics, file names and bounded strings on the wire.
+void check_name(const Node& node, const std::string& name) {
+  const bool good = !name.empty() && name.size() <= 31 &&
+                    std::all_of(name.begin(), name.end(),
+                                [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; });
+  if (!good) node.fault("`" + name + "` is no name", "use 1 to 31 letters, digits, _ or -");
+}
+
+CellHost read_host(const Node& node) {
+  CellHost host{node.key(), node.text("address")};
+  in_addr address{};
+  if (node.has("address") && inet_pton(AF_INET, host.address.c_str(), &address) != 1)
+    node["address"].fault("`" + host.address + "` is no IPv4 address", "write it as 10.0.0.11");
+  check_name(node, host.name);
+  return host;
+}
+
+CellComponent read_component(const Node& node, std::uint32_t id) {
+  CellComponent component{.name = node.key(),
+                          .type = node.text("type"),
+                          .id = id,
+                          .every = 1,
+                          .connections = {},
+                          .profiles = {},
+                          .node = node};
+  check_name(node, component.name);
+  component.every = node.integer("every", 1, 1'000'000, 1);
+  for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();
+  for (const Node& port : node["qos"].children()) component.profiles[port.key()] = port.as_text();
+  return component;
+}
+
+RealtimeRequest read_realtime(const Node& node) {
+  RealtimeRequest request;
+  request.priority = static_cast<int>(node.integer("priority", 0, 99, 0));
+  if (node.has("cpu")) request.cpu = static_cast<int>(node["cpu"].as_integer(0, 1023));
+  request.lock_memory = node.flag("lock_memory", false);
+  request.require = node.flag("require", false);
+  return request;
+}
+
+CellProcess read_process(const Node& node, std::uint32_t& next_id) {
+  CellProcess process;
+  process.name = node.key();
+  process.where = node.where();
+  check_name(node, process.name);
+  process.host = node.text("host");
+  const Range rates{0.1, 20'000.0};
+  double rate = 1.0;
+  if (const Node realtime = node["realtime"]; realtime.exists()) {
+    if (node.has("rate"))
+      node["rate"].fault("stands beside `realtime`", "keep `realtime: {rate: ...}` alone");
+    process.realtime = read_realtime(realtime);
+    rate = realtime.number("rate", "Hz", rates);
+  } else {
+    rate = node.number("rate", "Hz", rates);
+  }
+  process.period = Duration::seconds(1.0 / std::max(rate, rates.lower));
+  const std::string overrun = node.choice("overrun", {"skip", "degrade", "safe_stop"}, "skip");
+  process.overrun = overrun == "degrade"     ? OverrunPolicy::degrade
+                    : overrun == "safe_stop" ? OverrunPolicy::safe_stop
+                                             : OverrunPolicy::skip;
+  const Node components = node.required("components");
+  for (const Node& child : components.children())
+    process.components.push_back(read_component(child, next_id++));
+  if (components.exists() && process.components.empty())
+    components.fault("has no components", "name at least one, or remove the process");
+  return process;
+}
+
+void check_identities(const Node& root, const Cell& cell) {
+  std::set<std::string> names;
+  for (const CellProcess& process : cell.processes) {
+    const bool known = std::any_of(cell.hosts.begin(), cell.hosts.end(),
+                                   [&](const CellHost& host) { return host.name == process.host; });
+    if (!known && !process.host.empty()) {
+      std::vector<std::string> hosts;
+      for (const CellHost& host : cell.hosts) hosts.push_back(host.name);
+      const std::string near = nearest(process.host, hosts);
+      root["processes"][process.name]["host"].fault(
+          "`" + process.host + "` is no host of this cell",
+          near.empty() ? "add it to `hosts`" : "did you mean `" + near + "`?");
+    }
+    for (const CellComponent& component : process.components)
+      if (!names.insert(component.name).second)
+        component.node.fault("component `" + component.name + "` stands twice in this cell",
+                             "rename one of them");
+  }
+}
+
+}  // namespace
+
+std::string Cell::topic(const std::string& connection) const {
+  if (connection.starts_with('/')) return connection.substr(1);
+  const auto dot = connection.find('.');
+  return dot == std::string::npos ? "" : topic(connection.substr(0, dot), connection.substr(dot + 1));
+}
+
+const CellComponent* Cell::find(const std::string& component) const {
+  for (const CellProcess& process : processes)
+    for (const CellComponent& candidate : process.components)
+      if (candidate.name == component) return &candidate;
+  return nullptr;
+}
+
+Cell read_cell(const Yaml& yaml) {
+  const Node root = yaml.root();
+  Cell cell;
+  cell.file = yaml.file();
+  (void)root.integer("invar_cell", 1, 1);
+  cell.name = root.text("name");
+  if (root.has("name")) check_name(root["name"], cell.name);
+  cell.id = static_cast<std::uint32_t>(root.integer("id", 1, 65535, 1));
+  cell.domain = static_cast<int>(root.integer("domain", 0, 232, 0));
+  cell.simulated_time = root.choice("time", {"real", "simulated"}, "real") == "simulated";
+  cell.shared_memory = root.flag("shared_memory", true);
+  const auto beside = [&](const Node& node) {
+    std::filesystem::path path = node.as_text();
+    if (path.is_relative()) path = cell.file.parent_path() / path;
+    if (!std::filesystem::is_regular_file(path))
+      node.fault("file `" + path.string() + "` does not exist", "paths count from the cell file's folder");
+    return path;
+  };
+  if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);
+  for (const Node& plugin : root["plugins"].children()) cell.plugins.push_back(beside(plugin));
+  const Node hosts = root.required("hosts");
+  for (const Node& host : hosts.children()) cell.hosts.push_back(read_host(host));
+  const Node processes = root.required("processes");
+  std::uint32_t next_id = 1;
+  for (const Node& process : processes.children()) cell.processes.push_back(read_process(process, next_id));
+  check_identities(root, cell);
+  return cell;
+}
+
+}  // namespace invar::config

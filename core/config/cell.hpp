@@ -1,0 +1,76 @@
+// The cell file: which component runs in which process on which PC, and what is joined to what.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/config/yaml.hpp"
+
+namespace invar::config {
+
+/// One component of the cell file. Its own parameters stand beside `type`, `every`, `connect` and `qos`.
+struct CellComponent {
+  std::string name;
+  std::string type;
+  std::uint32_t id = 0;                            // position in the file, from 1: the key of its samples
+  std::int64_t every = 1;                          // stepped each `every`-th period
+  std::map<std::string, std::string> connections;  // port -> "component.port", or "/topic" of the plant
+  std::map<std::string, std::string> profiles;     // port -> QoS profile, where not the component's own
+  Node node;                                       // for its parameters and for faults
+};
+
+/// What a process asks of the system for its loop.
+struct RealtimeRequest {
+  int priority = 0;          // SCHED_FIFO, 1..99; 0: none
+  std::optional<int> cpu;    // pin to it
+  bool lock_memory = false;  // mlockall
+  bool require = false;      // refuse to run where not granted; otherwise run and say so in every status
+};
+
+enum class OverrunPolicy { skip, degrade, safe_stop };
+
+struct CellProcess {
+  std::string name;
+  std::string host;
+  Duration period;
+  std::optional<RealtimeRequest> realtime;
+  OverrunPolicy overrun = OverrunPolicy::skip;
+  std::vector<CellComponent> components;  // in the order they are stepped
+  std::string where;                      // "cell.yaml:12: processes.motion"
+};
+
+struct CellHost {
+  std::string name;
+  std::string address;  // IPv4
+};
+
+struct Cell {
+  std::filesystem::path file;
+  std::string name;
+  std::uint32_t id = 0;
+  int domain = 0;
+  bool simulated_time = false;
+  bool shared_memory = true;
+  std::filesystem::path profiles;
+  std::vector<std::filesystem::path> plugins;  // shared libraries with further component types
+  std::vector<CellHost> hosts;
+  std::vector<CellProcess> processes;
+
+  [[nodiscard]] std::string topic(const std::string& component, const std::string& port) const {
+    return "cell/" + name + "/" + component + "/" + port;
+  }
+  /// The topic that a connection means: "stage_x.state" of this cell, or "/plant/line1/pressure" as it is.
+  [[nodiscard]] std::string topic(const std::string& connection) const;
+  [[nodiscard]] const CellComponent* find(const std::string& component) const;
+};
+
+/// Reads the structure of a cell file; faults are put on the document, parameters of components are left to
+/// their types. Component types are not known here: tools/cell checks them, and the connections.
+Cell read_cell(const Yaml& yaml);
+
+}  // namespace invar::config
