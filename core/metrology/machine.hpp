@@ -1,0 +1,42 @@
+// Machine: what machine.yaml says of a machine, and the hidden errors of a simulated one.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "core/base/range.hpp"
+#include "core/metrology/error_function.hpp"
+#include "core/metrology/volumetric.hpp"
+
+namespace invar::metrology {
+
+/// The 21 errors of a simulated machine. Evaluation is real-time.
+struct MachineErrors {
+  std::array<ErrorFunction, component_count> functions;
+  Squareness squareness{};
+  std::array<double, 3> reversal{};     // m, lost motion of an axis: half of it to either side of the mean
+  std::array<double, 3> expansion{};    // 1/K, of the axis' scale: adds expansion * (T - reference) * q
+  double reference_temperature = 20.0;  // degC
+
+  /// The six error motions of every axis of the chain at `position` [m].
+  [[nodiscard]] ErrorMotions motions(const Chain& chain, const Eigen::Vector3d& position) const noexcept;
+};
+
+struct Machine {
+  Chain chain;
+  std::array<Range, 3> travel{Range{0.0, 0.0}, Range{0.0, 0.0}, Range{0.0, 0.0}};  // m, by axis letter
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();                                  // m
+  std::array<double, 3> resolution{};                                              // m, one count of the axis
+  std::optional<MachineErrors> errors;  // of a simulated machine; nothing when the file names none
+};
+
+/// Where the tool of a simulated machine really stands minus where it is commanded [m], by exact transforms.
+/// `directions` is axis_directions(chain, errors.squareness), made once. `moving` holds +1 or -1 per axis,
+/// the sense of its last motion (0: mean of both). Real-time.
+Eigen::Vector3d simulated_error(const Machine& machine, const Eigen::Matrix3d& directions,
+                                const Eigen::Vector3d& position, const Eigen::Vector3d& tool,
+                                const Eigen::Vector3d& moving = Eigen::Vector3d::Zero(),
+                                double temperature = 20.0) noexcept;
+
+}  // namespace invar::metrology
