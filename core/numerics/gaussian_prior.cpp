@@ -1,0 +1,83 @@
+#include "core/numerics/gaussian_prior.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace invar::numerics {
+
+NormalEquations NormalEquations::of(const Eigen::Ref<const Eigen::MatrixXd>& rows,
+                                    const Eigen::Ref<const Eigen::VectorXd>& y,
+                                    const Eigen::Ref<const Eigen::VectorXd>& weights) {
+  NormalEquations sums;
+  const Eigen::VectorXd root = weights.cwiseSqrt();
+  const Eigen::MatrixXd scaled = root.asDiagonal() * rows;
+  sums.gram = Eigen::MatrixXd::Zero(rows.cols(), rows.cols());
+  sums.gram.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
+  sums.gram.triangularView<Eigen::StrictlyUpper>() = sums.gram.transpose();
+  sums.moment = scaled.transpose() * root.cwiseProduct(y);
+  sums.energy = root.cwiseProduct(y).squaredNorm();
+  for (const double weight : weights) {
+    if (weight <= 0.0) continue;
+    sums.readings += 1.0;
+    sums.log_weight += std::log(weight);
+  }
+  return sums;
+}
+
+Posterior posterior(const NormalEquations& data, const Eigen::Ref<const Eigen::MatrixXd>& prior_factor,
+                    double noise, bool with_covariance) {
+  const double precision = 1.0 / (noise * noise);
+  const Eigen::MatrixXd lower = prior_factor.triangularView<Eigen::Lower>();
+  Eigen::MatrixXd h = lower.transpose() * (precision * data.gram) * lower;
+  h.diagonal().array() += 1.0;
+  const Eigen::LLT<Eigen::MatrixXd> llt{h};
+  const Eigen::VectorXd b = precision * (lower.transpose() * data.moment);
+  const Eigen::VectorXd z = llt.solve(b);
+  Posterior result;
+  result.mean = lower * z;
+  const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  result.log_evidence =
+      -0.5 * (precision * data.energy - b.dot(z) + log_det +
+              data.readings * std::log(2.0 * std::numbers::pi * noise * noise) - data.log_weight);
+  if (llt.info() != Eigen::Success || !std::isfinite(result.log_evidence))
+    result.log_evidence = -std::numeric_limits<double>::infinity();
+  if (with_covariance) {
+    const Eigen::MatrixXd half = llt.matrixL().solve(Eigen::MatrixXd(lower.transpose()));
+    result.covariance = half.transpose() * half;
+  }
+  return result;
+}
+
+double matern52(double distance, double length) {
+  const double r = std::sqrt(5.0) * std::abs(distance) / length;
+  return (1.0 + r + r * r / 3.0) * std::exp(-r);
+}
+
+Eigen::VectorXd maximise(const std::function<double(const Eigen::VectorXd&)>& f, Eigen::VectorXd start,
+                         double step, double last_step) {
+  double best = f(start);
+  Eigen::VectorXd direction = Eigen::VectorXd::Ones(start.size());
+  for (; step >= last_step; step *= 0.5) {
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (Eigen::Index k = 0; k < start.size(); ++k) {
+        for (int side = 0; side < 2; ++side) {
+          Eigen::VectorXd trial = start;
+          trial(k) += step * direction(k);
+          if (const double value = f(trial); value > best + 1e-3) {
+            best = value;
+            start = trial;
+            moved = true;
+            break;
+          }
+          direction(k) = -direction(k);  // the other side now, and first next time
+        }
+      }
+    }
+  }
+  return start;
+}
+
+}  // namespace invar::numerics
