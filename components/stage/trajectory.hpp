@@ -1,0 +1,52 @@
+// Trajectory: one axis from rest to rest, or from motion to a stop, with bounded velocity, acceleration and
+// jerk.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace invar::stage {
+
+struct MotionLimits {
+  double velocity = 0.1;      // m/s
+  double acceleration = 2.0;  // m/s2
+  double jerk = 50.0;         // m/s3
+};
+
+struct MotionPoint {
+  double position = 0.0;      // m
+  double velocity = 0.0;      // m/s
+  double acceleration = 0.0;  // m/s2
+};
+
+/// Pieces of constant jerk, evaluated in closed form. Real-time.
+class Trajectory {
+ public:
+  /// Stands at `position`.
+  static Trajectory rest(double position) noexcept;
+  /// Rest to rest in the least time within the limits: the double-S profile of seven pieces (Biagiotti and
+  /// Melchiorri, Trajectory Planning for Automatic Machines and Robots, section 3.4).
+  static Trajectory move(double from, double to, const MotionLimits& limits) noexcept;
+  /// From any motion to rest: first the acceleration is taken back, then a double-S braking.
+  static Trajectory stop(const MotionPoint& from, const MotionLimits& limits) noexcept;
+
+  /// The motion `time` [s] after the start; the end point afterwards, the start before.
+  [[nodiscard]] MotionPoint at(double time) const noexcept;
+  [[nodiscard]] double duration() const noexcept { return duration_; }
+  [[nodiscard]] double target() const noexcept { return at(duration_).position; }
+
+ private:
+  struct Piece {
+    double begin = 0.0;  // s
+    double jerk = 0.0;   // m/s3
+    MotionPoint start;
+  };
+  void append(double duration, double jerk) noexcept;
+
+  std::array<Piece, 8> pieces_{};
+  std::size_t count_ = 0;
+  double duration_ = 0.0;
+  MotionPoint end_;
+};
+
+}  // namespace invar::stage
