@@ -9,6 +9,7 @@ namespace invar::tools {
 /// InputError for what the user must mend (exit 2) and CLI::RuntimeError(status) to end with another status.
 void add_about(CLI::App& program);
 void add_calibrate(CLI::App& program);
+void add_check(CLI::App& program);
 void add_predict(CLI::App& program);
 
 }  // namespace invar::tools

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   program.set_version_flag("--version", "invar " INVAR_VERSION);
   invar::tools::add_about(program);
   invar::tools::add_calibrate(program);
+  invar::tools::add_check(program);
   invar::tools::add_predict(program);
   try {
     program.parse(argc, argv);

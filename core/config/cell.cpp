@@ -39,6 +39,8 @@ CellComponent read_component(const Node& node, std::uint32_t id) {
   component.every = node.integer("every", 1, 1'000'000, 1);
   for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();
   for (const Node& port : node["qos"].children()) component.profiles[port.key()] = port.as_text();
+  for (const Node& port : node["publish"].children())
+    component.publish_rates[port.key()] = port.as_number("Hz", {0.01, 20'000.0});
   return component;
 }
 

@@ -13,7 +13,8 @@
 
 namespace invar::config {
 
-/// One component of the cell file. Its own parameters stand beside `type`, `every`, `connect` and `qos`.
+/// One component of the cell file. Its own parameters stand beside `type`, `every`, `connect`,
+/// `qos` and `publish`.
 struct CellComponent {
   std::string name;
   std::string type;
@@ -21,6 +22,7 @@ struct CellComponent {
   std::int64_t every = 1;                          // stepped each `every`-th period
   std::map<std::string, std::string> connections;  // port -> "component.port", or "/topic" of the plant
   std::map<std::string, std::string> profiles;     // port -> QoS profile, where not the component's own
+  std::map<std::string, double> publish_rates;     // output -> highest rate on the wire [Hz]; in the process it is full
   Node node;                                       // for its parameters and for faults
 };
 

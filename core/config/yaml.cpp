@@ -355,6 +355,8 @@ std::vector<Fault> Yaml::faults() const {
   return faults;
 }
 
+std::size_t Yaml::fault_count() const { return document_->faults.size(); }
+
 void Yaml::finish() const {
   if (auto all = faults(); !all.empty()) throw InputError{std::move(all)};
 }

@@ -108,6 +108,8 @@ class Yaml {
   void finish() const;
   /// The faults so far, unknown keys included.
   [[nodiscard]] std::vector<Fault> faults() const;
+  /// How many faults were found so far, unknown keys not counted.
+  [[nodiscard]] std::size_t fault_count() const;
 
  private:
   std::shared_ptr<detail::Document> document_;

@@ -1,0 +1,140 @@
+#include "tools/cell/connections.hpp"
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/component/port.hpp"
+#include "tools/cell/loaded_cell.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using config::Node;
+
+std::vector<std::string> port_names(const Component& component) {
+  std::vector<std::string> names;
+  for (const Port* port : component.ports()) names.push_back(port->name());
+  return names;
+}
+
+std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
+  if (const std::string near = config::nearest(word, names); !near.empty()) return "did you mean `" + near + "`?";
+  std::string text = "there are: ";
+  for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
+  return text;
+}
+
+/// Every key of `connect`, `qos` and `publish` must be a port of the component.
+void check_port_keys(const LoadedComponent& member) {
+  const auto names = port_names(*member.component);
+  const auto check = [&](const char* section, bool outputs_only) {
+    for (const Node& entry : member.file->node[section].children()) {
+      const Port* found = nullptr;
+      for (const Port* port : member.component->ports())
+        if (port->name() == entry.key()) found = port;
+      if (found == nullptr) {
+        entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`", mend_name(entry.key(), names));
+      } else if (outputs_only && found->direction() != Port::Direction::output) {
+        entry.fault("`" + entry.key() + "` is an input", "only outputs are published");
+      }
+    }
+  };
+  check("connect", false);
+  check("qos", false);
+  check("publish", true);
+}
+
+/// The port that "component.port" names; a fault at `at` when there is none.
+Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& at) {
+  const auto dot = connection.find('.');
+  if (dot == std::string::npos) {
+    at.fault("`" + connection + "` names no port", "write `component.port`, or `/topic` for one of the plant");
+    return nullptr;
+  }
+  const std::string component = connection.substr(0, dot);
+  const std::string port = connection.substr(dot + 1);
+  if (loaded.cell->find(component) == nullptr) {
+    std::vector<std::string> names;
+    for (const auto& process : loaded.cell->processes)
+      for (const auto& candidate : process.components) names.push_back(candidate.name);
+    at.fault("`" + component + "` is no component of this cell", mend_name(component, names));
+    return nullptr;
+  }
+  Port* found = loaded.port(component, port);
+  if (found == nullptr) {
+    for (const LoadedProcess& process : loaded.processes)
+      for (const LoadedComponent& member : process.components)
+        if (member.file->name == component && member.component)
+          at.fault("`" + component + "` has no port `" + port + "`", mend_name(port, port_names(*member.component)));
+  }
+  return found;
+}
+
+void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port) {
+  const auto& connections = member.file->connections;
+  const auto found = connections.find(port.name());
+  if (const auto qos = member.file->profiles.find(port.name()); qos != member.file->profiles.end())
+    port.profile = qos->second;
+  if (port.direction() != Port::Direction::input) port.topic = loaded.cell->topic(member.file->name, port.name());
+  if (found == connections.end()) {
+    if (port.direction() == Port::Direction::input && !static_cast<InputPort&>(port).options().optional)
+      member.file->node["connect"].fault("input `" + port.name() + "` of `" + member.file->name + "` is not connected",
+                                         "add `" + port.name() + ": component.port` to its `connect`");
+    return;
+  }
+  const Node at = member.file->node["connect"][port.name()];
+  if (found->second.starts_with('/')) {
+    port.topic = loaded.cell->topic(found->second);
+    return;
+  }
+  const Port* other = named_port(loaded, found->second, at);
+  if (other == nullptr) return;
+  const bool writes = port.direction() == Port::Direction::output;
+  if (writes && other->direction() != Port::Direction::inbox) {
+    at.fault("`" + found->second + "` is no inbox, and an output is joined to inboxes only",
+             "name the output in the `connect` of the component that reads it");
+  } else if (!writes && other->direction() != Port::Direction::output) {
+    at.fault("`" + found->second + "` is no output", "name the output that this port reads");
+  } else if (other->type() != port.type()) {
+    at.fault("`" + found->second + "` carries another type than `" + port.name() + "`",
+             "join ports of the same IDL type");
+  } else {
+    port.topic = loaded.cell->topic(found->second);
+  }
+}
+
+/// Two outputs that command one inbox: two masters of one axis.
+void check_owners(const LoadedCell& loaded) {
+  std::map<std::string, std::string> owner;
+  for (const LoadedProcess& process : loaded.processes)
+    for (const LoadedComponent& member : process.components)
+      for (const auto& [port, target] : member.file->connections) {
+        if (!member.component || target.starts_with('/')) continue;
+        for (const Port* candidate : member.component->ports()) {
+          if (candidate->name() != port || candidate->direction() != Port::Direction::output ||
+              candidate->profile != "command")
+            continue;
+          const auto [known, added] = owner.emplace(target, member.file->name);
+          if (!added)
+            member.file->node["connect"][port].fault(
+                "`" + target + "` is commanded by `" + known->second + "` already",
+                "let one component command it, or give this output another profile by `qos`");
+        }
+      }
+}
+
+}  // namespace
+
+void connect_ports(LoadedCell& loaded) {
+  for (LoadedProcess& process : loaded.processes)
+    for (LoadedComponent& member : process.components) {
+      if (!member.component) continue;
+      check_port_keys(member);
+      for (Port* port : member.component->ports()) connect_port(loaded, member, *port);
+    }
+  check_owners(loaded);
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,79 @@
+#include "tools/cell/loaded_cell.hpp"
+
+#include "components/all.hpp"
+#include "tools/cell/connections.hpp"
+#include "tools/cell/plugins.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+std::string list(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void prepare(LoadedCell& loaded, const config::CellComponent& component) {
+  LoadedComponent result;
+  result.file = &component;
+  if (!loaded.registry->has(component.type)) {
+    const auto names = loaded.registry->names();
+    const std::string near = config::nearest(component.type, names);
+    component.node.accept_all();
+    if (!component.type.empty())
+      component.node["type"].fault("`" + component.type + "` is no component type",
+                                   near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
+    loaded.processes.back().components.push_back(std::move(result));
+    return;
+  }
+  const auto faults_before = loaded.yaml.fault_count();
+  result.prepared = loaded.registry->prepare(component.type, component.node, loaded.cell->file.parent_path());
+  if (loaded.yaml.fault_count() == faults_before) {
+    try {
+      result.component = result.prepared.make();
+    } catch (const InputError& error) {
+      for (const Fault& fault : error.faults()) component.node.fault(fault.where + ": " + fault.what, fault.mend);
+    }
+  }
+  if (result.component) {
+    result.component->name = component.name;
+    result.component->cell = loaded.cell->id;
+    result.component->id = component.id;
+  }
+  loaded.processes.back().components.push_back(std::move(result));
+}
+
+}  // namespace
+
+LoadedProcess* LoadedCell::process(const std::string& name) {
+  for (LoadedProcess& candidate : processes)
+    if (candidate.file->name == name) return &candidate;
+  return nullptr;
+}
+
+Port* LoadedCell::port(const std::string& component, const std::string& name) {
+  for (LoadedProcess& candidate : processes)
+    for (LoadedComponent& member : candidate.components) {
+      if (member.file->name != component || !member.component) continue;
+      for (Port* found : member.component->ports())
+        if (found->name() == name) return found;
+    }
+  return nullptr;
+}
+
+LoadedCell load_cell(const std::filesystem::path& file) {
+  LoadedCell loaded{config::Yaml::load(file), nullptr, std::make_shared<Registry>(), {}};
+  loaded.cell = std::make_unique<config::Cell>(config::read_cell(loaded.yaml));
+  add_all_components(*loaded.registry);
+  load_plugins(*loaded.cell, *loaded.registry, loaded.yaml.root());
+  for (const config::CellProcess& process : loaded.cell->processes) {
+    loaded.processes.push_back({&process, {}});
+    for (const config::CellComponent& component : process.components) prepare(loaded, component);
+  }
+  connect_ports(loaded);
+  loaded.yaml.finish();
+  return loaded;
+}
+
+}  // namespace invar::tools

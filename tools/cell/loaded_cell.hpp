@@ -1,0 +1,41 @@
+// A cell file, read and checked completely: every fault is found before anything starts.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/component/registry.hpp"
+#include "core/config/cell.hpp"
+
+namespace invar::tools {
+
+struct LoadedComponent {
+  const config::CellComponent* file = nullptr;
+  Prepared prepared;  // outlives the component
+  std::unique_ptr<Component> component;
+};
+
+struct LoadedProcess {
+  const config::CellProcess* file = nullptr;
+  std::vector<LoadedComponent> components;
+};
+
+/// The whole cell with its components made (not configured: nothing is opened, nothing moves), every port with its
+/// topic and profile.
+struct LoadedCell {
+  config::Yaml yaml;
+  std::unique_ptr<config::Cell> cell;
+  std::shared_ptr<Registry> registry;  // keeps plugins loaded
+  std::vector<LoadedProcess> processes;
+
+  [[nodiscard]] LoadedProcess* process(const std::string& name);
+  [[nodiscard]] Port* port(const std::string& component, const std::string& name);
+};
+
+/// Throws InputError with all faults of the file: structure, component types, parameters, connections, QoS that cannot
+/// match, two owners of one command.
+LoadedCell load_cell(const std::filesystem::path& file);
+
+}  // namespace invar::tools

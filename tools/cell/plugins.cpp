@@ -1,0 +1,26 @@
+#include "tools/cell/plugins.hpp"
+
+#include <dlfcn.h>
+
+namespace invar::tools {
+
+void load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root) {
+  const auto places = root["plugins"].children();
+  for (std::size_t i = 0; i < cell.plugins.size(); ++i) {
+    if (!std::filesystem::is_regular_file(cell.plugins[i])) continue;  // read_cell has said so
+    void* library = dlopen(cell.plugins[i].c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (library == nullptr) {
+      places[i].fault(std::string{"cannot be loaded: "} + dlerror(), "build it against this version of Invar");
+      continue;
+    }
+    using Entry = void (*)(Registry&);
+    const auto entry = reinterpret_cast<Entry>(dlsym(library, "invar_add_components"));
+    if (entry == nullptr) {
+      places[i].fault("has no entry function `invar_add_components`", "add INVAR_PLUGIN(registry) { ... } to it");
+      continue;
+    }
+    entry(registry);
+  }
+}
+
+}  // namespace invar::tools

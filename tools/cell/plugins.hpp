@@ -1,0 +1,14 @@
+// Component types from shared libraries outside this tree.
+#pragma once
+
+#include "core/component/registry.hpp"
+#include "core/config/cell.hpp"
+
+namespace invar::tools {
+
+/// Each library has one entry function, `extern "C" void invar_add_components(invar::Registry&)`; INVAR_PLUGIN in
+/// core/component/plugin.hpp writes it. Faults (not loadable, no entry) go to the cell file's document. A library stays
+/// loaded until the process ends.
+void load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root);
+
+}  // namespace invar::tools

@@ -1,0 +1,56 @@
+// `invar check`: finds every fault of a cell file before anything starts.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "tools/cell/loaded_cell.hpp"
+#include "tools/command.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  std::filesystem::path file;
+  bool json = false;
+};
+
+int check(const Options& options) {
+  std::vector<Fault> faults;
+  std::size_t components = 0;
+  std::size_t processes = 0;
+  try {
+    const LoadedCell loaded = load_cell(options.file);
+    for (const LoadedProcess& process : loaded.processes) components += process.components.size();
+    processes = loaded.processes.size();
+  } catch (const InputError& error) {
+    faults = error.faults();
+  }
+  if (options.json) {
+    nlohmann::json report{{"file", options.file.string()}, {"sound", faults.empty()}, {"faults", nlohmann::json::array()}};
+    for (const Fault& fault : faults)
+      report["faults"].push_back({{"where", fault.where}, {"what", fault.what}, {"mend", fault.mend}});
+    std::cout << report.dump(2) << '\n';
+  } else {
+    for (const Fault& fault : faults) std::cerr << fault.line() << '\n';
+    if (faults.empty())
+      std::cout << options.file.string() << ": sound (" << components << " components in " << processes << " processes)\n";
+  }
+  return faults.empty() ? 0 : 2;
+}
+
+}  // namespace
+
+void add_check(CLI::App& program) {
+  auto* command = program.add_subcommand("check", "Find every fault of a cell file before anything starts");
+  command->footer("Example: invar check deployment/xy-table.yaml\nExit status: 0 sound, 2 faults (one a line on stderr)");
+  auto options = std::make_shared<Options>();
+  command->add_option("file", options->file, "the cell file")->required();
+  command->add_flag("--json", options->json, "print the faults as JSON on stdout");
+  command->callback([options] {
+    if (const int status = check(*options); status != 0) throw CLI::RuntimeError(status);
+  });
+}
+
+}  // namespace invar::tools
