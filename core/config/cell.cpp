@@ -28,13 +28,7 @@ CellHost read_host(const Node& node) {
 }
 
 CellComponent read_component(const Node& node, std::uint32_t id) {
-  CellComponent component{.name = node.key(),
-                          .type = node.text("type"),
-                          .id = id,
-                          .every = 1,
-                          .connections = {},
-                          .profiles = {},
-                          .node = node};
+  CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, node};
   check_name(node, component.name);
   component.every = node.integer("every", 1, 1'000'000, 1);
   for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();

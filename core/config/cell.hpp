@@ -22,8 +22,9 @@ struct CellComponent {
   std::int64_t every = 1;                          // stepped each `every`-th period
   std::map<std::string, std::string> connections;  // port -> "component.port", or "/topic" of the plant
   std::map<std::string, std::string> profiles;     // port -> QoS profile, where not the component's own
-  std::map<std::string, double> publish_rates;     // output -> highest rate on the wire [Hz]; in the process it is full
-  Node node;                                       // for its parameters and for faults
+  std::map<std::string, double>
+      publish_rates;  // output -> highest rate on the wire [Hz]; in the process it is full
+  Node node;          // for its parameters and for faults
 };
 
 /// What a process asks of the system for its loop.

@@ -20,7 +20,8 @@ std::vector<std::string> port_names(const Component& component) {
 }
 
 std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
-  if (const std::string near = config::nearest(word, names); !near.empty()) return "did you mean `" + near + "`?";
+  if (const std::string near = config::nearest(word, names); !near.empty())
+    return "did you mean `" + near + "`?";
   std::string text = "there are: ";
   for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
   return text;
@@ -35,7 +36,8 @@ void check_port_keys(const LoadedComponent& member) {
       for (const Port* port : member.component->ports())
         if (port->name() == entry.key()) found = port;
       if (found == nullptr) {
-        entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`", mend_name(entry.key(), names));
+        entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`",
+                    mend_name(entry.key(), names));
       } else if (outputs_only && found->direction() != Port::Direction::output) {
         entry.fault("`" + entry.key() + "` is an input", "only outputs are published");
       }
@@ -50,7 +52,8 @@ void check_port_keys(const LoadedComponent& member) {
 Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& at) {
   const auto dot = connection.find('.');
   if (dot == std::string::npos) {
-    at.fault("`" + connection + "` names no port", "write `component.port`, or `/topic` for one of the plant");
+    at.fault("`" + connection + "` names no port",
+             "write `component.port`, or `/topic` for one of the plant");
     return nullptr;
   }
   const std::string component = connection.substr(0, dot);
@@ -67,7 +70,8 @@ Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& 
     for (const LoadedProcess& process : loaded.processes)
       for (const LoadedComponent& member : process.components)
         if (member.file->name == component && member.component)
-          at.fault("`" + component + "` has no port `" + port + "`", mend_name(port, port_names(*member.component)));
+          at.fault("`" + component + "` has no port `" + port + "`",
+                   mend_name(port, port_names(*member.component)));
   }
   return found;
 }
@@ -77,11 +81,13 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
   const auto found = connections.find(port.name());
   if (const auto qos = member.file->profiles.find(port.name()); qos != member.file->profiles.end())
     port.profile = qos->second;
-  if (port.direction() != Port::Direction::input) port.topic = loaded.cell->topic(member.file->name, port.name());
+  if (port.direction() != Port::Direction::input)
+    port.topic = loaded.cell->topic(member.file->name, port.name());
   if (found == connections.end()) {
     if (port.direction() == Port::Direction::input && !static_cast<InputPort&>(port).options().optional)
-      member.file->node["connect"].fault("input `" + port.name() + "` of `" + member.file->name + "` is not connected",
-                                         "add `" + port.name() + ": component.port` to its `connect`");
+      member.file->node["connect"].fault(
+          "input `" + port.name() + "` of `" + member.file->name + "` is not connected",
+          "add `" + port.name() + ": component.port` to its `connect`");
     return;
   }
   const Node at = member.file->node["connect"][port.name()];

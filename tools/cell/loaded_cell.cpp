@@ -22,8 +22,9 @@ void prepare(LoadedCell& loaded, const config::CellComponent& component) {
     const std::string near = config::nearest(component.type, names);
     component.node.accept_all();
     if (!component.type.empty())
-      component.node["type"].fault("`" + component.type + "` is no component type",
-                                   near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
+      component.node["type"].fault(
+          "`" + component.type + "` is no component type",
+          near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
     loaded.processes.back().components.push_back(std::move(result));
     return;
   }
@@ -33,7 +34,8 @@ void prepare(LoadedCell& loaded, const config::CellComponent& component) {
     try {
       result.component = result.prepared.make();
     } catch (const InputError& error) {
-      for (const Fault& fault : error.faults()) component.node.fault(fault.where + ": " + fault.what, fault.mend);
+      for (const Fault& fault : error.faults())
+        component.node.fault(fault.where + ": " + fault.what, fault.mend);
     }
   }
   if (result.component) {

@@ -10,13 +10,15 @@ void load_plugins(const config::Cell& cell, Registry& registry, const config::No
     if (!std::filesystem::is_regular_file(cell.plugins[i])) continue;  // read_cell has said so
     void* library = dlopen(cell.plugins[i].c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
-      places[i].fault(std::string{"cannot be loaded: "} + dlerror(), "build it against this version of Invar");
+      places[i].fault(std::string{"cannot be loaded: "} + dlerror(),
+                      "build it against this version of Invar");
       continue;
     }
     using Entry = void (*)(Registry&);
     const auto entry = reinterpret_cast<Entry>(dlsym(library, "invar_add_components"));
     if (entry == nullptr) {
-      places[i].fault("has no entry function `invar_add_components`", "add INVAR_PLUGIN(registry) { ... } to it");
+      places[i].fault("has no entry function `invar_add_components`",
+                      "add INVAR_PLUGIN(registry) { ... } to it");
       continue;
     }
     entry(registry);

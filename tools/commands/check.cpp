@@ -28,14 +28,16 @@ int check(const Options& options) {
     faults = error.faults();
   }
   if (options.json) {
-    nlohmann::json report{{"file", options.file.string()}, {"sound", faults.empty()}, {"faults", nlohmann::json::array()}};
+    nlohmann::json report{
+        {"file", options.file.string()}, {"sound", faults.empty()}, {"faults", nlohmann::json::array()}};
     for (const Fault& fault : faults)
       report["faults"].push_back({{"where", fault.where}, {"what", fault.what}, {"mend", fault.mend}});
     std::cout << report.dump(2) << '\n';
   } else {
     for (const Fault& fault : faults) std::cerr << fault.line() << '\n';
     if (faults.empty())
-      std::cout << options.file.string() << ": sound (" << components << " components in " << processes << " processes)\n";
+      std::cout << options.file.string() << ": sound (" << components << " components in " << processes
+                << " processes)\n";
   }
   return faults.empty() ? 0 : 2;
 }
@@ -44,7 +46,8 @@ int check(const Options& options) {
 
 void add_check(CLI::App& program) {
   auto* command = program.add_subcommand("check", "Find every fault of a cell file before anything starts");
-  command->footer("Example: invar check deployment/xy-table.yaml\nExit status: 0 sound, 2 faults (one a line on stderr)");
+  command->footer(
+      "Example: invar check deployment/xy-table.yaml\nExit status: 0 sound, 2 faults (one a line on stderr)");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->file, "the cell file")->required();
   command->add_flag("--json", options->json, "print the faults as JSON on stdout");
