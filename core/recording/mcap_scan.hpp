@@ -1,0 +1,37 @@
+// What an MCAP file holds, found by its summary or, where there is none, by walking over it up to the cut.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/recording/recording_reader.hpp"
+
+namespace invar::recording {
+
+struct RecordingContents {
+  ByteView bytes;  // the whole file
+  std::shared_ptr<const void> keeper;
+
+  std::map<std::uint16_t, mcap::Schema> schemas;
+  std::map<std::uint16_t, mcap::Channel> channels;
+  mcap::Statistics statistics;
+  std::vector<mcap::Attachment> attachments;
+  std::vector<mcap::Metadata> metadata;
+  std::vector<Segment> segments;
+  std::vector<std::string> damage;
+  bool complete = false;
+};
+
+/// Fills the contents from the summary at the file's end. False (contents in any state) when there is none,
+/// its CRC is wrong, or it does not index every message.
+bool read_summary(RecordingContents& contents);
+
+/// Fills the contents by walking over the records; unpacks every chunk, checks its CRC and counts its
+/// messages.
+void scan(RecordingContents& contents);
+
+/// The records of a segment: fewer where the file is cut inside it, nothing at all where its bytes are
+/// damaged.
+std::optional<Bytes> records_of(const Segment& segment, ByteView file);
+
+}  // namespace invar::recording
