@@ -91,7 +91,9 @@ TEST_P(EachCompression, IsReadableUpToACutAtAnyByte) {
     ASSERT_LE(messages.size(), sent.size());
     ASSERT_TRUE(std::equal(messages.begin(), messages.end(), sent.begin())) << "cut at byte " << size;
     ASSERT_LE(messages.size(), readable) << "a shorter file has no more messages; cut at byte " << size;
-    if (size + 40 > whole) ASSERT_EQ(messages.size(), sent.size()) << "only the footer is cut";
+    if (size + 40 > whole) {
+      ASSERT_EQ(messages.size(), sent.size()) << "only the footer is cut";
+    }
     ASSERT_EQ(recording.statistics().messages, messages.size()) << size;
     readable = messages.size();
   }
