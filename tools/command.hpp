@@ -11,5 +11,6 @@ void add_about(CLI::App& program);
 void add_calibrate(CLI::App& program);
 void add_check(CLI::App& program);
 void add_predict(CLI::App& program);
+void add_simulate(CLI::App& program);
 
 }  // namespace invar::tools

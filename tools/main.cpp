@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   invar::tools::add_calibrate(program);
   invar::tools::add_check(program);
   invar::tools::add_predict(program);
+  invar::tools::add_simulate(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::RuntimeError& end) {

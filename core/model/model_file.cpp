@@ -1,0 +1,396 @@
+#include "core/model/model_file.hpp"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "core/base/unit.hpp"
+#include "core/physics/library.hpp"
+
+namespace invar::model {
+
+namespace {
+
+using config::Node;
+using physics::Model;
+using physics::Parameter;
+using physics::Plant;
+using physics::Signal;
+using physics::Term;
+
+struct SignalRow {
+  const char* name;
+  const char* unit;
+  bool is_output;
+  bool required;
+};
+
+/// The signals that `columns` of a plant may name.
+std::vector<SignalRow> signal_rows(Plant plant, bool closed_loop) {
+  switch (plant) {
+    case Plant::axis:
+      return {{"time", "s", false, true},
+              {"reference", "m", false, closed_loop},
+              {"position", "m", true, true},
+              {"current", "A", closed_loop, true},
+              {"temperature", "degC", false, false}};
+    case Plant::thermal:
+      return {
+          {"time", "s", false, true}, {"speed", "m/s", false, false}, {"motor_current", "A", false, false}};
+    case Plant::error_map:
+      return {{"time", "s", false, true},        {"position", "m", false, true},
+              {"direction", "1", false, false},  {"temperature", "degC", false, false},
+              {"pressure", "hPa", false, false}, {"offset", "m", false, false},
+              {"error", "m", true, true}};
+    case Plant::droplet:
+      return {{"time", "s", false, true},          {"target_x", "m", false, true},
+              {"target_y", "m", false, true},      {"height", "m", false, true},
+              {"velocity_x", "m/s", false, false}, {"velocity_y", "m/s", false, false},
+              {"pressure", "Pa", false, false},    {"on_time", "s", false, false},
+              {"image_x", "px", false, false},     {"image_y", "px", false, false},
+              {"landed_x", "m", true, true},       {"landed_y", "m", true, true},
+              {"diameter", "m", true, false}};
+    case Plant::sensor:
+      return {{"time", "s", false, true},
+              {"true_position", "m", false, true},
+              {"encoder", "m", true, false},
+              {"velocity_sensor", "m/s", true, false}};
+    case Plant::equations:
+      return {{"time", "s", false, true}};
+  }
+  return {};
+}
+
+void read_columns(const Node& root, Model& model) {
+  const auto columns = root.required("columns");
+  for (const auto& row : signal_rows(model.plant, model.controller.has_value())) {
+    if (!columns.has(row.name)) {
+      if (row.required)
+        columns.fault(std::string{"no column is named for `"} + row.name + "`",
+                      std::string{"add `"} + row.name + ": <column of the recording>`");
+      continue;
+    }
+    model.signals.push_back({row.name, columns.text(row.name), row.unit, row.is_output});
+  }
+}
+
+void add_parameter(Model& model, std::string name, std::string unit, const Node& node, Range bounds) {
+  const auto quantity = node.as_quantity(unit, bounds);
+  model.parameters.push_back({std::move(name), std::move(unit), quantity.value, quantity.sigma, bounds});
+}
+
+struct ParameterRow {
+  const char* name;
+  const char* unit;
+  Range bounds;
+  bool required;
+};
+
+std::vector<ParameterRow> parameter_rows(Plant plant) {
+  const Range any{};
+  switch (plant) {
+    case Plant::axis:
+      return {{"mass", "kg", {1e-6, 1e6}, true},
+              {"motor_constant", "N/A", {1e-6, 1e6}, true},
+              {"viscous_damping", "N s/m", {0.0, 1e7}, true}};
+    case Plant::error_map:
+      return {{"reference_temperature", "degC", {-100.0, 500.0}, false},
+              {"expansion", "1/K", {-1e-2, 1e-2}, false}};
+    case Plant::droplet:
+      return {{"placement_error_x", "m", any, false}, {"placement_error_y", "m", any, false},
+              {"slope_x", "1", any, false},           {"slope_y", "1", any, false},
+              {"speed", "m/s", {1e-3, 1e3}, false},   {"camera_scale", "m/px", {1e-12, 1.0}, false}};
+    case Plant::sensor:
+      return {{"resolution", "m", {0.0, 1.0}, false}, {"gain", "1", {1e-6, 1e6}, false}};
+    default:
+      return {};
+  }
+}
+
+void read_parameters(const Node& root, Model& model) {
+  const auto node = root["parameters"];
+  for (const auto& row : parameter_rows(model.plant)) {
+    if (!node.has(row.name)) {
+      if (row.required)
+        node.fault(std::string{"`"} + row.name + "` is missing",
+                   std::string{"add `"} + row.name + ": {value: ..., unit: " + row.unit + ", sigma: ...}`");
+      continue;
+    }
+    std::string unit = row.unit;
+    // A drive that is commanded in volts has its constant in N/V.
+    if (unit == "N/A" && node[row.name].is_map() && node[row.name].text("unit", "N/A") == "N/V") {
+      unit = "N/V";
+      for (auto& signal : model.signals)
+        if (signal.name == "current") signal.unit = "V";
+    }
+    add_parameter(model, row.name, unit, node[row.name], row.bounds);
+  }
+}
+
+void read_controller(const Node& root, Model& model) {
+  if (!root.has("controller")) return;
+  const auto node = root["controller"];
+  physics::AxisControllerSettings settings;
+  const bool cascade = node.choice("kind", {"pid", "cascade"}) == "cascade";
+  settings.kind =
+      cascade ? physics::AxisControllerSettings::Kind::cascade : physics::AxisControllerSettings::Kind::pid;
+  settings.rate = node.number("rate", "Hz", {1.0, 1e6});
+  settings.kp = node.number("kp", "1");
+  if (cascade) {
+    settings.kv = node.number("kv", "1");
+  } else {
+    settings.ki = node.number("ki", "1", {}, 0.0);
+    settings.kd = node.number("kd", "1", {}, 0.0);
+  }
+  if (node.has("velocity_filter_hz"))
+    settings.velocity_filter_hz = node.number("velocity_filter_hz", "1", Range::positive());
+  settings.limit = node.number("limit", "1", Range::not_negative(), 0.0);
+  model.controller = settings;
+}
+
+void read_thermal(const Node& root, Model& model) {
+  for (const auto& node : root.required("nodes").children()) {
+    const auto name = node.key();
+    model.thermal.nodes.push_back(name);
+    model.signals.push_back({name, node.text("column"), "degC", true});
+    add_parameter(model, name + ".capacity", "J/K", node.required("capacity"), {1e-9, 1e12});
+    add_parameter(model, name + ".loss", "W/K", node.required("loss"), {0.0, 1e9});
+  }
+  if (model.thermal.nodes.empty())
+    root["nodes"].fault("names no node", "add one, with column, capacity and loss");
+  const auto known = [&](const Node& at, const std::string& name) {
+    if (std::find(model.thermal.nodes.begin(), model.thermal.nodes.end(), name) == model.thermal.nodes.end())
+      at.fault("`" + name + "` is no node of this model", "name one of `nodes`");
+  };
+  for (const auto& node : root["heaters"].children()) {
+    const auto name = node.key();
+    model.thermal.heaters.push_back({name, node.text("node")});
+    known(node["node"], model.thermal.heaters.back().node);
+    model.signals.push_back({name, node.text("column"), "W", false});
+    add_parameter(model, name + ".gain", "W/W", node.required("gain"), {0.0, 1e6});
+  }
+  for (const auto& node : root["couplings"].children()) {
+    const auto pair = node.required("between").as_texts();
+    if (pair.size() != 2) {
+      node["between"].fault("names " + std::to_string(pair.size()) + " nodes", "name two");
+      continue;
+    }
+    for (const auto& name : pair) known(node["between"], name);
+    model.thermal.couplings.emplace_back(pair[0], pair[1]);
+    add_parameter(model, pair[0] + "-" + pair[1] + ".conductance", "W/K", node.required("conductance"),
+                  {0.0, 1e9});
+  }
+  const auto ambient = root.required("ambient");
+  if (ambient.is_map())
+    add_parameter(model, "ambient", "degC", ambient, {-100.0, 1000.0});
+  else
+    model.signals.push_back({"ambient", ambient.as_text(), "degC", false});
+}
+
+std::string si_unit_or_as_is(const Node& node) { return node.is_map() ? node.text("unit", "1") : "1"; }
+
+void read_equations(const Node& root, Model& model) {
+  for (const auto& node : root["inputs"].children()) {
+    physics::Equations::Input input{node.key(), node.key(), false};
+    std::string column;
+    if (node.is_map()) {
+      column = node.text("column");
+      input.linear = node.choice("hold", {"linear", "step"}, "step") == "linear";
+    } else {
+      column = node.as_text();
+    }
+    model.equations.inputs.push_back(input);
+    model.signals.push_back({input.signal, column, "", false});
+  }
+  for (const auto& node : root.required("states").children()) {
+    model.equations.states.push_back({node.key(), node.text("derivative")});
+    const auto initial = node.required("initial");
+    const auto unit = si_unit_or_as_is(initial);
+    add_parameter(model, node.key() + ".initial", unit, initial, {});
+  }
+  for (const auto& node : root.required("outputs").children()) {
+    physics::Equations::Output output{node.key(), node.text("expression"), {}};
+    if (node.has("limits")) output.limits = node["limits"].as_range("");
+    model.equations.outputs.push_back(output);
+    model.signals.push_back({node.key(), node.text("column"), "", true});
+  }
+  for (const auto& node : root["parameters"].children())
+    add_parameter(model, node.key(), si_unit_or_as_is(node), node, {});
+  if (root.has("controller")) {
+    model.equations.controlled_input = root["controller"].text("output");
+    model.equations.control_law = root["controller"].text("expression");
+  }
+}
+
+std::optional<Term> read_term(const Node& node, const Model& model) {
+  const auto name = node.text("term");
+  Term term;
+  if (name == "unmodelled") {
+    term.info = physics::unmodelled(model.plant, node.text("site", ""));
+    term.curve.over = node.text("over");
+    term.curve.knots = node.required("knots").as_numbers("");
+    term.curve.values = node.required("values").as_numbers("");
+    if (term.curve.knots.empty() || term.curve.knots.size() != term.curve.values.size() ||
+        !std::is_sorted(term.curve.knots.begin(), term.curve.knots.end()))
+      node["knots"].fault("knots must ascend and be as many as values", "write one value a knot");
+  } else {
+    term.info = physics::find_term(model.plant, name);
+  }
+  term.on = node.text("on", node.text("node", ""));
+  term.with = node.text("with", "");
+  if (node.has("between")) {
+    const auto pair = node["between"].as_texts();
+    if (pair.size() == 2) term.on = pair[0], term.with = pair[1];
+  }
+  if (term.on.empty() && !model.thermal.nodes.empty()) term.on = model.thermal.nodes.front();
+  if (term.with.empty() && model.thermal.nodes.size() > 1)
+    term.with = model.thermal.nodes[term.on == model.thermal.nodes[0] ? 1 : 0];
+  if (term.info == nullptr) {
+    std::vector<std::string> known;
+    for (const auto* info : physics::terms_of(model.plant)) known.emplace_back(info->name);
+    const auto meant = config::nearest(name, known);
+    node["term"].fault("`" + name + "` is no term of plant " + std::string{physics::name_of(model.plant)},
+                       meant.empty() ? "see the contract's table of names" : "did you mean `" + meant + "`?");
+    node.accept_all();
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
+    const auto& parameter = term.info->parameters[i];
+    const std::string key{parameter.name};
+    if (node.has(key)) {
+      const auto quantity = node[key].as_quantity(parameter.unit, parameter.bounds);
+      term.values[i] = quantity.value;
+      term.sigmas[i] = quantity.sigma;
+      term.given[i] = true;
+    } else if (const auto* shared = model.find(key)) {
+      term.values[i] = shared->value;
+    } else {
+      term.values[i] = parameter.role == physics::Role::amplitude ? 0.0 : parameter.starts[0];
+    }
+  }
+  return term;
+}
+
+YAML::Node quantity_yaml(double value, const std::string& unit, std::optional<double> sigma) {
+  const auto text = [](double x) {
+    char buffer[40];
+    std::snprintf(buffer, sizeof buffer, "%.9g", x);
+    return std::string{buffer};
+  };
+  YAML::Node node;
+  node["value"] = text(value);
+  node["unit"] = unit;
+  if (sigma) node["sigma"] = text(*sigma);
+  node.SetStyle(YAML::EmitterStyle::Flow);
+  return node;
+}
+
+/// The place of a parameter in the file: parameters.mass, nodes.slide.loss, heaters.pad.gain, ambient, ...
+YAML::Node place_of(YAML::Node root, const Model& model, const std::string& name) {
+  const auto dot = name.rfind('.');
+  if (dot == std::string::npos)
+    return name == "ambient" && root["ambient"] ? root["ambient"] : root["parameters"][name];
+  const auto owner = name.substr(0, dot), key = name.substr(dot + 1);
+  if (model.plant == Plant::equations) return root["states"][owner][key];
+  if (key == "gain") return root["heaters"][owner][key];
+  if (key != "conductance") return root["nodes"][owner][key];
+  for (auto coupling : root["couplings"]) {
+    const auto pair = coupling["between"];
+    if (pair[0].as<std::string>() + "-" + pair[1].as<std::string>() == owner) return coupling[key];
+  }
+  return {};
+}
+
+YAML::Node term_yaml(const Term& term, const Model& model) {
+  YAML::Node node;
+  node["term"] = std::string{term.info->name};
+  if (model.plant == Plant::thermal || model.plant == Plant::equations) {
+    if (!term.on.empty()) node["on"] = term.on;
+    if (!term.with.empty()) node["with"] = term.with;
+  }
+  if (!term.curve.knots.empty()) {
+    node["site"] = std::string{term.info->site};
+    node["over"] = term.curve.over;
+    for (double knot : term.curve.knots) node["knots"].push_back(knot);
+    for (double value : term.curve.values) node["values"].push_back(value);
+    node["knots"].SetStyle(YAML::EmitterStyle::Flow);
+    node["values"].SetStyle(YAML::EmitterStyle::Flow);
+    return node;
+  }
+  for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
+    const auto& parameter = term.info->parameters[i];
+    if (!term.given[i] && model.find(parameter.name) != nullptr) continue;  // shared with the nominal model
+    node[std::string{parameter.name}] =
+        quantity_yaml(term.values[i], std::string{parameter.unit}, term.sigmas[i]);
+  }
+  node.SetStyle(YAML::EmitterStyle::Flow);
+  return node;
+}
+
+}  // namespace
+
+physics::Model read(const config::Yaml& yaml) {
+  const auto root = yaml.root();
+  Model model;
+  (void)root.integer("invar_model", 1, 1);
+  const auto plant = root.choice("plant", {"axis", "thermal", "error_map", "droplet", "sensor", "equations"});
+  (void)physics::plant_by_name(plant, model.plant);
+  if (model.plant == Plant::axis) read_controller(root, model);
+  read_columns(root, model);
+  switch (model.plant) {
+    case Plant::thermal:
+      read_thermal(root, model);
+      break;
+    case Plant::equations:
+      read_equations(root, model);
+      break;
+    default:
+      read_parameters(root, model);
+  }
+  if (model.plant == Plant::error_map) {
+    model.baseline.positions = root.required("baseline").required("positions").as_numbers("m");
+    model.baseline.errors = root["baseline"].required("errors").as_numbers("m");
+    if (model.baseline.positions.empty() || model.baseline.positions.size() != model.baseline.errors.size())
+      root["baseline"].fault("positions and errors differ in number", "write one error a position");
+  }
+  for (const auto& node : root["noise"].children()) {
+    const auto sigma = node.as_number("", Range::not_negative());
+    const auto key = node.key();
+    const auto at = std::find_if(model.signals.begin(), model.signals.end(), [&](const Signal& signal) {
+      return signal.is_output && (signal.name == key || signal.column == key);
+    });
+    if (at == model.signals.end())
+      node.fault("`" + key + "` is no output of this model", "name an output or its column");
+    else
+      model.noise[at->name] = sigma;
+  }
+  for (const auto& node : root["terms"].children())
+    if (auto term = read_term(node, model)) model.terms.push_back(*term);
+  return model;
+}
+
+physics::Model load(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  auto model = read(yaml);
+  yaml.finish();
+  return model;
+}
+
+std::string patched(const config::Yaml& original, const physics::Model& changed) {
+  YAML::Node root = YAML::Clone(original.root().raw());
+  const Model before = read(original);
+  for (const auto& parameter : changed.parameters) {
+    const auto* old = before.find(parameter.name);
+    if (old != nullptr && old->value == parameter.value) continue;
+    place_of(root, changed, parameter.name) = quantity_yaml(parameter.value, parameter.unit, parameter.sigma);
+  }
+  root["terms"] = YAML::Node{YAML::NodeType::Sequence};
+  for (const auto& term : changed.terms) root["terms"].push_back(term_yaml(term, changed));
+  YAML::Emitter out;
+  out << root;
+  return std::string{out.c_str()} + "\n";
+}
+
+}  // namespace invar::model

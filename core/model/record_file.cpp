@@ -1,0 +1,65 @@
+#include "core/model/record_file.hpp"
+
+#include "core/base/unit.hpp"
+
+namespace invar::model {
+
+namespace {
+
+ColumnUnit unit_of(const recording::Column& column, const std::string& si, const std::string& where) {
+  if (column.unit.empty()) return {si, 1.0, 0.0};
+  if (si.empty()) {  // a model in the user's own expressions: whatever the column measures, in SI
+    const auto unit = parse_unit(column.unit);
+    return unit ? ColumnUnit{column.unit, unit->factor, unit->offset} : ColumnUnit{column.unit, 1.0, 0.0};
+  }
+  const auto to = conversion(column.unit, si);
+  if (!to)
+    throw InputError{where + ": column `" + column.name + "`", "is in " + column.unit + ", which is no " + si,
+                     "give it in a unit like " + si};
+  return {column.unit, to->factor, to->offset};
+}
+
+}  // namespace
+
+RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed) {
+  RecordFile result;
+  std::vector<Fault> faults;
+  for (const auto& signal : model.signals) {
+    const auto* column = table.find(signal.column);
+    if (column == nullptr) {
+      if (!signal.is_output || outputs_needed)
+        faults.push_back({table.file.string(),
+                          "has no column `" + signal.column + "` for `" + signal.name + "`",
+                          "add it, or name the right one in the model"});
+      continue;
+    }
+    const auto unit = unit_of(*column, signal.unit, table.file.string());
+    std::vector<double> values = column->values;
+    for (double& value : values) value = unit.factor * value + unit.offset;
+    result.units[signal.name] = unit;
+    if (signal.name == "time")
+      result.record.time = std::move(values);
+    else
+      result.record.signals[signal.name] = std::move(values);
+  }
+  if (!faults.empty()) throw InputError{faults};
+  return result;
+}
+
+recording::Table to_table(const physics::Model& model, const RecordFile& inputs,
+                          const physics::Outputs& outputs) {
+  recording::Table table;
+  const auto add = [&](const physics::Signal& signal, std::vector<double> values) {
+    ColumnUnit unit{signal.unit, 1.0, 0.0};
+    if (const auto at = inputs.units.find(signal.name); at != inputs.units.end()) unit = at->second;
+    for (double& value : values) value = (value - unit.offset) / unit.factor;
+    table.add(signal.column, unit.unit, std::move(values));
+  };
+  if (const auto* time = model.signal("time")) add(*time, inputs.record.time);
+  std::size_t at = 0;
+  for (const auto& signal : model.signals)
+    if (signal.is_output) add(signal, outputs[at++]);
+  return table;
+}
+
+}  // namespace invar::model

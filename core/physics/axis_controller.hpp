@@ -1,0 +1,39 @@
+// AxisController: the discrete PID or cascade that closes an axis's loop, exactly as model.yaml defines it.
+#pragma once
+
+#include <optional>
+
+namespace invar::physics {
+
+struct AxisControllerSettings {
+  enum class Kind { pid, cascade };
+  Kind kind = Kind::pid;
+  double rate = 1000.0;  // [Hz]
+  double kp = 0.0;       // pid [A/m]; cascade [1/s]
+  double ki = 0.0;       // [A/(m s)]
+  double kd = 0.0;       // [A s/m]
+  double kv = 0.0;       // cascade [A s/m]
+  std::optional<double> velocity_filter_hz;
+  double limit = 0.0;  // [A], of the output; not positive: none
+};
+
+/// pid: e = r - y; d[k] = d[k-1] + a ((e[k]-e[k-1]) rate - d[k-1]), a = 1 - exp(-2 pi f / rate);
+/// u = clamp(kp e + ki sum(e)/rate + kd d), the sum with e[k], which is not added where u clamps.
+/// cascade: u = clamp(kv (kp e - v)), v the same filtered backward difference of y. At rest e[-1] = e[0].
+/// Real-time.
+class AxisController {
+ public:
+  explicit AxisController(const AxisControllerSettings& settings);
+  /// Sums and filters at zero; the next step is the first. Real-time.
+  void reset() noexcept;
+  /// The command [A] for this reference and reading [m]; call once a period.
+  [[nodiscard]] double step(double reference, double reading) noexcept;
+
+ private:
+  AxisControllerSettings settings_;
+  double share_;  // a of the filter
+  double sum_ = 0.0, last_ = 0.0, rate_of_change_ = 0.0;
+  bool started_ = false;
+};
+
+}  // namespace invar::physics

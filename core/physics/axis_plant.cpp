@@ -1,0 +1,281 @@
+#include "core/physics/axis_plant.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/base/contract.hpp"
+#include "core/physics/terms/axis/backlash.hpp"
+#include "core/physics/terms/axis/presliding_friction.hpp"
+
+namespace invar::physics {
+
+namespace {
+
+enum Variable { position, velocity, time, current, temperature, acceleration };
+
+int code_of(const std::string& name) {
+  if (name == "velocity" || name == "speed" || name == "direction") return velocity;
+  if (name == "time") return time;
+  if (name == "current") return current;
+  if (name == "temperature") return temperature;
+  return position;
+}
+
+}  // namespace
+
+AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> terms, double longest_step)
+    : parameters_{parameters}, terms_{std::move(terms)} {
+  INVAR_EXPECTS(parameters.mass > 0.0 && longest_step > 0.0, parameters.mass, longest_step);
+  double fastest = parameters.viscous_damping / parameters.mass;  // [1/s] of everything that swings or decays
+  for (const auto& term : terms_) {
+    const auto& p = term.parameters;
+    if (term.kind->force != nullptr) forces_.push_back(&term);
+    if (term.kind->motor != nullptr) motors_.push_back(&term);
+    if (term.kind->command != nullptr) commands_.push_back(&term);
+    if (term.kind->friction != nullptr) frictions_.push_back(&term);
+    if (term.kind->reading != nullptr) readings_.push_back(&term);
+    if (!term.curve.knots.empty())
+      (term.kind->info->site == "actuator" ? motor_curves_ : force_curves_)
+          .emplace_back(&term, code_of(term.curve.over));
+    switch (term.kind->memory) {
+      case AxisMemory::none:
+        break;
+      case AxisMemory::transport_delay:
+        delay_ += std::max(0.0, p[0]);
+        break;
+      case AxisMemory::amplifier_lag:
+        lag_ = std::max(lag_, p[0]);
+        break;
+      case AxisMemory::measurement_delay:
+        age_ += std::max(0.0, p[0]);
+        break;
+      case AxisMemory::backlash:
+        play_ = &term;
+        break;
+      case AxisMemory::presliding:
+        if (bristles_.size() < bristle_.size()) bristles_.push_back(&term);
+        fastest = std::max(fastest, std::sqrt(p[1] / parameters.mass));
+        break;
+      case AxisMemory::flexible_mode: {
+        const double share = std::clamp(p[0], 0.0, 0.95);
+        const double omega = 2.0 * std::numbers::pi * p[1];
+        const double mass = share * parameters.mass;
+        mode_ = {share, mass * omega * omega, 2.0 * mass * p[2] * omega};
+        if (share > 0.0) fastest = std::max(fastest, omega / std::sqrt(1.0 - share));
+        break;
+      }
+    }
+    if (term.kind->info->name == "position_stiffness")
+      fastest = std::max(fastest, std::sqrt(std::abs(p[0]) / parameters.mass));
+  }
+  // A history of 256 steps must cover the delays.
+  const double oldest = static_cast<double>(Past::size - 8) * longest_step;
+  delay_ = std::min(delay_, oldest);
+  age_ = std::min(age_, oldest);
+  // Runge-Kutta of fourth order errs by (omega h)^5/120 a step.
+  if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 2e-5, 5e-4);
+  rest_at(0.0);
+}
+
+void AxisPlant::rest_at(double position, double time) noexcept {
+  time_ = time;
+  position_ = position;
+  played_ = position;
+  bristle_from_ = position;
+  velocity_ = swing_ = swing_speed_ = current_ = current_mean_ = 0.0;
+  bristle_.fill(0.0);
+  commands_past_.clear();
+  positions_past_.clear();
+  positions_past_.push(time, position, 0.0);
+}
+
+double AxisPlant::variable(int code, const AxisPoint& at) const noexcept {
+  switch (code) {
+    case Variable::velocity:
+      return at.velocity;
+    case Variable::time:
+      return at.time;
+    case Variable::current:
+      return at.current;
+    case Variable::temperature:
+      return at.temperature;
+    default:
+      return at.position;
+  }
+}
+
+double AxisPlant::push(const AxisPoint& at) const noexcept {
+  double motor = 1.0;
+  for (const auto* term : motors_) motor += term->kind->motor(at, term->parameters.data());
+  for (const auto& [term, code] : motor_curves_) motor += term->curve(variable(code, at));
+  double force = parameters_.motor_constant * at.current * motor - parameters_.viscous_damping * at.velocity +
+                 outside_force_;
+  for (const auto* term : forces_) force += term->kind->force(at, term->parameters.data());
+  for (const auto& [term, code] : force_curves_) force += term->curve(variable(code, at));
+  for (std::size_t i = 0; i < bristles_.size(); ++i) {
+    const auto* p = bristles_[i]->parameters.data();
+    force -= p[1] * PreslidingFriction::deflection(bristle_[i], at.position - bristle_from_, p);
+  }
+  return force;
+}
+
+double AxisPlant::hold(double speed) const noexcept {
+  double friction = 0.0;
+  for (const auto* term : frictions_) friction += term->kind->friction(speed, term->parameters.data());
+  return friction;
+}
+
+AxisPlant::Slope AxisPlant::slope(const State& s, double time, double direction, bool stuck) const noexcept {
+  const AxisPoint at{time, s.position, s.velocity, current_mean_, temperature_};
+  double force = push(at);
+  if (direction != 0.0) force -= direction * hold(std::abs(s.velocity));
+  if (mode_.share <= 0.0) return {s.velocity, stuck ? 0.0 : force / parameters_.mass, 0.0, 0.0};
+  const double spring =
+      mode_.stiffness * s.swing + mode_.damping * s.swing_speed;  // pulls the carriage along
+  const double carriage = stuck ? 0.0 : (force + spring) / (parameters_.mass * (1.0 - mode_.share));
+  return {s.velocity, carriage, s.swing_speed, -spring / (parameters_.mass * mode_.share) - carriage};
+}
+
+AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction, bool stuck) const noexcept {
+  const auto moved = [&](const Slope& d, double by) {
+    return State{s.position + by * d.velocity, s.velocity + by * d.acceleration, s.swing + by * d.swing_speed,
+                 s.swing_speed + by * d.swing_acceleration};
+  };
+  const auto a = slope(s, time_, direction, stuck);
+  const auto b = slope(moved(a, 0.5 * h), time_ + 0.5 * h, direction, stuck);
+  const auto c = slope(moved(b, 0.5 * h), time_ + 0.5 * h, direction, stuck);
+  const auto d = slope(moved(c, h), time_ + h, direction, stuck);
+  const auto mean = [](double p, double q, double r, double w) { return (p + 2.0 * (q + r) + w) / 6.0; };
+  return moved({mean(a.velocity, b.velocity, c.velocity, d.velocity),
+                mean(a.acceleration, b.acceleration, c.acceleration, d.acceleration),
+                mean(a.swing_speed, b.swing_speed, c.swing_speed, d.swing_speed),
+                mean(a.swing_acceleration, b.swing_acceleration, c.swing_acceleration, d.swing_acceleration)},
+               h);
+}
+
+void AxisPlant::move(double h) noexcept {
+  const bool dry = !frictions_.empty();
+  // A sub-step may hold a reversal or two; what is left after eight events is done in one go.
+  for (int events = 0; h > 0.0 && events < 8; ++events) {
+    const State now{position_, velocity_, swing_, swing_speed_};
+    double direction = 0.0;
+    bool stuck = false;
+    if (dry) {
+      direction = velocity_ > 0.0 ? 1.0 : (velocity_ < 0.0 ? -1.0 : 0.0);
+      if (direction == 0.0) {
+        double force = push({time_, position_, 0.0, current_mean_, temperature_});
+        if (mode_.share > 0.0) force += mode_.stiffness * swing_ + mode_.damping * swing_speed_;
+        stuck = std::abs(force) <= hold(0.0);
+        if (!stuck) direction = force > 0.0 ? 1.0 : -1.0;
+      }
+    }
+    double taken = h;
+    State next = advanced(now, h, direction, stuck);
+    if (direction != 0.0 && next.velocity * direction < 0.0) {
+      if (now.velocity == 0.0) {  // would slide back at once: it stays where it is
+        next = advanced(now, h, 0.0, true);
+        next.velocity = 0.0;
+      } else {
+        // The reversal: where the speed passes zero (regula falsi; the speed is nearly straight in time).
+        double low = 0.0, low_speed = now.velocity, high = h, high_speed = next.velocity;
+        for (int i = 0; i < 4; ++i) {
+          taken = low + (high - low) * low_speed / (low_speed - high_speed);
+          next = advanced(now, taken, direction, false);
+          if (next.velocity * direction > 0.0)
+            low = taken, low_speed = next.velocity;
+          else
+            high = taken, high_speed = next.velocity;
+          if (std::abs(next.velocity) <= 1e-12 + 1e-6 * std::abs(now.velocity)) break;
+        }
+        next.velocity = 0.0;
+      }
+    }
+    if (stuck) next.velocity = 0.0;
+    time_ += taken;
+    position_ = next.position, velocity_ = next.velocity, swing_ = next.swing,
+    swing_speed_ = next.swing_speed;
+    for (std::size_t i = 0; i < bristles_.size(); ++i)
+      bristle_[i] = PreslidingFriction::deflection(bristle_[i], position_ - bristle_from_,
+                                                   bristles_[i]->parameters.data());
+    bristle_from_ = position_;
+    h -= taken;
+  }
+  if (h > 0.0) time_ += h;
+  if (play_ != nullptr) played_ = Backlash::play(played_, position_, play_->parameters.data());
+}
+
+void AxisPlant::drive(double command, double dt) noexcept {
+  if (!(dt > 0.0)) return;
+  const auto parts = static_cast<int>(std::ceil(dt / longest_substep_ - 1e-9));
+  const double h = dt / std::max(1, parts);
+  for (int i = 0; i < std::max(1, parts); ++i) {
+    if (lag_ > 0.0) {
+      // Exact for a held command: the end value, and the mean that the carriage feels over the sub-step.
+      const double kept = std::exp(-h / lag_);
+      current_mean_ = command + (current_ - command) * lag_ / h * (1.0 - kept);
+      current_ = command + (current_ - command) * kept;
+    } else {
+      current_ = current_mean_ = command;
+    }
+    move(h);
+  }
+}
+
+void AxisPlant::step(double command, double dt) noexcept {
+  for (const auto* term : commands_) command = term->kind->command(command, time_, term->parameters.data());
+  const double begin = time_, end = time_ + dt;
+  if (delay_ > 0.0) {
+    commands_past_.push(begin, command, 0.0);
+    // The commands that reach the motor during this step, oldest first; before the very first one there was
+    // none.
+    const auto& past = commands_past_;
+    const std::size_t oldest = past.count - std::min(past.count, Past::size);
+    std::size_t i = past.count - 1;
+    while (i > oldest && past.time[i % Past::size] + delay_ > begin) --i;
+    double from = begin;
+    if (const double first = std::min(end, past.time[i % Past::size] + delay_); first > from) {
+      drive(0.0, first - from);
+      from = first;
+    }
+    for (; i < past.count && from < end; ++i) {
+      const double until = i + 1 < past.count ? past.time[(i + 1) % Past::size] + delay_ : end;
+      const double to = std::min(until, end);
+      if (to <= from) continue;
+      drive(past.value[i % Past::size], to - from);
+      from = to;
+    }
+  } else {
+    drive(command, dt);
+  }
+  time_ = end;
+  if (age_ > 0.0) positions_past_.push(end, play_ != nullptr ? played_ : position_, velocity_);
+}
+
+double AxisPlant::delayed_position(double age) const noexcept {
+  const double when = time_ - age;
+  const auto& past = positions_past_;
+  const std::size_t kept = std::min(past.count, Past::size);
+  const std::size_t oldest = past.count - kept;
+  std::size_t after = past.count - 1;  // the newest instant that is not before `when`
+  while (after > oldest && past.time[(after - 1) % Past::size] >= when) --after;
+  if (after == oldest) return past.value[oldest % Past::size];
+  const auto a = (after - 1) % Past::size, b = after % Past::size;
+  const double h = past.time[b] - past.time[a];
+  if (!(h > 0.0)) return past.value[b];
+  // Cubic Hermite between the two instants.
+  const double s = (when - past.time[a]) / h, r = 1.0 - s;
+  return past.value[a] * (1.0 + 2.0 * s) * r * r + past.slope[a] * h * s * r * r +
+         past.value[b] * s * s * (3.0 - 2.0 * s) - past.slope[b] * h * s * s * r;
+}
+
+double AxisPlant::reading() const noexcept {
+  double shown = play_ != nullptr ? played_ : position_;
+  if (age_ > 0.0) shown = delayed_position(age_);
+  double error = 0.0;
+  for (const auto* term : readings_) error += term->kind->reading(shown, term->parameters.data());
+  return shown + error;
+}
+
+}  // namespace invar::physics

@@ -1,0 +1,110 @@
+// An axis in closed loop from its reference alone, or in open loop from its current.
+#include <algorithm>
+#include <cmath>
+
+#include "core/physics/simulate_plants.hpp"
+
+namespace invar::physics {
+
+namespace {
+
+double first_or(const Record& record, const char* name, double otherwise) {
+  const auto* values = record.find(name);
+  return values == nullptr || values->empty() || !std::isfinite(values->front()) ? otherwise
+                                                                                 : values->front();
+}
+
+/// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp.
+class ClosedLoop final : public Simulation {
+ public:
+  ClosedLoop(const Model& structure, const Record& inputs) {
+    const double rate = structure.controller->rate;
+    period_ = 1.0 / rate;
+    start_time_ = inputs.time.front();
+    const auto reference = bridged(inputs.time, inputs.signals.at("reference"));
+    const auto* temperatures = inputs.find("temperature");
+    const auto temperature =
+        temperatures != nullptr ? bridged(inputs.time, *temperatures) : std::vector<double>{};
+    tick_of_row_.reserve(inputs.rows());
+    for (std::size_t row = 0; row < inputs.rows(); ++row) {
+      const auto tick =
+          static_cast<std::size_t>(std::max(0.0, std::round((inputs.time[row] - start_time_) * rate)));
+      tick_of_row_.push_back(tick);
+      // Ticks that no row records: the reference is bridged, as far as a straight line can.
+      const std::size_t known = reference_.size();
+      if (tick < known) continue;
+      const double from = row == 0 ? reference[0] : reference_.back();
+      const double warm = row == 0 || temperature.empty() ? 20.0 : temperature_.back();
+      for (std::size_t k = known; k <= tick; ++k) {
+        const double share = static_cast<double>(k + 1 - known) / static_cast<double>(tick + 1 - known);
+        reference_.push_back(from + share * (reference[row] - from));
+        if (!temperature.empty())
+          temperature_.push_back(row == 0 ? temperature[0] : warm + share * (temperature[row] - warm));
+      }
+    }
+    start_position_ = first_or(inputs, "position", reference_.front());
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    auto plant = make_axis(model, period_);
+    AxisController controller{*model.controller};
+    plant.rest_at(start_position_, start_time_);
+    outputs.resize(2);
+    outputs[0].assign(tick_of_row_.size(), 0.0);
+    outputs[1].assign(tick_of_row_.size(), 0.0);
+    std::size_t row = 0;
+    for (std::size_t tick = 0; tick < reference_.size(); ++tick) {
+      const double shown = plant.reading();
+      const double command = controller.step(reference_[tick], shown);
+      while (row < tick_of_row_.size() && tick_of_row_[row] <= tick) {
+        outputs[0][row] = shown;
+        outputs[1][row] = command;
+        ++row;
+      }
+      if (!temperature_.empty()) plant.set_temperature(temperature_[tick]);
+      plant.step(command, period_);
+    }
+  }
+
+ private:
+  double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0;
+  std::vector<double> reference_, temperature_;  // a tick
+  std::vector<std::size_t> tick_of_row_;
+};
+
+class OpenLoop final : public Simulation {
+ public:
+  OpenLoop(const Model& /*structure*/, const Record& inputs)
+      : time_{inputs.time},
+        current_{bridged(inputs.time, inputs.signals.at("current"))},
+        start_position_{first_or(inputs, "position", 0.0)} {
+    if (const auto* values = inputs.find("temperature")) temperature_ = bridged(inputs.time, *values);
+    for (std::size_t i = 1; i < time_.size(); ++i) longest_ = std::max(longest_, time_[i] - time_[i - 1]);
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    auto plant = make_axis(model, longest_ > 0.0 ? longest_ : 1e-3);
+    plant.rest_at(start_position_, time_.front());
+    outputs.resize(1);
+    outputs[0].resize(time_.size());
+    for (std::size_t row = 0; row < time_.size(); ++row) {
+      outputs[0][row] = plant.reading();
+      if (row + 1 == time_.size()) break;
+      if (!temperature_.empty()) plant.set_temperature(temperature_[row]);
+      plant.step(current_[row], time_[row + 1] - time_[row]);
+    }
+  }
+
+ private:
+  std::vector<double> time_, current_, temperature_;
+  double start_position_ = 0.0, longest_ = 0.0;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> prepare_axis(const Model& structure, const Record& inputs) {
+  if (structure.controller) return std::make_unique<ClosedLoop>(structure, inputs);
+  return std::make_unique<OpenLoop>(structure, inputs);
+}
+
+}  // namespace invar::physics

@@ -1,0 +1,42 @@
+#include "core/physics/simulation.hpp"
+
+#include <cmath>
+
+#include "core/base/contract.hpp"
+#include "core/physics/simulate_plants.hpp"
+
+namespace invar::physics {
+
+std::vector<double> bridged(const std::vector<double>& time, const std::vector<double>& values) {
+  std::vector<double> out = values;
+  const std::size_t n = out.size();
+  std::size_t last = n;  // the last row that had a value
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!std::isfinite(values[i])) continue;
+    if (last == n)
+      for (std::size_t j = 0; j < i; ++j) out[j] = values[i];
+    else
+      for (std::size_t j = last + 1; j < i; ++j) {
+        const double share = (time[j] - time[last]) / (time[i] - time[last]);
+        out[j] = values[last] + share * (values[i] - values[last]);
+      }
+    last = i;
+  }
+  for (std::size_t j = last == n ? 0 : last + 1; j < n; ++j) out[j] = last == n ? 0.0 : values[last];
+  return out;
+}
+
+std::unique_ptr<Simulation> prepare(const Model& structure, const Record& inputs) {
+  switch (structure.plant) {
+    case Plant::axis:
+      return prepare_axis(structure, inputs);
+    case Plant::thermal:
+      return prepare_thermal(structure, inputs);
+    default:
+      break;
+  }
+  INVAR_EXPECTS(false, "no simulation for", name_of(structure.plant));
+  return nullptr;
+}
+
+}  // namespace invar::physics

@@ -1,0 +1,43 @@
+// Simulation: a model on one recording's inputs; prepared once, run for any values of its parameters.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/physics/model.hpp"
+
+namespace invar::physics {
+
+/// Signals of one recording by name, in SI, one value a row; NaN where one is missing. Temperatures in degC.
+struct Record {
+  std::vector<double> time;
+  std::map<std::string, std::vector<double>, std::less<>> signals;
+
+  [[nodiscard]] std::size_t rows() const { return time.size(); }
+  [[nodiscard]] const std::vector<double>* find(std::string_view name) const {
+    const auto at = signals.find(name);
+    return at == signals.end() ? nullptr : &at->second;
+  }
+};
+
+/// By output, in the order of Model::outputs(), one value a row of the record.
+using Outputs = std::vector<std::vector<double>>;
+
+/// Reads from the record: the time, the inputs, and of each output the first row alone, where it is filled:
+/// the initial state. Rows must be in order of time. Inputs are held from one row to the next; missing ones
+/// are bridged. Implementations are const and without shared state: any number of threads may run one.
+class Simulation {
+ public:
+  virtual ~Simulation() = default;
+  virtual void run(const Model& model, Outputs& outputs) const = 0;
+};
+
+/// `structure` may later be run with other values and other terms, but with the same signals.
+std::unique_ptr<Simulation> prepare(const Model& structure, const Record& inputs);
+
+/// Linear bridges over missing values, constant at the ends; zeros where all are missing.
+std::vector<double> bridged(const std::vector<double>& time, const std::vector<double>& values);
+
+}  // namespace invar::physics

@@ -1,0 +1,28 @@
+// Periodic disturbance: a force that repeats in time.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/axis_hooks.hpp"
+
+namespace invar::physics {
+
+struct PeriodicDisturbance {
+  static constexpr TermInfo info{
+      .name = "periodic_disturbance",
+      .plant = Plant::axis,
+      .site = "disturbance",
+      .depends_on = {"time"},
+      .parameters = {{{"amplitude", "N", {0.0, 1000.0}, Role::amplitude, {0.2}, "size"},
+                      {"frequency", "Hz", {0.02, 500.0}, Role::shape, {25.0}, "repetitions per second"},
+                      {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at time zero"}}},
+      .description = "A pump, a fan or a neighbouring machine shakes the axis in its own rhythm.",
+      .source = "F = amplitude sin(2 pi frequency t + phase)"};
+  static double force(const AxisPoint& at, const double* p) {
+    return p[0] * std::sin(2.0 * std::numbers::pi * p[1] * at.time + p[2]);
+  }
+  static constexpr AxisTermKind kind{.info = &info, .force = force};
+};
+
+}  // namespace invar::physics

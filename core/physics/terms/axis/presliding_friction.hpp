@@ -1,0 +1,39 @@
+// Presliding friction: after a reversal the friction builds up like a spring over micrometres.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/axis_hooks.hpp"
+
+namespace invar::physics {
+
+struct PreslidingFriction {
+  static constexpr TermInfo info{
+      .name = "presliding_friction",
+      .plant = Plant::axis,
+      .site = "force",
+      .depends_on = {"position", "velocity", "direction", "history"},
+      .parameters = {{{"level", "N", {0.0, 500.0}, Role::amplitude, {0.5}, "friction force once sliding"},
+                      {"stiffness",
+                       "N/m",
+                       {1e3, 1e7},
+                       Role::shape,
+                       {5e4, 1e4, 3e5},
+                       "slope of the force just after a reversal"}}},
+      .description =
+          "Rolling bearings and seals bend before they slide: the friction force follows the way since "
+          "the last reversal, with hysteresis, and reaches its level after some level / stiffness.",
+      .source = "Dahl, AIAA Journal 14 (1976), exponent 1: dF/dx = stiffness (1 - F/level sign(v))"};
+  /// The bristle deflection after moving by `way` from a deflection `z` (both m): the exact solution for one
+  /// direction of motion, whatever the speed.
+  static double deflection(double z, double way, const double* p) {
+    const double most = p[0] / p[1];
+    if (!(most > 0.0)) return 0.0;
+    const double limit = way >= 0.0 ? most : -most;
+    return limit + (z - limit) * std::exp(-std::abs(way) / most);
+  }
+  static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::presliding};
+};
+
+}  // namespace invar::physics

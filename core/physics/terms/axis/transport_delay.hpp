@@ -1,0 +1,24 @@
+// Transport delay: the motor gets the current late.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/axis_hooks.hpp"
+
+namespace invar::physics {
+
+struct TransportDelay {
+  static constexpr TermInfo info{
+      .name = "transport_delay",
+      .plant = Plant::axis,
+      .site = "actuator",
+      .depends_on = {"current", "frequency", "acceleration", "history"},
+      .parameters = {{{"delay", "s", {0.0, 0.05}, Role::amplitude, {2e-4}, "dead time before the motor"}}},
+      .description =
+          "Computation, bus and amplifier take time: the current of one instant acts some time later.",
+      .source = "u(t - delay)"};
+  static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::transport_delay};
+};
+
+}  // namespace invar::physics
