@@ -1,0 +1,96 @@
+// A Modbus TCP connection and the devices behind it, kept alive through faults.
+//
+// Two ways to drive it, chosen once:
+// - `start()`: one I/O thread polls every device at its map's period, sends writes as they come and the
+//   heartbeat while its owner refreshes it. Time is CLOCK_MONOTONIC. For wall-clock cells.
+// - `exchange(now)`: the caller's thread does one round - heartbeat if due, queued writes, all reads - and
+//   returns when it is done. Time is what the caller says. For simulated time: with a simulated device that
+//   swaps its image in its own step (server.hpp), every step sees the same values in every run.
+//
+// Reconnecting: a connection that cannot be made, and a device that does not answer, are each left alone for
+// `first_retry`, then twice as long, up to `longest_retry`; a silent unit behind a gateway does not hold up
+// its neighbours. Any failure but an exception answer closes the connection.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/modbus/backoff.hpp"
+#include "core/modbus/device.hpp"
+#include "core/modbus/link.hpp"
+
+namespace invar::modbus {
+
+struct BusOptions {
+  std::string host = "127.0.0.1";  // name or address, IPv4 or IPv6
+  std::uint16_t port = 502;
+  Duration connect_timeout = Duration::milliseconds(500);
+  Duration first_retry = Duration::milliseconds(100);
+  Duration longest_retry = Duration::milliseconds(5000);
+};
+
+/// What happened with the connection since the start, by cause.
+struct LinkCounters {
+  std::uint64_t connects = 0;
+  std::uint64_t refused = 0;
+  std::uint64_t unreachable = 0;
+  std::uint64_t losses = 0;  // connections closed because a request failed
+};
+
+class Bus {
+ public:
+  explicit Bus(BusOptions options);
+  ~Bus();  // stops
+  Bus(const Bus&) = delete;
+  Bus& operator=(const Bus&) = delete;
+
+  /// A device on this bus; lives as long as the bus. Set-up only, before `start` and `exchange`.
+  Device& add(RegisterMap map);
+
+  /// Starts the I/O thread. Precondition: `exchange` was never called.
+  void start();
+  /// Sends what is still queued if the connection stands, then ends the thread; waits at most about one
+  /// answer timeout a device. The heartbeat stops with it.
+  void stop();
+
+  /// One round with every device that is not backing off. True when every request of every device was
+  /// answered without exception. Blocks at most for the timeouts. Precondition: not started, `now` never goes
+  /// back.
+  bool exchange(Instant now);
+  /// Only the due heartbeats and the queued writes, no reads: what was computed from this step's readings
+  /// arrives in this step.
+  bool send(Instant now);
+
+  [[nodiscard]] bool is_connected() const { return connected_.load(); }
+  [[nodiscard]] LinkCounters counters() const;
+
+ private:
+  enum class Part { writes_only, all, due };
+  bool round(Instant now, Part part);
+  bool connect(Instant now);
+  void set_polled(Instant now);
+  [[nodiscard]] Instant clock(Instant now) const;
+  void run();
+  void wait_until(Instant when) const;
+
+  BusOptions options_;
+  Link link_;
+  Backoff link_backoff_;
+  std::vector<std::unique_ptr<Device>> devices_;
+  std::vector<std::unique_ptr<DeviceIo>> ios_;
+  std::size_t first_ = 0;  // the device that a round begins with
+  int wake_ = -1;
+  std::atomic<bool> stopping_{false};
+  std::atomic<bool> connected_{false};
+  bool polled_ = false;
+  std::thread thread_;
+  mutable std::mutex counters_mutex_;
+  LinkCounters counters_;
+};
+
+}  // namespace invar::modbus

@@ -1,0 +1,76 @@
+#include "core/modbus/device.hpp"
+
+#include <unistd.h>
+
+#include <cmath>
+#include <ctime>
+#include <limits>
+
+#include "core/base/contract.hpp"
+#include "core/modbus/clock.hpp"
+
+namespace invar::modbus {
+
+std::string_view name_of(WriteState state) {
+  constexpr std::array<std::string_view, 9> names{"none",    "queued",    "written", "confirmed", "refused",
+                                                  "expired", "uncertain", "lost",    "mismatched"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+Device::Device(RegisterMap map)
+    : map_{std::move(map)},
+      samples_(map_.registers.size(), Sample{std::numeric_limits<double>::quiet_NaN(), {}, false}),
+      writes_(map_.registers.size()) {}
+Device::~Device() = default;
+
+std::size_t Device::index(std::string_view name) const {
+  const auto found = map_.find(name);
+  INVAR_EXPECTS(found.has_value(), map_.device, name);
+  return *found;
+}
+
+Reading Device::value(std::size_t reg) const {
+  INVAR_EXPECTS(reg < map_.registers.size(), map_.device, reg);
+  const std::lock_guard lock{mutex_};
+  const Sample& sample = samples_[reg];
+  if (!sample.seen) return {sample.value, Duration{std::numeric_limits<std::int64_t>::max()}, true};
+  const Duration age = (threaded_ ? monotonic_now() : polled_now_) - sample.stamp;
+  return {sample.value, age, age > map_.registers[reg].stale_after};
+}
+
+Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value) {
+  INVAR_EXPECTS(reg < map_.registers.size() && map_.registers[reg].writable, map_.device, reg);
+  if (!map_.registers[reg].range.contains(value)) return WriteRefusal::out_of_range;
+  const std::lock_guard lock{mutex_};
+  Pending& slot = writes_[reg];
+  if (slot.report.state == WriteState::queued) ++counters_.writes_superseded;
+  slot = {{++written_, WriteState::queued, value, 0}, {}, false};
+  if (threaded_) {
+    const std::uint64_t one = 1;
+    [[maybe_unused]] const auto ignored = ::write(wake_, &one, sizeof one);  // full means it is awake already
+  }
+  return slot.report.number;
+}
+
+WriteReport Device::last_write(std::size_t reg) const {
+  INVAR_EXPECTS(reg < map_.registers.size(), map_.device, reg);
+  const std::lock_guard lock{mutex_};
+  return writes_[reg].report;
+}
+
+void Device::refresh() {
+  const std::lock_guard lock{mutex_};
+  refreshed_ = true;
+}
+
+bool Device::is_online() const {
+  const std::lock_guard lock{mutex_};
+  return online_;
+}
+
+DeviceCounters Device::counters() const {
+  const std::lock_guard lock{mutex_};
+  return counters_;
+}
+
+}  // namespace invar::modbus

@@ -1,0 +1,57 @@
+// The I/O side of a device: what is due, the requests, and what their answers mean. Used by one thread.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "core/modbus/backoff.hpp"
+#include "core/modbus/device.hpp"
+#include "core/modbus/grouping.hpp"
+#include "core/modbus/link.hpp"
+
+namespace invar::modbus {
+
+/// Gives the time of an answer.
+using Clock = std::function<Instant()>;
+
+class DeviceIo {
+ public:
+  DeviceIo(Device& device, Backoff backoff);
+
+  /// Takes in what the owner asked for since the last call; drops writes that waited too long.
+  void take_in(Instant now);
+  [[nodiscard]] bool may_try(Instant now) const { return backoff_.may_try(now); }
+  [[nodiscard]] bool has_something_to_do(Instant now) const;
+  /// When to look again if nobody asks for anything.
+  [[nodiscard]] Instant next_due(Instant now) const;
+
+  /// What went wrong: nothing, only exception answers (the link is sound), or the link failed.
+  enum class Done { all, refused, failed };
+  enum class Reads { none, if_due, now };
+  /// Heartbeat if due, queued writes, then the reads. Precondition: the link is open.
+  Done exchange(Link& link, const Clock& clock, Reads reads);
+  /// The link could not be opened.
+  void offline();
+
+ private:
+  Outcome counted(Outcome outcome, Instant now);
+  Outcome beat(Link& link, Instant now);
+  Outcome write_next(Link& link, const Clock& clock);
+  Outcome read_all(Link& link, const Clock& clock, bool& refused);
+  void judge_read_backs(Instant now);
+  [[nodiscard]] bool beats(Instant now) const;
+
+  Device& device_;
+  Backoff backoff_;
+  std::vector<ReadRequest> plan_;
+  std::vector<std::uint16_t> words_;     // of one answer
+  std::vector<bool> read_this_round_;    // by register
+  std::vector<std::size_t> queue_;       // registers with a queued write, oldest first
+  std::vector<std::size_t> unresolved_;  // registers whose write awaits its read-back
+  Instant next_poll_{INT64_MIN};
+  Instant next_beat_{INT64_MIN};
+  Instant beat_until_{INT64_MIN};  // the owner's refresh holds until then
+  double beat_count_ = 0;
+};
+
+}  // namespace invar::modbus
