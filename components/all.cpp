@@ -1,7 +1,15 @@
 #include "components/all.hpp"
 
+#include "components/interferometer/interferometer.hpp"
+#include "components/stage/axis_stage.hpp"
+#include "components/world/simulated_stage.hpp"
+
 namespace invar {
 
-void add_all_components(Registry& registry) { (void)registry; }
+void add_all_components(Registry& registry) {
+  registry.add<world::SimulatedStage>("simulated_stage", "drives, encoders and true tool position of a machine");
+  registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
+  registry.add<stage::Stage>("stage", "servo of one axis");
+}
 
 }  // namespace invar

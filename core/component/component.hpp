@@ -66,6 +66,8 @@ class Component {
   /// Numeric identity of the cell and of this component, for the keys of its samples. Set before configure.
   std::uint32_t cell = 0;
   std::uint32_t id = 0;
+  /// Time is simulated: whatever waits for the outside must do so inside `step` (a Modbus exchange), so that runs repeat.
+  bool simulated_time = false;
 
   [[nodiscard]] const std::vector<Port*>& ports() const { return ports_; }
   /// The time of the current step.

@@ -1,0 +1,250 @@
+#include "components/stage/axis_stage.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace invar::stage {
+
+namespace {
+
+physics::AxisControllerSettings settings(const Stage::Control& control, double period) {
+  using Kind = physics::AxisControllerSettings::Kind;
+  physics::AxisControllerSettings result;
+  result.kind = control.kind == "cascade" ? Kind::cascade : Kind::pid;
+  result.rate = 1.0 / period;
+  result.kp = control.kp;
+  result.ki = control.ki;
+  result.kd = control.kd;
+  result.kv = control.kv;
+  result.velocity_filter_hz = control.velocity_filter;
+  result.limit = control.limit;
+  return result;
+}
+
+double chosen(double asked, double own) { return asked > 0.0 ? std::min(asked, own) : own; }
+
+}  // namespace
+
+Stage::Stage(const Parameters& parameters) : parameters_{parameters} {
+  MotorCommand released;
+  released.current(0.0);
+  released.enabled(false);
+  released.axis(static_cast<std::uint32_t>(parameters.axis));
+  motor_.set_safe_value(released);
+}
+
+void Stage::activate() {
+  mode_ = AXIS_MODE_DISABLED;
+  primed_ = false;
+  blind_ = false;
+  homed_ = parameters_.absolute_encoder;
+  offset_ = 0.0;
+  current_ = 0.0;
+  correction_held_ = 0.0;
+  settled_ = false;
+}
+
+void Stage::deactivate() noexcept { mode_ = AXIS_MODE_DISABLED; }
+
+void Stage::begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept {
+  trajectory_ = trajectory;
+  trajectory_start_ = tick.now;
+  mode_ = mode;
+}
+
+MotionPoint Stage::setpoint(const Tick& tick) const noexcept {
+  return trajectory_.at((tick.now - trajectory_start_).in_seconds());
+}
+
+/// Setpoint := measured, so that nothing moves on activation or enabling.
+void Stage::prime(const Tick& tick) noexcept {
+  controller_ = physics::AxisController{settings(parameters_.control, tick.period)};
+  begin(Trajectory::rest(position_ - correction_held_), tick, mode_);
+  outside_at_ = tick.now;
+  primed_ = true;
+}
+
+bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
+  const Limits& own = parameters_.limits;
+  const MotionLimits limits{chosen(command.velocity(), own.velocity), chosen(command.acceleration(), own.acceleration),
+                            chosen(command.jerk(), own.jerk)};
+  const bool standing = mode_ == AXIS_MODE_HOLDING;
+  if (command.kind() == AXIS_COMMAND_MOVE) {
+    const Range travel = parameters_.travel;
+    if (!standing || !homed_ || !travel.contains(command.position())) return false;
+    begin(Trajectory::move(setpoint(tick).position, command.position(), limits), tick, AXIS_MODE_MOVING);
+    return true;
+  }
+  if (!standing) return false;
+  const double beyond = setpoint(tick).position - 1.5 * parameters_.travel.width();
+  begin(Trajectory::move(setpoint(tick).position, beyond, {parameters_.homing_velocity, limits.acceleration, limits.jerk}),
+        tick, AXIS_MODE_HOMING);
+  homed_ = false;
+  return true;
+}
+
+void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
+  bool accepted = true;
+  bool done = true;
+  switch (command.kind()) {
+    case AXIS_COMMAND_ENABLE:
+      accepted = mode_ == AXIS_MODE_DISABLED || mode_ == AXIS_MODE_HOLDING;
+      if (mode_ == AXIS_MODE_DISABLED) {
+        prime(tick);
+        mode_ = AXIS_MODE_HOLDING;
+      }
+      break;
+    case AXIS_COMMAND_DISABLE:
+      if (mode_ != AXIS_MODE_FAULT) mode_ = AXIS_MODE_DISABLED;
+      break;
+    case AXIS_COMMAND_MOVE:
+    case AXIS_COMMAND_HOME:
+      accepted = start_move(command, tick);
+      done = !accepted;
+      break;
+    case AXIS_COMMAND_STOP:
+      if (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING) {
+        const Limits& own = parameters_.limits;
+        begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+      }
+      break;
+    case AXIS_COMMAND_CLEAR_FAULT:
+      if (mode_ == AXIS_MODE_FAULT) mode_ = AXIS_MODE_DISABLED;
+      blind_ = false;
+      break;
+  }
+  sample_.command_id(command.id());
+  sample_.command_refused(!accepted);
+  sample_.command_done(done);
+}
+
+/// Feedback is gone: brake along the stopping trajectory on feedforward alone, then let go.
+void Stage::stop_blindly(const Tick& tick) noexcept {
+  if (!blind_) {
+    blind_ = true;
+    const Limits& own = parameters_.limits;
+    begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+  }
+  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) mode_ = AXIS_MODE_FAULT;
+}
+
+double Stage::feedforward(const MotionPoint& at) const noexcept {
+  const double current = parameters_.control.feedforward_velocity * at.velocity +
+                         parameters_.control.feedforward_acceleration * at.acceleration;
+  return std::clamp(current, -parameters_.control.limit, parameters_.control.limit);
+}
+
+/// What ends a motion: the home switch, the end of the trajectory, a following error or a limit switch.
+void Stage::supervise(const Tick& tick) noexcept {
+  const auto& feedback = *feedback_.latest();
+  if (std::abs(following_error_) > parameters_.following_error ||
+      (feedback.limit_low() && setpoint(tick).velocity < 0.0 && mode_ == AXIS_MODE_MOVING) ||
+      (feedback.limit_high() && setpoint(tick).velocity > 0.0)) {
+    mode_ = AXIS_MODE_FAULT;
+    return;
+  }
+  if (mode_ == AXIS_MODE_HOMING && feedback.home_switch()) {
+    const double shift = parameters_.travel.lower - position_;
+    MotionPoint from = setpoint(tick);
+    from.position += shift;
+    offset_ += shift;
+    position_ += shift;
+    controller_.reset();
+    homed_ = true;
+    const Limits& own = parameters_.limits;
+    begin(Trajectory::stop(from, {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+  }
+  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration() && mode_ != AXIS_MODE_HOLDING) {
+    if (mode_ == AXIS_MODE_HOMING) {  // travelled the whole way and never saw the switch
+      sample_.command_refused(true);
+    }
+    mode_ = AXIS_MODE_HOLDING;
+    sample_.command_done(true);
+  }
+}
+
+void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
+  const bool inside = mode_ == AXIS_MODE_HOLDING && at.velocity == 0.0 &&
+                      std::abs(following_error_) <= parameters_.settle_window;
+  if (!inside) outside_at_ = tick.now;
+  settled_ = inside && tick.now - outside_at_ >= Duration::seconds(parameters_.settle_time);
+}
+
+void Stage::step(const Tick& tick) noexcept {
+  const auto* feedback = feedback_.latest();
+  const Duration patience = Duration::seconds(parameters_.feedback_timeout);
+  const bool seeing = feedback != nullptr && feedback_.age(tick.now) <= patience;
+  if (seeing) {
+    const auto* fused = fused_.latest();
+    position_ = (fused != nullptr && fused->valid() ? fused->position() : feedback->position()) + offset_;
+  }
+  // A correction that stays away is held where it was: no step.
+  if (const auto* correction = correction_.latest()) correction_held_ = correction->correction();
+  if (seeing && !primed_) prime(tick);
+
+  AxisCommand command;
+  while (command_.take(command)) {
+    if (seeing || command.kind() == AXIS_COMMAND_DISABLE) {
+      obey(command, tick);
+    } else {
+      sample_.command_id(command.id());
+      sample_.command_refused(true);
+      sample_.command_done(true);
+    }
+  }
+
+  const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
+  if (driving && !seeing) {
+    stop_blindly(tick);
+    current_ = feedforward(setpoint(tick));
+  } else if (driving && blind_) {
+    mode_ = AXIS_MODE_FAULT;  // sight came back too late: stay stopped until somebody clears the fault
+  } else if (driving) {
+    const MotionPoint at = setpoint(tick);
+    following_error_ = at.position + correction_held_ - position_;
+    const double feedback_current = controller_.step(at.position + correction_held_, position_);
+    current_ = std::clamp(feedback_current + feedforward(at), -parameters_.control.limit, parameters_.control.limit);
+    supervise(tick);
+  }
+  const bool enabled = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
+  if (!enabled) {
+    current_ = 0.0;
+    begin(Trajectory::rest(position_ - correction_held_), tick, mode_);
+    following_error_ = 0.0;
+  }
+  const MotionPoint at = setpoint(tick);
+  track_settling(tick, at);
+
+  MotorCommand motor;
+  motor.cell(cell);
+  motor.axis(static_cast<std::uint32_t>(parameters_.axis));
+  motor.at().time_ns(tick.now.ns);
+  motor.at().cycle(tick.cycle);
+  motor.current(current_);
+  motor.enabled(enabled);
+  motor_.write(motor);
+  publish(tick, at);
+}
+
+void Stage::publish(const Tick& tick, const MotionPoint& at) noexcept {
+  sample_.cell(cell);
+  sample_.axis(static_cast<std::uint32_t>(parameters_.axis));
+  sample_.at().time_ns(tick.now.ns);
+  sample_.at().cycle(tick.cycle);
+  sample_.setpoint_position(at.position);
+  sample_.setpoint_velocity(at.velocity);
+  sample_.setpoint_acceleration(at.acceleration);
+  sample_.position(position_);
+  if (const auto* feedback = feedback_.latest()) sample_.velocity(feedback->velocity());
+  sample_.current(current_);
+  sample_.correction(correction_held_);
+  sample_.following_error(following_error_);
+  sample_.mode(mode_);
+  sample_.homed(homed_);
+  sample_.moving(mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING || mode_ == AXIS_MODE_STOPPING);
+  sample_.enabled(mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT);
+  sample_.settled(settled_);
+  state_.write(sample_);
+}
+
+}  // namespace invar::stage

@@ -1,0 +1,125 @@
+// Stage: the servo of one axis - commands, trajectory, control law, limits and a controlled stop.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "components/stage/trajectory.hpp"
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/physics/axis_controller.hpp"
+#include "idl/compensation.h"
+#include "idl/sensing.h"
+#include "idl/stage.h"
+
+namespace invar::stage {
+
+/// Reads feedback, follows the trajectory of the last command with a PID or cascade law and feedforward, and writes the
+/// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction).
+/// Safe value: motor not enabled. Stops under control on stale feedback, soft limits and following error.
+class Stage final : public Component {
+ public:
+  struct Control {
+    std::string kind = "pid";
+    double kp = 4.0e4;
+    double ki = 4.0e5;
+    double kd = 300.0;
+    double kv = 0.0;
+    double velocity_filter = 300.0;
+    double limit = 10.0;
+    double feedforward_velocity = 0.0;
+    double feedforward_acceleration = 0.0;
+    void describe(auto& p) {
+      p(kind, "kind", "pid or cascade, the laws of model.yaml");
+      p(kp, "kp", "1", Range{0.0, 1e9}, "proportional gain: A/m, in a cascade 1/s");
+      p(ki, "ki", "A/(m s)", Range{0.0, 1e10}, "integral gain");
+      p(kd, "kd", "A s/m", Range{0.0, 1e7}, "derivative gain");
+      p(kv, "kv", "A s/m", Range{0.0, 1e7}, "velocity gain of a cascade");
+      p(velocity_filter, "velocity_filter", "Hz", Range{1.0, 1e5}, "corner of the velocity's low-pass");
+      p(limit, "limit", "A", Range{1e-3, 1e3}, "highest current");
+      p(feedforward_velocity, "feedforward_velocity", "A s/m", Range{0.0, 1e5}, "damping over motor constant",
+        while_running);
+      p(feedforward_acceleration, "feedforward_acceleration", "A s2/m", Range{0.0, 1e5}, "mass over motor constant",
+        while_running);
+      if constexpr (requires { p.node(); })
+        if (kind != "pid" && kind != "cascade") p.node()["kind"].fault("`" + kind + "` is no law", "use pid or cascade");
+    }
+  };
+  struct Limits {
+    double velocity = 0.1;
+    double acceleration = 2.0;
+    double jerk = 60.0;
+    void describe(auto& p) {
+      p(velocity, "velocity", "m/s", Range{1e-6, 10.0}, "highest velocity");
+      p(acceleration, "acceleration", "m/s2", Range{1e-4, 200.0}, "highest acceleration");
+      p(jerk, "jerk", "m/s3", Range{1e-2, 1e5}, "highest jerk");
+    }
+  };
+  struct Parameters {
+    std::int64_t axis = 0;
+    Range travel{0.0, 0.2};
+    Control control;
+    Limits limits;
+    double homing_velocity = 0.01;
+    bool absolute_encoder = true;
+    double following_error = 1e-3;
+    double settle_window = 1e-6;
+    double settle_time = 0.02;
+    double feedback_timeout = 0.002;
+    void describe(auto& p) {
+      p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
+      p(travel, "travel", "m", "soft limits");
+      p(control, "control", "control law");
+      p(limits, "limits", "of the trajectories");
+      p(homing_velocity, "homing_velocity", "m/s", Range{1e-5, 1.0}, "towards the home switch");
+      p(absolute_encoder, "absolute_encoder", "homed from the start");
+      p(following_error, "following_error", "m", Range{1e-7, 1.0}, "trip above it", while_running);
+      p(settle_window, "settle_window", "m", Range{1e-9, 1e-2}, "settled: following error inside", while_running);
+      p(settle_time, "settle_time", "s", Range{0.0, 10.0}, "... for so long", while_running);
+      p(feedback_timeout, "feedback_timeout", "s", Range{1e-4, 1.0}, "older feedback: controlled stop, then trip");
+    }
+  };
+
+  explicit Stage(const Parameters& parameters);
+  void activate() override;
+  void deactivate() noexcept override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  void obey(const AxisCommand& command, const Tick& tick) noexcept;
+  [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
+  void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
+  void prime(const Tick& tick) noexcept;
+  void stop_blindly(const Tick& tick) noexcept;
+  void supervise(const Tick& tick) noexcept;
+  void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
+  void publish(const Tick& tick, const MotionPoint& setpoint) noexcept;
+  [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
+  [[nodiscard]] double feedforward(const MotionPoint& setpoint) const noexcept;
+
+  const Parameters& parameters_;
+  Input<AxisFeedback> feedback_{*this, "feedback"};
+  Input<sensing::FusedPosition> fused_{*this, "fused", {.optional = true}};
+  Input<compensation::AxisCorrection> correction_{*this, "correction", {.optional = true}};
+  Inbox<AxisCommand> command_{*this, "command"};
+  Output<MotorCommand> motor_{*this, "motor"};
+  Output<AxisState> state_{*this, "state"};
+
+  physics::AxisController controller_{{}};
+  Trajectory trajectory_ = Trajectory::rest(0.0);
+  Instant trajectory_start_;
+  AxisMode mode_ = AXIS_MODE_DISABLED;
+  AxisState sample_;      // what was published last; answers to commands are kept in it
+  bool primed_ = false;   // the controller knows the loop's rate
+  bool homed_ = false;
+  bool blind_ = false;    // feedback is lost: braking on feedforward alone
+  double offset_ = 0.0;   // what homing adds to the encoder's reading
+  double position_ = 0.0;
+  double correction_held_ = 0.0;
+  double current_ = 0.0;
+  double following_error_ = 0.0;
+  bool settled_ = false;
+  Instant outside_at_;    // when the following error was last outside the settling window
+};
+
+}  // namespace invar::stage

@@ -1,0 +1,102 @@
+#include "components/thermal/thermal.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace invar::thermal {
+
+Thermal::Thermal(const Parameters& parameters)
+    : parameters_{parameters},
+      thermistor_{parameters.thermistor.resistance, parameters.thermistor.base_temperature,
+                  parameters.thermistor.coefficient_percent} {
+  if (parameters.modbus.map.empty()) throw InputError{"modbus.map", "missing", "name the heater's register map"};
+  const auto map = modbus::load_map(parameters.modbus.map);
+  for (const char* name : {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"})
+    if (!map.find(name))
+      throw InputError{"modbus.map", std::string{"has no register `"} + name + "`", "name a heater's register map"};
+}
+
+void Thermal::configure() {
+  bus_ = std::make_unique<modbus::Bus>(modbus::BusOptions{
+      .host = parameters_.modbus.host, .port = static_cast<std::uint16_t>(parameters_.modbus.port)});
+  device_ = &bus_->add(modbus::load_map(parameters_.modbus.map));
+  if (!simulated_time) bus_->start();
+}
+
+void Thermal::cleanup() noexcept {
+  bus_.reset();
+  device_ = nullptr;
+}
+
+void Thermal::activate() {
+  setpoint_ = setpoint_parameter_ = parameters_.setpoint;
+  integral_ = 0.0;
+  power_ = 0.0;
+  primed_ = false;
+  wanted_ = true;
+}
+
+void Thermal::deactivate() noexcept {
+  drive(0.0, false);
+  if (simulated_time) bus_->send(now());
+}
+
+/// Power [W] for this temperature. The integral stops where the output is at its limit and would be driven further.
+double Thermal::control(double temperature, double period) noexcept {
+  const Pid& pid = parameters_.pid;
+  if (!primed_) previous_ = temperature, slope_ = 0.0, primed_ = true;
+  const double share = pid.derivative_filter > 0.0 ? -std::expm1(-period / pid.derivative_filter) : 1.0;
+  slope_ += share * ((temperature - previous_) / period - slope_);
+  previous_ = temperature;
+  const double error = setpoint_ - temperature;
+  const double wanted = pid.kp * error + pid.ki * (integral_ + error * period) - pid.kd * slope_;
+  const double power = std::clamp(wanted, 0.0, parameters_.power_limit);
+  if (power == wanted || (wanted - power) * error < 0.0) integral_ += error * period;
+  return power;
+}
+
+void Thermal::drive(double power, bool enable) noexcept {
+  if (device_ == nullptr) return;
+  power_ = enable ? power : 0.0;
+  // Out of the map's range cannot be: the limit was checked; a refusal would leave the last value and its watchdog.
+  (void)device_->write("enable", enable ? 1.0 : 0.0);
+  (void)device_->write("power", power_);
+}
+
+void Thermal::step(const Tick& tick) noexcept {
+  ThermalCommand command;
+  while (command_.take(command)) {
+    setpoint_ = command.setpoint();
+    wanted_ = command.enabled();
+    if (command.reset_latch()) latched_ = false;
+  }
+  if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
+  if (simulated_time) bus_->exchange(tick.now);
+  device_->refresh();
+
+  const modbus::Reading resistance = device_->value("slide_resistance");
+  const bool sound = !resistance.stale && resistance.value > 1.0;
+  if (sound) temperature_ = thermistor_.temperature(resistance.value);
+  if (sound && temperature_ > parameters_.over_temperature) latched_ = true;
+  const bool enable = sound && wanted_ && !latched_;
+  if (!enable) primed_ = false;
+  drive(enable ? control(temperature_, tick.period) : 0.0, enable);
+  if (simulated_time) bus_->send(tick.now);
+
+  NodeTemperature sample;
+  sample.cell(cell);
+  sample.node(id);
+  sample.at().time_ns(tick.now.ns);
+  sample.at().cycle(tick.cycle);
+  sample.temperature(temperature_);
+  sample.setpoint(setpoint_);
+  sample.heater_power(power_);
+  sample.enabled(enable);
+  sample.over_temperature(latched_);
+  const modbus::Reading lost = device_->value("comm_lost");
+  sample.watchdog_tripped(!lost.stale && lost.value != 0.0);
+  sample.stale(!sound);
+  state_.write(sample);
+}
+
+}  // namespace invar::thermal

@@ -1,0 +1,103 @@
+// Thermal: holds a temperature with a heater behind Modbus TCP.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/metrology/thermistor.hpp"
+#include "core/modbus/bus.hpp"
+#include "idl/thermal.h"
+
+namespace invar::thermal {
+
+/// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go - and the device's own
+/// watchdog then keeps it off - when readings are stale, a sensor is out of range, or the latch trips: at `over_temperature` the
+/// latch holds until a command resets it. Not real-time (Modbus).
+class Thermal final : public Component {
+ public:
+  struct Modbus {
+    std::string host = "127.0.0.1";
+    std::int64_t port = 502;
+    std::filesystem::path map;
+    void describe(auto& p) {
+      p(host, "host", "name or address of the heater's controller");
+      p(port, "port", 1, 65535, "TCP port");
+      p(map, "map", "register map");
+    }
+  };
+  struct Pid {
+    double kp = 20.0;
+    double ki = 0.2;
+    double kd = 0.0;
+    double derivative_filter = 5.0;
+    void describe(auto& p) {
+      p(kp, "kp", "W/K", Range{0.0, 1e4}, "proportional gain", while_running);
+      p(ki, "ki", "W/(K s)", Range{0.0, 1e3}, "integral gain", while_running);
+      p(kd, "kd", "W s/K", Range{0.0, 1e5}, "derivative gain, on the measurement", while_running);
+      p(derivative_filter, "derivative_filter", "s", Range{0.0, 600.0}, "time constant of the derivative's filter");
+    }
+  };
+  struct Thermistor {
+    double resistance = 1000.0;
+    double base_temperature = 25.0;
+    double coefficient_percent = 4.4;
+    void describe(auto& p) {
+      p(resistance, "resistance", "ohm", Range{1.0, 1e7}, "at the base temperature");
+      p(base_temperature, "base_temperature", "degC", Range{-50.0, 150.0}, "where that resistance holds");
+      p(coefficient_percent, "coefficient", "%/K", Range{1e-3, 20.0}, "loss of resistance per kelvin there");
+    }
+  };
+  struct Parameters {
+    Modbus modbus;
+    Pid pid;
+    Thermistor thermistor;
+    double setpoint = 30.0;
+    double power_limit = 60.0;
+    double over_temperature = 60.0;
+    void describe(auto& p) {
+      p(modbus, "modbus", "the heater's controller");
+      p(pid, "pid", "control law");
+      p(thermistor, "thermistor", "of the slide");
+      p(setpoint, "setpoint", "degC", Range{-20.0, 150.0}, "wanted at the start; a command changes it", while_running);
+      p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
+      p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0}, "the latch lets go of the heater above it");
+      if constexpr (requires { p.node(); })
+        if (setpoint >= over_temperature)
+          p.node()["setpoint"].fault("is not below `over_temperature`", "lower it, or raise the latch");
+    }
+  };
+
+  explicit Thermal(const Parameters& parameters);
+  void configure() override;
+  void activate() override;
+  void deactivate() noexcept override;
+  void cleanup() noexcept override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  [[nodiscard]] double control(double temperature, double period) noexcept;
+  void drive(double power, bool enable) noexcept;
+
+  const Parameters& parameters_;
+  Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
+  Output<NodeTemperature> state_{*this, "state", "state"};
+  metrology::Thermistor thermistor_;
+  std::unique_ptr<modbus::Bus> bus_;
+  modbus::Device* device_ = nullptr;
+  double setpoint_ = 0.0;
+  double setpoint_parameter_ = 0.0;
+  double temperature_ = 0.0;
+  double integral_ = 0.0;
+  double slope_ = 0.0;
+  double previous_ = 0.0;
+  bool primed_ = false;
+  bool wanted_ = true;
+  bool latched_ = false;
+  double power_ = 0.0;
+};
+
+}  // namespace invar::thermal

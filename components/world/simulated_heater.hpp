@@ -1,0 +1,71 @@
+// SimulatedHeater: pad, slide and base as heat nodes behind the Modbus registers of a real heater controller.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/metrology/thermistor.hpp"
+#include "core/modbus/server.hpp"
+#include "core/physics/thermal_plant.hpp"
+
+namespace invar::world {
+
+/// Serves the register map on a TCP port of its own; the device's watchdog and over-temperature latch are part of it, so that
+/// a dead master finds the heater off.
+class SimulatedHeater final : public Component {
+ public:
+  struct Parameters {
+    std::filesystem::path map;
+    std::string host = "127.0.0.1";
+    std::int64_t port = 1502;
+    double ambient = 23.0;
+    double pad_capacity = 60.0;
+    double slide_capacity = 850.0;
+    double base_capacity = 6000.0;
+    double pad_slide = 4.0;
+    double slide_base = 3.0;
+    double slide_loss = 1.0;
+    double base_loss = 8.0;
+    double noise = 0.003;
+    std::int64_t seed = 3;
+    void describe(auto& p) {
+      p(map, "map", "register map to serve");
+      p(host, "host", "address to listen on");
+      p(port, "port", 1, 65535, "TCP port to listen on");
+      p(ambient, "ambient", "degC", Range{-50.0, 100.0}, "of the room", while_running);
+      p(pad_capacity, "pad_capacity", "J/K", Range{0.1, 1e6}, "heat capacity of the pad");
+      p(slide_capacity, "slide_capacity", "J/K", Range{0.1, 1e6}, "of the slide");
+      p(base_capacity, "base_capacity", "J/K", Range{0.1, 1e7}, "of the base");
+      p(pad_slide, "pad_slide", "W/K", Range{0.0, 1e4}, "conductance pad to slide");
+      p(slide_base, "slide_base", "W/K", Range{0.0, 1e4}, "conductance slide to base");
+      p(slide_loss, "slide_loss", "W/K", Range{0.0, 1e4}, "slide to the air");
+      p(base_loss, "base_loss", "W/K", Range{0.0, 1e4}, "base to the air");
+      p(noise, "noise", "K", Range{0.0, 1.0}, "1 sigma of the thermistors");
+      p(seed, "seed", 0, 1'000'000'000, "of the noise");
+    }
+  };
+  explicit SimulatedHeater(const Parameters& parameters);
+  void configure() override;
+  void cleanup() noexcept override;
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  enum Node : std::size_t { pad, slide, base };
+  const Parameters& parameters_;
+  metrology::Thermistor thermistor_;
+  std::unique_ptr<modbus::Server> server_;
+  std::optional<physics::ThermalPlant> plant_;
+  bool over_temperature_ = false;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+}  // namespace invar::world

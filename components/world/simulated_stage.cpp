@@ -1,0 +1,94 @@
+#include "components/world/simulated_stage.hpp"
+
+#include <cmath>
+
+#include "core/machine/machine_file.hpp"
+#include "core/metrology/components.hpp"
+
+namespace invar::world {
+
+/// One drive with its carriage and encoder.
+struct SimulatedStage::Device {
+  Device(SimulatedStage& owner, int axis_number, const Axis& axis_parameters)
+      : parameters{axis_parameters},
+        axis{axis_number},
+        plant{{.mass = parameters.mass,
+               .motor_constant = parameters.motor_constant,
+               .viscous_damping = parameters.viscous_damping},
+              {}},
+        motor{owner, "motor_" + letter(axis_number)},
+        feedback{owner, "feedback_" + letter(axis_number)} {}
+
+  static std::string letter(int axis) { return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]); }
+
+  const Axis& parameters;
+  int axis;
+  physics::AxisPlant plant;
+  Input<stage::MotorCommand> motor;
+  Output<stage::AxisFeedback> feedback;
+};
+
+SimulatedStage::SimulatedStage(const Parameters& parameters)
+    : parameters_{parameters}, random_{static_cast<std::uint64_t>(parameters.seed)} {
+  if (parameters.machine.empty()) throw InputError{"machine", "missing", "name a machine.yaml"};
+  machine_ = machine::load_machine(parameters.machine);
+  if (!machine_.errors) machine_.errors.emplace();
+  directions_ = metrology::axis_directions(machine_.chain, machine_.errors->squareness);
+  const Axis* axes[] = {&parameters.x, &parameters.y, &parameters.z};
+  for (int axis = 0; axis < metrology::axis_count; ++axis)
+    if (machine_.chain.has(axis)) devices_.push_back(std::make_unique<Device>(*this, axis, *axes[axis]));
+}
+
+SimulatedStage::~SimulatedStage() = default;
+
+void SimulatedStage::activate() {
+  random_.seed(static_cast<std::uint64_t>(parameters_.seed));
+  normal_.reset();
+  moving_.setZero();
+  for (auto& device : devices_) device->plant.rest_at(device->parameters.start, now().in_seconds());
+}
+
+void SimulatedStage::step(const Tick& tick) noexcept {
+  const auto* slide = slide_.latest();
+  const double temperature = slide != nullptr ? slide->temperature() : parameters_.temperature;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  for (auto& device : devices_) {
+    const auto* command = device->motor.latest();
+    const bool enabled = command != nullptr && command->enabled() &&
+                         device->motor.age(tick.now) < Duration::seconds(parameters_.watchdog);
+    device->plant.set_temperature(temperature);
+    device->plant.step(enabled ? command->current() : 0.0, tick.period);
+
+    const double velocity = device->plant.velocity();
+    if (velocity != 0.0) moving_[device->axis] = velocity > 0.0 ? 1.0 : -1.0;
+    double reading = device->plant.reading() + device->parameters.noise * normal_(random_);
+    if (const double count = device->parameters.resolution; count > 0.0) reading = count * std::round(reading / count);
+    const Range travel = machine_.travel[static_cast<std::size_t>(device->axis)];
+
+    stage::AxisFeedback feedback;
+    feedback.cell(cell);
+    feedback.axis(static_cast<std::uint32_t>(device->axis));
+    feedback.at().time_ns(tick.now.ns);
+    feedback.at().cycle(tick.cycle);
+    feedback.position(reading);
+    feedback.velocity(velocity + device->parameters.velocity_noise * normal_(random_));
+    feedback.current(device->plant.motor_current());
+    feedback.drive_enabled(enabled);
+    feedback.limit_low(reading < travel.lower - 2e-3);
+    feedback.limit_high(reading > travel.upper + 2e-3);
+    feedback.home_switch(reading < travel.lower);
+    device->feedback.write(feedback);
+    position[device->axis] = device->plant.position();
+  }
+  const Eigen::Vector3d tool =
+      position + metrology::simulated_error(machine_, directions_, position, machine_.tool, moving_, temperature);
+  sensing::ToolPosition sample;
+  sample.cell(cell);
+  sample.sensor(id);
+  sample.at().time_ns(tick.now.ns);
+  sample.at().cycle(tick.cycle);
+  sample.position({tool.x(), tool.y(), tool.z()});
+  tool_.write(sample);
+}
+
+}  // namespace invar::world

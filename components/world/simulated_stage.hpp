@@ -1,0 +1,86 @@
+// SimulatedStage: the drives, encoders and the true tool position of a machine that is not there.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/metrology/machine.hpp"
+#include "core/physics/axis_plant.hpp"
+#include "idl/sensing.h"
+#include "idl/stage.h"
+#include "idl/thermal.h"
+
+namespace invar::world {
+
+/// Integrates one physics::AxisPlant an axis of the machine file's chain, and carries the carriages' positions to the tool by
+/// the machine's hidden geometric errors (exact transforms). Every axis `a` has the ports `motor_a` and `feedback_a`.
+/// The drive lets go of the motor when its command is older than the watchdog, as real drives do.
+class SimulatedStage final : public Component {
+ public:
+  struct Axis {
+    std::string model;                // a model.yaml of plant axis (mismatch.md): the truth, terms included
+    double mass = 3.2;                // used where no model is named
+    double motor_constant = 12.0;     //
+    double viscous_damping = 25.0;    //
+    double resolution = 1e-8;
+    double noise = 2e-8;
+    double velocity_noise = 1e-4;
+    double start = 0.0;
+    void describe(auto& p);
+  };
+  struct Parameters {
+    std::filesystem::path machine;
+    Axis x, y, z;
+    double watchdog = 0.02;
+    double temperature = 20.0;
+    std::int64_t seed = 1;
+    void describe(auto& p);
+  };
+
+  explicit SimulatedStage(const Parameters& parameters);
+  ~SimulatedStage() override;
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  struct Device;
+  const Parameters& parameters_;
+  metrology::Machine machine_;
+  Eigen::Matrix3d directions_;
+  std::vector<std::unique_ptr<Device>> devices_;
+  Eigen::Vector3d moving_ = Eigen::Vector3d::Zero();
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  Input<thermal::NodeTemperature> slide_{*this, "slide", {.optional = true, .profile = "state"}};
+  Output<sensing::ToolPosition> tool_{*this, "tool"};
+};
+
+void SimulatedStage::Axis::describe(auto& p) {
+  p(model, "model", "model.yaml of plant axis that is this axis' truth; replaces mass, motor_constant, damping");
+  p(mass, "mass", "kg", Range{0.01, 1e4}, "all that moves");
+  p(motor_constant, "motor_constant", "N/A", Range{1e-3, 1e5}, "force per current");
+  p(viscous_damping, "viscous_damping", "N s/m", Range{0.0, 1e5}, "force per speed");
+  p(resolution, "resolution", "m", Range{0.0, 1e-3}, "one count of the encoder; 0: none");
+  p(noise, "noise", "m", Range{0.0, 1e-3}, "1 sigma of the encoder");
+  p(velocity_noise, "velocity_noise", "m/s", Range{0.0, 1.0}, "1 sigma of the velocity sensor");
+  p(start, "start", "m", Range{-10.0, 10.0}, "where the carriage stands at the start");
+}
+
+void SimulatedStage::Parameters::describe(auto& p) {
+  p(machine, "machine", "machine.yaml with chain, travel and hidden errors");
+  p(x, "x", "the X axis");
+  p(y, "y", "the Y axis");
+  p(z, "z", "the Z axis");
+  p(watchdog, "watchdog", "s", Range{1e-3, 10.0}, "the drive lets go when its command is older");
+  p(temperature, "temperature", "degC", Range{-50.0, 150.0}, "of the machine, where `slide` is not connected",
+    while_running);
+  p(seed, "seed", 0, 1'000'000'000, "of the noise");
+}
+
+}  // namespace invar::world
