@@ -29,10 +29,15 @@ recording::Table lines_table() {
   return table;
 }
 
-void append(recording::Table& table, const std::string& line, const Eigen::Vector3d& point, double displacement,
-            double cycle, double direction) {
+void append(recording::Table& table, const std::string& line, const Eigen::Vector3d& point,
+            double displacement, double cycle, double direction) {
   table.columns[0].texts.push_back(line);
-  const double row[] = {std::numeric_limits<double>::quiet_NaN(), point.x(), point.y(), point.z(), displacement, cycle,
+  const double row[] = {std::numeric_limits<double>::quiet_NaN(),
+                        point.x(),
+                        point.y(),
+                        point.z(),
+                        displacement,
+                        cycle,
                         direction};
   for (std::size_t i = 0; i < table.columns.size(); ++i) table.columns[i].values.push_back(row[i]);
 }
@@ -41,7 +46,8 @@ void append(recording::Table& table, const std::string& line, const Eigen::Vecto
 
 struct Calibration::Axis {
   Axis(Calibration& owner, std::size_t number)
-      : state{owner, std::string{"state_"} + letters[number]}, command{owner, std::string{"command_"} + letters[number], "command"} {}
+      : state{owner, std::string{"state_"} + letters[number]},
+        command{owner, std::string{"command_"} + letters[number], "command"} {}
   Input<stage::AxisState> state;
   Output<stage::AxisCommand> command;
   std::uint64_t last_command = 0;
@@ -146,7 +152,8 @@ Task Calibration::enable_axes() {
       return state != nullptr && state->command_id() == axis->last_command && state->enabled();
     });
     if (all) co_return;
-    if (now() > give_up) throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
+    if (now() > give_up)
+      throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
   }
 }
 
@@ -228,7 +235,9 @@ Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cy
       double mean = 0.0;
       co_await average_reading(readings, mean);
       append(table, line.name, target, mean, static_cast<double>(cycle + 1), forth ? 1.0 : -1.0);
-      progress_ = begin + share * (static_cast<double>(cycle) + static_cast<double>(k) / static_cast<double>(2 * intervals + 2)) /
+      progress_ = begin + share *
+                              (static_cast<double>(cycle) +
+                               static_cast<double>(k) / static_cast<double>(2 * intervals + 2)) /
                               static_cast<double>(cycles);
     }
   }
@@ -263,7 +272,8 @@ Calibration::Verification Calibration::evaluate(const recording::Table& table) c
   Point start = Point::Zero();
   const auto& lines = table.columns[0].texts;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const Point here{table.columns[1].values[row], table.columns[2].values[row], table.columns[3].values[row]};
+    const Point here{table.columns[1].values[row], table.columns[2].values[row],
+                     table.columns[3].values[row]};
     if (row == 0 || lines[row] != lines[row - 1]) start = here;
     const double error = table.columns[4].values[row] - (here - start).norm();
     result.maximum = std::max(result.maximum, std::abs(error));
@@ -285,7 +295,8 @@ Task Calibration::run(const GeometricJob& job) {
   if (before.rows() > 0) before.write(folder / "verify_before.csv");
 
   recording::Table lines = lines_table();
-  for (const LineSpec& line : job.lines) co_await measure(line, job.interval, job.cycles, job.readings, share, lines);
+  for (const LineSpec& line : job.lines)
+    co_await measure(line, job.interval, job.cycles, job.readings, share, lines);
   lines.write(folder / "lines.csv");
 
   report(job::JOB_RUNNING, "identifying the error");
@@ -296,14 +307,16 @@ Task Calibration::run(const GeometricJob& job) {
   report(job::JOB_RUNNING, "compensation active; verifying");
 
   recording::Table after = lines_table();
-  for (const LineSpec& line : job.verify) co_await measure(line, job.verify_interval, 1, job.readings, share, after);
+  for (const LineSpec& line : job.verify)
+    co_await measure(line, job.verify_interval, 1, job.readings, share, after);
   if (after.rows() > 0) {
     after.write(folder / "verify_after.csv");
     const Verification was = evaluate(before);
     const Verification is = evaluate(after);
     if (is.rms > was.rms) {
       co_await command_model(compensation::MODEL_ROLLBACK, model.string());
-      throw std::runtime_error{"the compensation makes the error larger on lines that were not fitted; rolled back"};
+      throw std::runtime_error{
+          "the compensation makes the error larger on lines that were not fitted; rolled back"};
     }
   }
   progress_ = 1.0;

@@ -69,7 +69,8 @@ class Calibration final : public Component {
     std::vector<GeometricJob> jobs;
     void describe(auto& p) {
       p(axes, "axes", 1, 3, "how many axes the machine has");
-      p(settle_timeout, "settle_timeout", "s", Range{0.01, 600.0}, "the job fails when an axis needs longer to settle");
+      p(settle_timeout, "settle_timeout", "s", Range{0.01, 600.0},
+        "the job fails when an axis needs longer to settle");
       p(velocity, "velocity", "m/s", Range{0.0, 10.0}, "of the moves; 0: the stage's own");
       p(jobs, "jobs", "what can be run");
     }
@@ -91,8 +92,8 @@ class Calibration final : public Component {
   Task enable_axes();
   Task move_to(Point target);
   Task average_reading(std::int64_t count, double& mean);
-  Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings, double share,
-               recording::Table& table);
+  Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
+               double share, recording::Table& table);
   Task command_model(compensation::ModelCommandKind kind, const std::string& path);
   Verification evaluate(const recording::Table& table) const;
   void report(job::JobPhase phase, const std::string& text);
@@ -104,7 +105,8 @@ class Calibration final : public Component {
   Inbox<sensing::DisplacementReading> reading_{*this, "reading", {.profile = "calibration"}, 4096};
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};
-  Input<compensation::ModelStatus> model_status_{*this, "model_status", {.optional = true, .profile = "state"}};
+  Input<compensation::ModelStatus> model_status_{
+      *this, "model_status", {.optional = true, .profile = "state"}};
   struct Axis;
   std::vector<std::unique_ptr<Axis>> axes_;
 

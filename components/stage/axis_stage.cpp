@@ -66,7 +66,8 @@ void Stage::prime(const Tick& tick) noexcept {
 
 bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
   const Limits& own = parameters_.limits;
-  const MotionLimits limits{chosen(command.velocity(), own.velocity), chosen(command.acceleration(), own.acceleration),
+  const MotionLimits limits{chosen(command.velocity(), own.velocity),
+                            chosen(command.acceleration(), own.acceleration),
                             chosen(command.jerk(), own.jerk)};
   const bool standing = mode_ == AXIS_MODE_HOLDING;
   if (command.kind() == AXIS_COMMAND_MOVE) {
@@ -77,7 +78,8 @@ bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
   }
   if (!standing) return false;
   const double beyond = setpoint(tick).position - 1.5 * parameters_.travel.width();
-  begin(Trajectory::move(setpoint(tick).position, beyond, {parameters_.homing_velocity, limits.acceleration, limits.jerk}),
+  begin(Trajectory::move(setpoint(tick).position, beyond,
+                         {parameters_.homing_velocity, limits.acceleration, limits.jerk}),
         tick, AXIS_MODE_HOMING);
   homed_ = false;
   return true;
@@ -105,7 +107,8 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
     case AXIS_COMMAND_STOP:
       if (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING) {
         const Limits& own = parameters_.limits;
-        begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+        begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick,
+              AXIS_MODE_STOPPING);
       }
       break;
     case AXIS_COMMAND_CLEAR_FAULT:
@@ -123,7 +126,8 @@ void Stage::stop_blindly(const Tick& tick) noexcept {
   if (!blind_) {
     blind_ = true;
     const Limits& own = parameters_.limits;
-    begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+    begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick,
+          AXIS_MODE_STOPPING);
   }
   if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) mode_ = AXIS_MODE_FAULT;
 }
@@ -173,6 +177,8 @@ void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
 void Stage::step(const Tick& tick) noexcept {
   const auto* feedback = feedback_.latest();
   const Duration patience = Duration::seconds(parameters_.feedback_timeout);
+  const bool fresh = feedback_.received() != received_;
+  received_ = feedback_.received();
   const bool seeing = feedback != nullptr && feedback_.age(tick.now) <= patience;
   if (seeing) {
     const auto* fused = fused_.latest();
@@ -199,11 +205,12 @@ void Stage::step(const Tick& tick) noexcept {
     current_ = feedforward(setpoint(tick));
   } else if (driving && blind_) {
     mode_ = AXIS_MODE_FAULT;  // sight came back too late: stay stopped until somebody clears the fault
-  } else if (driving) {
+  } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
     const double feedback_current = controller_.step(at.position + correction_held_, position_);
-    current_ = std::clamp(feedback_current + feedforward(at), -parameters_.control.limit, parameters_.control.limit);
+    current_ =
+        std::clamp(feedback_current + feedforward(at), -parameters_.control.limit, parameters_.control.limit);
     supervise(tick);
   }
   const bool enabled = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;

@@ -39,10 +39,11 @@ class Stage final : public Component {
       p(limit, "limit", "A", Range{1e-3, 1e3}, "highest current");
       p(feedforward_velocity, "feedforward_velocity", "A s/m", Range{0.0, 1e5}, "damping over motor constant",
         while_running);
-      p(feedforward_acceleration, "feedforward_acceleration", "A s2/m", Range{0.0, 1e5}, "mass over motor constant",
-        while_running);
+      p(feedforward_acceleration, "feedforward_acceleration", "A s2/m", Range{0.0, 1e5},
+        "mass over motor constant", while_running);
       if constexpr (requires { p.node(); })
-        if (kind != "pid" && kind != "cascade") p.node()["kind"].fault("`" + kind + "` is no law", "use pid or cascade");
+        if (kind != "pid" && kind != "cascade")
+          p.node()["kind"].fault("`" + kind + "` is no law", "use pid or cascade");
     }
   };
   struct Limits {
@@ -74,9 +75,11 @@ class Stage final : public Component {
       p(homing_velocity, "homing_velocity", "m/s", Range{1e-5, 1.0}, "towards the home switch");
       p(absolute_encoder, "absolute_encoder", "homed from the start");
       p(following_error, "following_error", "m", Range{1e-7, 1.0}, "trip above it", while_running);
-      p(settle_window, "settle_window", "m", Range{1e-9, 1e-2}, "settled: following error inside", while_running);
+      p(settle_window, "settle_window", "m", Range{1e-9, 1e-2}, "settled: following error inside",
+        while_running);
       p(settle_time, "settle_time", "s", Range{0.0, 10.0}, "... for so long", while_running);
-      p(feedback_timeout, "feedback_timeout", "s", Range{1e-4, 1.0}, "older feedback: controlled stop, then trip");
+      p(feedback_timeout, "feedback_timeout", "s", Range{1e-4, 1.0},
+        "older feedback: controlled stop, then trip");
     }
   };
 
@@ -109,17 +112,18 @@ class Stage final : public Component {
   Trajectory trajectory_ = Trajectory::rest(0.0);
   Instant trajectory_start_;
   AxisMode mode_ = AXIS_MODE_DISABLED;
-  AxisState sample_;      // what was published last; answers to commands are kept in it
-  bool primed_ = false;   // the controller knows the loop's rate
+  AxisState sample_;     // what was published last; answers to commands are kept in it
+  bool primed_ = false;  // the controller knows the loop's rate
   bool homed_ = false;
-  bool blind_ = false;    // feedback is lost: braking on feedforward alone
-  double offset_ = 0.0;   // what homing adds to the encoder's reading
+  bool blind_ = false;   // feedback is lost: braking on feedforward alone
+  double offset_ = 0.0;  // what homing adds to the encoder's reading
   double position_ = 0.0;
   double correction_held_ = 0.0;
   double current_ = 0.0;
   double following_error_ = 0.0;
   bool settled_ = false;
-  Instant outside_at_;    // when the following error was last outside the settling window
+  std::uint64_t received_ = 0;  // samples of feedback so far
+  Instant outside_at_;  // when the following error was last outside the settling window
 };
 
 }  // namespace invar::stage

@@ -9,11 +9,13 @@ Thermal::Thermal(const Parameters& parameters)
     : parameters_{parameters},
       thermistor_{parameters.thermistor.resistance, parameters.thermistor.base_temperature,
                   parameters.thermistor.coefficient_percent} {
-  if (parameters.modbus.map.empty()) throw InputError{"modbus.map", "missing", "name the heater's register map"};
+  if (parameters.modbus.map.empty())
+    throw InputError{"modbus.map", "missing", "name the heater's register map"};
   const auto map = modbus::load_map(parameters.modbus.map);
   for (const char* name : {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"})
     if (!map.find(name))
-      throw InputError{"modbus.map", std::string{"has no register `"} + name + "`", "name a heater's register map"};
+      throw InputError{"modbus.map", std::string{"has no register `"} + name + "`",
+                       "name a heater's register map"};
 }
 
 void Thermal::configure() {

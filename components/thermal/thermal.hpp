@@ -38,7 +38,8 @@ class Thermal final : public Component {
       p(kp, "kp", "W/K", Range{0.0, 1e4}, "proportional gain", while_running);
       p(ki, "ki", "W/(K s)", Range{0.0, 1e3}, "integral gain", while_running);
       p(kd, "kd", "W s/K", Range{0.0, 1e5}, "derivative gain, on the measurement", while_running);
-      p(derivative_filter, "derivative_filter", "s", Range{0.0, 600.0}, "time constant of the derivative's filter");
+      p(derivative_filter, "derivative_filter", "s", Range{0.0, 600.0},
+        "time constant of the derivative's filter");
     }
   };
   struct Thermistor {
@@ -62,9 +63,11 @@ class Thermal final : public Component {
       p(modbus, "modbus", "the heater's controller");
       p(pid, "pid", "control law");
       p(thermistor, "thermistor", "of the slide");
-      p(setpoint, "setpoint", "degC", Range{-20.0, 150.0}, "wanted at the start; a command changes it", while_running);
+      p(setpoint, "setpoint", "degC", Range{-20.0, 150.0}, "wanted at the start; a command changes it",
+        while_running);
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
-      p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0}, "the latch lets go of the heater above it");
+      p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0},
+        "the latch lets go of the heater above it");
       if constexpr (requires { p.node(); })
         if (setpoint >= over_temperature)
           p.node()["setpoint"].fault("is not below `over_temperature`", "lower it, or raise the latch");

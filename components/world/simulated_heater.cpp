@@ -10,10 +10,12 @@ SimulatedHeater::SimulatedHeater(const Parameters& parameters) : parameters_{par
 void SimulatedHeater::configure() {
   server_ = std::make_unique<modbus::Server>(
       modbus::load_map(parameters_.map),
-      modbus::ServerOptions{.host = parameters_.host, .port = static_cast<std::uint16_t>(parameters_.port), .faults = {}});
+      modbus::ServerOptions{
+          .host = parameters_.host, .port = static_cast<std::uint16_t>(parameters_.port), .faults = {}});
   const Parameters& p = parameters_;
   plant_.emplace(
-      std::vector<physics::ThermalNode>{{p.pad_capacity, 0.0}, {p.slide_capacity, p.slide_loss}, {p.base_capacity, p.base_loss}},
+      std::vector<physics::ThermalNode>{
+          {p.pad_capacity, 0.0}, {p.slide_capacity, p.slide_loss}, {p.base_capacity, p.base_loss}},
       std::vector<physics::ThermalHeater>{{pad, 1.0}},
       std::vector<physics::ThermalCoupling>{{pad, slide, p.pad_slide}, {slide, base, p.slide_base}},
       std::vector<physics::ThermalTerm>{});

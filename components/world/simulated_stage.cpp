@@ -19,7 +19,9 @@ struct SimulatedStage::Device {
         motor{owner, "motor_" + letter(axis_number)},
         feedback{owner, "feedback_" + letter(axis_number)} {}
 
-  static std::string letter(int axis) { return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]); }
+  static std::string letter(int axis) {
+    return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
+  }
 
   const Axis& parameters;
   int axis;
@@ -62,7 +64,8 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     const double velocity = device->plant.velocity();
     if (velocity != 0.0) moving_[device->axis] = velocity > 0.0 ? 1.0 : -1.0;
     double reading = device->plant.reading() + device->parameters.noise * normal_(random_);
-    if (const double count = device->parameters.resolution; count > 0.0) reading = count * std::round(reading / count);
+    if (const double count = device->parameters.resolution; count > 0.0)
+      reading = count * std::round(reading / count);
     const Range travel = machine_.travel[static_cast<std::size_t>(device->axis)];
 
     stage::AxisFeedback feedback;
@@ -80,8 +83,8 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     device->feedback.write(feedback);
     position[device->axis] = device->plant.position();
   }
-  const Eigen::Vector3d tool =
-      position + metrology::simulated_error(machine_, directions_, position, machine_.tool, moving_, temperature);
+  const Eigen::Vector3d tool = position + metrology::simulated_error(machine_, directions_, position,
+                                                                     machine_.tool, moving_, temperature);
   sensing::ToolPosition sample;
   sample.cell(cell);
   sample.sensor(id);

@@ -24,10 +24,10 @@ namespace invar::world {
 class SimulatedStage final : public Component {
  public:
   struct Axis {
-    std::string model;                // a model.yaml of plant axis (mismatch.md): the truth, terms included
-    double mass = 3.2;                // used where no model is named
-    double motor_constant = 12.0;     //
-    double viscous_damping = 25.0;    //
+    std::string model;              // a model.yaml of plant axis (mismatch.md): the truth, terms included
+    double mass = 3.2;              // used where no model is named
+    double motor_constant = 12.0;   //
+    double viscous_damping = 25.0;  //
     double resolution = 1e-8;
     double noise = 2e-8;
     double velocity_noise = 1e-4;
@@ -62,7 +62,8 @@ class SimulatedStage final : public Component {
 };
 
 void SimulatedStage::Axis::describe(auto& p) {
-  p(model, "model", "model.yaml of plant axis that is this axis' truth; replaces mass, motor_constant, damping");
+  p(model, "model",
+    "model.yaml of plant axis that is this axis' truth; replaces mass, motor_constant, damping");
   p(mass, "mass", "kg", Range{0.01, 1e4}, "all that moves");
   p(motor_constant, "motor_constant", "N/A", Range{1e-3, 1e5}, "force per current");
   p(viscous_damping, "viscous_damping", "N s/m", Range{0.0, 1e5}, "force per speed");

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/time.hpp"
@@ -70,6 +71,8 @@ class Component {
   bool simulated_time = false;
 
   [[nodiscard]] const std::vector<Port*>& ports() const { return ports_; }
+  /// nullptr when there is none of that name.
+  [[nodiscard]] Port* find_port(std::string_view port_name) const;
   /// The time of the current step.
   [[nodiscard]] Instant now() const noexcept { return now_; }
   /// By the executor, before each step and transition.

@@ -32,9 +32,7 @@ void check_port_keys(const LoadedComponent& member) {
   const auto names = port_names(*member.component);
   const auto check = [&](const char* section, bool outputs_only) {
     for (const Node& entry : member.file->node[section].children()) {
-      const Port* found = nullptr;
-      for (const Port* port : member.component->ports())
-        if (port->name() == entry.key()) found = port;
+      const Port* found = member.component->find_port(entry.key());
       if (found == nullptr) {
         entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`",
                     mend_name(entry.key(), names));
@@ -118,16 +116,15 @@ void check_owners(const LoadedCell& loaded) {
     for (const LoadedComponent& member : process.components)
       for (const auto& [port, target] : member.file->connections) {
         if (!member.component || target.starts_with('/')) continue;
-        for (const Port* candidate : member.component->ports()) {
-          if (candidate->name() != port || candidate->direction() != Port::Direction::output ||
-              candidate->profile != "command")
-            continue;
-          const auto [known, added] = owner.emplace(target, member.file->name);
-          if (!added)
-            member.file->node["connect"][port].fault(
-                "`" + target + "` is commanded by `" + known->second + "` already",
-                "let one component command it, or give this output another profile by `qos`");
-        }
+        const Port* output = member.component->find_port(port);
+        if (output == nullptr || output->direction() != Port::Direction::output ||
+            output->profile != "command")
+          continue;
+        const auto [known, added] = owner.emplace(target, member.file->name);
+        if (!added)
+          member.file->node["connect"][port].fault(
+              "`" + target + "` is commanded by `" + known->second + "` already",
+              "let one component command it, or give this output another profile by `qos`");
       }
 }
 

@@ -58,8 +58,7 @@ Port* LoadedCell::port(const std::string& component, const std::string& name) {
   for (LoadedProcess& candidate : processes)
     for (LoadedComponent& member : candidate.components) {
       if (member.file->name != component || !member.component) continue;
-      for (Port* found : member.component->ports())
-        if (found->name() == name) return found;
+      return member.component->find_port(name);
     }
   return nullptr;
 }

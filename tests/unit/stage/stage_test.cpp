@@ -1,0 +1,178 @@
+#include "components/stage/axis_stage.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+namespace invar::stage {
+namespace {
+
+/// A carriage without friction that the motor pushes, integrated exactly for a held force; behind real ports.
+struct Bench final : Component {
+  Input<MotorCommand> motor{*this, "motor"};
+  Output<AxisFeedback> feedback{*this, "feedback"};
+  Output<AxisCommand> command{*this, "command"};
+  Output<compensation::AxisCorrection> correction{*this, "correction"};
+  Input<AxisState> state{*this, "state"};
+
+  Stage::Parameters parameters = [] {
+    Stage::Parameters p;
+    p.travel = {0.0, 0.2};
+    p.control.feedforward_acceleration = mass / force_constant;
+    return p;
+  }();
+  Stage stage{parameters};
+  double position = 0.05;
+  double velocity = 0.0;
+  bool seeing = true;
+  bool at_switch = false;
+  std::uint64_t cycle = 0;
+  std::uint64_t next_id = 1;
+  static constexpr double mass = 3.0;
+  static constexpr double force_constant = 12.0;
+  static constexpr double period = 1e-3;
+
+  Bench() {
+    join(feedback, "feedback");
+    join(command, "command");
+    join(correction, "correction");
+    static_cast<OutputPort*>(stage.find_port("motor"))->connect(motor);
+    static_cast<OutputPort*>(stage.find_port("state"))->connect(state);
+    stage.activate();
+  }
+  void join(OutputPort& output, const char* port) {
+    output.connect(*static_cast<InputPort*>(stage.find_port(port)));
+  }
+  void step(const Tick&) noexcept override {}
+
+  const AxisState& cycle_once() {
+    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, period, cycle};
+    set_now(tick.now);
+    stage.set_now(tick.now);
+    const auto* drive = motor.latest();
+    const double force = drive != nullptr && drive->enabled() ? force_constant * drive->current() : 0.0;
+    position += velocity * period + force / mass * period * period / 2;
+    velocity += force / mass * period;
+    AxisFeedback sample;
+    sample.position(position);
+    sample.velocity(velocity);
+    sample.home_switch(at_switch || position < 0.0);
+    if (seeing) feedback.write(sample);
+    stage.step(tick);
+    ++cycle;
+    return *state.latest();
+  }
+  void send(AxisCommandKind kind, double target = 0.0) {
+    AxisCommand sample;
+    sample.id(next_id++);
+    sample.kind(kind);
+    sample.position(target);
+    command.write(sample);
+  }
+  bool run_until(const std::function<bool(const AxisState&)>& reached, int cycles = 20'000) {
+    for (int i = 0; i < cycles; ++i)
+      if (reached(cycle_once())) return true;
+    return false;
+  }
+  void enable() {
+    cycle_once();
+    send(AXIS_COMMAND_ENABLE);
+    ASSERT_TRUE(run_until([](const AxisState& s) { return s.enabled(); }, 5));
+  }
+};
+
+TEST(Stage, EnablingDoesNotMoveTheCarriage) {
+  Bench bench;
+  bench.enable();
+  for (int i = 0; i < 1000; ++i) {
+    bench.cycle_once();
+    ASSERT_NEAR(bench.position, 0.05, 1e-12);
+  }
+}
+
+TEST(Stage, MovesWhereItIsToldAndSettles) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_done() && s.settled(); }));
+  EXPECT_NEAR(bench.position, 0.15, 1e-6);
+  EXPECT_EQ(bench.state.latest()->command_id(), 2U);
+}
+
+TEST(Stage, AddsTheCorrectionToTheSetpoint) {
+  Bench bench;
+  bench.enable();
+  compensation::AxisCorrection correction;
+  correction.correction(-3e-6);
+  bench.correction.write(correction);
+  bench.send(AXIS_COMMAND_MOVE, 0.1);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_done() && s.settled(); }));
+  EXPECT_NEAR(bench.position, 0.1 - 3e-6, 1e-6);
+}
+
+TEST(Stage, RefusesMovesOutsideItsSoftLimitsAndWhileMoving) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.3);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_id() == 2; }, 5));
+  EXPECT_TRUE(bench.state.latest()->command_refused());
+  bench.send(AXIS_COMMAND_MOVE, 0.1);
+  bench.cycle_once();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_id() == 4; }, 5));
+  EXPECT_TRUE(bench.state.latest()->command_refused());
+}
+
+TEST(Stage, LostFeedbackBrakesUnderControlAndThenLetsGo) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.09; }));
+  bench.seeing = false;
+  // The braking has begun two periods after the last sample can have been used.
+  for (int i = 0; i < 4; ++i) bench.cycle_once();
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_STOPPING);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.mode() == AXIS_MODE_FAULT; }, 1000));
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+  EXPECT_LT(std::abs(bench.velocity), 2e-3);
+  bench.seeing = true;
+  bench.cycle_once();
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_FAULT);  // stays stopped until somebody clears it
+  bench.send(AXIS_COMMAND_CLEAR_FAULT);
+  bench.cycle_once();
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_DISABLED);
+}
+
+TEST(Stage, FollowingErrorTrips) {
+  Bench bench;
+  bench.enable();
+  bench.position += 2e-3;  // somebody pushed the carriage
+  bench.cycle_once();
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_FAULT);
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+}
+
+TEST(Stage, HomingFindsTheSwitchAndCountsFromIt) {
+  Bench bench;
+  bench.parameters.absolute_encoder = false;
+  bench.stage.activate();
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.1);
+  bench.cycle_once();
+  EXPECT_TRUE(bench.state.latest()->command_refused());  // not homed yet
+  bench.send(AXIS_COMMAND_HOME);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.homed() && s.command_done(); }));
+  EXPECT_LT(bench.position, 0.0);
+  EXPECT_GT(bench.position, -1e-3);
+}
+
+TEST(Stage, SafeValueLetsGoOfTheMotor) {
+  Bench bench;
+  bench.enable();
+  static_cast<OutputPort*>(bench.stage.find_port("motor"))->write_safe_value();
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+}
+
+}  // namespace
+}  // namespace invar::stage
