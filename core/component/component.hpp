@@ -38,8 +38,8 @@ class Component {
   /// unconfigured -> inactive. May allocate, open files and connections, throw InputError. Not on the loop's
   /// thread.
   virtual void configure() {}
-  /// inactive -> active, on the thread that steps, directly before the first step. Must be bumpless: setpoint
-  /// := measured. Real-time where the executor is.
+  /// inactive -> active, on the thread that steps, before the first step. Must be bumpless: setpoint :=
+  /// measured; `starts_at` lets the executor check it. Real-time where the executor is.
   virtual void activate() {}
   /// The work of one period. Real-time where the executor is: neither allocates, locks, throws, logs nor
   /// waits.
@@ -62,6 +62,20 @@ class Component {
   [[nodiscard]] const char* failure() const noexcept { return failure_; }
   void clear_failure() noexcept { failure_ = nullptr; }
 
+  /// Set-up: after activation, `setpoint` must equal `measured` within `tolerance`, or the component goes to
+  /// error instead of jumping. Checked once, as soon as both are finite: directly after `activate`, or after
+  /// the first step in which they are (start with NaN when there is nothing measured yet). Both must live as
+  /// long as the component.
+  void starts_at(const double& setpoint, const double& measured, double tolerance) {
+    bumpless_.push_back({&setpoint, &measured, tolerance});
+  }
+  struct Bumpless {
+    const double* setpoint;
+    const double* measured;
+    double tolerance;
+  };
+  [[nodiscard]] const std::vector<Bumpless>& bumpless() const noexcept { return bumpless_; }
+
   /// The name in the deployment ("stage_x"). Set before configure.
   std::string name;
   /// Numeric identity of the cell and of this component, for the keys of its samples. Set before configure.
@@ -81,6 +95,7 @@ class Component {
  private:
   friend class Port;
   std::vector<Port*> ports_;
+  std::vector<Bumpless> bumpless_;
   Instant now_;
   const char* failure_ = nullptr;
 };

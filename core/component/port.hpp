@@ -70,6 +70,9 @@ class InputPort : public Port {
   /// first. Any thread.
   [[nodiscard]] Instant arrived() const noexcept { return {arrived_ns_.load(std::memory_order_acquire)}; }
   [[nodiscard]] std::uint64_t received() const noexcept { return received_.load(std::memory_order_relaxed); }
+  /// The outputs of this process that feed it. Set-up only.
+  [[nodiscard]] const std::vector<const Port*>& sources() const { return sources_; }
+  void add_source(const Port& output) { sources_.push_back(&output); }
 
  protected:
   void mark(Instant now) noexcept {
@@ -79,6 +82,7 @@ class InputPort : public Port {
 
  private:
   InputOptions options_;
+  std::vector<const Port*> sources_;
   std::atomic<std::int64_t> arrived_ns_{INT64_MIN};
   std::atomic<std::uint64_t> received_{0};
 };
@@ -192,6 +196,7 @@ class Output final : public OutputPort {
     } else {
       add_sink(static_cast<Inbox<T>*>(&input)->add_lane());
     }
+    input.add_source(*this);
     return true;
   }
   /// Set-up only.

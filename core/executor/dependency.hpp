@@ -1,0 +1,16 @@
+// In which order the components of a process are brought up and taken down: who feeds whom, from their ports.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "core/component/component.hpp"
+
+namespace invar {
+
+/// Indices of `components`, upstream (who feeds) before downstream (who is fed); the given order decides
+/// where nothing else does and where the graph runs in a circle, as every control loop does. One feeds
+/// another when an output is connected to an input, or both carry the same topic.
+[[nodiscard]] std::vector<std::size_t> upstream_first(const std::vector<const Component*>& components);
+
+}  // namespace invar

@@ -1,0 +1,100 @@
+// The executor by the clock: one thread that sleeps to absolute times.
+#include <pthread.h>
+#include <time.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "core/base/contract.hpp"
+#include "core/base/fault.hpp"
+#include "core/executor/executor.hpp"
+#include "core/executor/slot.hpp"
+
+namespace invar {
+
+void Executor::start() {
+  INVAR_EXPECTS(!options_.simulated && !thread_.joinable());
+  prepare();
+  stop_requested_ = false;
+  std::promise<bool> ready;
+  auto is_ready = ready.get_future();
+  thread_ = std::thread{[this, &ready] { loop(ready); }};
+  if (is_ready.get()) return;
+  thread_.join();
+  std::vector<Fault> faults;
+  for (const Grant& g : grants_)
+    if (!g.granted)
+      faults.push_back({"process " + options_.process + ": " + g.setting,
+                        g.what + " not granted (" + g.why + ")", g.mend + ", or declare `require: false`"});
+  throw InputError{std::move(faults)};
+}
+
+void Executor::stop() {
+  request_stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+bool Executor::sleep_until(Instant due) noexcept {
+  // A slow loop looks up now and then, so that it obeys and stops without waiting for its next cycle.
+  constexpr Duration longest = Duration::milliseconds(100);
+  for (;;) {
+    const Instant current = now();
+    const bool last = due - current <= longest;
+    const Instant until = last ? due : current + longest;
+    const timespec t{until.ns / 1'000'000'000, until.ns % 1'000'000'000};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {
+    }
+    if (stop_requested_.load(std::memory_order_acquire)) return false;
+    if (last) return true;
+    obey(until);
+  }
+}
+
+void Executor::loop(std::promise<bool>& ready) {
+  const std::lock_guard turn{stepping_};
+  pthread_setname_np(pthread_self(), options_.process.substr(0, 15).c_str());
+  if (options_.real_time) grants_ = claim_real_time(*options_.real_time);
+  const bool refused = std::any_of(grants_.begin(), grants_.end(), [](const Grant& g) { return !g.granted; });
+  if (refused && options_.real_time->require) {
+    ready.set_value(false);
+    return;
+  }
+  count_ = {};
+  next_cycle_ = 0;
+  count_.tripped = counters_.read().tripped;
+  const std::int64_t period = options_.period.ns;
+  const Instant first{(now().ns / period + 2) * period};
+  for (const auto& slot : slots_) {
+    slot->next_due = 0;
+    slot->active_since = std::max(slot->active_since, first);
+  }
+  Pacer pacer{options_.period, options_.overrun, options_.tolerated, first};
+  running_.store(true, std::memory_order_release);
+  ready.set_value(true);
+
+  constexpr std::string_view too_late = "the loop lost a period, and its overrun policy is safe_stop";
+  while (sleep_until(pacer.due())) {
+    const Instant woke = now();
+    const Duration late = woke - pacer.due();
+    if (const std::uint64_t gone = pacer.wake(woke); gone > 0) {
+      stall_end_ = pacer.due();
+      stall_ = options_.period * static_cast<std::int64_t>(gone * pacer.stretch());
+    }
+    const Instant due = pacer.due();
+    if (pacer.take_stop()) stop_safely(too_late, due);
+    run_cycle(due, pacer.cycle(), pacer.stretch());
+    const Instant done = now();
+    pacer.finish(done);
+    if (pacer.take_stop()) stop_safely(too_late, due);
+    wake_up_.add(late);
+    compute_.add(done - woke);
+    count_.overruns = pacer.overruns();
+    count_.skipped = pacer.skipped();
+    count_.stretch = pacer.stretch();
+    close_cycle(due, late, done - woke);
+  }
+  deactivate_all(now());
+  running_.store(false, std::memory_order_release);
+}
+
+}  // namespace invar

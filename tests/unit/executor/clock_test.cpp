@@ -1,0 +1,186 @@
+// The executor by the clock: it starts, obeys, stops in order; nothing here depends on how fast the machine
+// is.
+#include <gmock/gmock.h>
+
+#include <chrono>
+#include <thread>
+
+#include "core/base/fault.hpp"
+#include "core/executor/process_control.hpp"
+#include "tests/unit/executor/toys.hpp"
+
+namespace invar {
+namespace {
+
+using namespace toys;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+ExecutorOptions by_the_clock() {
+  ExecutorOptions options;
+  options.process = "test";
+  return options;
+}
+
+/// Waits for the world; a watchdog, not a measurement.
+template <class Condition>
+bool eventually(Condition condition) {
+  for (int i = 0; i < 20'000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  }
+  return false;
+}
+
+TEST(Loop, RunsOnWholeMultiplesOfItsPeriodAndCountsEveryOne) {
+  std::vector<Tick> ticks;
+  ticks.reserve(100'000);
+  Executor executor{by_the_clock()};
+  executor.add(std::make_unique<Call>([&](const Tick& t) { ticks.push_back(t); }));
+  executor.start();
+  EXPECT_TRUE(executor.transition(0, Transition::configure).ok());
+  EXPECT_TRUE(executor.transition(0, Transition::activate).ok());
+  ASSERT_TRUE(eventually([&] { return executor.steps(0) >= 50; }));
+  executor.stop();
+  EXPECT_FALSE(executor.is_running());
+  EXPECT_EQ(executor.state(0), LifecycleState::inactive);
+  for (std::size_t i = 1; i < ticks.size(); ++i) {
+    EXPECT_EQ(ticks[i].now.ns % 1'000'000, 0);
+    EXPECT_GT(ticks[i].cycle, ticks[i - 1].cycle);
+    EXPECT_EQ((ticks[i].now - ticks[i - 1].now).ns,
+              static_cast<std::int64_t>(ticks[i].cycle - ticks[i - 1].cycle) * 1'000'000);
+  }
+  const LoopCounters counters = executor.counters();
+  EXPECT_EQ(counters.executed + counters.skipped, counters.cycle + 1);
+  EXPECT_EQ(executor.wake_up().count(), counters.executed);
+  EXPECT_EQ(executor.compute().count(), counters.executed);
+}
+
+TEST(Loop, ASlowProcessStopsAndObeysWithoutWaitingForItsNextCycle) {
+  ExecutorOptions options = by_the_clock();
+  options.period = Duration::seconds(60.0);
+  Executor executor{options};
+  executor.add(std::make_unique<Call>([](const Tick&) {}));
+  executor.start();
+  EXPECT_TRUE(executor.transition(0, Transition::configure).ok());
+  EXPECT_TRUE(executor.transition(0, Transition::activate).ok());
+  executor.stop();
+  EXPECT_EQ(executor.counters().executed, 0U);
+  EXPECT_EQ(executor.state(0), LifecycleState::inactive);
+}
+
+TEST(Loop, SaysWhatWasNotGrantedOrRefusesToRunAsDeclared) {
+  ExecutorOptions options = by_the_clock();
+  options.real_time = RealTimeRequest{.priority = 0, .cpu = 1000, .lock_memory = false, .require = false};
+  {
+    Executor executor{options};
+    executor.start();
+    const ProcessStatus status = ProcessControl{executor}.status();
+    ASSERT_EQ(status.not_granted.size(), 1U);
+    EXPECT_THAT(status.not_granted.front(),
+                HasSubstr("realtime.cpu: core 1000 not granted (Invalid argument)"));
+  }
+  options.real_time->require = true;
+  Executor executor{options};
+  try {
+    executor.start();
+    FAIL() << "it ran";
+  } catch (const InputError& error) {
+    ASSERT_EQ(error.faults().size(), 1U);
+    EXPECT_THAT(
+        error.faults().front().line(),
+        HasSubstr("process test: realtime.cpu: core 1000 not granted (Invalid argument); name a core"));
+  }
+  EXPECT_FALSE(executor.is_running());
+}
+
+TEST(Loop, ALostPeriodUnderSafeStopDeactivatesEverything) {
+  ExecutorOptions options = by_the_clock();
+  options.overrun = OverrunPolicy::safe_stop;
+  options.tolerated = 1'000'000;  // the host may be slow; only the test's own hang must count
+  Executor tolerant{options};
+  options.tolerated = 0;
+  Executor strict{options};
+  for (Executor* executor : {&tolerant, &strict}) {
+    executor->add(std::make_unique<Call>([](const Tick& t) {
+      if (t.cycle > 5) std::this_thread::sleep_for(std::chrono::milliseconds{3});
+    }));
+    (void)executor->transition(0, Transition::configure);
+    (void)executor->transition(0, Transition::activate);
+    executor->start();
+    ASSERT_TRUE(eventually([&] { return executor->counters().cycle > 50; }));
+    const bool strictly = executor == &strict;
+    EXPECT_EQ(executor->counters().tripped, strictly);
+    EXPECT_EQ(executor->state(0), strictly ? LifecycleState::inactive : LifecycleState::active);
+    EXPECT_GT(executor->counters().overruns, 0U);
+    executor->stop();
+  }
+}
+
+TEST(ProcessControl, BringsUpUpstreamFirstAndTakesDownDownstreamFirstOncePerRequestId) {
+  std::vector<std::string> journal;
+  Executor executor{by_the_clock()};
+  // Declared against the flow: the listener stands first.
+  struct Source final : Component {
+    Output<Sample> out{*this, "out"};
+    std::vector<std::string>* journal = nullptr;
+    void step(const Tick&) noexcept override {}
+    void configure() override { journal->push_back("configure " + name); }
+    void activate() override { journal->push_back("activate " + name); }
+    void deactivate() noexcept override { journal->push_back("deactivate " + name); }
+    void cleanup() noexcept override { journal->push_back("cleanup " + name); }
+  };
+  struct Sink final : Component {
+    Input<Sample> in{*this, "in"};
+    std::vector<std::string>* journal = nullptr;
+    void step(const Tick&) noexcept override {}
+    void configure() override { journal->push_back("configure " + name); }
+    void activate() override { journal->push_back("activate " + name); }
+    void deactivate() noexcept override { journal->push_back("deactivate " + name); }
+    void cleanup() noexcept override { journal->push_back("cleanup " + name); }
+  };
+  auto sink = std::make_unique<Sink>();
+  auto source = std::make_unique<Source>();
+  sink->name = "sink";
+  source->name = "source";
+  sink->journal = source->journal = &journal;
+  source->out.topic = sink->in.topic = "cell/a/source/out";
+  executor.add(std::move(sink));
+  executor.add(std::move(source));
+  executor.start();
+  ProcessControl control{executor};
+  EXPECT_EQ(control.request("all", Transition::configure, 1).verdict, Verdict::done);
+  EXPECT_EQ(control.request("", Transition::activate, 2).verdict, Verdict::done);
+  EXPECT_EQ(control.request("", Transition::activate, 2).verdict, Verdict::done) << "as before";
+  EXPECT_EQ(control.request("", Transition::activate, 3).verdict, Verdict::already);
+  EXPECT_THAT(control.request("surce", Transition::activate, 4).reason, HasSubstr("did you mean `source`?"));
+  control.stop();
+  EXPECT_THAT(journal, ElementsAre("configure source", "configure sink", "activate source", "activate sink",
+                                   "deactivate sink", "cleanup sink", "deactivate source", "cleanup source"));
+  EXPECT_EQ(executor.state(0), LifecycleState::finalized);
+}
+
+TEST(ProcessControl, ConvertsUnitsAndReportsEverythingAStatusNeeds) {
+  Loop loop{by_the_clock()};
+  ProcessControl control{loop.executor};
+  EXPECT_TRUE(control.request("all", Transition::configure).ok());
+  EXPECT_TRUE(control.request("all", Transition::activate).ok());
+  loop.executor.start();
+  ASSERT_TRUE(eventually([&] { return loop.executor.steps(1) > 10; }));
+  EXPECT_EQ(control.set_parameter("servo", "gain", 0.0002, "1/ms2"), "");
+  EXPECT_THAT(control.set_parameter("servo", "gain", 1.0, "m"), HasSubstr("`m` is no unit of it; give 1/s2"));
+  const auto parameters = control.parameters("servo");
+  ASSERT_EQ(parameters.size(), 2U);
+  EXPECT_NEAR(*parameters[0].value, 200.0, 1e-9);
+  EXPECT_FALSE(parameters[1].value);
+  const ProcessStatus status = control.status();
+  EXPECT_TRUE(status.running);
+  ASSERT_EQ(status.components.size(), 3U);
+  EXPECT_EQ(status.components[1].type, "servo");
+  EXPECT_GT(status.components[1].compute.count, 0U);
+  EXPECT_GT(status.wake_up.count, 0U);
+  EXPECT_LE(status.compute.p50, status.compute.max);
+}
+
+}  // namespace
+}  // namespace invar
