@@ -44,8 +44,9 @@ std::optional<std::size_t> named(const RegisterMap& map, const Node& node) {
 
 /// A value of `reg` in the device's unit, as SI.
 double value_of(const Register& reg, const Node& node) {
-  const double value =
-      reg.type == Type::boolean ? node.as_number("1", {0, 1}) : node.as_number(reg.unit) * reg.unit_in_si;
+  const Unit unit = parse_unit(reg.unit).value_or(Unit{});
+  const double value = reg.type == Type::boolean ? node.as_number("1", {0, 1})
+                                                 : node.as_number(reg.unit) * unit.factor + unit.offset;
   if (!reg.range.contains(value))
     node.fault("the value is outside the range of `" + reg.name + "`", "choose one inside its range");
   return value;
@@ -106,7 +107,7 @@ void read_shape(const Node& node, const std::string& default_order, Register& re
     node["address"].fault("the second word would stand beyond 65535", "use 65534 or less");
 }
 
-void read_quantity(const Node& node, Register& reg) {
+void read_quantity(const config::Yaml& yaml, const Node& node, Register& reg) {
   const Node scale = node["scale"];
   const Node offset = node["offset"];
   const Node unit = node["unit"];
@@ -128,10 +129,11 @@ void read_quantity(const Node& node, Register& reg) {
       reg.unit = "1";
     }
   }
-  reg.unit_in_si = si.factor;
+  const std::size_t before = yaml.faults().size();
   reg.scale = scale.exists() ? scale.as_number("1") : 1.0;
   if (reg.scale == 0.0) {
-    scale.fault("a scale of 0 loses the value", "write how much one count is, for example 0.01");
+    if (yaml.faults().size() == before)
+      scale.fault("a scale of 0 loses the value", "write how much one count is, for example 0.01");
     reg.scale = 1.0;
   }
   reg.offset = (offset.exists() ? offset.as_number(reg.unit) : 0.0) * si.factor + si.offset;
@@ -151,6 +153,7 @@ void read_access(const Node& node, Register& reg) {
   const std::string access = node.choice("access", {"read", "write", "read_write"});
   reg.readable = access != "write";
   reg.writable = access != "read";
+  const bool has_role = reg.writable;
   if (reg.writable && (reg.kind == Kind::input || reg.kind == Kind::discrete)) {
     node["access"].fault("a register of kind " + std::string{name_of(reg.kind)} + " cannot be written",
                          "write `access: read`, or use holding or coil");
@@ -162,7 +165,7 @@ void read_access(const Node& node, Register& reg) {
     reg.writable = false;
   }
   const Node role = node["role"];
-  if (reg.writable) {
+  if (has_role) {
     reg.is_actuator = node.choice("role", {"actuator", "setting"}) == "actuator";
   } else if (role.exists()) {
     (void)role.as_choice({"actuator", "setting"});
@@ -170,23 +173,26 @@ void read_access(const Node& node, Register& reg) {
   }
 }
 
-Register read_register(const Node& node, const std::string& default_order) {
+Register read_register(const config::Yaml& yaml, const Node& node, const std::string& default_order) {
   Register reg;
   reg.name = node.key();
   if (!is_name(reg.name)) node.fault("`" + reg.name + "` is no name", "use lower_case_words");
   reg.description = node.text("description", "");
+  (void)node["read_back"];  // a known key; read when all registers are known
   read_shape(node, default_order, reg);
-  read_quantity(node, reg);
+  read_quantity(yaml, node, reg);
   read_access(node, reg);
   reg.initial = reg.range.clamp(0.0);
   if (const Node initial = node["initial"]; initial.exists()) reg.initial = value_of(reg, initial);
   return reg;
 }
 
-void read_read_backs(const Node& registers, RegisterMap& map) {
-  for (auto& reg : map.registers) {
+void read_read_backs(const Node& registers, RegisterMap& map, const std::vector<bool>& sound) {
+  for (std::size_t i = 0; i < map.registers.size(); ++i) {
+    Register& reg = map.registers[i];
     const Node node = registers[reg.name];
     const Node read_back = node["read_back"];
+    if (!sound[i]) continue;
     if (!read_back.exists()) {
       if (reg.is_actuator)
         node.fault("an actuator without read-back: nobody would see that a write did not arrive",
@@ -212,12 +218,12 @@ void read_read_backs(const Node& registers, RegisterMap& map) {
   }
 }
 
-void read_heartbeat(const Node& root, RegisterMap& map) {
+void read_heartbeat(const Node& root, RegisterMap& map, const std::vector<bool>& sound) {
   const Node node = root["heartbeat"];
   if (!node.exists()) {
-    for (const auto& reg : map.registers) {
-      if (!reg.is_actuator) continue;
-      root["registers"][reg.name].fault(
+    for (std::size_t i = 0; i < map.registers.size(); ++i) {
+      if (!map.registers[i].is_actuator || !sound[i]) continue;
+      root["registers"][map.registers[i].name].fault(
           "an actuator in a map without heartbeat keeps on when its master dies",
           "add `heartbeat:` to the map");
     }
@@ -242,7 +248,7 @@ void read_heartbeat(const Node& root, RegisterMap& map) {
       beat.timeout_setting.reset();
     }
   }
-  if (index == nowhere) return;
+  if (index == nowhere || !sound[index]) return;
   const Register& target = map.registers[index];
   if (!target.writable || target.is_actuator || target.type == Type::float32 || target.unit != "1") {
     reg.fault("`" + target.name + "` cannot be counted up",
@@ -253,10 +259,11 @@ void read_heartbeat(const Node& root, RegisterMap& map) {
   map.heartbeat = beat;
 }
 
-void read_comm_loss(const Node& root, RegisterMap& map) {
+void read_comm_loss(const Node& root, RegisterMap& map, const std::vector<bool>& sound) {
   const Node node = root["comm_loss"];
   std::vector<bool> decided(map.registers.size());
   const auto decide = [&](const Node& where, std::size_t index) {
+    if (!sound[index]) return;
     if (!map.registers[index].writable)
       where.fault("`" + map.registers[index].name + "` is not commanded", "name a writable register");
     else if (decided[index])
@@ -284,18 +291,18 @@ void read_comm_loss(const Node& root, RegisterMap& map) {
     }
   }
   for (std::size_t i = 0; i < map.registers.size(); ++i) {
-    if (!map.registers[i].is_actuator || decided[i]) continue;
+    if (!map.registers[i].is_actuator || decided[i] || !sound[i]) continue;
     root["registers"][map.registers[i].name].fault(
         "an actuator without comm-loss action",
         "name it under `comm_loss.set` with its safe value, or under `comm_loss.hold`");
   }
 }
 
-void check_overlaps(const Node& registers, const RegisterMap& map) {
+void check_overlaps(const Node& registers, const RegisterMap& map, const std::vector<bool>& sound) {
   const auto& all = map.registers;
   for (std::size_t i = 0; i < all.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      if (all[i].kind != all[j].kind) continue;
+      if (all[i].kind != all[j].kind || !sound[i] || !sound[j]) continue;
       const unsigned begin = std::max(all[i].address, all[j].address);
       const unsigned end = std::min(all[i].address + all[i].width(), all[j].address + all[j].width());
       const bool other_bits = all[i].bit && all[j].bit && *all[i].bit != *all[j].bit;
@@ -313,12 +320,10 @@ RegisterMap read(const config::Yaml& yaml) {
   (void)root.integer("invar_modbus_map", 1, 1);
   map.device = root.text("device");
   map.description = root.text("description", "");
-  map.unit = static_cast<std::uint8_t>(root.integer("unit", 0, 255, 1));
-  if (map.unit == 0 || map.unit > 247) {
-    // 0 is broadcast and 248 to 255 are reserved, but a device with an address of its own answers at 255.
-    if (map.unit != 255)
-      root["unit"].fault("is no unit of a device", "use 1 to 247, or 255 where it has none");
-  }
+  map.unit = static_cast<std::uint8_t>(root.integer("unit", 1, 255, 1));
+  // A device with an address of its own often answers at 255; the others are reserved.
+  if (map.unit > 247 && map.unit != 255)
+    root["unit"].fault("is no unit of a device", "use 1 to 247, or 255 where it has none");
   map.gaps_readable = root.choice("gaps", {"refused", "readable"}, "refused") == "readable";
   const std::string order = root.choice("word_order", {"abcd", "cdab", "badc", "dcba"}, "abcd");
   map.poll = span(root, "poll", 0.1);
@@ -332,16 +337,19 @@ RegisterMap read(const config::Yaml& yaml) {
         .fault("values would be stale between two polls", "make `timeouts.stale` at least twice `poll`");
 
   const Node registers = root.required("registers");
+  std::vector<bool> sound;  // what hangs on a wrong register is not reported a second time
   for (const Node& node : registers.children()) {
-    map.registers.push_back(read_register(node, order));
+    const std::size_t before = yaml.faults().size();
+    map.registers.push_back(read_register(yaml, node, order));
     map.registers.back().stale_after = stale;
+    sound.push_back(yaml.faults().size() == before);
   }
   if (registers.exists() && map.registers.empty())
     registers.fault("no registers", "write `name: {address: 0, kind: holding, type: uint16, access: read}`");
-  check_overlaps(registers, map);
-  read_read_backs(registers, map);
-  read_heartbeat(root, map);
-  read_comm_loss(root, map);
+  check_overlaps(registers, map, sound);
+  read_read_backs(registers, map, sound);
+  read_heartbeat(root, map, sound);
+  read_comm_loss(root, map, sound);
   yaml.finish();
   return map;
 }

@@ -40,10 +40,9 @@ struct Register {
   std::optional<unsigned> bit;  // of a boolean inside a 16-bit register
   double scale = 1.0;           // SI = scale * raw + offset
   double offset = 0.0;
-  std::string unit;       // as written in the file, for people
-  double unit_in_si = 1;  // how much SI one `unit` is, for people
-  Range range;            // SI; a write outside it is refused, by the client and by the simulated device
-  double initial = 0.0;   // SI; what a simulated device shows before anything is written
+  std::string unit;      // as written in the file, for people
+  Range range;           // SI; a write outside it is refused, by the client and by the simulated device
+  double initial = 0.0;  // SI; what a simulated device shows before anything is written
   bool readable = true;
   bool writable = false;
   bool is_actuator = false;              // moves, heats or presses something: must be made safe on comm loss
