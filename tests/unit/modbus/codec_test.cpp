@@ -29,21 +29,17 @@ TEST(Codec, PutsTheBytesOf32BitValuesWhereEachWordOrderWantsThem) {
   EXPECT_EQ(encode(of(Type::uint32, WordOrder::dcba), value), (Words{{0x0D0C, 0x0B0A}}));
 }
 
-// libmodbus has its own conversions of floats in the four orders: an independent truth.
+// libmodbus reads floats in the four orders: an independent truth. (Its 3.1.6 writes them wrongly.)
 TEST(Codec, AgreesWithLibmodbusOnFloatsInEveryWordOrder) {
   const std::array orders{WordOrder::abcd, WordOrder::cdab, WordOrder::badc, WordOrder::dcba};
   const std::array read{modbus_get_float_abcd, modbus_get_float_cdab, modbus_get_float_badc,
                         modbus_get_float_dcba};
-  const std::array write{modbus_set_float_abcd, modbus_set_float_cdab, modbus_set_float_badc,
-                         modbus_set_float_dcba};
   for (std::size_t i = 0; i < orders.size(); ++i) {
     for (const float value : {0.0F, 1.5F, -30.1F, 3.4e38F, 1e-30F, 805.436F}) {
       const Register reg = of(Type::float32, orders[i]);
-      const Words ours = encode(reg, static_cast<double>(value));
-      EXPECT_EQ(read[i](ours.word.data()), value) << i;
-      Words theirs;
-      write[i](value, theirs.word.data());
-      EXPECT_EQ(decode(reg, theirs.word), static_cast<double>(value)) << i;
+      const Words words = encode(reg, static_cast<double>(value));
+      EXPECT_EQ(read[i](words.word.data()), value) << i;
+      EXPECT_EQ(decode(reg, words.word), static_cast<double>(value)) << i;
     }
   }
 }
