@@ -68,6 +68,8 @@ CellProcess read_process(const Node& node, std::uint32_t& next_id) {
   process.overrun = overrun == "degrade"     ? OverrunPolicy::degrade
                     : overrun == "safe_stop" ? OverrunPolicy::safe_stop
                                              : OverrunPolicy::skip;
+  process.tolerate =
+      node.integer("tolerate", 0, 1'000'000, process.overrun == OverrunPolicy::degrade ? 3 : 0);
   const Node components = node.required("components");
   for (const Node& child : components.children())
     process.components.push_back(read_component(child, next_id++));

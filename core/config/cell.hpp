@@ -43,6 +43,7 @@ struct CellProcess {
   Duration period;
   std::optional<RealtimeRequest> realtime;
   OverrunPolicy overrun = OverrunPolicy::skip;
+  std::int64_t tolerate = 0;              // lost periods within a second before `degrade` or `safe_stop` acts
   std::vector<CellComponent> components;  // in the order they are stepped
   std::string where;                      // "cell.yaml:12: processes.motion"
 };

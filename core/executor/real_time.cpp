@@ -62,7 +62,7 @@ std::vector<Grant> claim_real_time(const RealTimeRequest& request) {
   }
   // Without SCHED_FIFO the kernel may otherwise be 50 us late on purpose.
   const int error = prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL) == 0 ? 0 : errno;
-  grants.push_back(grant("timer slack 1 ns", "realtime", error, "allow prctl(PR_SET_TIMERSLACK)"));
+  grants.push_back(grant("timer slack 1 ns", "realtime", error, "allow the system call prctl"));
   touch_stack();
   return grants;
 }
