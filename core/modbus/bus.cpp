@@ -30,9 +30,10 @@ Bus::~Bus() {
 Device& Bus::add(RegisterMap map) {
   INVAR_EXPECTS(!thread_.joinable() && !polled_);
   devices_.push_back(std::make_unique<Device>(std::move(map)));
-  ios_.push_back(
-      std::make_unique<DeviceIo>(*devices_.back(), Backoff{options_.first_retry, options_.longest_retry}));
-  return *devices_.back();
+  Device& device = *devices_.back();
+  ios_.push_back(std::make_unique<DeviceIo>(device, Backoff{options_.first_retry, options_.longest_retry},
+                                            options_.answer_timeout.value_or(device.map().answer_timeout)));
+  return device;
 }
 
 void Bus::start() {

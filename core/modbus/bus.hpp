@@ -4,7 +4,8 @@
 // - `start()`: one I/O thread polls every device at its map's period, sends writes as they come and the
 //   heartbeat while its owner refreshes it. Time is CLOCK_MONOTONIC. For wall-clock cells.
 // - `exchange(now)`: the caller's thread does one round - heartbeat if due, queued writes, all reads - and
-//   returns when it is done. Time is what the caller says. For simulated time: with a simulated device that
+//   returns when it is done. Time is what the caller says. For simulated time (with a
+//   generous `answer_timeout`): with a simulated device that
 //   swaps its image in its own step (server.hpp), every step sees the same values in every run.
 //
 // Reconnecting: a connection that cannot be made, and a device that does not answer, are each left alone for
@@ -15,6 +16,8 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -32,6 +35,9 @@ struct BusOptions {
   Duration connect_timeout = Duration::milliseconds(500);
   Duration first_retry = Duration::milliseconds(100);
   Duration longest_retry = Duration::milliseconds(5000);
+  /// Instead of the maps' answer timeouts. Waits are real even where time is simulated: there say some seconds,
+  /// so that a busy host is not taken for a dead device.
+  std::optional<Duration> answer_timeout;
 };
 
 /// What happened with the connection since the start, by cause.

@@ -33,9 +33,10 @@ Instant next_in_rhythm(Instant last, Duration period, Instant now) {
 
 }  // namespace
 
-DeviceIo::DeviceIo(Device& device, Backoff backoff)
+DeviceIo::DeviceIo(Device& device, Backoff backoff, Duration answer_timeout)
     : device_{device},
       backoff_{backoff},
+      answer_timeout_{answer_timeout},
       plan_{plan_reads(device.map())},
       words_(longest_answer(plan_)),
       read_this_round_(device.map().registers.size()) {}
@@ -229,7 +230,7 @@ DeviceIo::Done DeviceIo::exchange(Link& link, const Clock& clock, Reads reads) {
     }
     return true;
   };
-  link.address(device_.map().unit, device_.map().answer_timeout);
+  link.address(device_.map().unit, answer_timeout_);
   const Instant now = clock();
   if (beats(now) && now >= next_beat_ && fails(beat(link, now))) return Done::failed;
   while (!queue_.empty())

@@ -16,7 +16,7 @@ using Clock = std::function<Instant()>;
 
 class DeviceIo {
  public:
-  DeviceIo(Device& device, Backoff backoff);
+  DeviceIo(Device& device, Backoff backoff, Duration answer_timeout);
 
   /// Takes in what the owner asked for since the last call; drops writes that waited too long.
   void take_in(Instant now);
@@ -43,6 +43,7 @@ class DeviceIo {
 
   Device& device_;
   Backoff backoff_;
+  Duration answer_timeout_;
   std::vector<ReadRequest> plan_;
   std::vector<std::uint16_t> words_;     // of one answer
   std::vector<bool> read_this_round_;    // by register

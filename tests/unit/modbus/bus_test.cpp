@@ -21,7 +21,7 @@ struct Cell {
                {.faults = faults.empty() ? FaultScript{}
                                          : parse_faults("invar_modbus_faults: 1\nfaults:\n" + faults,
                                                         "faults.yaml", heater_map())}},
-        bus{{.port = server.port()}},
+        bus{{.port = server.port(), .answer_timeout = Duration::seconds(20)}},
         heater{bus.add(heater_map())} {}
 
   bool step(bool refresh = true) {
