@@ -1,0 +1,87 @@
+// Connections: the writers and readers that a node hands out, typed and raw.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+
+#include "core/dds/node.hpp"
+#include "core/dds/participant.hpp"
+#include "core/dds/wire_type.hpp"
+
+namespace invar::dds {
+
+/// A data writer of one type.
+class WriterConnection final : public Connection {
+ public:
+  WriterConnection(Participant& participant, const std::string& topic, const WireType& type,
+                   const Profile& profile);
+  ~WriterConnection() override;
+  [[nodiscard]] fdds::DataWriter& writer() { return *writer_; }
+
+  [[nodiscard]] std::size_t matched() const override;
+  [[nodiscard]] std::uint64_t lost() const override { return refused_; }
+  bool write(const void* sample) override;
+  bool wait_for_acknowledgments(Duration patience) override;
+
+ private:
+  Participant& participant_;
+  const WireType& type_;
+  fdds::DataWriter* writer_;
+  std::atomic<std::uint64_t> refused_{0};
+};
+
+/// A data reader whose listener hands over; what it does with the samples is given as a function, called on
+/// threads of the middleware.
+class ReaderConnection final : public Connection, private fdds::DataReaderListener {
+ public:
+  using Receive = std::function<void(fdds::DataReader& reader)>;
+  ReaderConnection(Participant& participant, const std::string& topic, fdds::TopicDataType* type,
+                   const Profile& profile, Discovery& discovery, Receive receive);
+  ~ReaderConnection() override;
+
+  [[nodiscard]] std::size_t matched() const override;
+  [[nodiscard]] std::uint64_t lost() const override { return lost_; }
+  bool write(const void*) override { return false; }
+  bool wait_for_acknowledgments(Duration) override { return true; }
+
+ private:
+  void on_data_available(fdds::DataReader* reader) override { receive_(*reader); }
+  void on_subscription_matched(fdds::DataReader*, const fdds::SubscriptionMatchedStatus& status) override {
+    matched_ = status.current_count;
+  }
+  void on_liveliness_changed(fdds::DataReader*, const fdds::LivelinessChangedStatus& status) override;
+  void on_sample_lost(fdds::DataReader*, const fdds::SampleLostStatus& status) override {
+    lost_ = static_cast<std::uint64_t>(status.total_count);
+  }
+
+  Participant& participant_;
+  Discovery& discovery_;
+  std::string topic_;
+  Receive receive_;
+  std::atomic<std::int32_t> matched_{0};
+  std::atomic<std::uint64_t> lost_{0};
+  fdds::DataReader* reader_;
+};
+
+/// Writes bytes.
+class RawWriterConnection final : public Connection {
+ public:
+  RawWriterConnection(Participant& participant, const std::string& topic, const std::string& type,
+                      const Profile& profile);
+  ~RawWriterConnection() override;
+  [[nodiscard]] std::size_t matched() const override;
+  [[nodiscard]] std::uint64_t lost() const override { return refused_; }
+  bool write(const void* span) override;
+  bool wait_for_acknowledgments(Duration patience) override;
+
+ private:
+  Participant& participant_;
+  fdds::DataWriter* writer_;
+  std::atomic<std::uint64_t> refused_{0};
+};
+
+/// What a raw reader does with what arrives.
+[[nodiscard]] ReaderConnection::Receive raw_receiver(std::function<void(const RawSample&)> take);
+
+}  // namespace invar::dds

@@ -1,0 +1,91 @@
+#include "core/dds/discovery.hpp"
+
+#include <algorithm>
+
+namespace invar::dds {
+
+namespace {
+constexpr std::size_t alarms_kept = 1000;
+}
+
+void Discovery::add_participant(const std::string& id, const std::string& name) {
+  const std::lock_guard lock{mutex_};
+  participants_[id] = name;
+  for (auto& [key, endpoint] : endpoints_)
+    if (key.starts_with(id)) endpoint.participant = name;
+}
+
+void Discovery::remove_participant(const std::string& id) {
+  const std::lock_guard lock{mutex_};
+  participants_.erase(id);
+  std::erase_if(endpoints_,
+                [&id](const auto& entry) { return !entry.second.is_local && entry.first.starts_with(id); });
+}
+
+void Discovery::add_endpoint(Endpoint endpoint) {
+  const std::lock_guard lock{mutex_};
+  if (endpoint.participant.empty()) {
+    const auto known = std::find_if(participants_.begin(), participants_.end(),
+                                    [&](const auto& entry) { return endpoint.id.starts_with(entry.first); });
+    endpoint.participant = known != participants_.end() ? known->second : "an unnamed participant";
+  }
+  const auto old = endpoints_.find(endpoint.id);
+  if (old != endpoints_.end()) {
+    // Another participant of this node sees our endpoints as foreign ones; and news may come repeatedly.
+    if (endpoint.is_local == old->second.is_local) old->second = std::move(endpoint);
+    if (old->second.is_local || !endpoint.is_local) return;
+    endpoints_.erase(old);
+  }
+  for (const auto& [id, other] : endpoints_)
+    if (other.topic == endpoint.topic && other.is_writer != endpoint.is_writer &&
+        (other.is_local || endpoint.is_local))
+      check(endpoint, other);
+  endpoints_.emplace(endpoint.id, std::move(endpoint));
+}
+
+void Discovery::remove_endpoint(const std::string& id) {
+  const std::lock_guard lock{mutex_};
+  endpoints_.erase(id);
+}
+
+void Discovery::check(const Endpoint& one, const Endpoint& other) {
+  const Endpoint& writer = one.is_writer ? one : other;
+  const Endpoint& reader = one.is_writer ? other : one;
+  std::string why;
+  if (writer.type != reader.type) why = "type: writer sends " + writer.type + ", reader takes " + reader.type;
+  for (const auto& mismatch : mismatches(writer.qos, reader.qos))
+    why += (why.empty() ? "" : "; ") + mismatch.text();
+  if (why.empty()) return;
+  if (alarms_.size() == alarms_kept) alarms_.pop_front();
+  alarms_.push_back({one.topic, "no samples flow from " + writer.participant + " to " + reader.participant +
+                                    " on `" + one.topic + "`: " + why});
+}
+
+void Discovery::raise(Alarm alarm) {
+  const std::lock_guard lock{mutex_};
+  if (alarms_.size() == alarms_kept) alarms_.pop_front();
+  alarms_.push_back(std::move(alarm));
+}
+
+Snapshot Discovery::snapshot() const {
+  const std::lock_guard lock{mutex_};
+  Snapshot out;
+  for (const auto& [id, name] : participants_) out.participants.push_back({id, name});
+  for (const auto& [id, endpoint] : endpoints_) out.endpoints.push_back(endpoint);
+  return out;
+}
+
+std::vector<Alarm> Discovery::take_alarms() {
+  const std::lock_guard lock{mutex_};
+  std::vector<Alarm> out{alarms_.begin(), alarms_.end()};
+  alarms_.clear();
+  return out;
+}
+
+std::string Discovery::participant_name(const std::string& id) const {
+  const std::lock_guard lock{mutex_};
+  const auto found = participants_.find(id);
+  return found == participants_.end() ? "" : found->second;
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,65 @@
+// Discovery: who is there, which topics they write and read, and which of our ends they cannot talk to.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/dds/profile.hpp"
+
+namespace invar::dds {
+
+struct Endpoint {
+  std::string id;           // GUID as text
+  std::string participant;  // its participant's name, "invar/<cell>/<process>" for ours
+  std::string topic;
+  std::string type;
+  bool is_writer = false;
+  bool is_local = false;  // of this node
+  Profile qos;
+};
+
+struct ParticipantInfo {
+  std::string id;  // GUID prefix as text
+  std::string name;
+};
+
+struct Snapshot {
+  std::vector<ParticipantInfo> participants;
+  std::vector<Endpoint> endpoints;
+};
+
+/// Something about the transport that a person should know.
+struct Alarm {
+  std::string topic;
+  std::string text;
+};
+
+/// What the participants of one node know. Any thread.
+class Discovery {
+ public:
+  void add_participant(const std::string& id, const std::string& name);
+  void remove_participant(const std::string& id);
+  /// A new endpoint of ours or a foreign one. Every pair of one of ours and one of anybody on the same topic
+  /// is checked; one that cannot match raises an alarm that names both ends and the policy, once.
+  void add_endpoint(Endpoint endpoint);
+  void remove_endpoint(const std::string& id);
+  void raise(Alarm alarm);
+
+  [[nodiscard]] Snapshot snapshot() const;
+  /// The alarms since the last call, oldest first.
+  [[nodiscard]] std::vector<Alarm> take_alarms();
+  [[nodiscard]] std::string participant_name(const std::string& id) const;
+
+ private:
+  void check(const Endpoint& one, const Endpoint& other);
+
+  mutable std::mutex mutex_;
+  std::map<std::string, std::string> participants_;
+  std::map<std::string, Endpoint> endpoints_;
+  std::deque<Alarm> alarms_;
+};
+
+}  // namespace invar::dds

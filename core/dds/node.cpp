@@ -1,0 +1,169 @@
+#include "core/dds/node.hpp"
+
+#include <ctime>
+#include <mutex>
+
+#include "core/base/contract.hpp"
+#include "core/base/fault.hpp"
+#include "core/component/component.hpp"
+#include "core/dds/connection.hpp"
+#include "core/dds/publishing.hpp"
+#include "core/dds/raw_type.hpp"
+
+namespace invar::dds {
+
+Instant monotonic_now() {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return {now.tv_sec * 1'000'000'000 + now.tv_nsec};
+}
+
+std::string topic_name(const std::string& cell, const std::string& component, const std::string& port) {
+  return "cell/" + cell + "/" + component + "/" + port;
+}
+
+namespace {
+
+const WireType& wire_type_of(std::type_index type, const std::string& topic) {
+  const WireType* found = WireTypes::all().find(type);
+  if (found == nullptr)
+    throw InputError{"topic `" + topic + "`",
+                     std::string{"carries a type that no IDL describes ("} + type.name() + ")",
+                     "add it to idl/, or register it with add_wire_type"};
+  return *found;
+}
+
+struct BoundOutput {
+  std::unique_ptr<WriterConnection> connection;
+  std::unique_ptr<Outlet> outlet;
+};
+
+}  // namespace
+
+struct Node::Parts {
+  NodeOptions options;
+  Profiles profiles;
+  Discovery discovery;
+  std::mutex mutex;  // set-up only
+  std::unique_ptr<Participant> realtime, general, raw;
+  std::vector<BoundOutput> outputs;
+  std::vector<std::unique_ptr<Connection>> inputs;
+  Publishing realtime_publishing, general_publishing;
+
+  Participant& participant(Traffic traffic) {
+    const std::lock_guard lock{mutex};
+    auto& participant = traffic == Traffic::realtime ? realtime : general;
+    if (!participant) participant = std::make_unique<Participant>(options, traffic, profiles, discovery);
+    return *participant;
+  }
+  Participant& raw_participant() {
+    const std::lock_guard lock{mutex};
+    if (!raw) raw = std::make_unique<Participant>(options, Traffic::general, profiles, discovery);
+    return *raw;
+  }
+  Publishing& publishing(Traffic traffic) {
+    return traffic == Traffic::realtime ? realtime_publishing : general_publishing;
+  }
+};
+
+Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Parts>()} {
+  parts_->options = std::move(options);
+  parts_->profiles = std::move(profiles);
+  (void)parts_->participant(Traffic::general);  // discovery begins
+}
+
+Node::~Node() { stop(); }
+
+const NodeOptions& Node::options() const { return parts_->options; }
+
+const Profile& Node::profile(std::string_view name) const {
+  const auto found = parts_->profiles.find(name);
+  INVAR_EXPECTS(found != parts_->profiles.end(), name);
+  return found->second;
+}
+
+void Node::bind(OutputPort& port, OutputBinding binding) {
+  const Profile& qos = profile(port.profile);
+  const WireType& type = wire_type_of(port.type(), port.topic);
+  BoundOutput bound;
+  bound.connection =
+      std::make_unique<WriterConnection>(parts_->participant(qos.traffic), port.topic, type, qos);
+  if (binding.period.ns == 0) {
+    bound.outlet = type.attach_direct(port, bound.connection->writer(), binding.separation);
+  } else {
+    // Room for a tenth of a second in which the publishing thread does not get to run.
+    const auto capacity =
+        static_cast<std::size_t>(std::max<std::int64_t>(64, 400'000'000 / binding.period.ns));
+    bound.outlet = type.attach_paced(port, bound.connection->writer(), capacity, binding.separation);
+    parts_->publishing(qos.traffic).add(*bound.outlet, binding.period);
+  }
+  parts_->outputs.push_back(std::move(bound));
+}
+
+void Node::bind(InputPort& port, Clock clock) {
+  const Profile& qos = profile(port.profile);
+  const WireType& type = wire_type_of(port.type(), port.topic);
+  // An input wants the latest only: reading instead of taking costs the receiving thread no allocation.
+  const bool keep = qos.traffic == Traffic::realtime && !qos.keep_all && qos.depth == 1;
+  std::shared_ptr<Inlet> inlet = type.attach(port, keep);
+  parts_->inputs.push_back(std::make_unique<ReaderConnection>(
+      parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
+      [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }));
+}
+
+void Node::end_of_cycle(Instant start) noexcept {
+  parts_->realtime_publishing.end_of_cycle(start);
+  parts_->general_publishing.end_of_cycle(start);
+}
+
+void Node::start() {
+  parts_->realtime_publishing.start(parts_->options.realtime_priority);
+  parts_->general_publishing.start(0);
+}
+
+void Node::stop() {
+  parts_->realtime_publishing.stop();
+  parts_->general_publishing.stop();
+  parts_->inputs.clear();
+}
+
+std::unique_ptr<Connection> Node::raw_reader(const std::string& topic, const std::string& type,
+                                             const Profile& profile,
+                                             std::function<void(const RawSample&)> take, bool keyed) {
+  return std::make_unique<ReaderConnection>(parts_->raw_participant(), topic, new RawType{type, keyed},
+                                            profile, parts_->discovery, raw_receiver(std::move(take)));
+}
+
+std::unique_ptr<Connection> Node::raw_writer(const std::string& topic, const std::string& type,
+                                             const Profile& profile) {
+  return std::make_unique<RawWriterConnection>(parts_->raw_participant(), topic, type, profile);
+}
+
+Snapshot Node::snapshot() const { return parts_->discovery.snapshot(); }
+std::vector<Alarm> Node::take_alarms() { return parts_->discovery.take_alarms(); }
+Discovery& Node::discovery() { return parts_->discovery; }
+
+std::uint64_t Node::lost() const {
+  std::uint64_t sum = 0;
+  for (const auto& output : parts_->outputs) sum += output.outlet->lost();
+  for (const auto& input : parts_->inputs) sum += input->lost();
+  return sum;
+}
+
+std::unique_ptr<Connection> Node::make_writer(const std::string& topic, std::type_index type,
+                                              const Profile& profile) {
+  return std::make_unique<WriterConnection>(parts_->participant(profile.traffic), topic,
+                                            wire_type_of(type, topic), profile);
+}
+
+std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::type_index type,
+                                              const Profile& profile, std::function<void(const void*)> take) {
+  const WireType& wire = wire_type_of(type, topic);
+  std::shared_ptr<Inlet> inlet =
+      wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, false);
+  return std::make_unique<ReaderConnection>(
+      parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,
+      [inlet](fdds::DataReader& reader) { inlet->receive(reader, monotonic_now()); });
+}
+
+}  // namespace invar::dds

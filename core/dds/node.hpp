@@ -1,0 +1,147 @@
+// Node: how one process takes part in a cell - its participants, its ports on their topics, and typed or raw
+// writing and reading for tools.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <typeindex>
+#include <vector>
+
+#include "core/component/port.hpp"
+#include "core/dds/discovery.hpp"
+#include "core/dds/profile.hpp"
+
+namespace invar::dds {
+
+struct NodeOptions {
+  std::string cell;
+  std::string process;  // name of this process or tool; participants are "invar/<cell>/<process>"
+  std::uint32_t domain = 0;
+  /// Addresses of this host that may carry the cell's traffic; empty: all of its interfaces.
+  std::vector<std::string> addresses;
+  bool shared_memory = true;
+  /// Of the general participant [bytes]; a sample may take half of it.
+  std::uint32_t segment_size = 16U << 20U;
+  /// SCHED_FIFO priority of the middleware's threads that carry real-time traffic; 0: the usual scheduling.
+  int realtime_priority = 0;
+};
+
+/// How the samples of an output come from its loop to the middleware.
+struct OutputBinding {
+  /// Zero: the thread that writes calls the middleware itself (workers). Otherwise the loop's period: samples
+  /// pass a ring, and a thread that keeps time with the loop publishes them.
+  Duration period;
+  /// The least time between two samples on the wire; those between are left out. Zero: every sample.
+  Duration separation;
+};
+
+/// Where a raw sample came from.
+struct RawSample {
+  std::span<const std::byte> cdr;  // with its encapsulation; valid during the call
+  std::int64_t sent_ns = 0;        // source timestamp, UTC since 1970
+  std::uint64_t sequence = 0;      // counts the writer's samples from 1: a gap is a loss
+  std::string_view writer;         // GUID as text
+};
+
+using Clock = std::function<Instant()>;
+/// CLOCK_MONOTONIC.
+[[nodiscard]] Instant monotonic_now();
+
+[[nodiscard]] std::string topic_name(const std::string& cell, const std::string& component,
+                                     const std::string& port);
+
+/// Keeps a writer or reader alive; the node must outlive it.
+class Connection {
+ public:
+  virtual ~Connection() = default;
+  /// Foreign ends that are connected with this one now.
+  [[nodiscard]] virtual std::size_t matched() const = 0;
+  /// Samples lost on this side. Any thread.
+  [[nodiscard]] virtual std::uint64_t lost() const = 0;
+  /// Writers: a sample of the type that the connection was made for; false when the middleware refuses it.
+  virtual bool write(const void* sample) = 0;
+  /// Writers: waits until all reliable readers have everything; false when that took longer.
+  virtual bool wait_for_acknowledgments(Duration patience) = 0;
+};
+
+template <class T>
+class Writer {
+ public:
+  explicit Writer(std::unique_ptr<Connection> connection) : connection_{std::move(connection)} {}
+  bool write(const T& sample) { return connection_->write(&sample); }
+  [[nodiscard]] Connection& connection() const { return *connection_; }
+
+ private:
+  std::unique_ptr<Connection> connection_;
+};
+
+class Node {
+ public:
+  Node(NodeOptions options, Profiles profiles);
+  ~Node();
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+  [[nodiscard]] const NodeOptions& options() const;
+  /// Precondition: there is one of that name; deployments are checked before.
+  [[nodiscard]] const Profile& profile(std::string_view name) const;
+
+  /// Set-up, before the loop runs: joins a port to its topic with its profile. The node must outlive all
+  /// writing to the port, and the port must outlive the node or `stop`. Throws InputError when the topic is
+  /// in use with another type or nobody registered the port's type.
+  void bind(OutputPort& port, OutputBinding binding);
+  void bind(InputPort& port, Clock clock = monotonic_now);
+  /// By the executor, after each cycle, with the cycle's nominal start: everything of it was written.
+  /// Real-time. Optional; the publishing thread then never looks in the middle of a cycle.
+  void end_of_cycle(Instant start) noexcept;
+  /// Starts the publishing threads of ports bound with a period. Discovery and receiving begin with `bind`.
+  void start();
+  /// Publishes what is left and stops the threads. Readers of ports are removed: nothing arrives any more.
+  void stop();
+
+  /// Typed writing from any thread of the caller.
+  template <class T>
+  [[nodiscard]] Writer<T> writer(const std::string& topic, std::string_view profile_name) {
+    return Writer<T>{make_writer(topic, typeid(T), profile(profile_name))};
+  }
+  /// Typed reading; `take` is called on a thread of the middleware and must not create or remove anything
+  /// here.
+  template <class T>
+  [[nodiscard]] std::unique_ptr<Connection> reader(const std::string& topic, std::string_view profile_name,
+                                                   std::function<void(const T&)> take) {
+    return make_reader(topic, typeid(T), profile(profile_name), [take = std::move(take)](const void* sample) {
+      take(*static_cast<const T*>(sample));
+    });
+  }
+  /// Bytes as they travel, whatever the type; for recorders and for looking at foreign topics. Uses a
+  /// participant of its own, since a type can be known to a participant in one form only.
+  [[nodiscard]] std::unique_ptr<Connection> raw_reader(const std::string& topic, const std::string& type,
+                                                       const Profile& profile,
+                                                       std::function<void(const RawSample&)> take,
+                                                       bool keyed = true);
+  /// Writes CDR bytes with encapsulation: `write` takes a pointer to a std::span<const std::byte>.
+  [[nodiscard]] std::unique_ptr<Connection> raw_writer(const std::string& topic, const std::string& type,
+                                                       const Profile& profile);
+
+  /// What was discovered so far; a full picture takes about a second after the node was made.
+  [[nodiscard]] Snapshot snapshot() const;
+  /// The alarms since the last call.
+  [[nodiscard]] std::vector<Alarm> take_alarms();
+  [[nodiscard]] Discovery& discovery();
+  /// Samples lost by all ports of this node. Any thread.
+  [[nodiscard]] std::uint64_t lost() const;
+
+ private:
+  std::unique_ptr<Connection> make_writer(const std::string& topic, std::type_index type,
+                                          const Profile& profile);
+  std::unique_ptr<Connection> make_reader(const std::string& topic, std::type_index type,
+                                          const Profile& profile, std::function<void(const void*)> take);
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace invar::dds

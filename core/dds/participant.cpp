@@ -1,0 +1,218 @@
+#include "core/dds/participant.hpp"
+
+#include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
+#include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+#include <pthread.h>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+
+#include <sstream>
+
+#include "core/base/contract.hpp"
+#include "core/base/fault.hpp"
+#include "core/dds/qos.hpp"
+
+namespace invar::dds {
+
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::types::ReturnCode_t;
+
+namespace {
+
+template <class T>
+std::string as_text(const T& value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+/// The library's threads inherit policy and priority of the thread that creates the participant.
+class Priority {
+ public:
+  explicit Priority(int priority) {
+    if (priority <= 0) return;
+    pthread_getschedparam(pthread_self(), &policy_, &parameters_);
+    sched_param raised{};
+    raised.sched_priority = priority;
+    // Where it is not allowed the executor's own request is not either, and its status says so.
+    changed_ = pthread_setschedparam(pthread_self(), SCHED_FIFO, &raised) == 0;
+  }
+  ~Priority() {
+    if (changed_) pthread_setschedparam(pthread_self(), policy_, &parameters_);
+  }
+  Priority(const Priority&) = delete;
+  Priority& operator=(const Priority&) = delete;
+
+ private:
+  bool changed_ = false;
+  int policy_ = 0;
+  sched_param parameters_{};
+};
+
+fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
+                                           Traffic traffic, const Profiles& profiles) {
+  namespace transport = eprosima::fastdds::rtps;
+  fdds::DomainParticipantQos qos;
+  qos.name(name);
+  qos.transport().use_builtin_transports = false;
+  const bool realtime = traffic == Traffic::realtime;
+  if (options.shared_memory) {
+    auto shm = std::make_shared<transport::SharedMemTransportDescriptor>();
+    // A segment holds several of the largest samples, or samples of that size are lost or slow.
+    shm->segment_size(realtime ? 2U << 20U : options.segment_size);
+    shm->max_message_size(realtime ? 65'500 : options.segment_size / 2);
+    shm->port_queue_capacity(1024);
+    qos.transport().user_transports.push_back(shm);
+  }
+  auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = options.addresses;
+  udp->non_blocking_send = realtime;
+  udp->sendBufferSize = udp->receiveBufferSize = realtime ? 1U << 20U : 8U << 20U;
+  qos.transport().user_transports.push_back(udp);
+  qos.transport().listen_socket_buffer_size = realtime ? 1U << 20U : 8U << 20U;
+  qos.transport().send_socket_buffer_size = realtime ? 1U << 20U : 8U << 20U;
+
+  // A process that was killed is gone for others after 5 s; announcements in the first second are quick.
+  auto& discovery = qos.wire_protocol().builtin.discovery_config;
+  discovery.leaseDuration = {5, 0};
+  discovery.leaseDuration_announcementperiod = {1, 500'000'000};
+  discovery.initial_announcements.count = 10;
+  discovery.initial_announcements.period = {0, 50'000'000};
+  // Nobody asks for types over the wire: the IDL is the contract.
+  qos.wire_protocol().builtin.typelookup_config.use_client = false;
+  qos.wire_protocol().builtin.typelookup_config.use_server = false;
+
+  for (const auto& [key, profile] : profiles) {
+    if (profile.flow == 0 || profile.traffic != traffic) continue;
+    auto flow = std::make_shared<transport::FlowControllerDescriptor>();
+    flow->name = profile.name.c_str();
+    flow->period_ms = 10;
+    flow->max_bytes_per_period = static_cast<std::int32_t>(profile.flow / 100);
+    qos.flow_controllers().push_back(flow);
+  }
+  return qos;
+}
+
+}  // namespace
+
+Participant::Participant(const NodeOptions& options, Traffic traffic, const Profiles& profiles,
+                         Discovery& discovery)
+    : discovery_{discovery}, name_{"invar/" + options.cell + "/" + options.process} {
+  if (traffic == Traffic::realtime) name_ += "/realtime";
+  // Between two components of a process that an executor did not join, samples go the same way as between
+  // processes: a writer never runs a reader's listener.
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+
+  const Priority priority{traffic == Traffic::realtime ? options.realtime_priority : 0};
+  participant_ = fdds::DomainParticipantFactory::get_instance()->create_participant(
+      options.domain, participant_qos(options, name_, traffic, profiles), this, fdds::StatusMask::none());
+  if (participant_ == nullptr)
+    throw InputError{"domain " + std::to_string(options.domain), "Fast DDS could not create a participant",
+                     "check that the host's address is one of this PC's, and that /dev/shm has room"};
+  discovery_.add_participant(as_text(participant_->guid().guidPrefix), name_);
+}
+
+Participant::~Participant() {
+  participant_->set_listener(nullptr);
+  participant_->delete_contained_entities();
+  fdds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+fdds::Topic* Participant::topic(const std::string& name, fdds::TopicDataType* type) {
+  const fdds::TypeSupport support{type};
+  const std::string type_name = support.get_type_name();
+  if (participant_->find_type(type_name).empty()) support.register_type(participant_);
+  if (auto* known = participant_->lookup_topicdescription(name)) {
+    if (known->get_type_name() != type_name)
+      throw InputError{"topic `" + name + "`", "is of type " + known->get_type_name() + ", not " + type_name,
+                       "connect ports of one type only"};
+    return dynamic_cast<fdds::Topic*>(known);
+  }
+  fdds::Topic* made = participant_->create_topic(name, type_name, fdds::TOPIC_QOS_DEFAULT);
+  if (made == nullptr)
+    throw InputError{"topic `" + name + "`", "Fast DDS refuses it", "names have at most 255 characters"};
+  return made;
+}
+
+fdds::Publisher* Participant::publisher(const std::vector<std::string>& partitions) {
+  auto& made = publishers_[partitions];
+  if (made == nullptr) {
+    fdds::PublisherQos qos;
+    for (const auto& name : partitions) qos.partition().push_back(name.c_str());
+    made = participant_->create_publisher(qos);
+  }
+  return made;
+}
+
+fdds::Subscriber* Participant::subscriber(const std::vector<std::string>& partitions) {
+  auto& made = subscribers_[partitions];
+  if (made == nullptr) {
+    fdds::SubscriberQos qos;
+    for (const auto& name : partitions) qos.partition().push_back(name.c_str());
+    made = participant_->create_subscriber(qos);
+  }
+  return made;
+}
+
+fdds::DataWriter& Participant::create_writer(const std::string& name, fdds::TopicDataType* type,
+                                             const Profile& profile, fdds::DataWriterListener* listener) {
+  const std::lock_guard lock{mutex_};
+  fdds::Topic* on = topic(name, type);
+  auto* writer = publisher(profile.partitions)->create_datawriter(on, writer_qos(profile), listener);
+  INVAR_EXPECTS(writer != nullptr, name, profile.name);  // the profile was checked when it was read
+  discovery_.add_endpoint({as_text(writer->guid()), name_, name, on->get_type_name(), true, true, profile});
+  return *writer;
+}
+
+fdds::DataReader& Participant::create_reader(const std::string& name, fdds::TopicDataType* type,
+                                             const Profile& profile, fdds::DataReaderListener* listener) {
+  const std::lock_guard lock{mutex_};
+  fdds::Topic* on = topic(name, type);
+  auto* reader = subscriber(profile.partitions)->create_datareader(on, reader_qos(profile), listener);
+  INVAR_EXPECTS(reader != nullptr, name, profile.name);
+  discovery_.add_endpoint({as_text(reader->guid()), name_, name, on->get_type_name(), false, true, profile});
+  return *reader;
+}
+
+void Participant::remove(fdds::DataWriter& writer) {
+  const std::lock_guard lock{mutex_};
+  discovery_.remove_endpoint(as_text(writer.guid()));
+  const_cast<fdds::Publisher*>(writer.get_publisher())->delete_datawriter(&writer);  // NOLINT
+}
+
+void Participant::remove(fdds::DataReader& reader) {
+  const std::lock_guard lock{mutex_};
+  discovery_.remove_endpoint(as_text(reader.guid()));
+  const_cast<fdds::Subscriber*>(reader.get_subscriber())->delete_datareader(&reader);  // NOLINT
+}
+
+void Participant::on_participant_discovery(fdds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) {
+  const std::string id = as_text(info.info.m_guid.guidPrefix);
+  if (info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+      info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT)
+    discovery_.remove_participant(id);
+  else
+    discovery_.add_participant(id, info.info.m_participantName.c_str());
+}
+
+void Participant::on_publisher_discovery(fdds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) {
+  const std::string id = as_text(info.info.guid());
+  if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) return discovery_.remove_endpoint(id);
+  discovery_.add_endpoint({id, "", info.info.topicName().c_str(), info.info.typeName().c_str(), true, false,
+                           described(info.info.m_qos)});
+}
+
+void Participant::on_subscriber_discovery(fdds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& info) {
+  const std::string id = as_text(info.info.guid());
+  if (info.status == rtps::ReaderDiscoveryInfo::REMOVED_READER) return discovery_.remove_endpoint(id);
+  discovery_.add_endpoint({id, "", info.info.topicName().c_str(), info.info.typeName().c_str(), false, false,
+                           described(info.info.m_qos)});
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,63 @@
+// Participant: one participant of Fast DDS - its transports, its topics, what it discovers.
+#pragma once
+
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "core/dds/discovery.hpp"
+#include "core/dds/node.hpp"
+#include "core/dds/profile.hpp"
+
+namespace invar::dds {
+
+namespace fdds = eprosima::fastdds::dds;
+
+class Participant final : private fdds::DomainParticipantListener {
+ public:
+  /// Throws InputError when Fast DDS refuses, for instance an address that this PC does not have.
+  Participant(const NodeOptions& options, Traffic traffic, const Profiles& profiles, Discovery& discovery);
+  ~Participant() override;
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+
+  /// The type support goes to the participant, which keeps the first of each name. Set-up only, not in
+  /// listeners.
+  fdds::DataWriter& create_writer(const std::string& topic, fdds::TopicDataType* type, const Profile& profile,
+                                  fdds::DataWriterListener* listener = nullptr);
+  fdds::DataReader& create_reader(const std::string& topic, fdds::TopicDataType* type, const Profile& profile,
+                                  fdds::DataReaderListener* listener);
+  void remove(fdds::DataWriter& writer);
+  void remove(fdds::DataReader& reader);
+
+ private:
+  fdds::Topic* topic(const std::string& name, fdds::TopicDataType* type);
+  fdds::Publisher* publisher(const std::vector<std::string>& partitions);
+  fdds::Subscriber* subscriber(const std::vector<std::string>& partitions);
+
+  void on_participant_discovery(fdds::DomainParticipant*,
+                                eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
+  void on_publisher_discovery(fdds::DomainParticipant*,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
+  void on_subscriber_discovery(fdds::DomainParticipant*,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+
+  Discovery& discovery_;
+  std::string name_;
+  fdds::DomainParticipant* participant_ = nullptr;
+  std::mutex mutex_;
+  std::map<std::vector<std::string>, fdds::Publisher*> publishers_;
+  std::map<std::vector<std::string>, fdds::Subscriber*> subscribers_;
+};
+
+}  // namespace invar::dds

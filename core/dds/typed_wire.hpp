@@ -1,0 +1,177 @@
+// TypedWire: the WireType of one C++ type and its generated type support. Only where types are registered.
+#pragma once
+
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+
+#include <mutex>
+
+#include "core/dds/type.hpp"
+#include "core/dds/wire_type.hpp"
+
+namespace invar::dds {
+
+namespace fdds = eprosima::fastdds::dds;
+using eprosima::fastrtps::types::ReturnCode_t;
+
+/// The generated code takes void*, though it only reads.
+template <class T>
+bool write_sample(fdds::DataWriter& writer, const T& sample) {
+  return writer.write(const_cast<T*>(&sample));  // NOLINT
+}
+
+/// Leaves out cycles that come too soon after the last one sent; all samples of one cycle share its fate.
+class Thinning {
+ public:
+  explicit Thinning(Duration separation) : separation_{separation} {}
+  bool passes(Instant now) noexcept {
+    if (separation_.ns == 0 || now == last_) return true;
+    if (last_.ns != INT64_MIN && now - last_ + Duration::microseconds(1) < separation_) return false;
+    last_ = now;
+    return true;
+  }
+
+ private:
+  Duration separation_;
+  Instant last_{INT64_MIN};
+};
+
+template <class T>
+class PacedOutlet final : public Outlet {
+ public:
+  PacedOutlet(Output<T>& port, fdds::DataWriter& writer, std::size_t capacity, Duration separation)
+      : writer_{writer}, ring_{capacity}, thinning_{separation} {
+    port.add_sink([this](const T& sample, Instant now) {
+      if (!thinning_.passes(now)) return;
+      newest_ns_.store(now.ns, std::memory_order_relaxed);
+      ring_.push(sample);
+    });
+  }
+  std::size_t drain() override {
+    std::size_t count = 0;
+    for (; ring_.pop(sample_); ++count)
+      if (!write_sample(writer_, sample_)) refused_.fetch_add(1, std::memory_order_relaxed);
+    return count;
+  }
+  [[nodiscard]] std::uint64_t lost() const override {
+    return ring_.lost() + refused_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] Instant newest() const override { return {newest_ns_.load(std::memory_order_relaxed)}; }
+
+ private:
+  fdds::DataWriter& writer_;
+  Ring<T> ring_;
+  T sample_;
+  Thinning thinning_;
+  std::atomic<std::int64_t> newest_ns_{INT64_MIN};
+  std::atomic<std::uint64_t> refused_{0};
+};
+
+template <class T>
+class DirectOutlet final : public Outlet {
+ public:
+  DirectOutlet(Output<T>& port, fdds::DataWriter& writer, Duration separation) : thinning_{separation} {
+    port.add_sink([this, &writer](const T& sample, Instant now) {
+      if (thinning_.passes(now) && !write_sample(writer, sample))
+        refused_.fetch_add(1, std::memory_order_relaxed);
+    });
+  }
+  std::size_t drain() override { return 0; }
+  [[nodiscard]] std::uint64_t lost() const override { return refused_.load(std::memory_order_relaxed); }
+  [[nodiscard]] Instant newest() const override { return {INT64_MIN}; }
+
+ private:
+  Thinning thinning_;
+  std::atomic<std::uint64_t> refused_{0};
+};
+
+/// Several threads of the middleware (one a transport) may call; the port wants one at a time.
+template <class T, class B>
+class TypedInlet final : public Inlet {
+ public:
+  TypedInlet(Sink<T> sink, bool keep) : sink_{std::move(sink)}, keep_{keep} {}
+
+  void receive(fdds::DataReader& reader, Instant now) override {
+    const std::lock_guard lock{mutex_};
+    fdds::SampleInfo info;
+    while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
+           ReturnCode_t::RETCODE_OK)
+      if (info.valid_data) sink_(sample_, now);
+  }
+
+  bool deliver(std::span<const std::byte> cdr, Instant now) override {
+    const std::lock_guard lock{mutex_};
+    eprosima::fastrtps::rtps::SerializedPayload_t payload;
+    payload.data =
+        reinterpret_cast<eprosima::fastrtps::rtps::octet*>(const_cast<std::byte*>(cdr.data()));  // NOLINT
+    payload.length = payload.max_size = static_cast<std::uint32_t>(cdr.size());
+    const bool good = type_.deserialize(&payload, &sample_);
+    payload.data = nullptr;  // not ours to free
+    if (good) sink_(sample_, now);
+    return good;
+  }
+
+ private:
+  std::mutex mutex_;
+  Sink<T> sink_;
+  bool keep_;
+  T sample_;
+  Type<B> type_;
+};
+
+template <class T, class B>
+class TypedWire final : public WireType {
+ public:
+  [[nodiscard]] std::string name() const override { return Type<B>{}.getName(); }
+  [[nodiscard]] std::type_index index() const override { return typeid(T); }
+  [[nodiscard]] fdds::TopicDataType* make_support() const override {
+    auto* type = new Type<B>;            // NOLINT: Fast DDS takes it over
+    type->auto_fill_type_object(false);  // Cyclone DDS would refuse the endpoint
+    type->auto_fill_type_information(false);
+    return type;
+  }
+
+  [[nodiscard]] std::unique_ptr<Outlet> attach_paced(OutputPort& port, fdds::DataWriter& writer,
+                                                     std::size_t capacity,
+                                                     Duration separation) const override {
+    return std::make_unique<PacedOutlet<T>>(static_cast<Output<T>&>(port), writer, capacity, separation);
+  }
+  [[nodiscard]] std::unique_ptr<Outlet> attach_direct(OutputPort& port, fdds::DataWriter& writer,
+                                                      Duration separation) const override {
+    return std::make_unique<DirectOutlet<T>>(static_cast<Output<T>&>(port), writer, separation);
+  }
+  void attach_cdr(OutputPort& port, CdrSink sink) const override {
+    auto type = std::make_shared<Type<B>>();
+    auto payload = std::make_shared<eprosima::fastrtps::rtps::SerializedPayload_t>();
+    static_cast<Output<T>&>(port).add_sink([type, payload, sink = std::move(sink)](const T& sample, Instant) {
+      void* data = const_cast<T*>(&sample);  // NOLINT
+      payload->reserve(type->getSerializedSizeProvider(data)());
+      if (type->serialize(data, payload.get()))
+        sink({reinterpret_cast<const std::byte*>(payload->data), payload->length});
+    });
+  }
+  [[nodiscard]] std::unique_ptr<Inlet> attach(InputPort& port, bool keep) const override {
+    if (port.direction() == Port::Direction::inbox)
+      return std::make_unique<TypedInlet<T, B>>(static_cast<Inbox<T>&>(port).add_lane(), keep);
+    auto* input = &static_cast<Input<T>&>(port);
+    return std::make_unique<TypedInlet<T, B>>(
+        [input](const T& sample, Instant now) { input->accept(sample, now); }, keep);
+  }
+  [[nodiscard]] std::unique_ptr<Inlet> attach(SampleSink sink, bool keep) const override {
+    return std::make_unique<TypedInlet<T, B>>(
+        [sink = std::move(sink)](const T& sample, Instant now) { sink(&sample, now); }, keep);
+  }
+  bool write(fdds::DataWriter& writer, const void* sample) const override {
+    return write_sample(writer, *static_cast<const T*>(sample));
+  }
+};
+
+/// For an out-of-tree library with IDL of its own: add_wire_type<plant::Thing, plant::ThingPubSubType>().
+/// within_bounds must be found for T, as list_types.py writes it.
+template <class T, class B>
+void add_wire_type() {
+  WireTypes::all().add(std::make_unique<TypedWire<T, B>>());
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,93 @@
+// WireType: all that the transport must know of one type, so that the rest of this room knows none.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <typeindex>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/component/port.hpp"
+
+namespace eprosima::fastdds::dds {
+class DataReader;
+class DataWriter;
+class TopicDataType;
+}  // namespace eprosima::fastdds::dds
+
+namespace invar::dds {
+
+/// The samples of one output on their way to the middleware.
+class Outlet {
+ public:
+  virtual ~Outlet() = default;
+  /// Writes what the loop left in the ring; returns how many. Not on the loop's thread.
+  virtual std::size_t drain() = 0;
+  /// Samples lost: the ring was full, or the middleware refused them. Any thread.
+  [[nodiscard]] virtual std::uint64_t lost() const = 0;
+  /// The cycle start of the newest sample written, for pacing. Any thread.
+  [[nodiscard]] virtual Instant newest() const = 0;
+};
+
+/// The samples of one input as they arrive.
+class Inlet {
+ public:
+  virtual ~Inlet() = default;
+  /// Hands over all new samples of the reader. On a thread of the middleware.
+  virtual void receive(eprosima::fastdds::dds::DataReader& reader, Instant now) = 0;
+  /// Hands over one sample in CDR (with encapsulation); false when it is malformed.
+  virtual bool deliver(std::span<const std::byte> cdr, Instant now) = 0;
+};
+
+/// Takes the CDR (with encapsulation) of each sample that an output writes, on the writer's thread.
+using CdrSink = std::function<void(std::span<const std::byte> cdr)>;
+/// Takes a received sample; it lives until the call returns.
+using SampleSink = std::function<void(const void* sample, Instant now)>;
+
+class WireType {
+ public:
+  virtual ~WireType() = default;
+  [[nodiscard]] virtual std::string name() const = 0;
+  [[nodiscard]] virtual std::type_index index() const = 0;
+  /// A type support to register; the caller owns it.
+  [[nodiscard]] virtual eprosima::fastdds::dds::TopicDataType* make_support() const = 0;
+
+  /// Through a ring of `capacity` samples that `drain` empties: nothing of the middleware on the writer's
+  /// thread. Cycles that begin less than `separation` after the last one sent are left out.
+  [[nodiscard]] virtual std::unique_ptr<Outlet> attach_paced(OutputPort& port,
+                                                             eprosima::fastdds::dds::DataWriter& writer,
+                                                             std::size_t capacity,
+                                                             Duration separation) const = 0;
+  /// Straight to the middleware, on the thread that writes.
+  [[nodiscard]] virtual std::unique_ptr<Outlet> attach_direct(OutputPort& port,
+                                                              eprosima::fastdds::dds::DataWriter& writer,
+                                                              Duration separation) const = 0;
+  virtual void attach_cdr(OutputPort& port, CdrSink sink) const = 0;
+  /// `keep`: samples stay in the reader's history (`read`), which costs no allocation; otherwise they are
+  /// taken.
+  [[nodiscard]] virtual std::unique_ptr<Inlet> attach(InputPort& port, bool keep) const = 0;
+  [[nodiscard]] virtual std::unique_ptr<Inlet> attach(SampleSink sink, bool keep) const = 0;
+
+  virtual bool write(eprosima::fastdds::dds::DataWriter& writer, const void* sample) const = 0;
+};
+
+/// The types of idl/, and those that an out-of-tree library adds before the node is made.
+class WireTypes {
+ public:
+  static WireTypes& all();
+  void add(std::unique_ptr<WireType> type);
+  /// nullptr: unknown.
+  [[nodiscard]] const WireType* find(std::type_index index) const;
+  [[nodiscard]] const WireType* find(std::string_view name) const;
+  [[nodiscard]] std::vector<std::string> names() const;
+
+ private:
+  WireTypes();
+  std::vector<std::unique_ptr<WireType>> types_;
+};
+
+}  // namespace invar::dds
