@@ -21,6 +21,7 @@ ROOMS = {
     "core/numerics": ["core/base", "Eigen", "Ceres"],
     "core/metrology": ["core/base", "core/numerics", "Eigen", "Ceres"],
     "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "yaml-cpp", "Eigen"],
+    "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen"],
     "core/component": ["core/base", "core/config", "idl"],
     "core/executor": ["core/base", "core/config", "core/component", "idl"],
@@ -29,8 +30,8 @@ ROOMS = {
     "core/recording": ["core/base", "idl", "compression", "nlohmann-json"],
     "tools": None,  # everything
 }
-COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/physics",
-             "core/modbus", "idl", "Eigen", "yaml-cpp"]
+COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/compensation",
+             "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
 MORE_FOR = {"vision": ["OpenCV"], "calibration": ["OpenCV", "core/recording"], "recorder": ["core/recording", "core/dds"],
             "supervisor": ["core/dds"]}
 

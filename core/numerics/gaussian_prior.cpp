@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/base/contract.hpp"
+
 namespace invar::numerics {
 
 NormalEquations NormalEquations::of(const Eigen::Ref<const Eigen::MatrixXd>& rows,
@@ -26,25 +28,48 @@ NormalEquations NormalEquations::of(const Eigen::Ref<const Eigen::MatrixXd>& row
   return sums;
 }
 
-Posterior posterior(const NormalEquations& data, const Eigen::Ref<const Eigen::MatrixXd>& prior_factor,
+Posterior posterior(const NormalEquations& data, const std::vector<Eigen::MatrixXd>& prior_factors,
                     double noise, bool with_covariance) {
   const double precision = 1.0 / (noise * noise);
-  const Eigen::MatrixXd lower = prior_factor.triangularView<Eigen::Lower>();
-  Eigen::MatrixXd h = lower.transpose() * (precision * data.gram) * lower;
+  const Eigen::Index size = data.gram.rows();
+  Eigen::MatrixXd h(size, size);  // lower part only
+  Eigen::VectorXd b(size);
+  Eigen::Index row = 0;
+  for (const Eigen::MatrixXd& left : prior_factors) {
+    Eigen::Index column = 0;
+    for (const Eigen::MatrixXd& right : prior_factors) {
+      if (column > row) break;
+      const Eigen::MatrixXd inner =
+          data.gram.block(row, column, left.rows(), right.rows()) * right.triangularView<Eigen::Lower>();
+      const Eigen::MatrixXd whitened = left.transpose().triangularView<Eigen::Upper>() * inner;
+      h.block(row, column, left.rows(), right.rows()) = precision * whitened;
+      column += right.rows();
+    }
+    b.segment(row, left.rows()) = precision * (left.transpose() * data.moment.segment(row, left.rows()));
+    row += left.rows();
+  }
+  INVAR_EXPECTS(row == size, row, size);
   h.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> llt{h};
-  const Eigen::VectorXd b = precision * (lower.transpose() * data.moment);
   const Eigen::VectorXd z = llt.solve(b);
   Posterior result;
-  result.mean = lower * z;
   const double log_det = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
   result.log_evidence =
       -0.5 * (precision * data.energy - b.dot(z) + log_det +
               data.readings * std::log(2.0 * std::numbers::pi * noise * noise) - data.log_weight);
   if (llt.info() != Eigen::Success || !std::isfinite(result.log_evidence))
     result.log_evidence = -std::numeric_limits<double>::infinity();
+  Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(with_covariance ? size : 0, with_covariance ? size : 0);
+  result.mean.resize(size);
+  row = 0;
+  for (const Eigen::MatrixXd& factor : prior_factors) {
+    result.mean.segment(row, factor.rows()) = factor * z.segment(row, factor.rows());
+    if (with_covariance)
+      whole.block(row, row, factor.rows(), factor.rows()) = factor.triangularView<Eigen::Lower>();
+    row += factor.rows();
+  }
   if (with_covariance) {
-    const Eigen::MatrixXd half = llt.matrixL().solve(Eigen::MatrixXd(lower.transpose()));
+    const Eigen::MatrixXd half = llt.matrixL().solve(Eigen::MatrixXd(whole.transpose()));
     result.covariance = half.transpose() * half;
   }
   return result;

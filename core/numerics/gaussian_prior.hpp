@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <vector>
 
 namespace invar::numerics {
 
@@ -25,9 +26,9 @@ struct Posterior {
   double log_evidence = 0.0;   // log p(y | prior, noise), all constants in
 };
 
-/// theta = L z, z ~ N(0, I): the prior covariance is L L'. Whitening keeps the problem well conditioned
-/// however flat the prior is. O(M^3).
-Posterior posterior(const NormalEquations& data, const Eigen::Ref<const Eigen::MatrixXd>& prior_factor,
+/// theta = L z, z ~ N(0, I): the prior covariance is L L', L lower triangular, block diagonal in the given
+/// order. Whitening keeps the problem well conditioned however flat the prior is. O(M^3).
+Posterior posterior(const NormalEquations& data, const std::vector<Eigen::MatrixXd>& prior_factors,
                     double noise, bool with_covariance);
 
 /// Matern covariance of smoothness 5/2 at distance r, unit variance: once-differentiable curvature, hence

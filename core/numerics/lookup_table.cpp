@@ -1,22 +1,36 @@
 #include "core/numerics/lookup_table.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/contract.hpp"
 
 namespace invar::numerics {
 
 template <std::size_t D>
+std::size_t LookupTable<D>::prepare() {
+  std::size_t total = 1;
+  for (std::size_t d = 0; d < D; ++d) {
+    INVAR_EXPECTS(axes_[d].count >= 1 && axes_[d].range.width() >= 0.0, axes_[d].count);
+    const double width = axes_[d].range.width();
+    inverse_[d] = width > 0.0 ? static_cast<double>(axes_[d].count - 1) / width : 0.0;
+    total *= axes_[d].count;
+  }
+  return total;
+}
+
+template <std::size_t D>
+LookupTable<D>::LookupTable(const std::array<GridAxis, D>& axes, std::vector<double> values)
+    : axes_{axes}, values_{std::move(values)} {
+  const std::size_t total = prepare();
+  INVAR_EXPECTS(values_.size() == total, values_.size(), total);
+}
+
+template <std::size_t D>
 LookupTable<D>::LookupTable(const std::array<GridAxis, D>& axes,
                             const std::function<double(const Point&)>& function)
     : axes_{axes} {
-  std::size_t total = 1;
-  for (std::size_t d = 0; d < D; ++d) {
-    INVAR_EXPECTS(axes[d].count >= 1 && axes[d].range.width() >= 0.0, axes[d].count);
-    const double width = axes[d].range.width();
-    inverse_[d] = width > 0.0 ? static_cast<double>(axes[d].count - 1) / width : 0.0;
-    total *= axes[d].count;
-  }
+  const std::size_t total = prepare();
   values_.resize(total);
   for (std::size_t k = 0; k < total; ++k) {
     Point x;

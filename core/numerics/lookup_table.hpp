@@ -27,6 +27,8 @@ class LookupTable {
 
   LookupTable() = default;
   LookupTable(const std::array<GridAxis, D>& axes, const std::function<double(const Point&)>& function);
+  /// From values in order, first axis fastest; as many as the product of the counts.
+  LookupTable(const std::array<GridAxis, D>& axes, std::vector<double> values);
 
   [[nodiscard]] double operator()(const Point& x) const noexcept {
     std::size_t corner = 0;
@@ -49,6 +51,7 @@ class LookupTable {
 
   [[nodiscard]] std::size_t size() const { return values_.size(); }
   [[nodiscard]] const std::array<GridAxis, D>& axes() const { return axes_; }
+  [[nodiscard]] const std::vector<double>& values() const { return values_; }
 
  private:
   template <std::size_t K>
@@ -62,6 +65,8 @@ class LookupTable {
       return low + fraction[K - 1] * (high - low);
     }
   }
+
+  std::size_t prepare();  // fills inverse_, returns the number of nodes
 
   std::array<GridAxis, D> axes_{};
   std::array<double, D> inverse_{};

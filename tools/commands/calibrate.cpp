@@ -10,6 +10,7 @@ void add_calibrate(CLI::App& program) {
       program.add_subcommand("calibrate", "Identify an error from measurements and write its compensation");
   group->require_subcommand(1);
   group->footer("Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result");
+  add_calibrate_thermal(*group);
 }
 
 }  // namespace invar::tools

@@ -14,4 +14,8 @@ namespace invar::tools {
 /// file.
 using Predict = recording::Table (*)(const config::Yaml& model, const recording::Table& inputs);
 
+// One file each: tools/commands/calibrate_KIND.cpp. The first adds the subcommand to the group.
+void add_calibrate_thermal(CLI::App& group);
+recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
+
 }  // namespace invar::tools

@@ -12,7 +12,9 @@ namespace invar::tools {
 namespace {
 
 const std::map<std::string, Predict>& kinds() {
-  static const std::map<std::string, Predict> table{};
+  static const std::map<std::string, Predict> table{
+      {"thermal", predict_thermal},
+  };
   return table;
 }
 

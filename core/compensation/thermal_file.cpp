@@ -1,0 +1,93 @@
+#include "core/compensation/thermal_file.hpp"
+
+namespace invar::compensation {
+
+using metrology::ThermalError;
+using metrology::ThermalTerm;
+
+void write_thermal(ModelText& text, const ThermalError& model) {
+  text.comment("lengths m, temperatures degC, rates K/s; error = actual minus commanded position")
+      .open("range")
+      .range("x", model.x)
+      .range("temperature", model.temperature)
+      .range("heating_rate", model.heating_rate)
+      .close()
+      .number("lag", model.lag)
+      .number("noise", model.noise)
+      .comment("how fast the value may leave its end outside the ranges: per m, per K, per K/s")
+      .open("slope")
+      .number("x", model.slope_x)
+      .number("temperature", model.slope_temperature)
+      .number("heating_rate", model.slope_rate)
+      .close()
+      .open_list("terms");
+  for (const ThermalTerm& term : model.terms)
+    text.item()
+        .text("factor", name_of(term.factor))
+        .number("first", term.first)
+        .number("spacing", term.spacing)
+        .integer("centres", term.weights.rows())
+        .numbers("weights", Eigen::VectorXd{term.weights.reshaped()});
+  text.close().open("sigma");
+  const auto& axes = model.sigma_table.axes();
+  text.numbers("counts",
+               std::vector<double>{static_cast<double>(axes[0].count), static_cast<double>(axes[1].count),
+                                   static_cast<double>(axes[2].count)})
+      .numbers("values", model.sigma_table.values())
+      .close();
+}
+
+namespace {
+
+/// A range that may have no width (a temperature that never varied).
+Range range_of(const config::Node& node) {
+  const auto ends = exactly(node, 2, "1");
+  if (ends[1] < ends[0]) node.fault("its upper end lies below its lower one");
+  return {ends[0], std::max(ends[0], ends[1])};
+}
+
+}  // namespace
+
+ThermalError read_thermal(const config::Node& root) {
+  ThermalError model;
+  const auto range = root.required("range");
+  model.x = range_of(range.required("x"));
+  model.temperature = range_of(range.required("temperature"));
+  model.heating_rate = range_of(range.required("heating_rate"));
+  model.lag = root.number("lag", "s", Range::not_negative());
+  model.noise = root.number("noise", "m", Range::not_negative());
+  const auto slope = root.required("slope");
+  model.slope_x = slope.number("x", "1", Range::not_negative());
+  model.slope_temperature = slope.number("temperature", "1", Range::not_negative());
+  model.slope_rate = slope.number("heating_rate", "1", Range::not_negative());
+  for (const auto& node : root.required("terms").children()) {
+    ThermalTerm term;
+    const auto factor = metrology::thermal_factor(node.text("factor"));
+    if (!factor) {
+      node["factor"].fault("is no factor of a thermal term");
+      continue;
+    }
+    term.factor = *factor;
+    term.first = node.number("first", "m");
+    term.spacing = node.number("spacing", "m", Range::positive());
+    const auto centres = node.integer("centres", 1, 10'000);
+    const int factors = metrology::factor_count(term.factor);
+    const auto weights = exactly(node.required("weights"), static_cast<std::size_t>(centres * factors), "m");
+    term.weights = Eigen::Map<const Eigen::MatrixXd>(weights.data(), centres, factors);
+    model.terms.push_back(std::move(term));
+  }
+  const auto sigma = root.required("sigma");
+  const auto counts = exactly(sigma.required("counts"), 3, "1");
+  std::array<numerics::GridAxis, 3> axes;
+  const std::array<Range, 3> ranges{model.x, model.temperature, model.heating_rate};
+  std::size_t total = 1;
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double count = Range{1.0, 1000.0}.clamp(counts[d]);
+    axes[d] = {ranges[d], static_cast<std::size_t>(count)};
+    total *= axes[d].count;
+  }
+  model.sigma_table = numerics::LookupTable<3>{axes, exactly(sigma.required("values"), total, "m")};
+  return model;
+}
+
+}  // namespace invar::compensation

@@ -1,0 +1,223 @@
+#include "core/metrology/thermal_error.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "core/base/contract.hpp"
+
+namespace invar::metrology {
+
+namespace {
+
+constexpr int curve_centres = 5;
+constexpr double curve_spacing = 0.6;  // of the scaled input: centres at -1.2 .. 1.2, width one spacing
+
+constexpr std::pair<ThermalFactor, const char*> names[] = {
+    {ThermalFactor::geometry, "geometry"},
+    {ThermalFactor::temperature, "temperature"},
+    {ThermalFactor::temperature_curve, "temperature_curve"},
+    {ThermalFactor::rate, "rate"},
+    {ThermalFactor::rate_temperature, "rate_temperature"},
+    {ThermalFactor::rate_curve, "rate_curve"},
+    {ThermalFactor::hysteresis, "hysteresis"},
+    {ThermalFactor::direction, "direction"}};
+
+double curve(double scaled, int k) noexcept {
+  const double z = scaled / curve_spacing - (k - curve_centres / 2);
+  return std::exp(-0.5 * z * z);
+}
+
+/// The value of one factor; `tau` and `rho` are held to their ranges already.
+double factor_value(ThermalFactor factor, int k, double tau, double rho, double direction) noexcept {
+  switch (factor) {
+    case ThermalFactor::geometry:
+      return 1.0;
+    case ThermalFactor::temperature:
+      return tau;
+    case ThermalFactor::temperature_curve:
+      return curve(tau, k);
+    case ThermalFactor::rate:
+      return rho;
+    case ThermalFactor::rate_temperature:
+      return rho * tau;
+    case ThermalFactor::rate_curve:
+      return curve(rho, k);
+    case ThermalFactor::hysteresis:
+      return std::tanh(rho / 0.05);
+    case ThermalFactor::direction:
+      return direction;
+  }
+  return 0.0;
+}
+
+double scaled_temperature(const Range& range, double temperature) noexcept {
+  const double half = 0.5 * range.width();
+  return half > 0.0 ? (range.clamp(temperature) - range.lower - half) / half : 0.0;
+}
+
+double scaled_rate(const Range& range, double rate) noexcept {
+  const double size = std::max(std::abs(range.lower), std::abs(range.upper));
+  return range.width() > 0.0 && size > 0.0 ? range.clamp(rate) / size : 0.0;
+}
+
+double network(const ThermalTerm& term, double x, Eigen::Index factor) {
+  double sum = 0.0;
+  for (Eigen::Index k = 0; k < term.weights.rows(); ++k) {
+    const double z = (x - term.first) / term.spacing - static_cast<double>(k);
+    sum += term.weights(k, factor) * std::exp(-0.5 * z * z);
+  }
+  return sum / std::sqrt(2.0 * std::numbers::pi);
+}
+
+}  // namespace
+
+std::string name_of(ThermalFactor factor) {
+  for (const auto& [value, name] : names)
+    if (value == factor) return name;
+  return {};
+}
+
+std::optional<ThermalFactor> thermal_factor(const std::string& name) {
+  for (const auto& [value, text] : names)
+    if (name == text) return value;
+  return std::nullopt;
+}
+
+int factor_count(ThermalFactor factor) {
+  return factor == ThermalFactor::temperature_curve || factor == ThermalFactor::rate_curve ? curve_centres
+                                                                                           : 1;
+}
+
+Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model, const ThermalState& at,
+                              double direction) {
+  const double tau = scaled_temperature(model.temperature, at.temperature);
+  const double rho = scaled_rate(model.heating_rate, at.heating_rate);
+  const double x = model.x.clamp(at.x);
+  const Eigen::Index centres = term.weights.rows();
+  const int factors = factor_count(term.factor);
+  Eigen::VectorXd columns(centres * factors);
+  for (Eigen::Index k = 0; k < centres; ++k) {
+    const double z = (x - term.first) / term.spacing - static_cast<double>(k);
+    const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+    for (int f = 0; f < factors; ++f)
+      columns(f * centres + k) = phi * factor_value(term.factor, f, tau, rho, direction);
+  }
+  return columns;
+}
+
+double ThermalError::value(const ThermalState& at) const {
+  double sum = 0.0;
+  for (const ThermalTerm& term : terms)
+    if (term.factor != ThermalFactor::direction)
+      sum += thermal_basis(term, *this, at).dot(term.weights.reshaped());
+  return sum;
+}
+
+double ThermalError::sigma(const ThermalState& at) const {
+  const double within = sigma_table({at.x, at.temperature, at.heating_rate});
+  return std::hypot(std::hypot(within, slope_x * (at.x - x.clamp(at.x))),
+                    std::hypot(slope_temperature * (at.temperature - temperature.clamp(at.temperature)),
+                               slope_rate * (at.heating_rate - heating_rate.clamp(at.heating_rate))));
+}
+
+bool ThermalError::inside(const ThermalState& at) const {
+  const bool rate_known = heating_rate.width() > 0.0;
+  return x.contains(at.x) && temperature.contains(at.temperature) &&
+         (!rate_known || heating_rate.contains(at.heating_rate));
+}
+
+CompiledThermalError::CompiledThermalError(const ThermalError& model, double most_difference)
+    : x_{model.x},
+      temperature_{model.temperature},
+      heating_rate_{model.heating_rate},
+      slope_x_{model.slope_x},
+      slope_temperature_{model.slope_temperature},
+      slope_rate_{model.slope_rate},
+      sigma_table_{model.sigma_table} {
+  INVAR_EXPECTS(most_difference > 0.0, most_difference);
+  // |d2/dx2| of a network is at most sum |w| / (spacing^2 sqrt(2 pi)); factors are at most 1 in size.
+  double curvature = 0.0;
+  for (const ThermalTerm& term : model.terms)
+    if (term.factor != ThermalFactor::direction)
+      curvature +=
+          term.weights.cwiseAbs().sum() / (term.spacing * term.spacing * std::sqrt(2.0 * std::numbers::pi));
+  const double intervals = std::ceil(x_.width() * std::sqrt(curvature / (8.0 * most_difference)));
+  nodes_ = static_cast<std::size_t>(std::clamp(intervals, 1.0, 20000.0)) + 1;
+  const double step = x_.width() / static_cast<double>(nodes_ - 1);
+  inverse_step_ = step > 0.0 ? 1.0 / step : 0.0;
+  bound_ = curvature * step * step / 8.0;
+  for (const ThermalTerm& term : model.terms) {
+    if (term.factor == ThermalFactor::direction) continue;
+    for (int f = 0; f < factor_count(term.factor); ++f) {
+      layout_.push_back({term.factor, f, columns_.size()});
+      for (std::size_t i = 0; i < nodes_; ++i)
+        columns_.push_back(network(term, x_.lower + step * static_cast<double>(i), f));
+    }
+  }
+  values_.assign(nodes_, 0.0);
+  sigmas_.assign(nodes_, 0.0);
+  set(0.5 * (temperature_.lower + temperature_.upper), 0.0);
+}
+
+void CompiledThermalError::set(double temperature, double heating_rate) noexcept {
+  const double tau = scaled_temperature(temperature_, temperature);
+  const double rho = scaled_rate(heating_rate_, heating_rate);
+  std::fill(values_.begin(), values_.end(), 0.0);
+  for (const Column& column : layout_) {
+    const double factor = factor_value(column.factor, column.index, tau, rho, 0.0);
+    for (std::size_t i = 0; i < nodes_; ++i) values_[i] += factor * columns_[column.begin + i];
+  }
+  const double beyond_t = slope_temperature_ * (temperature - temperature_.clamp(temperature));
+  const double beyond_r = slope_rate_ * (heating_rate - heating_rate_.clamp(heating_rate));
+  outside_squared_ = beyond_t * beyond_t + beyond_r * beyond_r;
+  const bool rate_known = heating_rate_.width() > 0.0;
+  inside_ = temperature_.contains(temperature) && (!rate_known || heating_rate_.contains(heating_rate));
+  for (std::size_t i = 0; i < nodes_; ++i) {
+    const double x = x_.lower + x_.width() * static_cast<double>(i) / static_cast<double>(nodes_ - 1);
+    sigmas_[i] = sigma_table_({x, temperature, heating_rate});
+  }
+}
+
+double CompiledThermalError::value(double x) const noexcept {
+  double at = (x - x_.lower) * inverse_step_;
+  const double last = static_cast<double>(nodes_ - 1);
+  at = at > 0.0 ? (at < last ? at : last) : 0.0;
+  const auto cell = std::min(static_cast<std::size_t>(at), nodes_ - 2);
+  const double fraction = at - static_cast<double>(cell);
+  return values_[cell] + fraction * (values_[cell + 1] - values_[cell]);
+}
+
+double CompiledThermalError::sigma(double x) const noexcept {
+  double at = (x - x_.lower) * inverse_step_;
+  const double last = static_cast<double>(nodes_ - 1);
+  at = at > 0.0 ? (at < last ? at : last) : 0.0;
+  const auto cell = std::min(static_cast<std::size_t>(at), nodes_ - 2);
+  const double fraction = at - static_cast<double>(cell);
+  const double within = sigmas_[cell] + fraction * (sigmas_[cell + 1] - sigmas_[cell]);
+  const double beyond = slope_x_ * (x - x_.clamp(x));
+  return std::sqrt(within * within + beyond * beyond + outside_squared_);
+}
+
+Eigen::VectorXd lagged_temperature(const Eigen::Ref<const Eigen::VectorXd>& time,
+                                   const Eigen::Ref<const Eigen::VectorXd>& temperature, double tau) {
+  INVAR_EXPECTS(time.size() == temperature.size() && tau > 0.0, time.size(), temperature.size(), tau);
+  Eigen::VectorXd lagged(time.size());
+  if (time.size() == 0) return lagged;
+  lagged(0) = temperature(0);
+  for (Eigen::Index i = 1; i < time.size(); ++i) {
+    const double dt = time(i) - time(i - 1);
+    if (dt <= 0.0) {
+      lagged(i) = lagged(i - 1);
+      continue;
+    }
+    // T(t) = T0 + s t over the step: Tm = T0 + s (t - tau) + (Tm0 - T0 + s tau) exp(-t / tau).
+    const double slope = (temperature(i) - temperature(i - 1)) / dt;
+    lagged(i) = temperature(i) - slope * tau +
+                (lagged(i - 1) - temperature(i - 1) + slope * tau) * std::exp(-dt / tau);
+  }
+  return lagged;
+}
+
+}  // namespace invar::metrology

@@ -1,0 +1,115 @@
+// Thermal error: how far an axis is off at a position, a temperature and a heating rate.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/numerics/lookup_table.hpp"
+
+namespace invar::metrology {
+
+/// Where the error is asked for. SI; temperature in degC, rate in K/s.
+struct ThermalState {
+  double x = 0.0;
+  double temperature = 0.0;
+  double heating_rate = 0.0;
+};
+
+/// The factor by which a term's network over x is multiplied; tau is the temperature scaled to [-1, 1] over
+/// its range, rho the heating rate scaled by its largest size.
+enum class ThermalFactor {
+  geometry,           // 1
+  temperature,        // tau: expansion, linear in temperature
+  temperature_curve,  // Gaussians of tau: the residual surface
+  rate,               // rho: lag of the body behind the sensor, first order
+  rate_temperature,   // rho tau
+  rate_curve,         // Gaussians of rho
+  hysteresis,         // tanh(rho / 0.05): heating against cooling, whatever the rate
+  direction,          // direction of travel; its mean is zero, so it is never predicted
+};
+std::string name_of(ThermalFactor factor);
+std::optional<ThermalFactor> thermal_factor(const std::string& name);
+
+/// sum_k phi((x - first - k spacing) / spacing) / sqrt(2 pi) * (weights.row(k) . factors), a Gaussian network
+/// over x whose width is one spacing (it reproduces a constant to 5e-9).
+struct ThermalTerm {
+  ThermalFactor factor = ThermalFactor::geometry;
+  double first = 0.0;       // centre [m]
+  double spacing = 1.0;     // [m], also the width of the Gaussians
+  Eigen::MatrixXd weights;  // centres x factors [m]
+};
+
+/// The identified error of one axis: actual minus commanded position. Set-up and offline use; the loop
+/// evaluates `CompiledThermalError`. Held at the end of each range outside it; sigma grows there by the
+/// slopes.
+struct ThermalError {
+  std::vector<ThermalTerm> terms;
+  Range x;             // [m]
+  Range temperature;   // [degC]
+  Range heating_rate;  // [K/s]; empty width: rate unknown or constant
+  double lag = 0.0;    // time constant of the body behind the sensor [s]; 0: no lag state
+  double noise = 0.0;  // of one reading [m]
+  // How fast the value may leave its end outside: [m/m], [m/K], [m/(K/s)].
+  double slope_x = 0.0;
+  double slope_temperature = 0.0;
+  double slope_rate = 0.0;
+  numerics::LookupTable<3> sigma_table;  // standard deviation inside: x, temperature, rate -> [m]
+
+  /// With `lag`, `at.temperature` is the lagged one, T - lag * rate in a steady ramp.
+  [[nodiscard]] double value(const ThermalState& at) const;
+  [[nodiscard]] double sigma(const ThermalState& at) const;
+  [[nodiscard]] bool inside(const ThermalState& at) const;
+};
+
+/// The columns of a term at a state: activations of its centres times its factors, in the order of
+/// `weights.reshaped()`.
+Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model, const ThermalState& at,
+                              double direction = 0.0);
+int factor_count(ThermalFactor factor);
+
+/// For the loop: `set` prepares the slow state (a few microseconds, no allocation), `value` and `sigma` cost
+/// a table lookup in x. Real-time.
+class CompiledThermalError {
+ public:
+  /// `most_difference` [m] bounds the difference from the model between the nodes in x.
+  CompiledThermalError(const ThermalError& model, double most_difference);
+
+  void set(double temperature, double heating_rate) noexcept;
+  [[nodiscard]] double value(double x) const noexcept;
+  [[nodiscard]] double sigma(double x) const noexcept;
+  /// False where temperature or rate as set lie outside what was calibrated.
+  [[nodiscard]] bool inside() const noexcept { return inside_; }
+  [[nodiscard]] double bound() const noexcept { return bound_; }
+
+ private:
+  struct Column {
+    ThermalFactor factor;
+    int index;          // of the factor
+    std::size_t begin;  // in columns_
+  };
+  Range x_;
+  Range temperature_;
+  Range heating_rate_;
+  double slope_x_, slope_temperature_, slope_rate_;
+  double bound_ = 0.0;
+  std::size_t nodes_ = 2;
+  double inverse_step_ = 0.0;
+  std::vector<Column> layout_;
+  std::vector<double> columns_;  // each factor's network over x at the nodes
+  std::vector<double> values_;   // at the nodes, for the state as set
+  std::vector<double> sigmas_;
+  numerics::LookupTable<3> sigma_table_;
+  double outside_squared_ = 0.0;
+  bool inside_ = false;
+};
+
+/// The lagged temperature Tm of tau dTm/dt = T - Tm, T linear between readings (exact). Starts in
+/// equilibrium. `time` [s] ascending; `tau` [s] > 0.
+Eigen::VectorXd lagged_temperature(const Eigen::Ref<const Eigen::VectorXd>& time,
+                                   const Eigen::Ref<const Eigen::VectorXd>& temperature, double tau);
+
+}  // namespace invar::metrology

@@ -1,0 +1,51 @@
+// Identification of the thermal error from readings over position, temperature and heating rate.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/metrology/thermal_error.hpp"
+
+namespace invar::metrology {
+
+/// N readings: position [m], temperature [degC], error [m]; where measured the heating rate [K/s], the
+/// direction of travel (+1, -1) and the time [s, ascending]. All finite.
+struct ThermalReadings {
+  Eigen::VectorXd x;
+  Eigen::VectorXd temperature;
+  Eigen::VectorXd error;
+  std::optional<Eigen::VectorXd> heating_rate;
+  std::optional<Eigen::VectorXd> direction;
+  std::optional<Eigen::VectorXd> time;
+};
+
+/// A model that was tried, in the order of trial.
+struct ThermalCandidate {
+  std::string name;
+  double log_evidence = 0.0;  // log p(readings | model), hyperparameters at their best
+  double left_out_rms = 0.0;  // RMS of reading minus prediction without it [m]
+  double lag = 0.0;           // [s], of the lag-state model
+  bool chosen = false;
+  std::string verdict;  // why it was or was not taken
+};
+
+struct ThermalFit {
+  ThermalError model;
+  std::vector<ThermalCandidate> candidates;
+  Eigen::VectorXd predicted;  // of each reading, its direction included [m]
+  Eigen::VectorXd kept;       // 1, or 0 for a reading rejected as outlier
+  double reversal = 0.0;      // mean of forward minus backward [m]
+  std::vector<std::string> unidentified;
+  std::vector<std::string> notes;  // what the user should know, sentences
+};
+
+/// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
+/// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of the
+/// heating rate, hysteresis and a lagged temperature are tried in turn and kept where the log evidence rises
+/// by more than three. Outliers (4.5 standard deviations) are rejected. At least four readings at two
+/// positions.
+ThermalFit identify_thermal(const ThermalReadings& readings);
+
+}  // namespace invar::metrology

@@ -1,0 +1,204 @@
+// Thermistor golden numbers; identification on machines whose truth is known.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/thermistor.hpp"
+
+namespace invar::metrology {
+namespace {
+
+using ::testing::Contains;
+using ::testing::IsEmpty;
+
+TEST(Thermistor, HasTheGoldenResistances) {
+  const Thermistor seed;  // 1 kOhm at 25 degC, a = 4.4
+  EXPECT_NEAR(seed.resistance(20.0), 1250.761, 1e-3);
+  EXPECT_NEAR(seed.resistance(26.8), 924.294, 1e-3);
+  EXPECT_NEAR(seed.resistance(28.5), 858.805, 1e-3);
+  EXPECT_NEAR(seed.resistance(30.0), 805.436, 1e-3);
+  EXPECT_NEAR((seed.resistance(28.55) - seed.resistance(28.45)) / 0.1, -36.9, 0.1);
+  for (double t = -20.0; t < 80.0; t += 7.0) EXPECT_NEAR(seed.temperature(seed.resistance(t)), t, 1e-9);
+}
+
+TEST(Thermistor, IsCalibratedFromReadings) {
+  const Thermistor truth{1013.0, 25.0, 4.1};
+  const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(9, 20.0, 40.0);
+  const Eigen::VectorXd r = t.unaryExpr([&](double at) { return truth.resistance(at); });
+  const ThermistorFit fit = fit_thermistor(t, r);
+  EXPECT_NEAR(fit.thermistor.resistance_at_base, 1013.0, 1e-6);
+  EXPECT_NEAR(fit.thermistor.coefficient_percent, 4.1, 1e-9);
+  EXPECT_LT(fit.rms, 1e-9);
+}
+
+/// A stage with smooth geometry, expansion with curvature, and what else a test asks for.
+struct Stage {
+  std::array<double, 5> geometry{};
+  double expansion = 12e-6;  // [1/K]
+  double curved = 0.15;      // of the expansion, per K
+  double lag = 0.0;          // [m s/(K m)]: error per rate and metre
+  double hysteresis = 0.0;   // [m] at full travel
+  explicit Stage(unsigned seed) {
+    std::mt19937 random{seed};
+    std::normal_distribution<double> normal;
+    for (double& g : geometry) g = 0.7e-6 * normal(random);
+    expansion *= 1.0 + 0.3 * normal(random);
+  }
+  double error(double x, double t, double rate) const {
+    const double dt = t - 27.0;
+    double e = 0.0;
+    for (std::size_t k = 0; k < geometry.size(); ++k)
+      e += geometry[k] *
+           std::sin(std::numbers::pi * static_cast<double>(k + 1) * x / 0.2 + static_cast<double>(k));
+    e -= expansion * (x + 0.01) * dt * (1.0 + curved * (dt - 1.5) * std::cos(8.0 * x));
+    return e + lag * x * rate + hysteresis * x / 0.2 * std::tanh(rate / 1e-4);
+  }
+};
+
+ThermalReadings record(const Stage& stage, unsigned seed, const std::vector<double>& rates, double noise) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  std::vector<double> x, t, e, r, d;
+  for (const double level : {27.0, 28.0, 29.0, 30.0})
+    for (const double rate : rates)
+      for (const double way : {1.0, -1.0})
+        for (int k = 0; k <= 40; ++k) {
+          x.push_back(0.005 * (way > 0.0 ? k : 40 - k));
+          t.push_back(level + 0.03 * normal(random));
+          r.push_back(rate);
+          d.push_back(way);
+          e.push_back(stage.error(x.back(), t.back(), rate) + 0.2e-6 * way + noise * normal(random));
+          if (random() % 100 == 0) e.back() += 20e-6 * normal(random);
+        }
+  const auto vector = [](const std::vector<double>& v) -> Eigen::VectorXd {
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  };
+  ThermalReadings readings{vector(x), vector(t), vector(e), std::nullopt, vector(d), std::nullopt};
+  if (rates.front() != rates.back()) readings.heating_rate = vector(r);
+  return readings;
+}
+
+TEST(ThermalIdentification, FindsTheSurfaceAndKnowsHowWellOverManyStages) {
+  constexpr int stages = 4;
+  int covered = 0;
+  int total = 0;
+  for (unsigned seed = 1; seed <= stages; ++seed) {
+    const Stage stage{seed};
+    const ThermalFit fit = identify_thermal(record(stage, seed, {0.0, 0.0}, 0.3e-6));
+    double squares = 0.0;
+    int count = 0;
+    for (double x = 0.001; x < 0.2; x += 0.004)
+      for (double t = 27.1; t < 30.0; t += 0.37) {
+        const double apart = fit.model.value({x, t, 0.0}) - stage.error(x, t, 0.0);
+        squares += apart * apart;
+        covered += std::abs(apart) <= 2.0 * fit.model.sigma({x, t, 0.0}) ? 1 : 0;
+        ++count;
+      }
+    total += count;
+    EXPECT_LT(std::sqrt(squares / count), 0.12e-6) << "stage " << seed;  // noise 0.3 um, 656 readings
+    EXPECT_NEAR(fit.reversal, 0.4e-6, 0.05e-6);
+    EXPECT_THAT(fit.unidentified, IsEmpty());
+  }
+  EXPECT_GT(static_cast<double>(covered) / total, 0.88);
+  EXPECT_LT(static_cast<double>(covered) / total, 0.999);
+}
+
+TEST(ThermalIdentification, TakesHeatingRateAndHysteresisWhereTheDataShowThem) {
+  Stage stage{11};
+  stage.lag = 4e-3;
+  stage.hysteresis = 0.6e-6;
+  const std::vector<double> rates{-1.5e-3, -7e-4, 0.0, 7e-4, 1.5e-3};
+  const ThermalFit fit = identify_thermal(record(stage, 4, rates, 0.2e-6));
+  double squares = 0.0;
+  int count = 0;
+  for (double x = 0.0; x <= 0.2; x += 0.01)
+    for (const double rate : {-1.2e-3, -3e-4, 4e-4, 1.3e-3}) {
+      squares += std::pow(fit.model.value({x, 28.6, rate}) - stage.error(x, 28.6, rate), 2);
+      ++count;
+    }
+  EXPECT_LT(std::sqrt(squares / count), 0.15e-6);
+
+  const ThermalFit plain = identify_thermal(record(Stage{12}, 5, rates, 0.2e-6));
+  for (const auto& candidate : plain.candidates) {
+    if (candidate.chosen) {
+      EXPECT_EQ(candidate.name, "position and temperature");
+    }
+  }
+}
+
+TEST(ThermalIdentification, HoldsTheValueOutsideAndLetsSigmaGrow) {
+  const ThermalFit fit = identify_thermal(record(Stage{2}, 2, {0.0, 0.0}, 0.3e-6));
+  const Range& range = fit.model.temperature;
+  EXPECT_DOUBLE_EQ(fit.model.value({0.15, range.upper + 3.0, 0.0}),
+                   fit.model.value({0.15, range.upper, 0.0}));
+  const double edge = fit.model.sigma({0.15, range.upper, 0.0});
+  EXPECT_GT(fit.model.sigma({0.15, range.upper + 1.0, 0.0}), 2.0 * edge);
+  EXPECT_GT(fit.model.sigma({0.15, range.upper + 4.0, 0.0}),
+            3.0 * fit.model.sigma({0.15, range.upper + 1.0, 0.0}));
+  EXPECT_FALSE(fit.model.inside({0.15, range.upper + 0.1, 0.0}));
+}
+
+TEST(ThermalIdentification, SaysThatOneTemperatureTellsNothingOfOthers) {
+  ThermalReadings readings = record(Stage{3}, 3, {0.0, 0.0}, 0.3e-6);
+  readings.temperature.setConstant(27.0);
+  const ThermalFit fit = identify_thermal(readings);
+  EXPECT_THAT(fit.unidentified, Contains("temperature dependence"));
+  EXPECT_GT(fit.model.sigma({0.1, 28.0, 0.0}), 1e-6);
+}
+
+TEST(ThermalIdentification, FindsTheTimeConstantOfABodyThatLags) {
+  // Section 9: fast cycles, tau 600 s, 12 um/(m K) over 0.2 m, 27 to 30 degC.
+  const Stage stage{5};
+  std::vector<double> time, temperature;
+  for (double at = 0.0; at < 14'400.0; at += 10.0) {
+    time.push_back(at);
+    temperature.push_back(28.5 + 0.9 * std::sin(at / 400.0) + 0.6 * std::sin(at / 1300.0 + 1.0));
+  }
+  const auto n = static_cast<Eigen::Index>(time.size());
+  const Eigen::Map<const Eigen::VectorXd> t{time.data(), n};
+  const Eigen::Map<const Eigen::VectorXd> measured{temperature.data(), n};
+  const Eigen::VectorXd body = lagged_temperature(t, measured, 600.0);
+  std::mt19937 random{9};
+  std::normal_distribution<double> normal;
+  ThermalReadings readings{Eigen::VectorXd(n), measured,     Eigen::VectorXd(n),
+                           std::nullopt,       std::nullopt, Eigen::VectorXd(t)};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    readings.x(i) = 0.005 * static_cast<double>(i % 82 < 41 ? i % 82 : 81 - i % 82);
+    readings.error(i) = stage.error(readings.x(i), body(i), 0.0) + 0.2e-6 * normal(random);
+  }
+  const ThermalFit fit = identify_thermal(readings);
+  EXPECT_NEAR(fit.model.lag, 600.0, 60.0);
+}
+
+TEST(LaggedTemperature, IsExactForARamp) {
+  const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(7, 0.0, 3000.0);
+  const Eigen::VectorXd lagged = lagged_temperature(t, 20.0 + (t.array() * 1e-3), 400.0);
+  for (Eigen::Index i = 0; i < 7; ++i)
+    EXPECT_NEAR(lagged(i), 20.0 + 1e-3 * (t(i) - 400.0 * (1.0 - std::exp(-t(i) / 400.0))), 1e-12);
+}
+
+TEST(CompiledThermalError, StaysWithinItsBoundOfTheModel) {
+  Stage stage{11};
+  stage.lag = 4e-3;
+  const ThermalFit fit = identify_thermal(record(stage, 4, {-1.5e-3, 0.0, 1.5e-3}, 0.2e-6));
+  CompiledThermalError compiled{fit.model, 5e-9};
+  EXPECT_LE(compiled.bound(), 5e-9);
+  double worst = 0.0;
+  for (const double t : {26.0, 27.3, 28.9, 31.0})
+    for (const double rate : {-1e-3, 0.0, 2e-3}) {
+      compiled.set(t, rate);
+      for (double x = -0.01; x < 0.21; x += 1.7e-3) {
+        worst = std::max(worst, std::abs(compiled.value(x) - fit.model.value({x, t, rate})));
+        EXPECT_NEAR(compiled.sigma(x), fit.model.sigma({x, t, rate}), 0.05 * compiled.sigma(x));
+        EXPECT_EQ(compiled.inside() && x >= 0.0 && x <= 0.2, fit.model.inside({x, t, rate}));
+      }
+    }
+  EXPECT_LE(worst, compiled.bound());
+}
+
+}  // namespace
+}  // namespace invar::metrology

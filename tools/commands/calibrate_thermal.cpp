@@ -1,0 +1,352 @@
+// `invar calibrate thermal`: the error of an axis over position, temperature and heating rate.
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <set>
+
+#include "core/compensation/thermal_file.hpp"
+#include "core/metrology/thermal_identification.hpp"
+#include "tools/commands/calibrate.hpp"
+#include "tools/commands/calibration_result.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::ThermalFit;
+using metrology::ThermalReadings;
+using report::number;
+using report::si;
+
+Eigen::VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+double rms(const Eigen::VectorXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(values.size(), 1)));
+}
+
+ThermalReadings read_readings(const recording::Table& table) {
+  const auto column = [&](const char* name, const char* unit, double largest) {
+    const auto values = table.in(name, unit);
+    expect_finite(table.file, name, values, largest);
+    return vector_of(values);
+  };
+  const auto optional_column = [&](const char* name, const char* unit,
+                                   double largest) -> std::optional<Eigen::VectorXd> {
+    if (!table.has(name)) return std::nullopt;
+    return column(name, unit, largest);
+  };
+  ThermalReadings readings;
+  readings.x = column("x", "m", 1e3);
+  readings.temperature = column("temperature", "degC", 1e4);
+  readings.error = column("error", "m", 1.0);
+  readings.heating_rate = optional_column("heating_rate", "K/s", 1e3);
+  readings.direction = optional_column("direction", "1", 1e3);
+  readings.time = optional_column("t", "s", 1e12);
+  const std::string file = table.file.string();
+  if (readings.x.size() < 8)
+    throw InputError{file, "has too few rows (" + std::to_string(readings.x.size()) + "; 8 at least)",
+                     "record more points over position and temperature"};
+  if (readings.x.maxCoeff() - readings.x.minCoeff() < 1e-9)
+    throw InputError{file + ": column `x`", "all points are at the same position", "record along the travel"};
+  if (readings.time)
+    for (Eigen::Index i = 1; i < readings.time->size(); ++i)
+      if ((*readings.time)(i) < (*readings.time)(i - 1))
+        throw InputError{file + ": column `t`, row " + std::to_string(i + 1), "time runs backwards",
+                         "give the rows in the order of measurement"};
+  return readings;
+}
+
+/// Indices of the readings nearest to a temperature: the third of them closest to it.
+std::vector<Eigen::Index> near(const ThermalReadings& readings, double temperature, double within) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < readings.x.size(); ++i)
+    if (std::abs(readings.temperature(i) - temperature) <= within) rows.push_back(i);
+  return rows;
+}
+
+report::Plot surface_plot(const ThermalFit& fit) {
+  report::Plot plot;
+  plot.title = "Error over position and temperature";
+  plot.x_label = "x [mm]";
+  plot.y_label = "temperature [degC]";
+  report::Series heat;
+  heat.style = report::Series::Style::heat;
+  heat.label = "error [um]";
+  for (int i = 0; i <= 60; ++i)
+    for (int j = 0; j <= 30; ++j) {
+      const double x = fit.model.x.lower + fit.model.x.width() * i / 60.0;
+      const double t = fit.model.temperature.lower + fit.model.temperature.width() * j / 30.0;
+      heat.x.push_back(1e3 * x);
+      heat.y.push_back(t);
+      heat.u.push_back(1e6 * fit.model.value({x, t, 0.0}));
+    }
+  plot.series.push_back(std::move(heat));
+  return plot;
+}
+
+report::Plot levels_plot(const ThermalReadings& readings, const ThermalFit& fit) {
+  report::Plot plot;
+  plot.title = "Readings and model at four temperatures";
+  plot.x_label = "x [mm]";
+  plot.y_label = "error [um]";
+  const char* colours[] = {"#1f6fb4", "#2a9d5c", "#e09f1f", "#d1495b"};
+  const Range& range = fit.model.temperature;
+  for (int level = 0; level < (range.width() > 0.0 ? 4 : 1); ++level) {
+    const double t = range.lower + range.width() * (level + 0.5 * (range.width() <= 0.0)) / 3.0;
+    report::Series points;
+    points.style = report::Series::Style::points;
+    points.colour = colours[level];
+    for (const Eigen::Index i : near(readings, t, std::max(0.12 * range.width(), 1e-9)))
+      if (fit.kept(i) > 0.0) {
+        points.x.push_back(1e3 * readings.x(i));
+        points.y.push_back(1e6 * readings.error(i));
+      }
+    report::Series line;
+    line.label = number(t, 4) + " degC";
+    line.colour = colours[level];
+    report::Series band;
+    band.style = report::Series::Style::band;
+    band.colour = colours[level];
+    for (int k = 0; k <= 200; ++k) {
+      const double x = fit.model.x.lower + fit.model.x.width() * k / 200.0;
+      const double value = fit.model.value({x, t, 0.0});
+      const double sigma = fit.model.sigma({x, t, 0.0});
+      line.x.push_back(1e3 * x);
+      line.y.push_back(1e6 * value);
+      band.x.push_back(1e3 * x);
+      band.y.push_back(1e6 * (value - 2.0 * sigma));
+      band.u.push_back(1e6 * (value + 2.0 * sigma));
+    }
+    plot.series.push_back(std::move(band));
+    plot.series.push_back(std::move(points));
+    plot.series.push_back(std::move(line));
+  }
+  return plot;
+}
+
+/// Figures 3.9 and 3.10 of the seed: what is left with the model of the coldest readings (room temperature),
+/// and with the whole one; along x at mid temperature, and in the order of measurement.
+std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const ThermalFit& fit) {
+  report::Plot fixed;
+  report::Plot varying;
+  const Range& range = fit.model.temperature;
+  fixed.title = "Residual near " + number(range.lower + 0.5 * range.width(), 4) + " degC";
+  fixed.x_label = "x [mm]";
+  varying.title = "Residual over the whole recording";
+  varying.x_label = readings.time ? "t [s]" : "reading";
+  report::Series cold;
+  cold.label = "with the room-temperature model";
+  cold.style = report::Series::Style::points;
+  report::Series whole = cold;
+  whole.label = "with the position-temperature model";
+  report::Series cold_all = cold;
+  report::Series whole_all = whole;
+  const double middle = range.lower + 0.5 * range.width();
+  for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
+    if (fit.kept(i) <= 0.0) continue;
+    const double at_cold = 1e6 * (readings.error(i) - fit.model.value({readings.x(i), range.lower, 0.0}));
+    const double left = 1e6 * (readings.error(i) - fit.predicted(i));
+    const double t = readings.time ? (*readings.time)(i) : static_cast<double>(i);
+    cold_all.x.push_back(t);
+    cold_all.y.push_back(at_cold);
+    whole_all.x.push_back(t);
+    whole_all.y.push_back(left);
+    if (std::abs(readings.temperature(i) - middle) > 0.2 * range.width() + 1e-9) continue;
+    cold.x.push_back(1e3 * readings.x(i));
+    cold.y.push_back(at_cold);
+    whole.x.push_back(1e3 * readings.x(i));
+    whole.y.push_back(left);
+  }
+  fixed.y_label = varying.y_label = "residual [um]";
+  fixed.series = {std::move(cold), std::move(whole)};
+  varying.series = {std::move(cold_all), std::move(whole_all)};
+  return {std::move(fixed), std::move(varying)};
+}
+
+struct Figures {
+  double before = 0.0;  // readings against the model of the coldest temperature
+  double after = 0.0;   // left-out RMS
+  double spread = 0.0;  // peak to peak after
+  double sigma = 0.0;   // mean sigma of the systematic value
+  int rejected = 0;
+};
+
+Figures figures_of(const ThermalReadings& readings, const ThermalFit& fit) {
+  Figures figures;
+  std::vector<double> before;
+  std::vector<double> after;
+  for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
+    if (fit.kept(i) <= 0.0) {
+      ++figures.rejected;
+      continue;
+    }
+    before.push_back(readings.error(i) - fit.model.value({readings.x(i), fit.model.temperature.lower, 0.0}));
+    after.push_back(readings.error(i) - fit.predicted(i));
+    figures.sigma += fit.model.sigma({readings.x(i), readings.temperature(i), 0.0});
+  }
+  figures.sigma /= static_cast<double>(std::max<std::size_t>(after.size(), 1));
+  figures.before = rms(vector_of(before));
+  for (const auto& candidate : fit.candidates)
+    if (candidate.chosen) figures.after = candidate.left_out_rms;
+  const auto [low, high] = std::minmax_element(after.begin(), after.end());
+  figures.spread = after.empty() ? 0.0 : *high - *low;
+  return figures;
+}
+
+report::Page page_of(const std::filesystem::path& file, const ThermalReadings& readings,
+                     const ThermalFit& fit, const Figures& figures) {
+  report::Page page{"Thermal calibration",
+                    file.filename().string() + ", " + std::to_string(readings.x.size()) + " readings"};
+  page.callout("RMS " + si(figures.before, "m") + " with the room-temperature model, " +
+                   si(figures.after, "m") +
+                   " on readings left out of the fit; the systematic error is known to " +
+                   si(figures.sigma, "m") + " (1 sigma)",
+               "good");
+  for (const auto& what : fit.unidentified) page.callout("Not identified: " + what, "warn");
+  for (const auto& note : fit.notes) page.paragraph(note);
+  page.heading("Models tried");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& candidate : fit.candidates)
+    rows.push_back({candidate.name + (candidate.lag > 0.0 ? " (" + number(candidate.lag, 3) + " s)" : ""),
+                    number(candidate.log_evidence, 6), si(candidate.left_out_rms, "m"), candidate.verdict});
+  page.table({"model", "log evidence", "RMS of left-out readings", "verdict"}, rows);
+  page.heading("Error");
+  page.plots({levels_plot(readings, fit), surface_plot(fit)},
+             "Bands are two standard deviations of the curve.");
+  page.heading("Residual");
+  page.plots(residual_plots(readings, fit), "In the form of figures 3.9 and 3.10 of the seed.");
+  report::Plot growth;
+  growth.title = "Standard deviation over temperature";
+  growth.x_label = "temperature [degC]";
+  growth.y_label = "sigma at mid travel [um]";
+  report::Series line;
+  const Range& range = fit.model.temperature;
+  const double margin = std::max(1.0, 0.5 * range.width());
+  for (int k = 0; k <= 200; ++k) {
+    const double t = range.lower - margin + (range.width() + 2.0 * margin) * k / 200.0;
+    line.x.push_back(t);
+    line.y.push_back(1e6 * fit.model.sigma({fit.model.x.lower + 0.5 * fit.model.x.width(), t, 0.0}));
+  }
+  growth.series = {std::move(line)};
+  report::Plot histogram;
+  histogram.title = "Residuals";
+  histogram.x_label = "residual [um]";
+  histogram.y_label = "readings";
+  report::Series bars;
+  bars.style = report::Series::Style::bars;
+  const double width = fit.model.noise * 0.4;
+  for (int k = -12; k <= 12; ++k) {
+    bars.x.push_back(1e6 * width * k);
+    double count = 0.0;
+    for (Eigen::Index i = 0; i < readings.x.size(); ++i)
+      if (std::lround((readings.error(i) - fit.predicted(i)) / width) == k) count += 1.0;
+    bars.y.push_back(count);
+  }
+  histogram.series = {std::move(bars)};
+  page.plots({std::move(growth), std::move(histogram)},
+             "Outside the calibrated temperatures the value is held and its sigma grows with the slope.");
+  return page;
+}
+
+void calibrate(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  const auto table = recording::Table::read(file);
+  const ThermalReadings readings = read_readings(table);
+  const ThermalFit fit = metrology::identify_thermal(readings);
+  const Figures figures = figures_of(readings, fit);
+
+  compensation::ModelText text{"thermal", {file}};
+  compensation::write_thermal(text, fit.model);
+  nlohmann::json report;
+  report["kind"] = "thermal";
+  report["readings"] = readings.x.size();
+  report["rejected"] = figures.rejected;
+  report["noise_m"] = fit.model.noise;
+  report["before_rms_m"] = figures.before;
+  report["after_left_out_rms_m"] = figures.after;
+  report["mean_sigma_m"] = figures.sigma;
+  report["reversal_m"] = fit.reversal;
+  report["unidentified"] = fit.unidentified;
+  report["notes"] = fit.notes;
+  for (const auto& candidate : fit.candidates)
+    report["models"].push_back({{"name", candidate.name},
+                                {"log_evidence", candidate.log_evidence},
+                                {"left_out_rms_m", candidate.left_out_rms},
+                                {"lag_s", candidate.lag},
+                                {"chosen", candidate.chosen},
+                                {"verdict", candidate.verdict}});
+  write_calibration(folder, text, report, page_of(file, readings, fit, figures));
+
+  std::cout << "thermal error from " << readings.x.size() << " readings, " << figures.rejected
+            << " rejected as outliers, noise " << si(fit.model.noise, "m") << '\n';
+  for (const auto& candidate : fit.candidates)
+    std::cout << "  " << candidate.name << ": RMS " << si(candidate.left_out_rms, "m")
+              << " on readings left out; " << candidate.verdict << '\n';
+  std::cout << "RMS " << si(figures.before, "m") << " before, " << si(figures.after, "m")
+            << " after (readings left out); systematic error known to " << si(figures.sigma, "m") << '\n';
+  for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
+  for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
+  std::cout << "wrote " << (folder / "compensation.yaml").string() << ", report.json, report.html\n";
+}
+
+}  // namespace
+
+void add_calibrate_thermal(CLI::App& group) {
+  struct Options {
+    std::filesystem::path recording;
+    std::filesystem::path out;
+  };
+  auto* command = group.add_subcommand("thermal", "Error over position, temperature and heating rate");
+  command->footer("Example: invar calibrate thermal --recording thermal.csv --out result");
+  auto options = std::make_shared<Options>();
+  command
+      ->add_option("--recording", options->recording,
+                   "x [m], temperature [degC], error [m]; optional heating_rate [K/s], direction, t [s]")
+      ->required();
+  command->add_option("--out", options->out, "folder for compensation.yaml, report.json, report.html")
+      ->required();
+  command->callback([options] { calibrate(options->recording, options->out); });
+}
+
+recording::Table predict_thermal(const config::Yaml& file, const recording::Table& inputs) {
+  compensation::check_seal(file);
+  file.root()["identified_from"].accept_all();
+  const metrology::ThermalError model = compensation::read_thermal(file.root());
+  file.finish();
+  const auto x = inputs.in("x", "m");
+  auto temperature = inputs.in("temperature", "degC");
+  const auto rate = inputs.optionally_in("heating_rate", "K/s");
+  expect_finite(inputs.file, "x", x, 1e6);
+  expect_finite(inputs.file, "temperature", temperature, 1e6);
+  if (rate) expect_finite(inputs.file, "heating_rate", *rate, 1e6);
+  if (model.lag > 0.0) {
+    // With a time column the lagged state is followed; otherwise a steady ramp is assumed.
+    if (const auto time = inputs.optionally_in("t", "s")) {
+      const Eigen::VectorXd lagged =
+          metrology::lagged_temperature(vector_of(*time), vector_of(temperature), model.lag);
+      temperature.assign(lagged.begin(), lagged.end());
+    } else if (rate) {
+      for (std::size_t i = 0; i < x.size(); ++i) temperature[i] -= model.lag * (*rate)[i];
+    }
+  }
+  std::vector<double> error;
+  std::vector<double> sigma;
+  std::size_t outside = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const metrology::ThermalState at{x[i], temperature[i], rate ? (*rate)[i] : 0.0};
+    error.push_back(model.value(at));
+    sigma.push_back(model.sigma(at));
+    outside += model.inside(at) ? 0U : 1U;
+  }
+  if (outside > 0)
+    std::cerr << "warning: " << outside << " of " << x.size()
+              << " points lie outside what was calibrated; the value at the end of the range is held there\n";
+  recording::Table output;
+  output.add("error", "m", std::move(error));
+  output.add("sigma", "m", std::move(sigma));
+  return output;
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,35 @@
+#include "tools/commands/calibration_result.hpp"
+
+#include <cmath>
+#include <fstream>
+
+namespace invar::tools {
+
+void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
+                       const nlohmann::json& report, const report::Page& page) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed || !std::filesystem::is_directory(folder))
+    throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
+  page.write(folder / "report.html");
+  std::ofstream json{folder / "report.json.part"};
+  json << report.dump(1) << '\n';
+  json.close();
+  if (!json) throw InputError{(folder / "report.json").string(), "cannot be written", "check the space left"};
+  std::filesystem::rename(folder / "report.json.part", folder / "report.json");
+  model.write(folder / "compensation.yaml");  // last: where it is, all is there
+}
+
+void expect_finite(const std::filesystem::path& file, const std::string& column,
+                   const std::vector<double>& values, double largest) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (std::isfinite(values[i]) && std::abs(values[i]) <= largest) continue;
+    const std::string where = file.string() + ": column `" + column + "`, row " + std::to_string(i + 1);
+    if (!std::isfinite(values[i]))
+      throw InputError{where, "is empty, nan or not finite", "remove the row or fill the value in"};
+    throw InputError{where, report::number(values[i], 6) + " is out of range",
+                     "check the value and its unit"};
+  }
+}
+
+}  // namespace invar::tools

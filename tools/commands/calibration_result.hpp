@@ -1,0 +1,24 @@
+// What every calibration leaves: compensation.yaml, report.json, report.html - all three or none.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "core/compensation/model_file.hpp"
+#include "core/recording/table.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+/// Makes the folder and writes the three files into it. Throws InputError where that fails.
+void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
+                       const nlohmann::json& report, const report::Page& page);
+
+/// Throws InputError naming the file, the column and the row (of the file's data, from 1) of the first value
+/// that is missing, infinite or beyond `largest` in size.
+void expect_finite(const std::filesystem::path& file, const std::string& column,
+                   const std::vector<double>& values, double largest);
+
+}  // namespace invar::tools
