@@ -21,7 +21,7 @@ void BlackBox::start(std::string process, std::vector<std::string> components, b
     // Looks instead of being told: telling would be a system call of the loop.
     while (!wake_.wait_for(lock, std::chrono::milliseconds{20}, [this] { return stopping_; })) {
       lock.unlock();
-      hand_over(false);
+      deliver();
       lock.lock();
     }
   }};
@@ -36,10 +36,8 @@ void BlackBox::stop() {
     wake_.notify_all();
     thread_.join();
   }
-  hand_over(true);
+  deliver(true);
 }
-
-void BlackBox::deliver() { hand_over(false); }
 
 void BlackBox::add(const CycleRecord& record) noexcept {
   if (ring_.empty() || frozen_.load(std::memory_order_acquire)) return;
@@ -64,9 +62,9 @@ void BlackBox::trip(std::string_view prefix, std::string_view why, Instant now,
   tripped_ = true;
 }
 
-void BlackBox::hand_over(bool unfinished) {
-  // `unfinished`: the loop has ended, so a trip whose last cycles did not come any more is taken as it is.
-  if (!frozen_.load(std::memory_order_acquire) && !(unfinished && tripped_)) return;
+void BlackBox::deliver(bool loop_ended) {
+  const std::lock_guard turn{delivering_};
+  if (!frozen_.load(std::memory_order_acquire) && !(loop_ended && tripped_)) return;
   BlackBoxRecord record;
   record.process = process_;
   record.reason = reason_.data();

@@ -58,10 +58,11 @@ class BlackBox {
 
   /// Set-up: takes the memory. `threaded` starts the thread that calls back.
   void start(std::string process, std::vector<std::string> components, bool threaded);
-  /// Hands over what is frozen and ends the thread.
+  /// Ends the thread and hands over what is left.
   void stop();
-  /// Hands over a frozen record now, if there is one. Not on the loop's thread.
-  void deliver();
+  /// Hands over a frozen record now, if there is one. `loop_ended`: also one whose last cycles did not come any
+  /// more. Not on the loop's thread.
+  void deliver(bool loop_ended = false);
 
   /// By the loop, real-time: one more cycle. Nothing while frozen.
   void add(const CycleRecord& record) noexcept;
@@ -70,8 +71,6 @@ class BlackBox {
   void trip(std::string_view prefix, std::string_view why, Instant now, std::uint64_t cycle) noexcept;
 
  private:
-  void hand_over(bool unfinished);
-
   std::uint32_t capacity_;
   std::vector<BlackBoxRecord::Signal> signals_;
   std::vector<std::function<double()>> values_;
@@ -90,7 +89,8 @@ class BlackBox {
   std::uint64_t tripped_cycle_ = 0;
 
   std::atomic<bool> frozen_{false};  // true: the ring belongs to the reader
-  std::mutex mutex_;                 // never taken by the loop
+  std::mutex delivering_;            // neither is ever taken by the loop
+  std::mutex mutex_;
   std::condition_variable wake_;
   bool stopping_ = false;
   std::thread thread_;

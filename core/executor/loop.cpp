@@ -32,6 +32,7 @@ void Executor::start() {
 void Executor::stop() {
   request_stop();
   if (thread_.joinable()) thread_.join();
+  box_.deliver(true);
 }
 
 bool Executor::sleep_until(Instant due) noexcept {

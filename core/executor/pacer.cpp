@@ -27,10 +27,11 @@ std::uint64_t Pacer::wake(Instant now) noexcept {
 
 bool Pacer::finish(Instant now) noexcept {
   longest_in_window_ = std::max(longest_in_window_, now - due());
-  cycle_ = (cycle_ / stretch_ + 1) * stretch_;
+  cycle_ = next_multiple(cycle_ + stretch_);
   const bool overran = now > due();
   if (overran) lost();
-  counted_ = overran;  // the periods that wake() finds gone after this belong to the same event
+  cycle_ = next_multiple(cycle_);  // the rate may just have been halved
+  counted_ = overran;              // the periods that wake() finds gone after this belong to the same event
   if (cycle_ >= window_end_) close_window();
   return overran;
 }

@@ -37,6 +37,9 @@ class Pacer {
 
  private:
   void lost() noexcept;
+  [[nodiscard]] std::uint64_t next_multiple(std::uint64_t cycle) const noexcept {
+    return (cycle + stretch_ - 1) / stretch_ * stretch_;
+  }
   void close_window() noexcept;
 
   Duration period_;
