@@ -2,12 +2,16 @@
 
 #include "components/interferometer/interferometer.hpp"
 #include "components/stage/axis_stage.hpp"
+#include "components/thermal/thermal.hpp"
+#include "components/world/simulated_heater.hpp"
 #include "components/world/simulated_stage.hpp"
 
 namespace invar {
 
 void add_all_components(Registry& registry) {
   registry.add<world::SimulatedStage>("simulated_stage", "drives, encoders and true tool position of a machine");
+  registry.add<world::SimulatedHeater>("simulated_heater", "pad, slide and base behind a heater controller's registers");
+  registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
   registry.add<stage::Stage>("stage", "servo of one axis");
 }

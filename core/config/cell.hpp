@@ -4,11 +4,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "core/base/time.hpp"
 #include "core/config/yaml.hpp"
 
 namespace invar::config {
@@ -27,25 +25,11 @@ struct CellComponent {
   Node node;          // for its parameters and for faults
 };
 
-/// What a process asks of the system for its loop.
-struct RealtimeRequest {
-  int priority = 0;          // SCHED_FIFO, 1..99; 0: none
-  std::optional<int> cpu;    // pin to it
-  bool lock_memory = false;  // mlockall
-  bool require = false;      // refuse to run where not granted; otherwise run and say so in every status
-};
-
-enum class OverrunPolicy { skip, degrade, safe_stop };
-
 struct CellProcess {
   std::string name;
   std::string host;
-  Duration period;
-  std::optional<RealtimeRequest> realtime;
-  OverrunPolicy overrun = OverrunPolicy::skip;
-  std::int64_t tolerate = 0;              // lost periods within a second before `degrade` or `safe_stop` acts
   std::vector<CellComponent> components;  // in the order they are stepped
-  std::string where;                      // "cell.yaml:12: processes.motion"
+  Node node;                              // rate, overrun, realtime: core/executor reads them
 };
 
 struct CellHost {
@@ -64,6 +48,7 @@ struct Cell {
   std::vector<std::filesystem::path> plugins;  // shared libraries with further component types
   std::vector<CellHost> hosts;
   std::vector<CellProcess> processes;
+  std::map<std::string, std::string> jobs;  // job -> the component that runs it
 
   [[nodiscard]] std::string topic(const std::string& component, const std::string& port) const {
     return "cell/" + name + "/" + component + "/" + port;
