@@ -10,6 +10,7 @@ namespace invar::tools {
 void add_about(CLI::App& program);
 void add_calibrate(CLI::App& program);
 void add_check(CLI::App& program);
+void add_job(CLI::App& program);
 void add_predict(CLI::App& program);
 void add_simulate(CLI::App& program);
 

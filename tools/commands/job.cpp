@@ -1,0 +1,16 @@
+// `invar job`: the group; each kind of undertaking is a file of its own.
+#include "tools/commands/job.hpp"
+
+#include "tools/command.hpp"
+
+namespace invar::tools {
+
+void add_job(CLI::App& program) {
+  auto* group = program.add_subcommand(
+      "job", "Run, watch and cancel the jobs of a cell; compare runs with simulations");
+  group->require_subcommand(1);
+  group->footer("Example: invar job compare --recording recording.csv.gz --machine model.yaml");
+  add_job_compare(*group);
+}
+
+}  // namespace invar::tools
