@@ -12,9 +12,9 @@ Thermal::Thermal(const Parameters& parameters)
   if (parameters.modbus.map.empty())
     throw InputError{"modbus.map", "missing", "name the heater's register map"};
   const auto map = modbus::load_map(parameters.modbus.map);
-  for (const char* name : {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"})
-    if (!map.find(name))
-      throw InputError{"modbus.map", std::string{"has no register `"} + name + "`",
+  for (const char* needed : {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"})
+    if (!map.find(needed))
+      throw InputError{"modbus.map", std::string{"has no register `"} + needed + "`",
                        "name a heater's register map"};
 }
 
