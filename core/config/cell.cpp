@@ -38,9 +38,38 @@ CellComponent read_component(const Node& node, std::uint32_t id) {
   return component;
 }
 
+RealtimeRequest read_realtime(const Node& node) {
+  RealtimeRequest request;
+  request.priority = static_cast<int>(node.integer("priority", 0, 99, 0));
+  if (node.has("cpu")) request.cpu = static_cast<int>(node["cpu"].as_integer(0, 1023));
+  request.lock_memory = node.flag("lock_memory", false);
+  request.require = node.flag("require", false);
+  return request;
+}
+
 CellProcess read_process(const Node& node, std::uint32_t& next_id) {
-  CellProcess process{node.key(), node.text("host"), {}, node};
+  CellProcess process;
+  process.name = node.key();
+  process.where = node.where();
   check_name(node, process.name);
+  process.host = node.text("host");
+  const Range rates{0.1, 20'000.0};
+  double rate = 1.0;
+  if (const Node realtime = node["realtime"]; realtime.exists()) {
+    if (node.has("rate"))
+      node["rate"].fault("stands beside `realtime`", "keep `realtime: {rate: ...}` alone");
+    process.realtime = read_realtime(realtime);
+    rate = realtime.number("rate", "Hz", rates);
+  } else {
+    rate = node.number("rate", "Hz", rates);
+  }
+  process.period = Duration::seconds(1.0 / std::max(rate, rates.lower));
+  const std::string overrun = node.choice("overrun", {"skip", "degrade", "safe_stop"}, "skip");
+  process.overrun = overrun == "degrade"     ? OverrunPolicy::degrade
+                    : overrun == "safe_stop" ? OverrunPolicy::safe_stop
+                                             : OverrunPolicy::skip;
+  process.tolerate =
+      node.integer("tolerate", 0, 1'000'000, process.overrun == OverrunPolicy::degrade ? 3 : 0);
   const Node components = node.required("components");
   for (const Node& child : components.children())
     process.components.push_back(read_component(child, next_id++));
@@ -113,8 +142,7 @@ Cell read_cell(const Yaml& yaml) {
   for (const Node& job : root["jobs"].children()) {
     cell.jobs[job.key()] = job.as_text();
     if (cell.find(job.as_text()) == nullptr)
-      job.fault("`" + job.as_text() + "` is no component of this cell",
-                "name the component that runs the job");
+      job.fault("`" + job.as_text() + "` is no component of this cell", "name the component that runs the job");
   }
   return cell;
 }

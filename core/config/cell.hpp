@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/base/time.hpp"
 #include "core/config/yaml.hpp"
 
 namespace invar::config {
@@ -25,11 +27,25 @@ struct CellComponent {
   Node node;          // for its parameters and for faults
 };
 
+/// What a process asks of the system for its loop.
+struct RealtimeRequest {
+  int priority = 0;          // SCHED_FIFO, 1..99; 0: none
+  std::optional<int> cpu;    // pin to it
+  bool lock_memory = false;  // mlockall
+  bool require = false;      // refuse to run where not granted; otherwise run and say so in every status
+};
+
+enum class OverrunPolicy { skip, degrade, safe_stop };
+
 struct CellProcess {
   std::string name;
   std::string host;
+  Duration period;
+  std::optional<RealtimeRequest> realtime;
+  OverrunPolicy overrun = OverrunPolicy::skip;
+  std::int64_t tolerate = 0;              // lost periods within a second before `degrade` or `safe_stop` acts
   std::vector<CellComponent> components;  // in the order they are stepped
-  Node node;                              // rate, overrun, realtime: core/executor reads them
+  std::string where;                      // "cell.yaml:12: processes.motion"
 };
 
 struct CellHost {

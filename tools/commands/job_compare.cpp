@@ -69,9 +69,10 @@ void compare(const Options& options) {
   std::cout << "signal            rms difference   largest          share of the signal\n";
   const auto outputs = model.outputs();
   for (std::size_t k = 0; k < outputs.size(); ++k) {
-    const auto* measured = recorded.record.find(outputs[k].name);
+    const physics::Signal& signal = *model.signal(outputs[k]);
+    const auto* measured = recorded.record.find(signal.name);
     if (measured == nullptr) continue;
-    const Difference d = difference(outputs[k], *measured, simulated[k]);
+    const Difference d = difference(signal, *measured, simulated[k]);
     const std::string share = d.spread > 0.0 ? report::number(100.0 * d.rms / d.spread, 2) + " %" : "-";
     rows.push_back({d.signal, report::si(d.rms, d.unit), report::si(d.maximum, d.unit), share});
     std::printf("%-17s %-16s %-16s %s\n", d.signal.c_str(), rows.back()[1].c_str(), rows.back()[2].c_str(),
@@ -90,12 +91,12 @@ void compare(const Options& options) {
     rest.label = "";
     for (std::size_t i = 0; i < rest.y.size(); ++i) rest.y[i] -= simulated[k][i];
     report::Plot both;
-    both.title = outputs[k].column;
+    both.title = signal.column;
     both.x_label = "t [s]";
-    both.y_label = outputs[k].column + " [" + d.unit + "]";
+    both.y_label = signal.column + " [" + d.unit + "]";
     both.series = {was, is};
     report::Plot apart = both;
-    apart.title = outputs[k].column + ": recorded minus simulated";
+    apart.title = signal.column + ": recorded minus simulated";
     apart.series = {rest};
     plots.push_back(both);
     plots.push_back(apart);
