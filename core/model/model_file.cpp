@@ -224,6 +224,14 @@ void read_equations(const Node& root, Model& model) {
   }
 }
 
+config::Quantity free_quantity(const Node& node, Range bounds) {
+  if (!node.is_map()) return {node.as_number("", bounds), {}};
+  (void)node.text("unit", "");
+  config::Quantity quantity{node.required("value").as_number("", bounds), {}};
+  if (node.has("sigma")) quantity.sigma = node["sigma"].as_number("", Range::not_negative());
+  return quantity;
+}
+
 std::optional<Term> read_term(const Node& node, const Model& model) {
   const auto name = node.text("term");
   Term term;
@@ -247,6 +255,10 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
   if (term.on.empty() && !model.thermal.nodes.empty()) term.on = model.thermal.nodes.front();
   if (term.with.empty() && model.thermal.nodes.size() > 1)
     term.with = model.thermal.nodes[term.on == model.thermal.nodes[0] ? 1 : 0];
+  if (term.on.empty() && model.plant == Plant::sensor) {
+    const bool of_velocity = name == "gain_droop" && model.signal("velocity_sensor") != nullptr;
+    term.on = of_velocity || model.signal("encoder") == nullptr ? "velocity_sensor" : "encoder";
+  }
   if (term.info == nullptr) {
     std::vector<std::string> known;
     for (const auto* info : physics::terms_of(model.plant)) known.emplace_back(info->name);
@@ -260,7 +272,9 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     const auto& parameter = term.info->parameters[i];
     const std::string key{parameter.name};
     if (node.has(key)) {
-      const auto quantity = node[key].as_quantity(parameter.unit, parameter.bounds);
+      // "*": in whatever unit the place has on which the term acts; then only a number is checked.
+      const auto quantity = parameter.unit == "*" ? free_quantity(node[key], parameter.bounds)
+                                                  : node[key].as_quantity(parameter.unit, parameter.bounds);
       term.values[i] = quantity.value;
       term.sigmas[i] = quantity.sigma;
       term.given[i] = true;
@@ -306,7 +320,7 @@ YAML::Node place_of(YAML::Node root, const Model& model, const std::string& name
 YAML::Node term_yaml(const Term& term, const Model& model) {
   YAML::Node node;
   node["term"] = std::string{term.info->name};
-  if (model.plant == Plant::thermal || model.plant == Plant::equations) {
+  if (model.plant != Plant::axis && model.plant != Plant::error_map) {
     if (!term.on.empty()) node["on"] = term.on;
     if (!term.with.empty()) node["with"] = term.with;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "core/physics/term_lists.hpp"
 #include "core/physics/terms/axis/additive_disturbance.hpp"
 #include "core/physics/terms/axis/amplifier_lag.hpp"
 #include "core/physics/terms/axis/backlash.hpp"
@@ -98,7 +99,7 @@ bool plant_by_name(std::string_view name, Plant& plant) {
 }
 
 std::vector<const TermInfo*> terms_of(Plant plant) {
-  std::vector<const TermInfo*> terms;
+  auto terms = static_terms_of(plant);
   if (plant == Plant::axis)
     for (const auto* kind : axis_terms) terms.push_back(kind->info);
   if (plant == Plant::thermal)

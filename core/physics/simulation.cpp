@@ -32,10 +32,16 @@ std::unique_ptr<Simulation> prepare(const Model& structure, const Record& inputs
       return prepare_axis(structure, inputs);
     case Plant::thermal:
       return prepare_thermal(structure, inputs);
-    default:
-      break;
+    case Plant::error_map:
+      return prepare_error_map(structure, inputs);
+    case Plant::droplet:
+      return prepare_droplet(structure, inputs);
+    case Plant::sensor:
+      return prepare_sensor(structure, inputs);
+    case Plant::equations:
+      return prepare_equations(structure, inputs);
   }
-  INVAR_EXPECTS(false, "no simulation for", name_of(structure.plant));
+  INVAR_EXPECTS(false, name_of(structure.plant));
   return nullptr;
 }
 

@@ -20,6 +20,7 @@ enum class Role {
   amplitude,  // the term vanishes where all its amplitudes are zero
   shape,      // where, how fast, how often; means nothing while the amplitude is zero
   phase,      // a shape that wraps at 2 pi
+  reference,  // a point that the data choose (a mean pressure); written down, not fitted
 };
 
 /// No more parameters than this in a term that has a fixed number of them.

@@ -1,0 +1,329 @@
+// Models in the user's own equations: expressions parsed by muParser, integrated between the rows.
+#include <muParser.h>
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/base/fault.hpp"
+#include "core/physics/simulate_plants.hpp"
+#include "core/physics/static_plants.hpp"
+
+namespace invar::physics {
+
+namespace {
+
+double root_of(double x) { return x > 0.0 ? std::sqrt(x) : 0.0; }  // an empty tank does not run
+double logarithm(double x) { return std::log(std::max(x, std::numeric_limits<double>::min())); }
+double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
+
+/// One running copy of the equations; parsers hold pointers into it, so it is neither copied nor shared.
+class Machine {
+ public:
+  explicit Machine(const Model& model) : model_{model}, states_{model.equations.states.size()} {
+    const auto& equations = model.equations;
+    symbols_.resize(states_ + equations.inputs.size() + 1, 0.0);
+    for (std::size_t i = 0; i < states_; ++i) names_.push_back(equations.states[i].name);
+    for (const auto& input : equations.inputs) names_.push_back(input.symbol);
+    names_.push_back("t");
+    for (const auto& p : model.parameters)
+      if (p.name.find('.') == std::string::npos) constants_.emplace_back(p.name, p.value);
+    for (const auto& state : equations.states)
+      rates_.push_back(parser(state.derivative, "states." + state.name));
+    for (const auto& output : equations.outputs)
+      outputs_.push_back(parser(output.expression, "outputs." + output.name));
+    if (!equations.controlled_input.empty()) {
+      law_.push_back(parser(equations.control_law, "controller.expression"));
+      controlled_ = place(equations.controlled_input);
+    }
+    for (const auto& term : model.terms) add(term);
+  }
+  Machine(const Machine&) = delete;
+  Machine& operator=(const Machine&) = delete;
+
+  [[nodiscard]] std::size_t states() const { return states_; }
+  [[nodiscard]] std::size_t all_states() const { return states_ + hidden_.size(); }
+
+  using State = std::array<double, 16>;
+
+  void set_input(std::size_t i, double value) { symbols_[states_ + i] = value; }
+  [[nodiscard]] std::size_t controlled() const { return controlled_; }
+
+  void show(const State& s, double t) {
+    std::copy_n(s.begin(), states_, symbols_.begin());
+    symbols_.back() = t;
+  }
+
+  State slope(const State& s, double t) {
+    show(s, t);
+    State d{};
+    for (std::size_t i = 0; i < states_; ++i) d[i] = rates_[i].Eval();
+    for (const auto& term : rate_terms_) d[term.on] += term.kind->rate(symbols_[term.with], term.p);
+    for (std::size_t h = 0; h < hidden_.size(); ++h) {
+      const auto& term = hidden_[h];
+      const double difference = s[states_ + h] - s[term.on];
+      d[term.on] += term.p[0] * difference;
+      d[states_ + h] = -difference / term.p[1];
+    }
+    for (const auto& term : overflows_)
+      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) {
+        if (term.with < states_ && term.with != term.on) d[term.with] += term.p[1] * d[term.on];
+        d[term.on] = 0.0;
+      }
+    for (const auto& term : uppers_)
+      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) d[term.on] = 0.0;
+    for (const auto& term : lowers_)
+      if (s[term.on] <= term.p[0] && d[term.on] < 0.0) d[term.on] = 0.0;
+    return d;
+  }
+
+  /// Dry friction as an impulse: it takes at most what is there. Twice half a step keeps second order.
+  void rub(State& s, double h) const {
+    for (const auto& term : frictions_) {
+      const double most = term.p[0] * h;
+      s[term.on] -= std::clamp(s[term.on], -most, most);
+    }
+  }
+
+  void advance(State& s, double t, double h, int parts) {
+    h /= parts;
+    const std::size_t n = all_states();
+    const auto moved = [n](const State& from, const State& by, double share) {
+      State next = from;
+      for (std::size_t i = 0; i < n; ++i) next[i] += share * by[i];
+      return next;
+    };
+    for (int part = 0; part < parts; ++part, t += h) {
+      rub(s, 0.5 * h);
+      const State a = slope(s, t), b = slope(moved(s, a, 0.5 * h), t + 0.5 * h),
+                  c = slope(moved(s, b, 0.5 * h), t + 0.5 * h), d = slope(moved(s, c, h), t + h);
+      for (std::size_t i = 0; i < n; ++i) s[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+      rub(s, 0.5 * h);
+      for (const auto& term : uppers_) s[term.on] = std::min(s[term.on], term.p[0]);
+      for (const auto& term : lowers_) s[term.on] = std::max(s[term.on], term.p[0]);
+      for (const auto& term : overflows_) s[term.on] = std::min(s[term.on], term.p[0]);
+    }
+  }
+
+  double output(std::size_t i) { return outputs_[i].Eval(); }
+  double law() { return law_.front().Eval(); }
+
+  /// The largest rate of change of anything [1/s]: the spectral radius of the Jacobian here.
+  double fastest(const State& s, double t) {
+    const auto n = static_cast<Eigen::Index>(all_states());
+    Eigen::MatrixXd jacobian(n, n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      State up = s, down = s;
+      const auto at = static_cast<std::size_t>(j);
+      const double by = 1e-6 * std::max(1e-3, std::abs(s[at]));
+      up[at] += by, down[at] -= by;
+      const State a = slope(up, t), b = slope(down, t);
+      for (Eigen::Index i = 0; i < n; ++i)
+        jacobian(i, j) = (a[static_cast<std::size_t>(i)] - b[static_cast<std::size_t>(i)]) / (2.0 * by);
+    }
+    if (!jacobian.allFinite()) return 0.0;
+    return jacobian.eigenvalues().cwiseAbs().maxCoeff();
+  }
+
+  void balance_hidden(State& s) const {
+    for (std::size_t h = 0; h < hidden_.size(); ++h) s[states_ + h] = s[hidden_[h].on];
+  }
+
+ private:
+  struct Use {
+    const EquationsTermKind* kind;
+    std::size_t on, with;
+    const double* p;
+  };
+
+  std::size_t place(const std::string& symbol) const {
+    const auto at = std::find(names_.begin(), names_.end(), symbol);
+    return at == names_.end() ? names_.size() : static_cast<std::size_t>(at - names_.begin());
+  }
+
+  void add(const Term& term) {
+    const auto* kind = equations_kind(*term.info);
+    const std::size_t on = place(term.on), with = term.with.empty() ? on : place(term.with);
+    if (on >= states_) return;  // at an input or output: the simulation bends those
+    const Use use{kind, on, std::min(with, names_.size() - 1), term.values.data()};
+    if (kind->rate != nullptr) rate_terms_.push_back(use);
+    switch (kind->memory) {
+      case EquationsMemory::dry_friction:
+        frictions_.push_back(use);
+        break;
+      case EquationsMemory::upper_limit:
+        uppers_.push_back(use);
+        break;
+      case EquationsMemory::lower_limit:
+        lowers_.push_back(use);
+        break;
+      case EquationsMemory::overflow:
+        overflows_.push_back(use);
+        break;
+      case EquationsMemory::hidden_state:
+        if (states_ + hidden_.size() < 16) hidden_.push_back(use);
+        break;
+      default:
+        break;
+    }
+  }
+
+  mu::Parser parser(const std::string& expression, const std::string& where) {
+    mu::Parser made;
+    made.DefineConst("pi", std::numbers::pi);
+    made.DefineFun("sqrt", root_of);
+    made.DefineFun("log", logarithm);
+    made.DefineFun("sign", sign_of);
+    for (const auto& [name, value] : constants_) made.DefineConst(name, value);
+    for (std::size_t i = 0; i < names_.size(); ++i) made.DefineVar(names_[i], &symbols_[i]);
+    made.SetExpr(expression);
+    try {
+      (void)made.Eval();
+    } catch (const mu::Parser::exception_type& error) {
+      throw InputError{where, "`" + expression + "`: " + error.GetMsg(),
+                       "use states, inputs, parameters, t, pi and the functions of the contract"};
+    }
+    return made;
+  }
+
+  const Model& model_;
+  std::size_t states_;
+  std::vector<std::string> names_;
+  std::vector<double> symbols_;
+  std::vector<std::pair<std::string, double>> constants_;
+  std::vector<mu::Parser> rates_, outputs_, law_;
+  std::size_t controlled_ = 0;
+  std::vector<Use> rate_terms_, frictions_, uppers_, lowers_, overflows_, hidden_;
+};
+
+/// What terms at inputs and outputs do to a whole column.
+void bend(const Model& model, const std::string& on, const std::vector<double>& time,
+          std::vector<double>& values) {
+  for (const auto& term : model.terms) {
+    if (term.on != on) continue;
+    const double p = term.values[0];
+    switch (equations_kind(*term.info)->memory) {
+      case EquationsMemory::upper_limit:
+        for (double& v : values) v = std::min(v, p);
+        break;
+      case EquationsMemory::lower_limit:
+        for (double& v : values) v = std::max(v, p);
+        break;
+      case EquationsMemory::dead_zone:
+        for (double& v : values) v -= std::clamp(v, -p, p);
+        break;
+      case EquationsMemory::lag: {
+        if (!(p > 0.0)) break;
+        double z = values.front(), last = values.front();
+        for (std::size_t i = 1; i < values.size(); ++i) {
+          const double now = values[i], h = time[i] - time[i - 1];
+          z = last + (z - last) * std::exp(-h / p);
+          last = now;
+          values[i] = z;
+        }
+        break;
+      }
+      case EquationsMemory::delay: {
+        if (!(p > 0.0)) break;
+        const auto before = values;
+        std::size_t a = 0;
+        for (std::size_t i = 0; i < values.size(); ++i) {
+          const double when = time[i] - p;
+          while (a + 1 < before.size() && time[a + 1] <= when) ++a;
+          const std::size_t b = std::min(a + 1, before.size() - 1);
+          const double h = time[b] - time[a];
+          const double share = h > 0.0 ? std::clamp((when - time[a]) / h, 0.0, 1.0) : 0.0;
+          values[i] = before[a] + share * (before[b] - before[a]);
+        }
+        break;
+      }
+      default:
+        break;
+    }
+  }
+}
+
+class OwnEquations final : public Simulation {
+ public:
+  OwnEquations(const Model& structure, const Record& inputs) : time_{inputs.time} {
+    if (structure.equations.states.size() > 12)
+      throw InputError{"states", "are more than 12", "split the model"};
+    for (const auto& input : structure.equations.inputs) {
+      const auto* values = inputs.find(input.signal);
+      inputs_.push_back(values == nullptr ? std::vector<double>(time_.size(), 0.0) : bridged(time_, *values));
+    }
+    for (const auto& output : structure.equations.outputs) {
+      const auto* values = inputs.find(output.name);
+      first_.push_back(values == nullptr || values->empty() ? std::nan("") : values->front());
+    }
+    Machine check{structure};  // a wrong expression is found before anything runs
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    Machine machine{model};
+    const auto& equations = model.equations;
+    const std::size_t n = time_.size();
+    auto inputs = inputs_;
+    for (std::size_t i = 0; i < inputs.size(); ++i) bend(model, equations.inputs[i].symbol, time_, inputs[i]);
+    outputs.resize(equations.outputs.size());
+    for (auto& output : outputs) output.assign(n, 0.0);
+    Machine::State s{};
+    for (std::size_t i = 0; i < machine.states(); ++i)
+      s[i] = model.value(equations.states[i].name + ".initial");
+    for (std::size_t o = 0; o < first_.size(); ++o)  // an output that is a state, given in the first row
+      for (std::size_t i = 0; i < machine.states(); ++i)
+        if (std::isfinite(first_[o]) && equations.outputs[o].expression == equations.states[i].name)
+          s[i] = first_[o];
+    machine.balance_hidden(s);
+    double fastest = 0.0;
+    for (std::size_t row = 0; row < n; ++row) {
+      for (std::size_t i = 0; i < inputs.size(); ++i) machine.set_input(i, inputs[i][row]);
+      machine.show(s, time_[row]);
+      if (!equations.controlled_input.empty() && machine.controlled() >= machine.states())
+        machine.set_input(machine.controlled() - machine.states(), machine.law());
+      if (row % std::max<std::size_t>(1, n / 8) == 0)
+        fastest = std::max(fastest, machine.fastest(s, time_[row]));
+      machine.show(s, time_[row]);
+      for (std::size_t o = 0; o < outputs.size(); ++o) outputs[o][row] = machine.output(o);
+      if (row + 1 == n) break;
+      const double h = time_[row + 1] - time_[row];
+      if (!(h > 0.0)) continue;
+      const int parts = static_cast<int>(std::clamp(std::ceil(h * fastest / 0.25), 1.0, 60.0));
+      bool linear = false;
+      for (const auto& input : equations.inputs) linear = linear || input.linear;
+      if (!linear) {
+        machine.advance(s, time_[row], h, parts);
+        continue;
+      }
+      for (int part = 0; part < parts; ++part) {
+        const double middle = (part + 0.5) / parts;
+        for (std::size_t i = 0; i < inputs.size(); ++i)
+          if (equations.inputs[i].linear)
+            machine.set_input(i, inputs[i][row] + middle * (inputs[i][row + 1] - inputs[i][row]));
+        machine.advance(s, time_[row] + h * part / parts, h / parts, 1);
+      }
+    }
+    for (std::size_t o = 0; o < outputs.size(); ++o) {
+      const auto& output = equations.outputs[o];
+      bend(model, output.name, time_, outputs[o]);
+      for (double& value : outputs[o]) value = output.limits.clamp(value);
+    }
+  }
+
+ private:
+  std::vector<double> time_;
+  std::vector<std::vector<double>> inputs_;
+  std::vector<double> first_;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> prepare_equations(const Model& structure, const Record& inputs) {
+  return std::make_unique<OwnEquations>(structure, inputs);
+}
+
+}  // namespace invar::physics

@@ -1,0 +1,252 @@
+// Error maps, droplets and sensors: outputs that follow from their inputs row by row, with little or no memory.
+#include <algorithm>
+#include <cmath>
+
+#include "core/physics/library.hpp"
+#include "core/physics/simulate_plants.hpp"
+#include "core/physics/spline.hpp"
+#include "core/physics/static_plants.hpp"
+
+namespace invar::physics {
+
+namespace {
+
+std::vector<double> taken(const Record& inputs, const char* name, double otherwise = 0.0) {
+  const auto* values = inputs.find(name);
+  return values == nullptr ? std::vector<double>(inputs.rows(), otherwise) : bridged(inputs.time, *values);
+}
+
+/// The value over which a Curve goes in one row.
+struct Variables {
+  const Record* record;
+  std::map<std::string, std::vector<double>, std::less<>> columns;
+  explicit Variables(const Record& inputs) : record{&inputs} {
+    for (const auto& [name, values] : inputs.signals) columns[name] = bridged(inputs.time, values);
+    columns["time"] = inputs.time;
+  }
+  [[nodiscard]] const std::vector<double>* find(const std::string& name) const {
+    const auto at = columns.find(name);
+    return at == columns.end() ? nullptr : &at->second;
+  }
+};
+
+class ErrorMap final : public Simulation {
+ public:
+  ErrorMap(const Model& model, const Record& inputs)
+      : variables_{inputs},
+        time_{inputs.time},
+        position_{taken(inputs, "position")},
+        direction_{taken(inputs, "direction")},
+        pressure_{taken(inputs, "pressure", 1013.25)},
+        offset_{taken(inputs, "offset")},
+        has_temperature_{inputs.find("temperature") != nullptr},
+        temperature_{taken(inputs, "temperature")} {
+    const CubicSpline baseline{model.baseline.positions, model.baseline.errors};
+    for (double x : position_) baseline_.push_back(baseline(x));
+    first_ = model.baseline.positions.front(), last_ = model.baseline.positions.back();
+    if (!(last_ > first_)) last_ = first_ + 1.0;
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    const std::size_t n = time_.size();
+    outputs.resize(1);
+    auto& error = outputs[0];
+    error = baseline_;
+    const double reference = model.value("reference_temperature", 20.0);
+    const double expansion = model.value("expansion");
+    std::vector<double> warmth(n, 0.0);
+    if (has_temperature_)
+      for (std::size_t i = 0; i < n; ++i) warmth[i] = temperature_[i] - reference;
+    std::vector<double> late = warmth;
+    for (const auto& term : model.terms) {
+      const auto* kind = error_map_kind(*term.info);
+      if (!kind->delays_warmth || !(term.values[0] > 0.0)) continue;
+      // Exact for a temperature that goes straight from row to row.
+      for (std::size_t i = 1; i < n; ++i) {
+        const double h = time_[i] - time_[i - 1], tau = term.values[0];
+        if (!(h > 0.0)) {
+          late[i] = late[i - 1];
+          continue;
+        }
+        const double behind = tau * (warmth[i] - warmth[i - 1]) / h;
+        late[i] = warmth[i] - behind + (late[i - 1] - warmth[i - 1] + behind) * std::exp(-h / tau);
+      }
+    }
+    for (std::size_t i = 0; i < n; ++i) error[i] += expansion * late[i] * position_[i];
+    for (const auto& term : model.terms) {
+      const auto* kind = error_map_kind(*term.info);
+      if (kind->error != nullptr)
+        for (std::size_t i = 0; i < n; ++i)
+          error[i] += kind->error(
+              {time_[i], position_[i], direction_[i], late[i], pressure_[i], offset_[i], first_, last_},
+              term.values.data());
+      if (const auto* over = variables_.find(term.curve.over); !term.curve.knots.empty() && over != nullptr)
+        for (std::size_t i = 0; i < n; ++i)
+          error[i] += term.curve((*over)[i]) *
+                      (term.info->site == "measurement" || term.info->site == "thermal" ? position_[i] : 1.0);
+    }
+  }
+
+ private:
+  Variables variables_;
+  std::vector<double> time_, position_, direction_, pressure_, offset_;
+  bool has_temperature_;
+  std::vector<double> temperature_, baseline_;
+  double first_ = 0.0, last_ = 1.0;
+};
+
+class Droplets final : public Simulation {
+ public:
+  Droplets(const Model& model, const Record& inputs)
+      : variables_{inputs},
+        outputs_{model.outputs()},
+        target_x_{taken(inputs, "target_x")},
+        target_y_{taken(inputs, "target_y")} {
+    const auto height = taken(inputs, "height"), pressure = taken(inputs, "pressure");
+    const auto vx = taken(inputs, "velocity_x"), vy = taken(inputs, "velocity_y");
+    const auto ix = taken(inputs, "image_x"), iy = taken(inputs, "image_y");
+    for (std::size_t i = 0; i < inputs.rows(); ++i) {
+      Droplet d;
+      d.time = inputs.time[i], d.height = height[i], d.pressure = pressure[i];
+      d.image_x = ix[i], d.image_y = iy[i], d.stage_x = vx[i], d.stage_y = vy[i];
+      droplets_.push_back(d);
+    }
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    const std::size_t n = droplets_.size();
+    outputs.resize(outputs_.size());
+    for (auto& output : outputs) output.assign(n, 0.0);
+    const double px = model.value("placement_error_x"), py = model.value("placement_error_y");
+    const double sx = model.value("slope_x"), sy = model.value("slope_y");
+    const double speed = model.value("speed", 1.0), scale = model.value("camera_scale");
+    for (std::size_t i = 0; i < n; ++i) {
+      Droplet d = droplets_[i];
+      d.speed = speed;
+      for (const auto& term : model.terms)
+        if (const auto* kind = droplet_kind(*term.info); kind->apply != nullptr)
+          kind->apply(d, term.values.data());
+      const auto beside = landing(d, sx, sy);
+      double x = target_x_[i] + px + beside.x + scale * d.shift_x;
+      double y = target_y_[i] + py + beside.y + scale * d.shift_y;
+      for (const auto& term : model.terms) {
+        const auto* over = term.curve.knots.empty() ? nullptr : variables_.find(term.curve.over);
+        if (over != nullptr) (term.on == "landed_y" ? y : x) += term.curve((*over)[i]);
+      }
+      for (std::size_t o = 0; o < outputs_.size(); ++o)
+        outputs[o][i] = outputs_[o] == "landed_x" ? x : (outputs_[o] == "landed_y" ? y : std::nan(""));
+    }
+  }
+
+ private:
+  Variables variables_;
+  std::vector<std::string> outputs_;
+  std::vector<double> target_x_, target_y_;
+  std::vector<Droplet> droplets_;
+};
+
+class Sensors final : public Simulation {
+ public:
+  Sensors(const Model& model, const Record& inputs)
+      : variables_{inputs},
+        outputs_{model.outputs()},
+        time_{inputs.time},
+        position_{taken(inputs, "true_position")} {
+    const std::size_t n = time_.size();
+    velocity_.assign(n, 0.0);
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < n; ++i) steps.push_back(time_[i] - time_[i - 1]);
+    double usual = 0.0;
+    if (!steps.empty()) {
+      std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                       steps.end());
+      usual = steps[steps.size() / 2];
+    }
+    // Central differences; beside a gap the near side alone.
+    for (std::size_t i = 0; i < n; ++i) {
+      std::size_t a = i == 0 ? i : i - 1, b = i + 1 == n ? i : i + 1;
+      if (a < i && time_[i] - time_[a] > 3.0 * usual && b > i) a = i;
+      if (b > i && time_[b] - time_[i] > 3.0 * usual && a < i) b = i;
+      if (time_[b] > time_[a]) velocity_[i] = (position_[b] - position_[a]) / (time_[b] - time_[a]);
+    }
+  }
+
+  void run(const Model& model, Outputs& outputs) const override {
+    outputs.resize(outputs_.size());
+    const double resolution = model.value("resolution"), gain = model.value("gain", 1.0);
+    const std::size_t n = time_.size();
+    for (std::size_t o = 0; o < outputs_.size(); ++o) {
+      const bool encoder = outputs_[o] == "encoder";
+      std::vector<double> position = position_, velocity = velocity_;
+      for (const auto& term : model.terms) {
+        if (term.on != outputs_[o]) continue;
+        const auto* kind = sensor_kind(*term.info);
+        if (kind->delays && term.values[0] > 0.0) delay(term.values[0], position, velocity);
+        if (kind->plays) play(term.values[0], encoder ? position : velocity);
+      }
+      auto& out = outputs[o];
+      out.resize(n);
+      for (std::size_t i = 0; i < n; ++i) {
+        const SensorPoint at{position[i], velocity[i], encoder ? position[i] : gain * velocity[i]};
+        out[i] = at.value;
+        for (const auto& term : model.terms) {
+          if (term.on != outputs_[o]) continue;
+          const auto* kind = sensor_kind(*term.info);
+          if (kind->reading != nullptr) out[i] += kind->reading(at, term.values.data());
+          if (!term.curve.knots.empty()) {
+            const auto* over = variables_.find(term.curve.over);
+            out[i] += term.curve(
+                over != nullptr ? (*over)[i] : (term.curve.over == "velocity" ? velocity[i] : position[i]));
+          }
+        }
+        if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);
+      }
+    }
+  }
+
+ private:
+  /// Position and velocity some time ago, on the cubic through the rows (velocities as slopes).
+  void delay(double by, std::vector<double>& position, std::vector<double>& velocity) const {
+    const std::size_t n = time_.size();
+    std::size_t a = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double when = time_[i] - by;
+      while (a + 1 < n && time_[a + 1] <= when) ++a;
+      const std::size_t b = std::min(a + 1, n - 1);
+      const double h = time_[b] - time_[a];
+      if (when <= time_.front() || !(h > 0.0)) {
+        position[i] = position_[i] - by * velocity_[i];
+        continue;
+      }
+      const double s = (when - time_[a]) / h, r = 1.0 - s;
+      position[i] = position_[a] * (1.0 + 2.0 * s) * r * r + velocity_[a] * h * s * r * r +
+                    position_[b] * s * s * (3.0 - 2.0 * s) - velocity_[b] * h * s * s * r;
+      velocity[i] = velocity_[a] * r + velocity_[b] * s;
+    }
+  }
+  static void play(double width, std::vector<double>& values) {
+    double shown = values.empty() ? 0.0 : values.front();
+    for (double& value : values) {
+      shown = std::clamp(shown, value - 0.5 * width, value + 0.5 * width);
+      value = shown;
+    }
+  }
+
+  Variables variables_;
+  std::vector<std::string> outputs_;
+  std::vector<double> time_, position_, velocity_;
+};
+
+}  // namespace
+
+std::unique_ptr<Simulation> prepare_error_map(const Model& structure, const Record& inputs) {
+  return std::make_unique<ErrorMap>(structure, inputs);
+}
+std::unique_ptr<Simulation> prepare_droplet(const Model& structure, const Record& inputs) {
+  return std::make_unique<Droplets>(structure, inputs);
+}
+std::unique_ptr<Simulation> prepare_sensor(const Model& structure, const Record& inputs) {
+  return std::make_unique<Sensors>(structure, inputs);
+}
+
+}  // namespace invar::physics

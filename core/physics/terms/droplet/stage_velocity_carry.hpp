@@ -1,0 +1,27 @@
+// Stage velocity carry: the drop keeps the velocity of the stage while it falls.
+#pragma once
+
+#include <cmath>
+
+#include "core/physics/droplet_hooks.hpp"
+
+namespace invar::physics::droplet {
+
+struct StageVelocityCarry {
+  static constexpr TermInfo info{
+      .name = "stage_velocity_carry",
+      .plant = Plant::droplet,
+      .site = "flight",
+      .depends_on = {"velocity", "height"},
+      .parameters = {{{"speed", "m/s", {0.05, 50.0}, Role::shape, {3.0}, "of the drop at the nozzle"}}},
+      .description =
+          "Printing on the fly, the drop flies on with the stage: it lands velocity times flight time ahead.",
+      .source = "shift = velocity height / speed"};
+  static void apply(Droplet& d, const double* p) {
+    d.speed = p[0];
+    d.carried = true;
+  }
+  static constexpr DropletTermKind kind{.info = &info, .apply = apply};
+};
+
+}  // namespace invar::physics::droplet

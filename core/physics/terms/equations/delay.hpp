@@ -1,0 +1,23 @@
+// Delay: an input acts, or an output shows, some time later.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/equations_hooks.hpp"
+
+namespace invar::physics::equations {
+
+struct Delay {
+  static constexpr TermInfo info{
+      .name = "delay",
+      .plant = Plant::equations,
+      .site = "input",
+      .depends_on = {"history"},
+      .parameters = {{{"delay", "*", {0.0, 1e6}, Role::amplitude, {1e-3}, "in the unit of time"}}},
+      .description = "Transport through a pipe, a bus or a computation.",
+      .source = "s(t - delay)"};
+  static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::delay};
+};
+
+}  // namespace invar::physics::equations

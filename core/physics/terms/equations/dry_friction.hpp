@@ -1,0 +1,23 @@
+// Dry friction: a rate of constant size against the state.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/equations_hooks.hpp"
+
+namespace invar::physics::equations {
+
+struct DryFriction {
+  static constexpr TermInfo info{
+      .name = "dry_friction",
+      .plant = Plant::equations,
+      .site = "state",
+      .depends_on = {"direction"},
+      .parameters = {{{"level", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "size of the rate"}}},
+      .description = "Coulomb friction: constant size, against the motion, and it holds at rest.",
+      .source = "-level sign(s); at s = 0 whatever holds it there, up to the level"};
+  static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dry_friction};
+};
+
+}  // namespace invar::physics::equations

@@ -1,0 +1,24 @@
+// Hidden state: something behind the state stores and gives back.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/equations_hooks.hpp"
+
+namespace invar::physics::equations {
+
+struct HiddenState {
+  static constexpr TermInfo info{
+      .name = "hidden_state",
+      .plant = Plant::equations,
+      .site = "state",
+      .depends_on = {"history"},
+      .parameters = {{{"coefficient", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "rate per difference"},
+                      {"time_constant", "*", {1e-9, 1e12}, Role::shape, {1.0, 0.1, 10.0}, "of the store"}}},
+      .description = "A second store behind the state that nobody measures.",
+      .source = "adds coefficient (z - s), dz/dt = (s - z) / time_constant, z in balance at the start"};
+  static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::hidden_state};
+};
+
+}  // namespace invar::physics::equations

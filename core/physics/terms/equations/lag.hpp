@@ -1,0 +1,23 @@
+// Lag: an input acts, or an output shows, with a time constant.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/equations_hooks.hpp"
+
+namespace invar::physics::equations {
+
+struct Lag {
+  static constexpr TermInfo info{
+      .name = "lag",
+      .plant = Plant::equations,
+      .site = "input",
+      .depends_on = {"history"},
+      .parameters = {{{"time_constant", "*", {0.0, 1e9}, Role::amplitude, {1e-3}, "in the unit of time"}}},
+      .description = "An actuator or a sensor that follows like a first-order lag.",
+      .source = "dz/dt = (s - z) / time_constant"};
+  static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::lag};
+};
+
+}  // namespace invar::physics::equations

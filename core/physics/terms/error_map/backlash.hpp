@@ -1,0 +1,31 @@
+// Backlash: the error depends on the side from which a point is approached.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/physics/error_map_hooks.hpp"
+
+namespace invar::physics::error_map {
+
+struct Backlash {
+  static constexpr TermInfo info{
+      .name = "backlash",
+      .plant = Plant::error_map,
+      .site = "kinematic",
+      .depends_on = {"direction"},
+      .parameters = {{{"width",
+                       "m",
+                       {-1e-2, 1e-2},
+                       Role::amplitude,
+                       {5e-7},
+                       "the whole gap: error from + less error from -"}}},
+      .description =
+          "Play or elastic wind-up in the drive: a point reached from below differs from the same point "
+          "reached from above.",
+      .source = "ISO 230-2, reversal value: width / 2 times the direction"};
+  static double error(const MapPoint& at, const double* p) { return 0.5 * p[0] * at.direction; }
+  static constexpr ErrorMapTermKind kind{.info = &info, .error = error};
+};
+
+}  // namespace invar::physics::error_map
