@@ -11,6 +11,7 @@ void add_calibrate(CLI::App& program) {
   group->require_subcommand(1);
   group->footer("Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result");
   add_calibrate_thermal(*group);
+  add_calibrate_geometric(*group);
 }
 
 }  // namespace invar::tools

@@ -17,5 +17,7 @@ using Predict = recording::Table (*)(const config::Yaml& model, const recording:
 // One file each: tools/commands/calibrate_KIND.cpp. The first adds the subcommand to the group.
 void add_calibrate_thermal(CLI::App& group);
 recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
+void add_calibrate_geometric(CLI::App& group);
+recording::Table predict_geometric(const config::Yaml& model, const recording::Table& inputs);
 
 }  // namespace invar::tools

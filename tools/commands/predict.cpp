@@ -14,6 +14,7 @@ namespace {
 const std::map<std::string, Predict>& kinds() {
   static const std::map<std::string, Predict> table{
       {"thermal", predict_thermal},
+      {"geometric", predict_geometric},
   };
   return table;
 }

@@ -1,0 +1,160 @@
+#include "core/compensation/geometric_file.hpp"
+
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace invar::compensation {
+
+namespace {
+
+using metrology::axis_of;
+using metrology::component_count;
+using metrology::GeometricModel;
+using metrology::is_rotation;
+using metrology::squareness_count;
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
+
+constexpr double most_translation = 0.1;  // m; rad for rotations: beyond it a model is refused
+
+}  // namespace
+
+void write_geometric(ModelText& text, const GeometricModel& model) {
+  text.comment("Error = actual minus commanded position of the tool in the workpiece frame; m, rad.");
+  text.comment(
+      "Components by ISO 230-1; squareness by ISO sign; the frame is fixed by zero error at the origin.");
+  std::string chain;
+  for (int i = 0; i < model.chain.axes; ++i) chain += letter(model.chain.order[index(i)]);
+  text.text("chain", chain);
+  text.open("travel");
+  for (int k = 0; k < 3; ++k)
+    if (model.chain.has(k)) text.range(letter(k), model.travel[index(k)]);
+  text.close();
+  text.numbers("tool", model.tool.data(), 3);
+  text.text("outside", "end values are held");
+  text.open("squareness");
+  for (int pair = 0; pair < squareness_count; ++pair) {
+    const double cosine = model.squareness[index(pair)];
+    if (model.squareness_sigma[index(pair)] <= 0.0) continue;
+    text.open(std::string{metrology::squareness_iso_name(pair)});
+    text.number("value", metrology::squareness_angle_from_cosine(pair, cosine)).text("unit", "rad");
+    text.number("sigma", model.squareness_sigma[index(pair)]).close();
+  }
+  text.close();
+  text.comment("Uniform cubic B-splines over `interval` [m] of the moving axis: intervals + 3 coefficients,");
+  text.comment("the standard deviation at each knot.");
+  text.open("components");
+  for (int c = 0; c < component_count; ++c) {
+    if (model.coefficients[index(c)].size() == 0) continue;
+    text.open(std::string{metrology::iso_name(c)});
+    text.text("unit", is_rotation(c) ? "rad" : "m");
+    text.range("interval", model.splines[index(axis_of(c))].interval());
+    text.numbers("coefficients", model.coefficients[index(c)]);
+    text.numbers("sigma", model.sigma[index(c)]);
+    text.close();
+  }
+  text.close();
+  text.comment(
+      "Standard deviation of the field [m] at nodes over the travels, x fastest, less rigid motions.");
+  text.open("field_sigma");
+  for (int k = 0; k < 3; ++k) text.integer("nodes_" + letter(k), model.field_sigma.count[index(k)]);
+  for (int k = 0; k < 3; ++k) {
+    if (!model.chain.has(k)) continue;
+    std::vector<double> values;
+    for (const auto& sigma : model.field_sigma.values) values.push_back(sigma[k]);
+    text.numbers("sigma_" + letter(k), values);
+  }
+  text.close();
+}
+
+GeometricModel read_geometric(const config::Node& root) {
+  GeometricModel model;
+  for (const char* key : {"identified_from", "outside", "identification"}) root[key].accept_all();
+  const config::Node chain = root.required("chain");
+  const std::string letters = chain.as_text();
+  model.chain.axes = 0;
+  for (const char c : letters) {
+    const auto axis = metrology::axis_named(std::string(1, c));
+    if (!axis || model.chain.has(*axis) || model.chain.axes == 3) {
+      chain.fault("`" + letters + "` is no chain of axes", "write for example yxz");
+      break;
+    }
+    model.chain.order[index(model.chain.axes++)] = *axis;
+  }
+  const config::Node travel = root.required("travel");
+  for (int k = 0; k < 3; ++k)
+    if (model.chain.has(k)) model.travel[index(k)] = travel.required(letter(k)).as_range("m");
+  const auto tool = exactly(root.required("tool"), 3, "m");
+  model.tool = {tool[0], tool[1], tool[2]};
+  const config::Node squareness = root.required("squareness");
+  for (int pair = 0; pair < squareness_count; ++pair) {
+    const config::Node one = squareness[metrology::squareness_iso_name(pair)];
+    if (!one.exists()) continue;
+    const auto quantity = one.as_quantity("rad", {-0.1, 0.1});
+    model.squareness[index(pair)] = metrology::squareness_cosine_from_angle(pair, quantity.value);
+    model.squareness_sigma[index(pair)] = quantity.sigma.value_or(0.0);
+  }
+  const config::Node components = root.required("components");
+  for (int c = 0; c < component_count; ++c) {
+    const config::Node one = components[metrology::iso_name(c)];
+    if (!one.exists()) continue;
+    const char* unit = is_rotation(c) ? "rad" : "m";
+    if (!model.chain.has(axis_of(c))) {
+      one.fault("the chain has no such axis", "remove it");
+      continue;
+    }
+    if (one.text("unit") != unit) one["unit"].fault("a wrong unit", std::string{"it is "} + unit);
+    const Range interval = one.required("interval").as_range("m");
+    auto values = one.required("coefficients").as_numbers(unit);
+    if (values.size() < 4 || values.size() > 10'000) {
+      one["coefficients"].fault("holds " + std::to_string(values.size()) + " numbers",
+                                "a spline has at least 4");
+      continue;
+    }
+    const Range allowed{-most_translation, most_translation};
+    for (double& value : values)
+      if (!allowed.contains(value)) {
+        one["coefficients"].fault("a coefficient beyond 0.1 m or rad", "calibrate again");
+        break;
+      }
+    const numerics::CubicBSpline spline{interval, static_cast<int>(values.size()) - 3};
+    numerics::CubicBSpline& known = model.splines[index(axis_of(c))];
+    const bool first = known.intervals() == 1;
+    if (first) known = spline;
+    if (known.intervals() != spline.intervals() || known.interval().lower != interval.lower ||
+        known.interval().upper != interval.upper)
+      one.fault("another spline than the axis' other components", "calibrate again");
+    const auto sigma = exactly(one.required("sigma"), values.size() - 2, unit);
+    model.coefficients[index(c)] =
+        Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<long>(values.size()));
+    model.sigma[index(c)] = Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<long>(sigma.size()));
+  }
+  const config::Node grid = root.required("field_sigma");
+  std::size_t nodes = 1;
+  for (int k = 0; k < 3; ++k) {
+    model.field_sigma.count[index(k)] = static_cast<int>(grid.integer("nodes_" + letter(k), 1, 100));
+    nodes *= index(model.field_sigma.count[index(k)]);
+    if (model.chain.has(k)) model.field_sigma.range[index(k)] = model.travel[index(k)];
+  }
+  model.field_sigma.values.assign(nodes, Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
+  for (int k = 0; k < 3; ++k) {
+    if (!model.chain.has(k)) continue;
+    const auto values = exactly(grid.required("sigma_" + letter(k)), nodes, "m");
+    for (std::size_t i = 0; i < nodes; ++i) model.field_sigma.values[i][k] = values[i];
+  }
+  return model;
+}
+
+GeometricModel load_geometric(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  (void)yaml.root().integer("invar_compensation", 1, 1);
+  (void)yaml.root().choice("kind", {"geometric"});
+  check_seal(yaml);
+  const auto model = read_geometric(yaml.root());
+  yaml.finish();
+  return model;
+}
+
+}  // namespace invar::compensation

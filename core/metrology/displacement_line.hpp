@@ -1,0 +1,70 @@
+// Displacement lines: what a laser read, and each line condensed to the equations it gives.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace invar::metrology {
+
+/// One reading of a displacement line. All in m.
+struct Reading {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // commanded
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();      // offset of the reflector
+  double displacement = 0.0;                           // along the beam, zero at the line's first reading
+  int direction = 1;                                   // sense of the motion along the line, +1 or -1
+};
+
+/// The readings of one set-up of the laser, in the order of measurement.
+struct DisplacementLine {
+  std::string name;
+  std::vector<Reading> readings;
+};
+
+/// From the first commanded point to the one farthest from it.
+struct Beam {
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();  // m, with its tool offset below
+  Eigen::Vector3d start_tool = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction =
+      Eigen::Vector3d::Zero();  // unit vector in the machine frame; zero for a line without length
+  double length = 0.0;          // m
+};
+Beam beam_of(const DisplacementLine& line);
+
+/// How one line disturbs its readings y = mean of its point + reversal + drift + steps + noise.
+struct LineNoise {
+  double noise = 0.0;           // m, sd of one reading
+  double degrees = 0.0;         // degrees of freedom behind it
+  double reversal = 0.0;        // m, reading forward minus reading backward
+  double reversal_sigma = 0.0;  // m
+  double drift = 0.0;           // m, end minus beginning of the measurement
+  int readings = 0;
+  int outliers = 0;
+  std::vector<int> breaks;  // rows (of this line) before which the count jumped
+};
+
+/// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points, the readings
+/// say  -2 log likelihood = constant - 2 weighted'e + e' information e,  zero noise, reversal, drift and steps
+/// marginalised. Units 1/m^2, 1/m.
+struct CondensedLine {
+  std::string name;
+  Beam beam;
+  std::vector<Eigen::Vector3d> points;  // J commanded positions
+  std::vector<Eigen::Vector3d> tools;   // J
+  Eigen::MatrixXd information;          // J x J, symmetric, rank J less the offset
+  Eigen::VectorXd weighted;             // J
+  double constant = 0.0;
+  Eigen::VectorXd deviation;        // J, mean of reading minus nominal after the nuisances, m
+  Eigen::VectorXd deviation_sigma;  // J, of that mean, m
+  LineNoise noise;
+  std::vector<int> point_of;  // of each reading
+  Eigen::VectorXd weights;    // of each reading, 0..1; 0 is rejected
+};
+
+/// Condenses all lines together, since they share what repeats tell about noise and drift: robust within each line
+/// (repeats of one point must agree; Tukey weights), jumps of the count found and bridged, prior of drift
+/// by pooling. `resolution` [m] bounds the noise from below by resolution/sqrt(12). Lines without length (all points
+/// the same) are left out. Set-up only.
+std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, double resolution);
+
+}  // namespace invar::metrology

@@ -1,0 +1,144 @@
+#include "core/metrology/geometric_basis.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+namespace invar::metrology {
+
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+/// Orthonormal basis of the coefficients that keep the gauge of a component.
+Eigen::MatrixXd gauge_basis(const numerics::CubicBSpline& spline, double origin, bool no_slope) {
+  const int n = spline.size();
+  Eigen::MatrixXd constraint = Eigen::MatrixXd::Zero(n, no_slope ? 2 : 1);
+  const auto add = [&](double place, int column, double sign) {
+    const auto w = spline.at(place);
+    for (int i = 0; i < 4; ++i) constraint(w.first + i, column) += sign * w.value[index(i)];
+  };
+  add(origin, 0, 1.0);
+  if (no_slope) {
+    add(spline.interval().upper, 1, 1.0);
+    add(spline.interval().lower, 1, -1.0);
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr{constraint};
+  const Eigen::MatrixXd q = qr.householderQ();
+  return q.rightCols(n - constraint.cols());
+}
+
+/// The largest arm a rotation of `component` can have within the travels, at any of the tools.
+double largest_arm(const Chain& chain, const std::array<Range, 3>& ranges,
+                   const std::vector<Eigen::Vector3d>& tools, int component) {
+  const int axis = axis_of(component);
+  const Eigen::Vector3d about = Eigen::Vector3d::Unit(direction_of(component));
+  double largest = 0.0;
+  for (const Eigen::Vector3d& tool : tools) {
+    for (int corner = 0; corner < 8; ++corner) {
+      Eigen::Vector3d position;
+      for (int k = 0; k < 3; ++k)
+        position[k] = (corner >> k) % 2 == 0 ? ranges[index(k)].lower : ranges[index(k)].upper;
+      const Eigen::Vector3d arm = lever_arms(chain, Eigen::Matrix3d::Identity(), position, tool).col(axis);
+      Eigen::Vector3d effect = about.cross(arm);
+      for (int k = 0; k < 3; ++k)
+        if (!chain.has(k)) effect[k] = 0.0;
+      largest = std::max(largest, effect.norm());
+    }
+  }
+  return largest;
+}
+
+}  // namespace
+
+Eigen::VectorXd GeometricBasis::spline_coefficients(int component, const Eigen::VectorXd& unknowns) const {
+  for (const Block& block : blocks)
+    if (block.component == component) return block.coefficients * unknowns.segment(block.first, block.size());
+  return Eigen::VectorXd::Zero(splines[index(axis_of(component))].size());
+}
+
+Squareness GeometricBasis::squareness(const Eigen::VectorXd& unknowns) const {
+  Squareness result{};
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    result[index(pairs[i])] = unknowns[first_squareness() + static_cast<int>(i)];
+  return result;
+}
+
+GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges,
+                          const std::array<int, 3>& intervals, const std::vector<Eigen::Vector3d>& tools) {
+  GeometricBasis basis;
+  basis.chain = chain;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!chain.has(axis)) continue;
+    const Range range = ranges[index(axis)];
+    basis.splines[index(axis)] = numerics::CubicBSpline{range, intervals[index(axis)]};
+    basis.origin[index(axis)] = range.contains(0.0) ? 0.0 : range.lower;
+  }
+  for (int component = 0; component < component_count; ++component) {
+    const int axis = axis_of(component);
+    if (!chain.has(axis)) continue;
+    if (is_rotation(component) ? largest_arm(chain, ranges, tools, component) < 1e-9
+                               : !chain.has(direction_of(component)))
+      continue;
+    GeometricBasis::Block block;
+    block.component = component;
+    block.first = basis.size;
+    block.coefficients =
+        gauge_basis(basis.splines[index(axis)], basis.origin[index(axis)], is_straightness(component));
+    basis.size += block.size();
+    basis.blocks.push_back(std::move(block));
+  }
+  for (int a = 0; a < 3; ++a)
+    for (int b = a + 1; b < 3; ++b)
+      if (chain.has(a) && chain.has(b)) basis.pairs.push_back(squareness_of(a, b));
+  basis.size += static_cast<int>(basis.pairs.size());
+  return basis;
+}
+
+Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
+                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
+  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(3, basis.size);
+  const Eigen::Matrix3d directions = axis_directions(basis.chain, squareness);
+  const Eigen::Matrix3d arms = lever_arms(basis.chain, directions, position, tool);
+  for (const auto& block : basis.blocks) {
+    const int axis = axis_of(block.component);
+    const Eigen::Vector3d along = Eigen::Vector3d::Unit(direction_of(block.component));
+    const Eigen::Vector3d effect =
+        is_rotation(block.component) ? Eigen::Vector3d{along.cross(arms.col(axis))} : along;
+    if (effect.isZero(0.0)) continue;
+    const auto w = basis.splines[index(axis)].at(position[axis]);
+    Eigen::RowVectorXd row = w.value[0] * block.coefficients.row(w.first);
+    for (int i = 1; i < 4; ++i) row += w.value[index(i)] * block.coefficients.row(w.first + i);
+    for (int k = 0; k < 3; ++k)
+      if (effect[k] != 0.0) map.row(k).segment(block.first, block.size()) = effect[k] * row;
+  }
+  for (std::size_t i = 0; i < basis.pairs.size(); ++i) {
+    for (int a = 0; a < 3; ++a) {
+      for (int b = a + 1; b < 3; ++b) {
+        if (squareness_of(a, b) != basis.pairs[i]) continue;
+        const int later = basis.chain.place(a) > basis.chain.place(b) ? a : b;
+        const int towards = later == a ? b : a;
+        const int column = basis.first_squareness() + static_cast<int>(i);
+        map(towards, column) = position[later];
+        map(later, column) = -position[later] * squareness[index(basis.pairs[i])] / directions(later, later);
+      }
+    }
+  }
+  return map;
+}
+
+Eigen::Vector3d squareness_remainder(const GeometricBasis& basis, const Squareness& squareness,
+                                     const Eigen::Vector3d& position) {
+  const Eigen::Matrix3d directions = axis_directions(basis.chain, squareness);
+  Eigen::Vector3d remainder = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis)
+    if (basis.chain.has(axis))
+      remainder += position[axis] * (directions.col(axis) - Eigen::Vector3d::Unit(axis));
+  Eigen::VectorXd unknowns = Eigen::VectorXd::Zero(basis.size);
+  for (std::size_t i = 0; i < basis.pairs.size(); ++i)
+    unknowns[basis.first_squareness() + static_cast<int>(i)] = squareness[index(basis.pairs[i])];
+  return remainder - field_map(basis, squareness, position, Eigen::Vector3d::Zero()) * unknowns;
+}
+
+}  // namespace invar::metrology

@@ -1,0 +1,53 @@
+// GeometricBasis: the unknowns of a machine's geometric error, and the linear map from them to the error field.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/metrology/volumetric.hpp"
+#include "core/numerics/bspline.hpp"
+
+namespace invar::metrology {
+
+/// Cubic B-splines of every error motion that can show, in the canonical gauge (metrology.md 3.1): each motion is zero
+/// at the origin of its axis, straightness has no end-point slope as well, and three squareness constants hold
+/// what is left. Displacements cannot see rigid motions of the frame; this gauge is one choice among them.
+struct GeometricBasis {
+  struct Block {
+    int component = 0;
+    int first = 0;                 // of its unknowns
+    Eigen::MatrixXd coefficients;  // spline size x unknowns: orthonormal columns that keep the gauge
+    [[nodiscard]] int size() const { return static_cast<int>(coefficients.cols()); }
+  };
+
+  Chain chain;
+  std::array<numerics::CubicBSpline, 3> splines;  // by axis letter
+  std::array<double, 3> origin{};                 // m, of the gauge
+  std::vector<Block> blocks;
+  std::vector<int> pairs;  // squareness constants, after the blocks
+  int size = 0;            // unknowns in all
+
+  [[nodiscard]] int first_squareness() const { return size - static_cast<int>(pairs.size()); }
+  /// Coefficients of a component's spline; zeros for one that cannot show.
+  [[nodiscard]] Eigen::VectorXd spline_coefficients(int component, const Eigen::VectorXd& unknowns) const;
+  [[nodiscard]] Squareness squareness(const Eigen::VectorXd& unknowns) const;
+};
+
+/// Components whose lever arms vanish for every one of `tools` [m] are left out: at zero offset a chain of three axes
+/// shows 14 of its 18. `ranges` [m] are the axes' travels (with the measured points inside), `intervals` the spline
+/// pieces of each axis.
+GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges,
+                          const std::array<int, 3>& intervals, const std::vector<Eigen::Vector3d>& tools);
+
+/// e(P, p) = V * unknowns to first order about the given squareness: 3 x size. With `squareness` not zero the constant
+/// remainder is `squareness_remainder`.
+Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
+                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
+
+/// What the linear form in the squareness leaves out at `position` [m]: exact axis directions minus their tangent.
+Eigen::Vector3d squareness_remainder(const GeometricBasis& basis, const Squareness& squareness,
+                                     const Eigen::Vector3d& position);
+
+}  // namespace invar::metrology

@@ -1,0 +1,184 @@
+#include "core/metrology/geometric_equations.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "core/base/contract.hpp"
+
+namespace invar::metrology {
+
+namespace {
+
+/// Precision of the prior in the gauge's coordinates, Q_k = N' K^-1 N, and what its derivatives need.
+struct BlockPrior {
+  Eigen::MatrixXd precision;  // Q_k
+  Eigen::MatrixXd solved;     // K^-1 N
+  double log_determinant = 0.0;
+};
+
+BlockPrior block_prior(const GeometricBasis& basis, const GeometricPrior& prior,
+                       const GeometricBasis::Block& block) {
+  const Eigen::LLT<Eigen::MatrixXd> factor{coefficient_covariance(basis, prior, block.component)};
+  BlockPrior result;
+  result.solved = factor.solve(block.coefficients);
+  result.precision = block.coefficients.transpose() * result.solved;
+  result.precision = 0.5 * (result.precision + result.precision.transpose().eval());
+  const Eigen::LLT<Eigen::MatrixXd> precision{result.precision};
+  result.log_determinant = 2.0 * precision.matrixLLT().diagonal().array().log().sum();
+  return result;
+}
+
+/// H = A'C^-1 A + Q, factored; log|H| - log|Q|.
+struct System {
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  std::vector<BlockPrior> blocks;
+  Eigen::VectorXd mean;
+  double log_evidence = 0.0;
+};
+
+System build(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior) {
+  System system;
+  Eigen::MatrixXd h = equations.normal;
+  double log_prior = 0.0;
+  for (const auto& block : basis.blocks) {
+    system.blocks.push_back(block_prior(basis, prior, block));
+    h.block(block.first, block.first, block.size(), block.size()) += system.blocks.back().precision;
+    log_prior += system.blocks.back().log_determinant;
+  }
+  const double stiffness = 1.0 / (prior.squareness * prior.squareness);
+  for (int i = basis.first_squareness(); i < basis.size; ++i) {
+    h(i, i) += stiffness;
+    log_prior += std::log(stiffness);
+  }
+  system.factor.compute(h);
+  INVAR_EXPECTS(system.factor.info() == Eigen::Success, basis.size);
+  system.mean = system.factor.solve(equations.right);
+  const double log_h = 2.0 * system.factor.matrixLLT().diagonal().array().log().sum();
+  system.log_evidence = -0.5 * (equations.constant - equations.right.dot(system.mean) + log_h - log_prior +
+                                equations.log_misfit);
+  return system;
+}
+
+}  // namespace
+
+LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const Squareness& squareness) {
+  const auto points = static_cast<Eigen::Index>(line.points.size());
+  const Eigen::RowVector3d beam = line.beam.direction.transpose();
+  const Eigen::RowVectorXd start = beam * field_map(basis, squareness, line.beam.start, line.beam.start_tool);
+  const double start_remainder = beam.dot(squareness_remainder(basis, squareness, line.beam.start));
+  Eigen::MatrixXd all(points, basis.size);
+  LineRows result;
+  result.remainder.resize(points);
+  for (Eigen::Index j = 0; j < points; ++j) {
+    const auto i = static_cast<std::size_t>(j);
+    all.row(j) = beam * field_map(basis, squareness, line.points[i], line.tools[i]) - start;
+    result.remainder[j] = beam.dot(squareness_remainder(basis, squareness, line.points[i])) - start_remainder;
+  }
+  for (int c = 0; c < basis.size; ++c)
+    if (all.col(c).cwiseAbs().maxCoeff() > 1e-14) result.unknowns.push_back(c);
+  result.rows = all(Eigen::all, result.unknowns);
+  return result;
+}
+
+NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                         int unknowns, double misfit, const std::vector<Eigen::VectorXd>& points) {
+  NormalEquations sum;
+  sum.normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  sum.right = Eigen::VectorXd::Zero(unknowns);
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    Eigen::MatrixXd information = lines[l].information;
+    const Eigen::VectorXd& h = rows[l].remainder;
+    Eigen::VectorXd weighted = lines[l].weighted - information * h;
+    double constant = lines[l].constant - 2.0 * h.dot(lines[l].weighted) + h.dot(information * h);
+    if (!points.empty() && points[l].minCoeff() < 1.0) {
+      // A point of weight w counts as if its reading had variance 1/w: extra variance in front of the information.
+      const Eigen::VectorXd extra = (points[l].cwiseInverse().array() - 1.0) *
+                                    information.diagonal().cwiseMax(1e-300).cwiseInverse().array();
+      const Eigen::VectorXd root = extra.cwiseSqrt();
+      const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(information.rows(), information.rows()) +
+                                    root.asDiagonal() * information * root.asDiagonal();
+      const Eigen::LLT<Eigen::MatrixXd> factor{inner};
+      const Eigen::MatrixXd left = information * root.asDiagonal();
+      const Eigen::VectorXd moved = factor.solve(root.cwiseProduct(weighted));
+      constant -= root.cwiseProduct(weighted).dot(moved);
+      weighted -= left * moved;
+      information -= left * factor.solve(left.transpose());
+    }
+    if (misfit > 0.0) {
+      const double variance = misfit * misfit;
+      const Eigen::LLT<Eigen::MatrixXd> factor{
+          Eigen::MatrixXd::Identity(information.rows(), information.rows()) + variance * information};
+      sum.log_misfit += 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+      const Eigen::VectorXd moved = factor.solve(weighted);
+      constant -= variance * weighted.dot(moved);
+      weighted = moved;
+      information = factor.solve(information).eval();
+      information = 0.5 * (information + information.transpose().eval());
+    }
+    sum.constant += constant;
+    const Eigen::MatrixXd product = information * rows[l].rows;
+    const Eigen::MatrixXd normal = rows[l].rows.transpose() * product;
+    const Eigen::VectorXd right = rows[l].rows.transpose() * weighted;
+    const auto& columns = rows[l].unknowns;
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      sum.right[columns[i]] += right[static_cast<Eigen::Index>(i)];
+      for (std::size_t j = 0; j < columns.size(); ++j)
+        sum.normal(columns[j], columns[i]) +=
+            normal(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(i));
+    }
+  }
+  return sum;
+}
+
+Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior) {
+  const System system = build(equations, basis, prior);
+  Posterior posterior;
+  posterior.mean = system.mean;
+  posterior.log_evidence = system.log_evidence;
+  posterior.covariance = system.factor.solve(Eigen::MatrixXd::Identity(basis.size, basis.size));
+  posterior.prior_covariance = Eigen::MatrixXd::Zero(basis.size, basis.size);
+  for (std::size_t k = 0; k < basis.blocks.size(); ++k) {
+    const auto& block = basis.blocks[k];
+    posterior.prior_covariance.block(block.first, block.first, block.size(), block.size()) =
+        system.blocks[k].precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
+  }
+  for (int i = basis.first_squareness(); i < basis.size; ++i)
+    posterior.prior_covariance(i, i) = prior.squareness * prior.squareness;
+  return posterior;
+}
+
+Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
+                     const GeometricPrior& prior) {
+  const System system = build(equations, basis, prior);
+  Posterior posterior;
+  posterior.mean = system.mean;
+  posterior.log_evidence = system.log_evidence;
+  return posterior;
+}
+
+Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
+                  const GeometricPrior& prior) {
+  const System system = build(equations, basis, prior);
+  Evidence result;
+  result.value = system.log_evidence;
+  // dL = 1/2 sum_k [ u' dK u + tr(dK K^-1 N (Sigma_kk - Q_k^-1) N' K^-1) ],  u = K^-1 N theta_k.
+  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(basis.size, basis.size);
+  system.factor.matrixL().solveInPlace(inverse);
+  for (std::size_t k = 0; k < basis.blocks.size(); ++k) {
+    const auto& block = basis.blocks[k];
+    const BlockPrior& own = system.blocks[k];
+    const auto columns = inverse.block(block.first, block.first, basis.size - block.first, block.size());
+    const Eigen::MatrixXd change =
+        columns.transpose() * columns -
+        own.precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
+    const Eigen::MatrixXd w = own.solved * change * own.solved.transpose();
+    const Eigen::VectorXd u = own.solved * system.mean.segment(block.first, block.size());
+    const CovarianceSlopes slopes = coefficient_covariance_slopes(basis, prior, block.component);
+    const auto kind = static_cast<Eigen::Index>(kind_of(block.component));
+    result.slope[kind] += 0.5 * (u.dot(slopes.by_amplitude * u) + slopes.by_amplitude.cwiseProduct(w).sum());
+    result.slope[3 + kind] += 0.5 * (u.dot(slopes.by_length * u) + slopes.by_length.cwiseProduct(w).sum());
+  }
+  return result;
+}
+
+}  // namespace invar::metrology

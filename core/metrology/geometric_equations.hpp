@@ -1,0 +1,59 @@
+// The equations that displacement lines give for the unknowns of a basis, and how well a prior explains them.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/geometric_basis.hpp"
+#include "core/metrology/geometric_prior.hpp"
+
+namespace invar::metrology {
+
+/// One condensed line as rows on the unknowns that it touches.
+struct LineRows {
+  std::vector<int> unknowns;  // the columns that are not zero
+  Eigen::MatrixXd rows;       // J x columns: d'(V(P_j) - V(S))
+  Eigen::VectorXd remainder;  // J, what the squareness' linear form leaves out along the beam, m
+};
+LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const Squareness& squareness);
+
+/// Normal equations: -2 log likelihood = constant - 2 right'theta + theta' normal theta (+ the part of the misfit).
+struct NormalEquations {
+  Eigen::MatrixXd normal;
+  Eigen::VectorXd right;
+  double constant = 0.0;
+  double log_misfit = 0.0;  // sum of log|I + misfit^2 G|
+};
+
+/// Adds up all lines. `misfit` [m] is the sd of what repeats at a point share but no smooth model explains (encoder
+/// counts, pitch errors finer than the data). `points` [0..1], by line and point, weakens points that do not fit; may be
+/// empty.
+NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                         int unknowns, double misfit, const std::vector<Eigen::VectorXd>& points = {});
+
+/// The posterior of the unknowns under a prior: theta ~ N(mean, covariance).
+struct Posterior {
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;        // H^-1
+  Eigen::MatrixXd prior_covariance;  // Q^-1, block diagonal
+  double log_evidence = 0.0;         // up to a constant of the data
+};
+Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior);
+
+/// The same without the covariances, which cost most.
+Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
+                     const GeometricPrior& prior);
+
+/// Log evidence of a prior and its gradient by log amplitudes and log lengths (six numbers).
+struct Evidence {
+  double value = 0.0;
+  Eigen::Matrix<double, 6, 1> slope = Eigen::Matrix<double, 6, 1>::Zero();
+};
+Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior);
+
+/// The prior that explains the readings best, under weak log-normal expectations about `start`. About 30 evaluations.
+GeometricPrior most_evident(const NormalEquations& equations, const GeometricBasis& basis,
+                            const GeometricPrior& expected, const GeometricPrior& start);
+
+}  // namespace invar::metrology

@@ -1,0 +1,299 @@
+#include "core/metrology/geometric_identification.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/contract.hpp"
+#include "core/metrology/geometric_stages.hpp"
+
+namespace invar::metrology {
+
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+/// The axes' travels, widened to hold every measured point.
+std::array<Range, 3> ranges_of(const Machine& machine, const std::vector<CondensedLine>& lines) {
+  std::array<Range, 3> ranges = machine.travel;
+  for (const auto& line : lines) {
+    for (const auto& point : line.points) {
+      for (int k = 0; k < 3; ++k) {
+        ranges[index(k)].lower = std::min(ranges[index(k)].lower, point[k]);
+        ranges[index(k)].upper = std::max(ranges[index(k)].upper, point[k]);
+      }
+    }
+  }
+  return ranges;
+}
+
+/// Spline pieces of an axis: one a data interval of the line that resolves it finest.
+int intervals_of(const std::vector<CondensedLine>& lines, int axis, Range range, int most) {
+  double finest = range.width() / 8.0;
+  for (const auto& line : lines) {
+    std::vector<double> places;
+    for (const auto& point : line.points) places.push_back(point[axis]);
+    std::sort(places.begin(), places.end());
+    std::vector<double> steps;
+    for (std::size_t i = 1; i < places.size(); ++i)
+      if (places[i] - places[i - 1] > 1e-7) steps.push_back(places[i] - places[i - 1]);
+    if (steps.size() < 3) continue;
+    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
+                     steps.end());
+    finest = std::min(finest, steps[steps.size() / 2]);
+  }
+  return std::clamp(static_cast<int>(std::lround(range.width() / finest)), 8, std::max(8, most));
+}
+
+std::vector<Eigen::Vector3d> tools_of(const Machine& machine, const std::vector<CondensedLine>& lines) {
+  std::vector<Eigen::Vector3d> tools{machine.tool};
+  for (const auto& line : lines)
+    for (const auto& tool : line.tools)
+      if (std::none_of(tools.begin(), tools.end(), [&](const auto& t) { return (t - tool).norm() < 1e-7; }))
+        tools.push_back(tool);
+  return tools;
+}
+
+GeometricPrior expected_prior(const GeometricPrior& given, const std::array<Range, 3>& ranges) {
+  GeometricPrior prior = given;
+  const double longest = std::max({ranges[0].width(), ranges[1].width(), ranges[2].width()});
+  for (double& length : prior.length)
+    if (!(length > 0.0)) length = longest / 3.0;
+  return prior;
+}
+
+/// Log posterior of the misfit at the present prior: evidence plus a weak expectation about `expected`.
+double misfit_score(double misfit, double expected, const Identification& work) {
+  const auto equations = assemble(work.lines, work.rows, work.basis.size, misfit, work.point_weights);
+  const double z = std::log(misfit / expected) / 1.5;
+  return solve_mean(equations, work.basis, work.prior).log_evidence - 0.5 * z * z;
+}
+
+/// Golden section over the log of the misfit: it is one number and the score has one top.
+double most_evident_misfit(const Identification& work, double expected) {
+  double low = std::log(5e-9);
+  double high = std::log(5e-6);
+  const double ratio = 0.618;
+  double a = high - ratio * (high - low);
+  double b = low + ratio * (high - low);
+  double at_a = misfit_score(std::exp(a), expected, work);
+  double at_b = misfit_score(std::exp(b), expected, work);
+  for (int i = 0; i < 6; ++i) {
+    if (at_a > at_b) {
+      high = b;
+      b = a;
+      at_b = at_a;
+      a = high - ratio * (high - low);
+      at_a = misfit_score(std::exp(a), expected, work);
+    } else {
+      low = a;
+      a = b;
+      at_a = at_b;
+      b = low + ratio * (high - low);
+      at_b = misfit_score(std::exp(b), expected, work);
+    }
+  }
+  return std::exp(at_a > at_b ? a : b);
+}
+
+/// Points that stand off by more than four sigma are weakened; true when any weight moved.
+bool weaken_outlying_points(Identification& work, const Eigen::VectorXd& unknowns) {
+  constexpr double limit = 4.0;
+  bool moved = false;
+  for (std::size_t l = 0; l < work.lines.size(); ++l) {
+    const CondensedLine& line = work.lines[l];
+    Eigen::VectorXd rest = line.deviation - work.rows[l].remainder;
+    Eigen::VectorXd chosen(static_cast<Eigen::Index>(work.rows[l].unknowns.size()));
+    for (Eigen::Index i = 0; i < chosen.size(); ++i)
+      chosen[i] = unknowns[work.rows[l].unknowns[index(static_cast<int>(i))]];
+    rest -= work.rows[l].rows * chosen;
+    double sum = 0.0;
+    double mass = 0.0;
+    for (Eigen::Index j = 0; j < rest.size(); ++j) {
+      const double w =
+          std::isfinite(rest[j]) ? 1.0 / (line.deviation_sigma[j] * line.deviation_sigma[j]) : 0.0;
+      if (w > 0.0) sum += w * rest[j] * work.point_weights[l][j];
+      mass += w * work.point_weights[l][j];
+    }
+    for (Eigen::Index j = 0; j < rest.size(); ++j) {
+      if (!std::isfinite(rest[j])) continue;
+      const double sigma = std::hypot(line.deviation_sigma[j], work.misfit);
+      const double z = std::abs(rest[j] - sum / mass) / sigma;
+      const double weight = z < limit ? 1.0 : std::pow(limit / z, 4.0);
+      if (std::abs(weight - work.point_weights[l][j]) > 0.05) moved = true;
+      work.point_weights[l][j] = weight;
+    }
+  }
+  return moved;
+}
+
+/// Component and field standard deviations from the posterior.
+void fill_sigma(Identification& work) {
+  GeometricModel& model = work.model;
+  for (const auto& block : work.basis.blocks) {
+    const auto& spline = work.basis.splines[index(axis_of(block.component))];
+    const Eigen::MatrixXd covariance =
+        work.posterior.covariance.block(block.first, block.first, block.size(), block.size());
+    Eigen::VectorXd& sigma = model.sigma[index(block.component)];
+    sigma.resize(spline.intervals() + 1);
+    for (int i = 0; i <= spline.intervals(); ++i) {
+      const auto w = spline.at(spline.interval().lower + i * spline.spacing());
+      Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(block.size());
+      for (int k = 0; k < 4; ++k) row += w.value[index(k)] * block.coefficients.row(w.first + k);
+      sigma[i] = std::sqrt(std::max(row.dot(row * covariance), 0.0));
+    }
+  }
+  for (std::size_t i = 0; i < work.basis.pairs.size(); ++i) {
+    const Eigen::Index k = work.basis.first_squareness() + static_cast<Eigen::Index>(i);
+    model.squareness_sigma[index(work.basis.pairs[i])] = std::sqrt(work.posterior.covariance(k, k));
+  }
+  constexpr int nodes = 9;
+  SigmaGrid& grid = model.field_sigma;
+  for (int k = 0; k < 3; ++k) {
+    grid.range[index(k)] = model.chain.has(k) ? model.travel[index(k)] : Range{0.0, 1.0};
+    grid.count[index(k)] = model.chain.has(k) ? nodes : 1;
+  }
+  const RigidPart rigid =
+      rigid_part(work.basis, model.squareness, volume_grid(model.chain, model.travel, 5), model.tool);
+  grid.values.clear();
+  for (const Eigen::Vector3d& position : volume_grid(model.chain, model.travel, nodes)) {
+    const Eigen::MatrixXd map = shape_map(work.basis, model.squareness, rigid, position, model.tool);
+    Eigen::Vector3d sigma;
+    const Eigen::MatrixXd moved = map * work.posterior.covariance;
+    for (int k = 0; k < 3; ++k)
+      sigma[k] = model.chain.has(k) ? std::sqrt(std::max(moved.row(k).dot(map.row(k)), 0.0))
+                                    : std::numeric_limits<double>::infinity();
+    grid.values.push_back(sigma);
+  }
+}
+
+void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges) {
+  GeometricModel& model = work.model;
+  model.chain = machine.chain;
+  model.travel = ranges;
+  model.tool = machine.tool;
+  model.splines = work.basis.splines;
+  for (const auto& block : work.basis.blocks)
+    model.coefficients[index(block.component)] =
+        work.basis.spline_coefficients(block.component, work.posterior.mean);
+  model.squareness = work.basis.squareness(work.posterior.mean);
+  fill_sigma(work);
+}
+
+void make_rows(Identification& work, const Squareness& squareness) {
+  work.rows.clear();
+  for (const auto& line : work.lines) work.rows.push_back(rows_of(line, work.basis, squareness));
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count) {
+  std::vector<Eigen::Vector3d> grid;
+  const auto nodes = [&](int axis) { return chain.has(axis) ? count : 1; };
+  const auto at = [&](int axis, int i) {
+    const Range r = travel[index(axis)];
+    return chain.has(axis) ? r.lower + r.width() * i / (count - 1) : 0.0;
+  };
+  for (int k = 0; k < nodes(2); ++k)
+    for (int j = 0; j < nodes(1); ++j)
+      for (int i = 0; i < nodes(0); ++i) grid.emplace_back(at(0, i), at(1, j), at(2, k));
+  return grid;
+}
+
+Eigen::MatrixXd RigidPart::rigid(const Chain& chain, const Eigen::Vector3d& p) {
+  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(3, 6);
+  modes.leftCols<3>().setIdentity();
+  modes.col(3) = Eigen::Vector3d{0.0, -p.z(), p.y()};
+  modes.col(4) = Eigen::Vector3d{p.z(), 0.0, -p.x()};
+  modes.col(5) = Eigen::Vector3d{-p.y(), p.x(), 0.0};
+  for (int k = 0; k < 3; ++k) {
+    if (chain.has(k)) continue;
+    modes.row(k).setZero();  // an axis that is not there: no error along it, no rotation out of the plane
+    for (int about = 0; about < 3; ++about)
+      if (about != k) modes.col(3 + about).setZero();
+  }
+  return modes;
+}
+
+RigidPart rigid_part(const GeometricBasis& basis, const Squareness& squareness,
+                     const std::vector<Eigen::Vector3d>& grid, const Eigen::Vector3d& tool) {
+  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(6, basis.size);
+  for (const auto& position : grid) {
+    const Eigen::MatrixXd modes = RigidPart::rigid(basis.chain, position);
+    Eigen::MatrixXd field = field_map(basis, squareness, position, tool);
+    for (int k = 0; k < 3; ++k)
+      if (!basis.chain.has(k)) field.row(k).setZero();
+    normal += modes.transpose() * modes;
+    right += modes.transpose() * field;
+  }
+  return {normal.completeOrthogonalDecomposition().solve(right)};
+}
+
+Eigen::MatrixXd shape_map(const GeometricBasis& basis, const Squareness& squareness, const RigidPart& rigid,
+                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
+  return field_map(basis, squareness, position, tool) - RigidPart::rigid(basis.chain, position) * rigid.map;
+}
+
+Eigen::VectorXd predicted_readings(const GeometricModel& model, const CondensedLine& line) {
+  Eigen::VectorXd result(static_cast<Eigen::Index>(line.points.size()));
+  const Eigen::Vector3d start = model.error(line.beam.start, line.beam.start_tool);
+  for (std::size_t j = 0; j < line.points.size(); ++j)
+    result[static_cast<Eigen::Index>(j)] =
+        line.beam.direction.dot(model.error(line.points[j], line.tools[j]) - start);
+  return result;
+}
+
+Identification identify(const Machine& machine, const std::vector<DisplacementLine>& lines,
+                        const IdentificationOptions& options) {
+  const auto say = [&](double part, const std::string& what) {
+    if (options.progress) options.progress(part, what);
+  };
+  Identification work;
+  say(0.05, "condensing the lines");
+  work.lines = condense(lines, 0.0);
+  INVAR_EXPECTS(!work.lines.empty(), lines.size());
+  const auto ranges = ranges_of(machine, work.lines);
+  std::array<int, 3> intervals{1, 1, 1};
+  for (int k = 0; k < 3; ++k)
+    if (machine.chain.has(k))
+      intervals[index(k)] = intervals_of(work.lines, k, ranges[index(k)], options.most_intervals);
+  work.basis = make_basis(machine.chain, ranges, intervals, tools_of(machine, work.lines));
+  work.prior = expected_prior(options.prior, ranges);
+  work.misfit = options.misfit;
+  double squares = 0.0;
+  for (const auto& line : work.lines) {
+    work.point_weights.emplace_back(Eigen::VectorXd::Ones(line.deviation.size()));
+    squares += line.noise.noise * line.noise.noise;
+  }
+  work.noise = std::sqrt(squares / static_cast<double>(work.lines.size()));
+
+  // The squareness is large and the field not linear in it: first find it roughly, then take exact directions there.
+  make_rows(work, {});
+  work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit);
+  work.posterior = solve(work.equations, work.basis, work.prior);
+  make_rows(work, work.basis.squareness(work.posterior.mean));
+  work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit);
+
+  if (options.method == IdentificationMethod::displacement) {
+    work.posterior = solve_in_stages(work.lines, work.rows, work.basis, work.prior, work.misfit);
+  } else {
+    const GeometricPrior expected = work.prior;
+    for (int round = 0; round < 2 && options.search_prior; ++round) {
+      say(0.2 + 0.4 * round, "searching the prior");
+      work.prior = most_evident(work.equations, work.basis, expected, work.prior);
+      work.misfit = most_evident_misfit(work, options.misfit);
+      work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+      const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
+      if (!weaken_outlying_points(work, mean) && round > 0) break;
+      work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+    }
+    work.posterior = solve(work.equations, work.basis, work.prior);
+  }
+  say(0.9, "field and its deviation");
+  fill_model(work, machine, ranges);
+  return work;
+}
+
+}  // namespace invar::metrology

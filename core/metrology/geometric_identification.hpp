@@ -1,0 +1,68 @@
+// Identification: from displacement lines to a geometric model, by all lines at once or as the seed does it.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/geometric_equations.hpp"
+#include "core/metrology/geometric_model.hpp"
+#include "core/metrology/machine.hpp"
+
+namespace invar::metrology {
+
+enum class IdentificationMethod {
+  full,          // all lines at once, prior by evidence, posterior covariance (metrology.md section 4)
+  displacement,  // the seed's steps with its errata: positioning, angles, then diagonals (metrology.md 3.2 to 3.4)
+};
+
+struct IdentificationOptions {
+  IdentificationMethod method = IdentificationMethod::full;
+  int most_intervals = 24;   // spline pieces an axis at most
+  bool search_prior = true;  // by evidence; false keeps `prior` and `misfit`
+  GeometricPrior prior;      // expected beforehand; lengths of zero mean a third of the longest travel
+  double misfit = 5e-8;      // m
+  std::function<void(double part, const std::string& what)> progress;  // may be empty
+};
+
+/// What was found, with all that reports and planning need. The unknowns are those of `basis`.
+struct Identification {
+  GeometricModel model;
+  GeometricBasis basis;
+  GeometricPrior prior;
+  double misfit = 0.0;
+  NormalEquations equations;
+  Posterior posterior;
+  std::vector<CondensedLine> lines;
+  std::vector<LineRows> rows;
+  std::vector<Eigen::VectorXd> point_weights;  // 1 where a point fits
+  double noise = 0.0;                          // m, sd of one reading, over all lines
+};
+
+/// Readings in, model out: the one entry point for the command and for the live cell. Precondition: at least one line
+/// has length (`beam_of`). Set-up only; under a second for 22 lines. No I/O.
+Identification identify(const Machine& machine, const std::vector<DisplacementLine>& lines,
+                        const IdentificationOptions& options = {});
+
+/// Beam-wise error [m] that a model says a line reads at its points, zero at its start.
+Eigen::VectorXd predicted_readings(const GeometricModel& model, const CondensedLine& line);
+
+/// Nodes [m] that fill the travels: `count` along each axis.
+std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count);
+
+/// The part of a field that is no rigid motion: e - R a, with R the rigid motions (translations, rotations) that best fit
+/// it over `grid`. `map` gives a = map * unknowns; `rigid` the columns of R at a position.
+struct RigidPart {
+  Eigen::MatrixXd map;
+  [[nodiscard]] static Eigen::MatrixXd rigid(const Chain& chain, const Eigen::Vector3d& position);
+};
+RigidPart rigid_part(const GeometricBasis& basis, const Squareness& squareness,
+                     const std::vector<Eigen::Vector3d>& grid, const Eigen::Vector3d& tool);
+
+/// V(P) less the rigid part: 3 x unknowns.
+Eigen::MatrixXd shape_map(const GeometricBasis& basis, const Squareness& squareness, const RigidPart& rigid,
+                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
+
+}  // namespace invar::metrology

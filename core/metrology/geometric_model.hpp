@@ -1,0 +1,50 @@
+// GeometricModel: an identified geometric error: evaluated anywhere, with its standard deviation.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/metrology/volumetric.hpp"
+#include "core/numerics/bspline.hpp"
+
+namespace invar::metrology {
+
+/// Standard deviations of the field on a grid over the travels, linear in between (of the variance), held outside.
+struct SigmaGrid {
+  std::array<Range, 3> range{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m, by axis letter
+  std::array<int, 3> count{1, 1, 1};    // nodes, 1 for an axis the machine lacks
+  std::vector<Eigen::Vector3d> values;  // m; x fastest, then y, then z; infinity where nothing is known
+  /// Real-time.
+  [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& position) const noexcept;
+};
+
+/// What compensation.yaml of kind geometric holds.
+struct GeometricModel {
+  Chain chain;
+  std::array<Range, 3> travel{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();                      // m, of the calibration
+  std::array<numerics::CubicBSpline, 3> splines;                       // by axis letter
+  std::array<Eigen::VectorXd, component_count>
+      coefficients;                                    // m or rad; of size 0 for a component not modelled
+  std::array<Eigen::VectorXd, component_count> sigma;  // of the component at its splines' knots
+  Squareness squareness{};
+  Squareness squareness_sigma{};
+  SigmaGrid field_sigma;
+
+  [[nodiscard]] double component(int component, double q) const noexcept;
+  /// Infinity for a component that is not modelled.
+  [[nodiscard]] double component_sigma(int component, double q) const noexcept;
+  [[nodiscard]] ErrorMotions motions(const Eigen::Vector3d& position) const noexcept;
+
+  /// Actual minus commanded position [m]; end values are held outside the travels. No allocation.
+  [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position,
+                                      const Eigen::Vector3d& tool) const noexcept;
+  /// Standard deviation [m] of `error`, of the field's shape: less the rigid motion of the frame, which is a
+  /// convention. Another tool than the calibration's adds the angles' share as if independent.
+  [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position,
+                                         const Eigen::Vector3d& tool) const noexcept;
+};
+
+}  // namespace invar::metrology

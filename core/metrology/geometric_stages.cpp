@@ -1,0 +1,106 @@
+#include "core/metrology/geometric_stages.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace invar::metrology {
+
+namespace {
+
+enum class Role { axis, parallel, plane_diagonal, elsewhere };
+
+double distance_beside(const CondensedLine& line) {
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k)
+    if (std::abs(line.beam.direction[k]) < 1e-6) sum += line.beam.start[k] * line.beam.start[k];
+  return std::sqrt(sum);
+}
+
+int moving_axes(const CondensedLine& line) {
+  return static_cast<int>((line.beam.direction.array().abs() > 1e-6).count());
+}
+
+/// What each line is for: the nearest to the origin of its kind identifies, the others beside it compare.
+std::vector<Role> roles_of(const std::vector<CondensedLine>& lines) {
+  std::array<double, 8> nearest;
+  nearest.fill(std::numeric_limits<double>::infinity());
+  const auto set_of = [](const CondensedLine& line) {
+    std::size_t set = 0;
+    for (int k = 0; k < 3; ++k)
+      if (std::abs(line.beam.direction[k]) > 1e-6) set |= std::size_t{1} << static_cast<std::size_t>(k);
+    return set;
+  };
+  for (const auto& line : lines)
+    nearest[set_of(line)] = std::min(nearest[set_of(line)], distance_beside(line));
+  std::vector<Role> roles;
+  for (const auto& line : lines) {
+    const bool first = distance_beside(line) < nearest[set_of(line)] + 1e-6;
+    if (moving_axes(line) == 1)
+      roles.push_back(first ? Role::axis : Role::parallel);
+    else
+      roles.push_back(moving_axes(line) == 2 && first ? Role::plane_diagonal : Role::elsewhere);
+  }
+  return roles;
+}
+
+/// The step in which a component is found.
+Role step_of(int component) {
+  if (is_positioning(component)) return Role::axis;
+  if (is_straightness(component)) return Role::plane_diagonal;
+  return direction_of(component) == axis_of(component) ? Role::elsewhere : Role::parallel;
+}
+
+}  // namespace
+
+Posterior solve_in_stages(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                          const GeometricBasis& basis, const GeometricPrior& prior, double misfit) {
+  NormalEquations nothing;
+  nothing.normal = Eigen::MatrixXd::Zero(basis.size, basis.size);
+  nothing.right = Eigen::VectorXd::Zero(basis.size);
+  Posterior result = solve(nothing, basis, prior);  // mean zero, covariance of the prior
+  const std::vector<Role> roles = roles_of(lines);
+  std::vector<int> known;
+  for (const Role step : {Role::axis, Role::parallel, Role::plane_diagonal, Role::elsewhere}) {
+    std::vector<CondensedLine> chosen_lines;
+    std::vector<LineRows> chosen_rows;
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+      if (roles[l] != step) continue;
+      chosen_lines.push_back(lines[l]);
+      chosen_rows.push_back(rows[l]);
+    }
+    std::vector<int> unknown;
+    for (const auto& block : basis.blocks)
+      if (step_of(block.component) == step)
+        for (int i = 0; i < block.size(); ++i) unknown.push_back(block.first + i);
+    if (step == Role::plane_diagonal)
+      for (int i = basis.first_squareness(); i < basis.size; ++i) unknown.push_back(i);
+    if (!chosen_lines.empty() && !unknown.empty()) {
+      const NormalEquations equations = assemble(chosen_lines, chosen_rows, basis.size, misfit);
+      const Eigen::MatrixXd precision =
+          result.prior_covariance(unknown, unknown)
+              .llt()
+              .solve(Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(unknown.size()),
+                                               static_cast<Eigen::Index>(unknown.size())));
+      const Eigen::LLT<Eigen::MatrixXd> factor{
+          Eigen::MatrixXd{equations.normal(unknown, unknown) + precision}};
+      const Eigen::MatrixXd carried = -factor.solve(Eigen::MatrixXd{equations.normal(unknown, known)});
+      const Eigen::VectorXd mean = factor.solve(Eigen::VectorXd{equations.right(unknown)}) +
+                                   carried * Eigen::VectorXd{result.mean(known)};
+      const Eigen::MatrixXd shared = carried * Eigen::MatrixXd{result.covariance(known, known)};
+      const Eigen::MatrixXd own =
+          factor.solve(Eigen::MatrixXd::Identity(precision.rows(), precision.cols())) +
+          shared * carried.transpose();
+      result.mean(unknown) = mean;
+      result.covariance(unknown, unknown) = own;
+      result.covariance(unknown, known) = shared;
+      result.covariance(known, unknown) = shared.transpose();
+    }
+    known.insert(known.end(), unknown.begin(), unknown.end());
+  }
+  return result;
+}
+
+}  // namespace invar::metrology

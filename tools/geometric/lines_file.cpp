@@ -1,0 +1,143 @@
+#include "tools/geometric/lines_file.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/base/fault.hpp"
+#include "core/recording/table.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::DisplacementLine;
+using metrology::Reading;
+
+std::string column_name(const char* prefix, int axis) {
+  return prefix + std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
+}
+
+[[noreturn]] void refuse(const recording::Table& table, const std::string& column, std::size_t row,
+                         const std::string& what, const std::string& mend) {
+  throw InputError{table.file.string() + ": column `" + column + "`, row " + std::to_string(row + 1), what,
+                   mend};
+}
+
+/// Positions of all rows; an axis that the machine lacks must stand still.
+std::vector<Eigen::Vector3d> read_positions(const recording::Table& table,
+                                            const metrology::Machine& machine) {
+  std::vector<Eigen::Vector3d> positions(table.rows(), Eigen::Vector3d::Zero());
+  for (int k = 0; k < 3; ++k) {
+    const std::string name = column_name("", k);
+    if (!machine.chain.has(k)) {
+      if (const auto values = table.optionally_in(name, "m"))
+        for (std::size_t i = 0; i < values->size(); ++i)
+          if (std::abs((*values)[i] - values->front()) > 1e-9)
+            refuse(table, name, i, "moves, but the machine has no such axis",
+                   "add the axis to the machine's chain");
+      continue;
+    }
+    const auto values = table.in(name, "m");
+    const Range travel = machine.travel[static_cast<std::size_t>(k)];
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) refuse(table, name, i, "no number", "give every reading its position");
+      if (values[i] < travel.lower - travel.width() || values[i] > travel.upper + travel.width())
+        refuse(table, name, i, report::number(values[i], 6) + " m is far outside the travel of the machine",
+               "check the unit, or the travel in the machine file");
+      positions[i][k] = values[i];
+    }
+  }
+  return positions;
+}
+
+/// Keeps the points that lie on multiples of `interval` from the start.
+void thin(DisplacementLine& line, double interval) {
+  const Eigen::Vector3d start = line.readings.front().position;
+  std::erase_if(line.readings, [&](const Reading& reading) {
+    const double steps = (reading.position - start).norm() / interval;
+    return std::abs(steps - std::round(steps)) > 1e-3;
+  });
+}
+
+}  // namespace
+
+LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine& machine, double interval) {
+  const auto table = recording::Table::read(file, {"line"});
+  LinesFile result;
+  result.rows = static_cast<int>(table.rows());
+  const recording::Column* names = table.find("line");
+  if (names == nullptr) (void)table.in("line", "1");  // says what is missing
+  const auto displacement = table.in("displacement", "m");
+  const auto positions = read_positions(table, machine);
+  const auto direction = table.optionally_in("direction", "1");
+  std::vector<Eigen::Vector3d> tools(table.rows(), machine.tool);
+  for (int k = 0; k < 3; ++k) {
+    const auto values = table.optionally_in(column_name("tool_", k), "m");
+    for (std::size_t i = 0; values && i < values->size(); ++i)
+      if (std::isfinite((*values)[i])) tools[i][k] = (*values)[i];
+  }
+  std::map<std::string, std::size_t> place;
+  std::size_t first_value = table.rows();
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    const std::string& name = names->texts[i];
+    if (std::isinf(displacement[i]) || std::abs(displacement[i]) > 1000.0)
+      refuse(table, "displacement", i, report::number(displacement[i], 6) + " m is out of range",
+             "check the value and its unit");
+    if (std::isnan(displacement[i])) {
+      ++result.without_value;
+      continue;
+    }
+    first_value = std::min(first_value, i);
+    const auto [found, is_new] = place.try_emplace(name, result.lines.size());
+    if (is_new) result.lines.push_back({name, {}});
+    Reading reading;
+    reading.position = positions[i];
+    reading.tool = tools[i];
+    reading.displacement = displacement[i];
+    reading.direction = direction && (*direction)[i] < 0.0 ? -1 : 1;
+    result.lines[found->second].readings.push_back(reading);
+  }
+  if (first_value == table.rows())
+    throw InputError{file.string() + ": column `displacement`", "holds no number at all", "add the readings"};
+
+  for (DisplacementLine& line : result.lines) {
+    if (interval > 0.0) thin(line, interval);
+    const auto beam = metrology::beam_of(line);
+    if (beam.length == 0.0) {
+      result.without_length.push_back(line.name);
+      continue;
+    }
+    // A reading one hundredth of the line off is no error of a machine: a count lost, or another unit.
+    const double limit = std::max(1e-3, 0.01 * beam.length);
+    const Reading first = line.readings.front();
+    const auto before = line.readings.size();
+    std::vector<double> off;
+    for (const Reading& r : line.readings)
+      off.push_back(r.displacement - beam.direction.dot(r.position + r.tool - first.position - first.tool));
+    std::vector<double> sorted = off;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                     sorted.end());
+    const double middle =
+        std::abs(sorted[sorted.size() / 2]) < 0.1 * beam.length ? sorted[sorted.size() / 2] : 0.0;
+    std::size_t i = 0;
+    std::erase_if(line.readings, [&](const Reading&) { return std::abs(off[i++] - middle) > limit; });
+    const auto dropped = before - line.readings.size();
+    result.far_off += static_cast<int>(dropped);
+    if (dropped * 5 > before)
+      throw InputError{file.string() + ": column `displacement`, line " + line.name,
+                       std::to_string(dropped) + " of " + std::to_string(before) +
+                           " readings differ from the commanded distance by more than a hundredth",
+                       "check the unit, the sign (along the beam, start = 0) and the beam's direction"};
+  }
+  std::erase_if(result.lines, [](const DisplacementLine& line) {
+    return line.readings.size() < 2 || metrology::beam_of(line).length == 0.0;
+  });
+  if (result.lines.empty())
+    throw InputError{file.string(), "no line has any length: all readings of a line stand at the same point",
+                     "measure each line at several points"};
+  return result;
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,26 @@
+// lines.csv: readings of displacement lines as a table, checked against the machine.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/machine.hpp"
+
+namespace invar::tools {
+
+struct LinesFile {
+  std::vector<metrology::DisplacementLine> lines;
+  int rows = 0;
+  int without_value = 0;  // rows with an empty displacement
+  int far_off = 0;        // rows so wrong that no statistics are needed (1 % of the line and more)
+  std::vector<std::string> without_length;  // lines that were left out
+};
+
+/// Reads the columns of calibration.md. `interval` [m] above 0 keeps only points at its multiples from the line's start
+/// (accuracy against data interval). Throws InputError with the first fault that makes the file unusable.
+LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine& machine,
+                     double interval = 0.0);
+
+}  // namespace invar::tools
