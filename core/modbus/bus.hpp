@@ -37,7 +37,7 @@ struct BusOptions {
   Duration longest_retry = Duration::milliseconds(5000);
   /// Instead of the maps' answer timeouts. Waits are real even where time is simulated: there say some seconds,
   /// so that a busy host is not taken for a dead device.
-  std::optional<Duration> answer_timeout;
+  std::optional<Duration> answer_timeout = {};
 };
 
 /// What happened with the connection since the start, by cause.

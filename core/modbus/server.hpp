@@ -41,7 +41,7 @@ struct Verdict;
 struct ServerOptions {
   std::string host = "127.0.0.1";  // IPv4 or IPv6 address, or a name
   std::uint16_t port = 0;          // 0: a free one
-  FaultScript faults;
+  FaultScript faults = {};
 };
 
 struct ServerCounters {
