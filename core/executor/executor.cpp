@@ -34,7 +34,7 @@ Executor::Executor(ExecutorOptions options) : options_{std::move(options)}, box_
 }
 
 Executor::~Executor() {
-  stop();
+  end_loop();  // and no more: what the outputs are connected to may be gone
   box_.stop();
 }
 

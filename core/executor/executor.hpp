@@ -167,6 +167,7 @@ class Executor {
   // the loop by the clock (loop.cpp)
   void loop(std::promise<bool>& ready);
   bool sleep_until(Instant due) noexcept;
+  void end_loop();
 
   // the callers of transitions (manager.cpp)
   void prepare();

@@ -30,6 +30,12 @@ void Executor::start() {
 }
 
 void Executor::stop() {
+  end_loop();
+  const std::lock_guard turn{stepping_};
+  deactivate_all(now());  // in simulated time, and before start()
+}
+
+void Executor::end_loop() {
   request_stop();
   if (thread_.joinable()) thread_.join();
   box_.deliver(true);
