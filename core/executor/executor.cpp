@@ -121,7 +121,11 @@ bool Executor::inputs_alive(Slot& slot, const Tick& tick) noexcept {
     Duration age = tick.now - since;
     // While this loop itself stood still nobody could feed it: that time is not the source's fault.
     if (since < stall_end_) age = age - (stall_end_ - std::max(since, stall_end_ - stall_));
-    if (age <= input.options().deadline) continue;
+    // And while it runs at a lower rate, its own sources do too.
+    const Duration limit = count_.stretch == 1
+                               ? input.options().deadline
+                               : std::max(input.options().deadline, options_.period * 2 * count_.stretch);
+    if (age <= limit) continue;
     if (slot.component->input_lost(input, tick)) continue;
     go_to_error(slot, deadline.failure, tick.now);
     return false;

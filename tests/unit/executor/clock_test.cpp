@@ -1,6 +1,9 @@
 // The executor by the clock: it starts, obeys, stops in order; nothing here depends on how fast the machine
 // is.
 #include <gmock/gmock.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
 
 #include <chrono>
 #include <thread>
@@ -94,6 +97,95 @@ TEST(Loop, SaysWhatWasNotGrantedOrRefusesToRunAsDeclared) {
   EXPECT_FALSE(executor.is_running());
 }
 
+TEST(Loop, HasThePriorityThatItsGrantsSayItHas) {
+  ExecutorOptions options = by_the_clock();
+  options.real_time = RealTimeRequest{.priority = 7, .cpu = 0, .lock_memory = true, .require = false};
+  std::atomic<int> policy{-1}, priority{-1}, cores{-1}, core{-1};
+  Executor executor{options};
+  executor.add(std::make_unique<Call>([&](const Tick&) {
+    sched_param parameters{};
+    int p = -1;
+    pthread_getschedparam(pthread_self(), &p, &parameters);
+    cpu_set_t set;
+    sched_getaffinity(0, sizeof set, &set);
+    policy = p;
+    priority = parameters.sched_priority;
+    cores = CPU_COUNT(&set);
+    core = sched_getcpu();
+  }));
+  (void)executor.transition(0, Transition::configure);
+  (void)executor.transition(0, Transition::activate);
+  executor.start();
+  ASSERT_TRUE(eventually([&] { return executor.steps(0) > 3; }));
+  executor.stop();
+  munlockall();
+  ASSERT_EQ(executor.grants().size(), 4U);
+  for (const Grant& grant : executor.grants()) {
+    EXPECT_EQ(grant.why.empty(), grant.granted) << grant.what;
+    if (grant.setting == "realtime.priority") {
+      EXPECT_EQ(policy == SCHED_FIFO && priority == 7, grant.granted);
+    }
+    if (grant.setting == "realtime.cpu") {
+      EXPECT_EQ(cores == 1 && core == 0, grant.granted);
+    }
+  }
+}
+
+TEST(Loop, DoesNotBlameAnInputForItsOwnStandstillButStillMissesOneThatIsGone) {
+  // The servo stands before the plant: what it reads is a cycle old, and older by the standstill.
+  Plant* plant = nullptr;
+  Servo* servo = nullptr;
+  const Servo::Parameters parameters;
+  std::atomic<bool> stall{false};
+  Executor executor{by_the_clock()};
+  auto a = std::make_unique<Servo>(parameters);
+  auto b = std::make_unique<Plant>();
+  servo = a.get();
+  plant = b.get();
+  plant->position.connect(servo->position);
+  servo->force.connect(plant->force);
+  executor.add(std::move(a));
+  executor.add(std::move(b));
+  executor.add(std::make_unique<Call>([&](const Tick&) {
+    if (stall.exchange(false)) std::this_thread::sleep_for(std::chrono::milliseconds{30});
+  }));
+  for (std::size_t i = 0; i < 3; ++i) {
+    (void)executor.transition(i, Transition::configure);
+    (void)executor.transition(i, Transition::activate);
+  }
+  executor.start();
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(eventually([&, then = executor.steps(0)] { return executor.steps(0) > then + 5; }));
+    stall = true;
+    ASSERT_TRUE(eventually([&] { return !stall; }));
+  }
+  ASSERT_TRUE(eventually([&, then = executor.steps(0)] { return executor.steps(0) > then + 5; }));
+  EXPECT_GT(executor.counters().skipped, 3U * 20U);
+  EXPECT_EQ(executor.state(0), LifecycleState::active) << executor.failure(0);
+  EXPECT_TRUE(executor.transition(1, Transition::deactivate).ok());
+  ASSERT_TRUE(eventually([&] { return executor.state(0) == LifecycleState::error; }));
+  EXPECT_THAT(executor.failure(0), HasSubstr("input `position` lost"));
+}
+
+TEST(Loop, DegradesToALowerRateAndTellsItsStepsTheLongerPeriod) {
+  ExecutorOptions options = by_the_clock();
+  options.overrun = OverrunPolicy::degrade;
+  std::atomic<bool> busy{true};
+  std::atomic<double> period{0.0};
+  Executor executor{options};
+  executor.add(std::make_unique<Call>([&](const Tick& t) {
+    period = t.period;
+    if (busy) std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }));
+  (void)executor.transition(0, Transition::configure);
+  (void)executor.transition(0, Transition::activate);
+  executor.start();
+  ASSERT_TRUE(eventually([&] { return executor.counters().stretch == 8; }));
+  ASSERT_TRUE(eventually([&] { return period == 8e-3; }));
+  EXPECT_FALSE(executor.counters().tripped);
+  executor.stop();
+}
+
 TEST(Loop, ALostPeriodUnderSafeStopDeactivatesEverything) {
   ExecutorOptions options = by_the_clock();
   options.overrun = OverrunPolicy::safe_stop;
@@ -158,6 +250,27 @@ TEST(ProcessControl, BringsUpUpstreamFirstAndTakesDownDownstreamFirstOncePerRequ
   EXPECT_THAT(journal, ElementsAre("configure source", "configure sink", "activate source", "activate sink",
                                    "deactivate sink", "cleanup sink", "deactivate source", "cleanup source"));
   EXPECT_EQ(executor.state(0), LifecycleState::finalized);
+}
+
+TEST(ProcessControl, BringingUpStopsAtTheFirstThatFailsAndTakingDownCarriesOn) {
+  Loop loop{by_the_clock()};
+  ProcessControl control{loop.executor};
+  loop.servo->refuse_to_configure = true;
+  const Outcome outcome = control.request("all", Transition::configure);
+  EXPECT_EQ(outcome.verdict, Verdict::failed);
+  EXPECT_EQ(outcome.reason, "servo: no such device");
+  EXPECT_EQ(outcome.state, LifecycleState::error);
+  EXPECT_EQ(loop.executor.state(0), LifecycleState::inactive);
+  EXPECT_EQ(loop.executor.state(2), LifecycleState::unconfigured) << "downstream of what failed";
+  EXPECT_EQ(control.request("all", Transition::configure).verdict, Verdict::refused) << "reset it first";
+  loop.servo->refuse_to_configure = false;
+  EXPECT_TRUE(control.request("all", Transition::reset).ok());
+  EXPECT_TRUE(control.request("all", Transition::configure).ok());
+  EXPECT_TRUE(control.request("all", Transition::activate).ok());
+  EXPECT_EQ(control.request("all", Transition::configure).verdict, Verdict::already);
+  EXPECT_EQ(control.request("all", Transition::activate).state, LifecycleState::active);
+  EXPECT_TRUE(control.request("all", Transition::shutdown).ok());
+  EXPECT_EQ(control.request("all", Transition::activate).verdict, Verdict::refused);
 }
 
 TEST(ProcessControl, ConvertsUnitsAndReportsEverythingAStatusNeeds) {
