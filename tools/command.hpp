@@ -10,8 +10,10 @@ namespace invar::tools {
 void add_about(CLI::App& program);
 void add_calibrate(CLI::App& program);
 void add_check(CLI::App& program);
+void add_export(CLI::App& program);
 void add_job(CLI::App& program);
 void add_predict(CLI::App& program);
+void add_recording(CLI::App& program);
 void add_simulate(CLI::App& program);
 
 }  // namespace invar::tools

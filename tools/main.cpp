@@ -13,8 +13,10 @@ int main(int argc, char** argv) {
   invar::tools::add_about(program);
   invar::tools::add_calibrate(program);
   invar::tools::add_check(program);
+  invar::tools::add_export(program);
   invar::tools::add_job(program);
   invar::tools::add_predict(program);
+  invar::tools::add_recording(program);
   invar::tools::add_simulate(program);
   try {
     program.parse(argc, argv);

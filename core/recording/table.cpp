@@ -74,9 +74,17 @@ std::optional<double> number(std::string_view cell) {
   return std::nullopt;
 }
 
+/// True for the bracket of `samples[3]`, false for that of `ratio [1]`: an index follows its name at once.
+bool is_index(std::string_view cell, std::size_t open) {
+  const std::string_view inside = cell.substr(open + 1, cell.size() - open - 2);
+  return open > 0 && cell[open - 1] != ' ' && cell.back() == ']' && !inside.empty() &&
+         inside.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
 Column header(std::string_view cell, const std::string& where) {
   Column column;
-  const auto open = cell.find('[');
+  auto open = cell.rfind('[');
+  if (open != std::string_view::npos && is_index(cell, open)) open = std::string_view::npos;
   column.name = std::string{trimmed(cell.substr(0, open))};
   if (open != std::string_view::npos) {
     const auto close = cell.find(']', open);

@@ -60,7 +60,7 @@ TEST_P(EachOrder, ReadsWhatFastCdrWrote) {
     EXPECT_EQ(number(value, "id"), sample.id());
     EXPECT_EQ(number(value, "flag"), sample.flag() ? 1.0 : 0.0);
     EXPECT_EQ(text(value, "letter"), std::string(1, sample.letter()));
-    EXPECT_EQ(number(value, "byte"), sample.byte());
+    EXPECT_EQ(number(value, "mask"), sample.mask());
     EXPECT_EQ(number(value, "tiny"), sample.tiny());
     EXPECT_EQ(number(value, "utiny"), sample.utiny());
     EXPECT_EQ(number(value, "small"), sample.small());

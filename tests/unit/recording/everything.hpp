@@ -30,7 +30,7 @@ inline probe::Everything random_sample(std::mt19937_64& random) {
   it.id(static_cast<std::uint32_t>(random()));
   it.flag(upto(1) == 1);
   it.letter(static_cast<char>('A' + upto(25)));
-  it.byte(static_cast<std::uint8_t>(random()));
+  it.mask(static_cast<std::uint8_t>(random()));
   it.tiny(static_cast<std::int8_t>(random()));
   it.utiny(static_cast<std::uint8_t>(random()));
   it.small(static_cast<std::int16_t>(random()));

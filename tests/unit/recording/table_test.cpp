@@ -45,6 +45,16 @@ TEST_F(TableTest, ReadsUnitsEmptyCellsAndTextColumns) {
   EXPECT_FALSE(table.optionally_in("missing", "m").has_value());
 }
 
+TEST_F(TableTest, TellsAnIndexInANameFromAUnit) {
+  const auto table = Table::read(make("volts[0] [V],grid[1][2],ratio [1],x[mm]\n1,2,3,4\n"));
+  EXPECT_EQ(table.columns[0].name, "volts[0]");
+  EXPECT_EQ(table.columns[0].unit, "V");
+  EXPECT_EQ(table.columns[1].name, "grid[1][2]");
+  EXPECT_EQ(table.columns[1].unit, "");
+  EXPECT_EQ(table.columns[2].unit, "1");
+  EXPECT_EQ(table.columns[3].unit, "mm");
+}
+
 TEST_F(TableTest, WritesWhatItReadsBackExactly) {
   Table table;
   table.add("x", "m", {0.1, 1.0 / 3.0, -2e-300});

@@ -1,0 +1,252 @@
+#include "core/recording/export.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+
+#include "core/base/fault.hpp"
+#include "core/recording/cdr.hpp"
+#include "core/recording/columns.hpp"
+#include "core/recording/value_json.hpp"
+
+namespace invar::recording {
+
+namespace {
+
+/// A file that takes its name when it is finished.
+class Output {
+ public:
+  explicit Output(std::filesystem::path target) : target_{std::move(target)}, temporary_{target_} {
+    temporary_ += ".part";
+    stream_.open(temporary_, std::ios::binary);
+    check();
+  }
+  ~Output() {
+    std::error_code ignored;
+    if (!finished_) std::filesystem::remove(temporary_, ignored);
+  }
+  Output(const Output&) = delete;
+  Output& operator=(const Output&) = delete;
+
+  void write(const std::string& line) {
+    stream_.write(line.data(), static_cast<std::streamsize>(line.size()));
+  }
+  void finish() {
+    stream_.close();
+    check();
+    std::filesystem::rename(temporary_, target_);
+    finished_ = true;
+  }
+
+ private:
+  void check() const {
+    if (!stream_)
+      throw InputError{target_.string(), "cannot be written",
+                       "check the folder, its permissions and the space left"};
+  }
+
+  std::filesystem::path target_, temporary_;
+  std::ofstream stream_;
+  bool finished_ = false;
+};
+
+/// One topic on its way out.
+struct Topic {
+  ExportedTopic report;
+  TypePointer type;
+  std::optional<Columns> columns;
+  std::unique_ptr<Output> output;
+};
+
+std::string file_name(const std::string& topic) {
+  std::string name;
+  for (const char c : topic) {
+    const bool plain = std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-' || c == '.';
+    name += c == '/' ? '.' : plain ? c : '_';
+  }
+  while (name.starts_with('.')) name.erase(0, 1);
+  return name.empty() ? "topic" : name;
+}
+
+void append_number(std::string& line, auto value) {
+  char digits[40];
+  line.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+}
+
+class Exporter {
+ public:
+  Exporter(const Recording& recording, const std::filesystem::path& folder, const ExportOptions& options)
+      : recording_{recording}, options_{options} {
+    refuse_unknown_topics();
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) throw InputError{folder.string(), "cannot be made: " + error.message(), "name another folder"};
+    for (const auto& [id, channel] : recording_.channels())
+      if (options_.selection.topics.empty() || options_.selection.topics.contains(channel.topic))
+        add_channel(id, channel, folder);
+  }
+
+  ExportReport run() {
+    widen();
+    for (Topic* topic : in_order_)
+      if (topic->output && !options_.json) topic->output->write(header(*topic));
+    ExportReport report;
+    auto stream = recording_.messages(options_.selection);
+    std::string line;
+    while (const auto message = stream.next()) {
+      Topic& topic = *by_channel_.at(message->channel->id);
+      if (!topic.output) continue;
+      const auto value = decode(*topic.type, message->data);
+      if (!value.ok()) {
+        if (topic.report.undecodable++ == 0)
+          topic.report.problem =
+              "message " + std::to_string(message->sequence) + ": " + std::string{sentence(value.error())};
+        continue;
+      }
+      line.clear();
+      if (options_.json)
+        append_json(line, *message, value.value());
+      else
+        append_row(line, topic, *message, value.value());
+      topic.output->write(line);
+      ++topic.report.rows;
+    }
+    report.damaged_chunks = stream.damaged_chunks();
+    for (Topic* topic : in_order_) {
+      if (topic->output) topic->output->finish();
+      if (topic->columns) topic->report.shortened = topic->columns->shortened();
+      report.topics.push_back(topic->report);
+    }
+    return report;
+  }
+
+ private:
+  void refuse_unknown_topics() const {
+    for (const std::string& topic : options_.selection.topics) {
+      const auto& channels = recording_.channels();
+      const bool known = std::any_of(channels.begin(), channels.end(),
+                                     [&](const auto& entry) { return entry.second.topic == topic; });
+      if (!known)
+        throw InputError{"--topic " + topic, "is not in the recording",
+                         "`invar recording info` lists its topics"};
+    }
+  }
+
+  void add_channel(std::uint16_t id, const mcap::Channel& channel, const std::filesystem::path& folder) {
+    const auto schema = recording_.schemas().find(channel.schema_id);
+    const std::string type_name = schema == recording_.schemas().end() ? "" : schema->second.name;
+    // Channels of one topic and type (several writers) share a file.
+    auto& topic = topics_[{channel.topic, channel.schema_id}];
+    if (topic == nullptr) {
+      topic = std::make_unique<Topic>();
+      in_order_.push_back(topic.get());
+      topic->report.topic = channel.topic;
+      topic->report.type = type_name;
+      prepare(*topic, channel, schema == recording_.schemas().end() ? nullptr : &schema->second, folder);
+    }
+    by_channel_[id] = topic.get();
+  }
+
+  void prepare(Topic& topic, const mcap::Channel& channel, const mcap::Schema* schema,
+               const std::filesystem::path& folder) {
+    if (schema == nullptr || schema->encoding != "omgidl" || channel.message_encoding != "cdr") {
+      topic.report.problem = "messages are `" + channel.message_encoding + "` by `" +
+                             (schema == nullptr ? "no schema" : schema->encoding) + "`, not cdr by omgidl";
+      return;
+    }
+    try {
+      topic.type = parse_idl(schema->data, "schema " + schema->name).find(schema->name);
+    } catch (const InputError& error) {
+      topic.report.problem = error.what();
+      return;
+    }
+    if (topic.type == nullptr) {
+      topic.report.problem = "its schema does not define `" + schema->name + "`";
+      return;
+    }
+    if (!options_.json) topic.columns.emplace(*topic.type, options_.longest);
+    const std::string stem = file_name(channel.topic);
+    std::string name = stem;
+    for (int n = 2; !file_names_.insert(name).second; ++n) name = stem + "-" + std::to_string(n);
+    topic.report.file = folder / (name + (options_.json ? ".jsonl" : ".csv"));
+    topic.output = std::make_unique<Output>(topic.report.file);
+  }
+
+  /// A first pass over the topics with sequences, for a table has the columns of its longest message.
+  void widen() {
+    Selection selection = options_.selection;
+    selection.topics.clear();
+    for (const Topic* topic : in_order_)
+      if (topic->columns && topic->columns->can_widen()) selection.topics.insert(topic->report.topic);
+    if (selection.topics.empty()) return;
+    auto stream = recording_.messages(selection);
+    while (const auto message = stream.next()) {
+      Topic& topic = *by_channel_.at(message->channel->id);
+      if (!topic.columns) continue;
+      const auto value = decode(*topic.type, message->data);
+      if (value.ok()) topic.columns->widen(value.value());
+    }
+  }
+
+  static std::string header(const Topic& topic) {
+    const auto fields = topic.columns->names();
+    std::string line;
+    const std::vector<ColumnName> own{
+        {"time", "s"}, {"log_time", "ns"}, {"publish_time", "ns"}, {"sequence", ""}};
+    for (const auto& column : own) {
+      const bool taken =
+          std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.path == column.path; });
+      line += (line.empty() ? "" : ",") + std::string{taken ? "recording." : ""} + column.path;
+      if (!column.unit.empty()) line += " [" + column.unit + "]";
+    }
+    for (const auto& column : fields)
+      line += "," + column.path + (column.unit.empty() ? "" : " [" + column.unit + "]");
+    return line + "\n";
+  }
+
+  void append_row(std::string& line, const Topic& topic, const RecordedMessage& message, const Value& value) {
+    append_number(line, (message.log_time - recording_.statistics().start).in_seconds());
+    line += ',';
+    append_number(line, message.log_time.ns);
+    line += ',';
+    append_number(line, message.publish_time.ns);
+    line += ',';
+    append_number(line, message.sequence);
+    topic.columns->fill(value, row_);
+    for (const Cell& cell : row_) {
+      line += ',';
+      append_cell(line, cell);
+    }
+    line += '\n';
+  }
+
+  static void append_json(std::string& line, const RecordedMessage& message, const Value& value) {
+    line = to_json_line({{"log_time_ns", message.log_time.ns},
+                         {"publish_time_ns", message.publish_time.ns},
+                         {"sequence", message.sequence},
+                         {"message", to_json(value)}});
+    line += '\n';
+  }
+
+  const Recording& recording_;
+  const ExportOptions& options_;
+  std::map<std::pair<std::string, std::uint16_t>, std::unique_ptr<Topic>> topics_;
+  std::vector<Topic*> in_order_;
+  std::map<std::uint16_t, Topic*> by_channel_;
+  std::set<std::string> file_names_;
+  std::vector<Cell> row_;
+};
+
+}  // namespace
+
+ExportReport export_recording(const Recording& recording, const std::filesystem::path& folder,
+                              const ExportOptions& options) {
+  return Exporter{recording, folder, options}.run();
+}
+
+}  // namespace invar::recording
