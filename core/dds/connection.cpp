@@ -31,11 +31,14 @@ WriterConnection::WriterConnection(Participant& participant, const std::string& 
                                    const Profile& profile)
     : participant_{participant},
       type_{type},
-      writer_{&participant.create_writer(topic, type.make_support(), profile)} {}
+      writer_{&participant.create_writer(topic, type.make_support(), profile, this)} {}
 
-WriterConnection::~WriterConnection() { participant_.remove(*writer_); }
+WriterConnection::~WriterConnection() {
+  writer_->set_listener(nullptr);
+  participant_.remove(*writer_);
+}
 
-std::size_t WriterConnection::matched() const { return readers_of(*writer_); }
+std::size_t WriterConnection::matched() const { return static_cast<std::size_t>(readers_.load()); }
 
 bool WriterConnection::write(const void* sample) {
   const bool written = type_.write(*writer_, sample);

@@ -12,12 +12,14 @@
 namespace invar::dds {
 
 /// A data writer of one type.
-class WriterConnection final : public Connection {
+class WriterConnection final : public Connection, private fdds::DataWriterListener {
  public:
   WriterConnection(Participant& participant, const std::string& topic, const WireType& type,
                    const Profile& profile);
   ~WriterConnection() override;
   [[nodiscard]] fdds::DataWriter& writer() { return *writer_; }
+  /// Readers connected now.
+  [[nodiscard]] const std::atomic<std::int32_t>& readers() const { return readers_; }
 
   [[nodiscard]] std::size_t matched() const override;
   [[nodiscard]] std::uint64_t lost() const override { return refused_; }
@@ -25,10 +27,15 @@ class WriterConnection final : public Connection {
   bool wait_for_acknowledgments(Duration patience) override;
 
  private:
+  void on_publication_matched(fdds::DataWriter*, const fdds::PublicationMatchedStatus& status) override {
+    readers_ = status.current_count;
+  }
+
   Participant& participant_;
   const WireType& type_;
-  fdds::DataWriter* writer_;
+  std::atomic<std::int32_t> readers_{0};
   std::atomic<std::uint64_t> refused_{0};
+  fdds::DataWriter* writer_;
 };
 
 /// A data reader whose listener hands over; what it does with the samples is given as a function, called on

@@ -82,14 +82,20 @@ const Profile& Node::profile(std::string_view name) const {
   return found->second;
 }
 
-void Node::bind(OutputPort& port, OutputBinding binding) {
-  const Profile& qos = profile(port.profile);
+const Profiles& Node::profiles() const { return parts_->profiles; }
+
+void Node::bind(OutputPort& port, OutputBinding binding) { bind(port, binding, profile(port.profile)); }
+
+void Node::bind(OutputPort& port, OutputBinding binding, const Profile& qos) {
   const WireType& type = wire_type_of(port.type(), port.topic);
   BoundOutput bound;
   bound.connection =
       std::make_unique<WriterConnection>(parts_->participant(qos.traffic), port.topic, type, qos);
   if (binding.period.ns == 0) {
-    bound.outlet = type.attach_direct(port, bound.connection->writer(), binding.separation);
+    bound.outlet = type.attach_direct(port, bound.connection->writer(), binding.separation,
+                                      binding.watched_only && qos.durability == Durability::volatile_
+                                          ? &bound.connection->readers()
+                                          : nullptr);
   } else {
     // Room for a tenth of a second in which the publishing thread does not get to run.
     const auto capacity =
@@ -111,14 +117,9 @@ void Node::bind(InputPort& port, Clock clock) {
       [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }));
 }
 
-void Node::end_of_cycle(Instant start) noexcept {
-  parts_->realtime_publishing.end_of_cycle(start);
-  parts_->general_publishing.end_of_cycle(start);
-}
-
-void Node::start() {
-  parts_->realtime_publishing.start(parts_->options.realtime_priority);
-  parts_->general_publishing.start(0);
+void Node::start(std::function<Instant()> ended) {
+  parts_->realtime_publishing.start(parts_->options.realtime_priority, ended);
+  parts_->general_publishing.start(0, ended);
 }
 
 void Node::stop() {

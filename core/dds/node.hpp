@@ -37,6 +37,8 @@ struct OutputBinding {
   Duration period;
   /// The least time between two samples on the wire; those between are left out. Zero: every sample.
   Duration separation;
+  /// Without a period: the middleware is left alone while nobody reads a volatile topic.
+  bool watched_only = false;
 };
 
 /// Where a raw sample came from.
@@ -89,31 +91,41 @@ class Node {
   [[nodiscard]] const NodeOptions& options() const;
   /// Precondition: there is one of that name; deployments are checked before.
   [[nodiscard]] const Profile& profile(std::string_view name) const;
+  [[nodiscard]] const Profiles& profiles() const;
 
   /// Set-up, before the loop runs: joins a port to its topic with its profile. The node must outlive all
   /// writing to the port, and the port must outlive the node or `stop`. Throws InputError when the topic is
   /// in use with another type or nobody registered the port's type.
   void bind(OutputPort& port, OutputBinding binding);
+  void bind(OutputPort& port, OutputBinding binding, const Profile& profile);
   void bind(InputPort& port, Clock clock = monotonic_now);
-  /// By the executor, after each cycle, with the cycle's nominal start: everything of it was written.
-  /// Real-time. Optional; the publishing thread then never looks in the middle of a cycle.
-  void end_of_cycle(Instant start) noexcept;
   /// Starts the publishing threads of ports bound with a period. Discovery and receiving begin with `bind`.
-  void start();
+  /// `ended` gives the nominal start of the loop's newest finished cycle, wait-free; with it the threads never look
+  /// in the middle of a cycle: [&] { return executor.counters().now; }
+  void start(std::function<Instant()> ended = {});
   /// Publishes what is left and stops the threads. Readers of ports are removed: nothing arrives any more.
   void stop();
 
   /// Typed writing from any thread of the caller.
   template <class T>
   [[nodiscard]] Writer<T> writer(const std::string& topic, std::string_view profile_name) {
-    return Writer<T>{make_writer(topic, typeid(T), profile(profile_name))};
+    return writer<T>(topic, profile(profile_name));
+  }
+  template <class T>
+  [[nodiscard]] Writer<T> writer(const std::string& topic, const Profile& profile) {
+    return Writer<T>{make_writer(topic, typeid(T), profile)};
   }
   /// Typed reading; `take` is called on a thread of the middleware and must not create or remove anything
   /// here.
   template <class T>
   [[nodiscard]] std::unique_ptr<Connection> reader(const std::string& topic, std::string_view profile_name,
                                                    std::function<void(const T&)> take) {
-    return make_reader(topic, typeid(T), profile(profile_name), [take = std::move(take)](const void* sample) {
+    return reader<T>(topic, profile(profile_name), std::move(take));
+  }
+  template <class T>
+  [[nodiscard]] std::unique_ptr<Connection> reader(const std::string& topic, const Profile& profile,
+                                                   std::function<void(const T&)> take) {
+    return make_reader(topic, typeid(T), profile, [take = std::move(take)](const void* sample) {
       take(*static_cast<const T*>(sample));
     });
   }

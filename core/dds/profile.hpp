@@ -36,6 +36,8 @@ struct Profile {
   bool exclusive = false;
   std::int64_t strength = 0;
   std::int64_t max_instances = 64;
+  /// The longest that a reliable writer waits for room in its history; then the sample is refused and counted.
+  Duration blocking = Duration::milliseconds(100);
   /// Bytes a second that writers of this profile in one process send at most; 0: no bound.
   std::int64_t flow = 0;
   std::vector<std::string> partitions;

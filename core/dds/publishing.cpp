@@ -26,8 +26,9 @@ void Publishing::add(Outlet& outlet, Duration period) {
   period_ = std::min(period_, period);
 }
 
-void Publishing::start(int priority) {
+void Publishing::start(int priority, std::function<Instant()> ended) {
   if (outlets_.empty() || thread_.joinable()) return;
+  ended_ = std::move(ended);
   stopping_ = false;
   thread_ = std::thread{[this] { run(); }};
   if (priority > 0) {
@@ -67,8 +68,8 @@ void Publishing::run() {
   while (!stopping_) {
     // With an executor that tells the end of its cycles, look only then; otherwise whenever awake. What was
     // written outside of cycles (safe values after a stop) goes out too, a little later.
-    const Instant ended{ended_ns_.load(std::memory_order_acquire)};
-    const bool told = ended.ns != INT64_MIN;
+    const bool told = ended_ != nullptr;
+    const Instant ended = told ? ended_() : Instant{INT64_MIN};
     const bool look = !told || ended != last || naps > 8;
     const bool found = (look && drain() > 0) || (told && ended != last);
     if (!found) {

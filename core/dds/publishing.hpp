@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <thread>
 #include <vector>
 
@@ -19,9 +20,9 @@ class Publishing {
   ~Publishing() { stop(); }
   /// Set-up only. `period` of the loop that writes.
   void add(Outlet& outlet, Duration period);
-  /// By the loop. Real-time.
-  void end_of_cycle(Instant start) noexcept { ended_ns_.store(start.ns, std::memory_order_release); }
-  void start(int priority);
+  /// `ended` gives the nominal start of the loop's newest finished cycle; wait-free. Without it the thread goes by
+  /// the samples, and may look in the middle of a cycle.
+  void start(int priority, std::function<Instant()> ended);
   /// Drains what is left.
   void stop();
 
@@ -32,7 +33,7 @@ class Publishing {
 
   std::vector<Outlet*> outlets_;
   Duration period_{INT64_MAX};
-  std::atomic<std::int64_t> ended_ns_{INT64_MIN};
+  std::function<Instant()> ended_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

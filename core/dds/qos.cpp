@@ -76,8 +76,7 @@ fdds::DataWriterQos writer_qos(const Profile& p) {
   if (p.liveliness == Liveliness::automatic && p.lease.ns != 0)
     qos.liveliness().announcement_period = wire_time(p.lease / 3);
   qos.ownership_strength().value = static_cast<std::uint32_t>(p.strength);
-  // A writer waits at most so long for room; then the sample is refused and counted.
-  qos.reliability().max_blocking_time = {0, 100'000'000};
+  qos.reliability().max_blocking_time = wire_time(p.blocking);
   qos.reliable_writer_qos().times.heartbeatPeriod = {0, 20'000'000};
   qos.reliable_writer_qos().times.nackResponseDelay = {0, 1'000'000};
   qos.publish_mode().kind = fdds::SYNCHRONOUS_PUBLISH_MODE;

@@ -71,8 +71,11 @@ class PacedOutlet final : public Outlet {
 template <class T>
 class DirectOutlet final : public Outlet {
  public:
-  DirectOutlet(Output<T>& port, fdds::DataWriter& writer, Duration separation) : thinning_{separation} {
-    port.add_sink([this, &writer](const T& sample, Instant now) {
+  DirectOutlet(Output<T>& port, fdds::DataWriter& writer, Duration separation,
+               const std::atomic<std::int32_t>* readers)
+      : thinning_{separation} {
+    port.add_sink([this, &writer, readers](const T& sample, Instant now) {
+      if (readers != nullptr && readers->load(std::memory_order_relaxed) == 0) return;
       if (thinning_.passes(now) && !write_sample(writer, sample))
         refused_.fetch_add(1, std::memory_order_relaxed);
     });
@@ -137,19 +140,22 @@ class TypedWire final : public WireType {
                                                      Duration separation) const override {
     return std::make_unique<PacedOutlet<T>>(static_cast<Output<T>&>(port), writer, capacity, separation);
   }
-  [[nodiscard]] std::unique_ptr<Outlet> attach_direct(OutputPort& port, fdds::DataWriter& writer,
-                                                      Duration separation) const override {
-    return std::make_unique<DirectOutlet<T>>(static_cast<Output<T>&>(port), writer, separation);
+  [[nodiscard]] std::unique_ptr<Outlet> attach_direct(
+      OutputPort& port, fdds::DataWriter& writer, Duration separation,
+      const std::atomic<std::int32_t>* readers) const override {
+    return std::make_unique<DirectOutlet<T>>(static_cast<Output<T>&>(port), writer, separation, readers);
   }
-  void attach_cdr(OutputPort& port, CdrSink sink) const override {
+  void attach_cdr(OutputPort& port, std::function<bool()> wanted, CdrSink sink) const override {
     auto type = std::make_shared<Type<B>>();
     auto payload = std::make_shared<eprosima::fastrtps::rtps::SerializedPayload_t>();
-    static_cast<Output<T>&>(port).add_sink([type, payload, sink = std::move(sink)](const T& sample, Instant) {
-      void* data = const_cast<T*>(&sample);  // NOLINT
-      payload->reserve(type->getSerializedSizeProvider(data)());
-      if (type->serialize(data, payload.get()))
-        sink({reinterpret_cast<const std::byte*>(payload->data), payload->length});
-    });
+    static_cast<Output<T>&>(port).add_sink(
+        [type, payload, wanted = std::move(wanted), sink = std::move(sink)](const T& sample, Instant) {
+          if (!wanted()) return;
+          void* data = const_cast<T*>(&sample);  // NOLINT
+          payload->reserve(type->getSerializedSizeProvider(data)());
+          if (type->serialize(data, payload.get()))
+            sink({reinterpret_cast<const std::byte*>(payload->data), payload->length});
+        });
   }
   [[nodiscard]] std::unique_ptr<Inlet> attach(InputPort& port, bool keep) const override {
     if (port.direction() == Port::Direction::inbox)

@@ -1,6 +1,7 @@
 // WireType: all that the transport must know of one type, so that the rest of this room knows none.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -62,11 +63,12 @@ class WireType {
                                                              eprosima::fastdds::dds::DataWriter& writer,
                                                              std::size_t capacity,
                                                              Duration separation) const = 0;
-  /// Straight to the middleware, on the thread that writes.
-  [[nodiscard]] virtual std::unique_ptr<Outlet> attach_direct(OutputPort& port,
-                                                              eprosima::fastdds::dds::DataWriter& writer,
-                                                              Duration separation) const = 0;
-  virtual void attach_cdr(OutputPort& port, CdrSink sink) const = 0;
+  /// Straight to the middleware, on the thread that writes; with `readers`, only while there are any.
+  [[nodiscard]] virtual std::unique_ptr<Outlet> attach_direct(
+      OutputPort& port, eprosima::fastdds::dds::DataWriter& writer, Duration separation,
+      const std::atomic<std::int32_t>* readers) const = 0;
+  /// `wanted` is asked before each sample; it and what `sink` refers to must outlive all writing.
+  virtual void attach_cdr(OutputPort& port, std::function<bool()> wanted, CdrSink sink) const = 0;
   /// `keep`: samples stay in the reader's history (`read`), which costs no allocation; otherwise they are
   /// taken.
   [[nodiscard]] virtual std::unique_ptr<Inlet> attach(InputPort& port, bool keep) const = 0;

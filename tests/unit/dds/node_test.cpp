@@ -169,7 +169,8 @@ TEST(Node, RawReaderSeesTheBytesTheSequenceAndTheWriter) {
     return got.size() == 20;
   }));
   for (std::size_t i = 0; i < 20; ++i) EXPECT_EQ(got[i].first, i + 1);
-  EXPECT_EQ(got[0].second, (4 + event::Notice::getCdrSerializedSize(notice) + 3) / 4 * 4);  // RTPS pads to words
+  EXPECT_EQ(got[0].second,
+            (4 + event::Notice::getCdrSerializedSize(notice) + 3) / 4 * 4);  // RTPS pads to words
 }
 
 TEST(Node, RawWriterIsReadByATypedReader) {

@@ -1,0 +1,349 @@
+#include "core/dds/simulated_clock.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+
+#include "core/base/contract.hpp"
+#include "core/base/fault.hpp"
+
+namespace invar::dds {
+
+namespace {
+
+using SteadyTime = std::chrono::steady_clock::time_point;
+constexpr std::size_t part_size = 1U << 20U;  // the bound of TimeReached.samples
+
+SteadyTime after(Duration patience) {
+  return std::chrono::steady_clock::now() + std::chrono::nanoseconds{patience.ns};
+}
+
+/// An answer stays available to those who connect late; a window needs no more than these parts.
+Profile answers_profile() {
+  Profile p;
+  p.name = "lockstep";
+  p.reliable = true;
+  p.depth = 256;
+  p.durability = Durability::transient_local;
+  p.max_instances = 64;
+  p.blocking = Duration::milliseconds(10'000);
+  return p;
+}
+
+Profile grants_profile() {
+  Profile p = answers_profile();
+  p.durability = Durability::volatile_;
+  return p;
+}
+
+std::string topic_of(const Node& node, const char* what) {
+  return "cell/" + node.options().cell + "/lockstep/" + what;
+}
+
+}  // namespace
+
+std::uint32_t name_number(std::string_view name) {
+  std::uint32_t hash = 2166136261U;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 16777619U;
+  return hash;
+}
+
+void ReachedBoard::put(const lockstep::TimeReached& part) {
+  const std::lock_guard lock{mutex_};
+  Window& window = windows_[{part.run(), part.sequence_number()}];
+  Entry& entry = window.partial[part.process_id()];
+  entry.samples.insert(entry.samples.end(), part.samples().begin(), part.samples().end());
+  entry.finished = part.finished();
+  entry.failure = part.failure().c_str();
+  if (!part.last()) return;
+  window.complete.insert_or_assign(part.process_id(), std::move(entry));
+  window.partial.erase(part.process_id());
+  news_.notify_all();
+}
+
+void ReachedBoard::clear() {
+  const std::lock_guard lock{mutex_};
+  windows_.clear();
+}
+
+std::optional<std::vector<ReachedBoard::Entry>> ReachedBoard::wait(
+    std::uint64_t run, std::uint64_t sequence, const std::vector<std::uint32_t>& processes, Duration patience,
+    const std::function<bool()>& given_up) {
+  std::unique_lock lock{mutex_};
+  const std::pair key{run, sequence};
+  const auto complete = [&] {
+    const auto& there = windows_[key].complete;
+    return std::all_of(processes.begin(), processes.end(), [&](auto p) { return there.contains(p); });
+  };
+  const auto end = after(patience);
+  while (!complete()) {
+    if (std::chrono::steady_clock::now() > end || (given_up && given_up())) return std::nullopt;
+    news_.wait_for(lock, std::chrono::milliseconds{50});
+  }
+  std::vector<Entry> entries;
+  for (const auto process : processes) entries.push_back(std::move(windows_[key].complete[process]));
+  // What is older, of this run or of one before it, nobody asks for again.
+  std::erase_if(windows_, [&](const auto& w) { return w.first.first != run || w.first.second <= sequence; });
+  return entries;
+}
+
+std::vector<std::uint32_t> ReachedBoard::missing(std::uint64_t run, std::uint64_t sequence,
+                                                 const std::vector<std::uint32_t>& processes) const {
+  const std::lock_guard lock{mutex_};
+  const auto window = windows_.find({run, sequence});
+  std::vector<std::uint32_t> out;
+  for (const auto process : processes)
+    if (window == windows_.end() || !window->second.complete.contains(process)) out.push_back(process);
+  return out;
+}
+
+SimulatedClockMaster::SimulatedClockMaster(Node& node, std::vector<std::string> processes, Duration window)
+    : names_{std::move(processes)},
+      window_{window},
+      run_{(std::uint64_t{std::random_device{}()} << 32U) | std::random_device{}()},
+      writer_{node.writer<lockstep::TimeGrant>(topic_of(node, "grant"), grants_profile())} {
+  INVAR_EXPECTS(window.ns > 0 && !names_.empty() && names_.size() <= 64, window.ns, names_.size());
+  for (const auto& name : names_) numbers_.push_back(name_number(name));
+  reader_ =
+      node.reader<lockstep::TimeReached>(topic_of(node, "reached"), answers_profile(),
+                                         [this](const lockstep::TimeReached& part) { board_.put(part); });
+}
+
+void SimulatedClockMaster::grant(lockstep::GrantKind kind, Instant until) {
+  lockstep::TimeGrant sample;
+  sample.kind(kind);
+  sample.run(run_);
+  sample.sequence_number(sequence_);
+  sample.from_ns(now_.ns);
+  sample.until_ns(until.ns);
+  sample.processes(numbers_);
+  writer_.write(sample);
+}
+
+std::string SimulatedClockMaster::names_of(const std::vector<std::uint32_t>& numbers) const {
+  std::string text;
+  for (std::size_t i = 0; i < numbers_.size(); ++i)
+    if (std::find(numbers.begin(), numbers.end(), numbers_[i]) != numbers.end())
+      text += (text.empty() ? "" : ", ") + names_[i];
+  return text;
+}
+
+std::string SimulatedClockMaster::wait_for_all(Duration patience, const std::function<bool()>& given_up) {
+  const auto end = after(patience);
+  while (std::chrono::steady_clock::now() < end && !(given_up && given_up())) {
+    grant(lockstep::GRANT_JOIN, now_);
+    if (board_.wait(run_, 0, numbers_, Duration::milliseconds(20), given_up)) return "";
+  }
+  return "these processes did not join simulated time: " + names_of(board_.missing(run_, 0, numbers_));
+}
+
+Advance SimulatedClockMaster::advance_to(Instant until, Duration patience,
+                                         const std::function<bool()>& given_up) {
+  while (now_ < until) {
+    const Instant next = std::min(until, now_ + window_);
+    ++sequence_;
+    grant(lockstep::GRANT_RUN, next);
+    const auto answers = board_.wait(run_, sequence_, numbers_, patience, given_up);
+    if (!answers)
+      return {now_, false,
+              "these processes did not reach " + std::to_string(next.in_seconds()) +
+                  " s of simulated time: " + names_of(board_.missing(run_, sequence_, numbers_))};
+    now_ = next;
+    for (std::size_t i = 0; i < answers->size(); ++i)
+      if (!(*answers)[i].failure.empty()) return {now_, false, names_[i] + ": " + (*answers)[i].failure};
+    if (std::all_of(answers->begin(), answers->end(), [](const auto& a) { return a.finished; }))
+      return {now_, true, ""};
+  }
+  return {now_, false, ""};
+}
+
+void SimulatedClockMaster::end() {
+  grant(lockstep::GRANT_END, now_);
+  (void)writer_.connection().wait_for_acknowledgments(Duration::milliseconds(1000));
+}
+
+SimulatedClockClient::SimulatedClockClient(Node& node)
+    : node_{node},
+      number_{name_number(node.options().process)},
+      writer_{node.writer<lockstep::TimeReached>(topic_of(node, "reached"), answers_profile())} {
+  membership_.process = node.options().process;
+  reached_reader_ = node.reader<lockstep::TimeReached>(topic_of(node, "reached"), answers_profile(),
+                                                       [this](const lockstep::TimeReached& part) {
+                                                         if (part.process_id() != number_) board_.put(part);
+                                                       });
+  grant_reader_ = node.reader<lockstep::TimeGrant>(topic_of(node, "grant"), grants_profile(),
+                                                   [this](const lockstep::TimeGrant& grant) {
+                                                     const std::lock_guard lock{mutex_};
+                                                     grants_.push_back(grant);
+                                                     news_.notify_one();
+                                                   });
+}
+
+void SimulatedClockClient::bind(OutputPort& port) {
+  const WireType* type = WireTypes::all().find(port.type());
+  if (type == nullptr)
+    throw InputError{"topic `" + port.topic + "`", "carries a type that no IDL describes", "add it to idl/"};
+  const auto number = static_cast<std::uint32_t>(membership_.written.size());
+  membership_.written.push_back({port.topic, type->name()});
+  const bool& wanted = wanted_.emplace_back(false);
+  type->attach_cdr(
+      port, [&wanted] { return wanted; },
+      [this, number](std::span<const std::byte> cdr) { bundle_.add(number, cdr); });
+
+  Profile outside = node_.profile(port.profile);
+  outside.reliable = true;
+  outside.keep_all = true;
+  outside.depth = 2000;
+  outside.lifespan = {};
+  outside.flow = 0;
+  outside.blocking = Duration::milliseconds(10'000);
+  node_.bind(port, {.period = {}, .separation = {}, .watched_only = true}, outside);
+}
+
+void SimulatedClockClient::bind(InputPort& port) {
+  const WireType* type = WireTypes::all().find(port.type());
+  if (type == nullptr)
+    throw InputError{"topic `" + port.topic + "`", "carries a type that no IDL describes", "add it to idl/"};
+  inputs_.push_back({port.topic, type->attach(port, false)});
+  membership_.wanted.push_back(port.topic);
+}
+
+void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) {
+  tap_ = std::move(sink);
+  membership_.wanted.emplace_back("*");
+}
+
+std::optional<lockstep::TimeGrant> SimulatedClockClient::next_grant(const std::atomic<bool>& stop,
+                                                                    Duration patience) {
+  std::unique_lock lock{mutex_};
+  const auto end = after(patience);
+  while (grants_.empty()) {
+    if (stop || std::chrono::steady_clock::now() > end) return std::nullopt;
+    news_.wait_for(lock, std::chrono::milliseconds{50});
+  }
+  auto grant = std::move(grants_.front());
+  grants_.pop_front();
+  return grant;
+}
+
+SimulatedClockClient::Run SimulatedClockClient::run(const std::function<std::string(Instant until)>& advance,
+                                                    const std::function<bool()>& is_finished,
+                                                    const std::atomic<bool>& stop, Duration patience) {
+  for (;;) {
+    const auto grant = next_grant(stop, patience);
+    if (!grant) return {false, stop ? "" : "no simulated time was granted for too long"};
+    switch (grant->kind()) {
+      case lockstep::GRANT_JOIN:
+        if (grant->run() != run_) join(*grant);
+        break;
+      case lockstep::GRANT_END:
+        if (grant->run() != run_) break;
+        // Ports get nothing any more, but a recorder wants the last window too.
+        if (tap_ && grant->sequence_number() > 0)
+          return {true, deliver_all(*grant, grant->sequence_number(), stop, patience)};
+        return {true, ""};
+      case lockstep::GRANT_RUN: {
+        if (grant->run() != run_) break;
+        const std::string failure = carry_out(*grant, advance, stop, patience);
+        answer(*grant, previous_, is_finished(), failure);
+        break;
+      }
+    }
+  }
+}
+
+void SimulatedClockClient::join(const lockstep::TimeGrant& grant) {
+  run_ = grant.run();
+  peers_.clear();
+  previous_.clear();
+  learn(number_, membership_);
+  answer(grant, write_membership(membership_), false, "");
+}
+
+void SimulatedClockClient::learn(std::uint32_t process, const Membership& membership) {
+  Peer& peer = peers_[process];
+  peer.name = membership.process;
+  peer.topics = membership.written;
+  peer.counts.assign(peer.topics.size(), 0);
+  peer.inlets.assign(peer.topics.size(), {});
+  if (process == number_) {
+    for (std::size_t i = 0; i < wanted_.size(); ++i) wanted_[i] = tap_ != nullptr;
+    return;  // own outputs are joined with own inputs by the executor
+  }
+  for (std::size_t i = 0; i < peer.topics.size(); ++i)
+    for (const auto& input : inputs_)
+      if (input.topic == peer.topics[i].topic) peer.inlets[i].push_back(input.inlet.get());
+  for (const auto& topic : membership.wanted)
+    for (std::size_t i = 0; i < membership_.written.size(); ++i)
+      if (topic == "*" || topic == membership_.written[i].topic) wanted_[i] = true;
+}
+
+bool SimulatedClockClient::deliver(std::uint32_t process, std::span<const std::uint8_t> bundle, Instant at) {
+  Peer& peer = peers_[process];
+  bool good = true;
+  good &= read_bundle(bundle, [&](std::uint32_t number, std::span<const std::byte> cdr) {
+    if (number >= peer.topics.size()) {
+      good = false;
+      return;
+    }
+    for (Inlet* inlet : peer.inlets[number]) good &= inlet->deliver(cdr, at);
+    ++peer.counts[number];
+    if (tap_) tap_({peer.name, peer.topics[number], peer.counts[number], at, cdr});
+  });
+  return good;
+}
+
+std::string SimulatedClockClient::deliver_all(const lockstep::TimeGrant& grant, std::uint64_t window,
+                                              const std::atomic<bool>& stop, Duration patience) {
+  std::vector<std::uint32_t> others = grant.processes();
+  std::erase(others, number_);
+  const auto answers = board_.wait(run_, window, others, patience, [&stop] { return stop.load(); });
+  if (!answers) return stop ? "was stopped" : "the samples of another process did not arrive";
+  std::size_t next = 0;
+  for (const auto process : grant.processes()) {
+    if (process == number_) {
+      if (tap_ && !deliver(number_, previous_, {grant.from_ns()})) return "malformed samples of its own";
+      continue;
+    }
+    const auto& samples = (*answers)[next++].samples;
+    if (window == 0)
+      learn(process, read_membership(samples));
+    else if (!deliver(process, samples, {grant.from_ns()}))
+      return "malformed samples of another process";
+  }
+  return "";
+}
+
+std::string SimulatedClockClient::carry_out(const lockstep::TimeGrant& grant,
+                                            const std::function<std::string(Instant)>& advance,
+                                            const std::atomic<bool>& stop, Duration patience) {
+  std::string failure = deliver_all(grant, grant.sequence_number() - 1, stop, patience);
+  if (!failure.empty()) return failure;
+  bundle_.clear();
+  failure = advance({grant.until_ns()});
+  previous_ = bundle_.bytes();
+  return failure;
+}
+
+void SimulatedClockClient::answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples,
+                                  bool finished, const std::string& failure) {
+  lockstep::TimeReached part;
+  part.cell(grant.cell());
+  part.process_id(number_);
+  part.run(run_);
+  part.sequence_number(grant.sequence_number());
+  part.finished(finished);
+  part.failure(failure);
+  std::size_t begin = 0;
+  do {
+    const std::size_t end = std::min(samples.size(), begin + part_size);
+    part.samples().assign(samples.begin() + static_cast<std::ptrdiff_t>(begin),
+                          samples.begin() + static_cast<std::ptrdiff_t>(end));
+    part.last(end == samples.size());
+    writer_.write(part);
+    part.part(part.part() + 1);
+    begin = end;
+  } while (begin < samples.size());
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,172 @@
+// Simulated time over several processes, in lock-step and repeatable bit for bit.
+//
+// A master grants windows of time. In each, every process first delivers to its ports what the others wrote in the
+// window before - process by process in one fixed order, each in the order written - then runs its cycles, then
+// hands all that it wrote in one bundle to everybody. So what a component sees depends on nothing but its inputs:
+// neither on scheduling nor on how long a message took. A sample written in window k is seen elsewhere in window
+// k + 1; inside a process as always.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/component/port.hpp"
+#include "core/dds/bundle.hpp"
+#include "core/dds/node.hpp"
+#include "core/dds/wire_type.hpp"
+#include "idl/lockstep.h"
+
+namespace invar::dds {
+
+/// A number for a name, the same everywhere (FNV-1a): processes in keys and in lock-step.
+[[nodiscard]] std::uint32_t name_number(std::string_view name);
+
+/// Collects what every process said of a window. Any thread.
+class ReachedBoard {
+ public:
+  struct Entry {
+    std::vector<std::uint8_t> samples;
+    bool finished = false;
+    std::string failure;
+  };
+  void put(const lockstep::TimeReached& part);
+  void clear();
+  /// Waits until all of `processes` answered `sequence` of `run`, and takes their answers, in that order; nothing when
+  /// that takes longer than `patience` or `given_up` says so.
+  std::optional<std::vector<Entry>> wait(std::uint64_t run, std::uint64_t sequence,
+                                         const std::vector<std::uint32_t>& processes, Duration patience,
+                                         const std::function<bool()>& given_up);
+  /// Those that did not answer.
+  [[nodiscard]] std::vector<std::uint32_t> missing(std::uint64_t run, std::uint64_t sequence,
+                                                   const std::vector<std::uint32_t>& processes) const;
+
+ private:
+  struct Window {
+    std::map<std::uint32_t, Entry> complete, partial;
+  };
+  mutable std::mutex mutex_;
+  std::condition_variable news_;
+  std::map<std::pair<std::uint64_t, std::uint64_t>, Window> windows_;
+};
+
+/// How a span of simulated time ended.
+struct Advance {
+  Instant reached;
+  bool finished = false;  // all processes said that nothing is left to do
+  std::string failure;    // empty: none
+};
+
+class SimulatedClockMaster {
+ public:
+  /// `processes` by name, in the order in which their samples are delivered.
+  SimulatedClockMaster(Node& node, std::vector<std::string> processes, Duration window);
+
+  /// Waits until every process is there and connected with every other. Empty: so it is; otherwise who is missing.
+  [[nodiscard]] std::string wait_for_all(Duration patience, const std::function<bool()>& given_up = {});
+  /// Grants window after window up to `until`, or until all have finished or one has failed. `patience` is wall-clock
+  /// time for one window.
+  Advance advance_to(Instant until, Duration patience = Duration::milliseconds(120'000),
+                     const std::function<bool()>& given_up = {});
+  /// Tells all that no more time comes.
+  void end();
+  [[nodiscard]] Instant now() const { return now_; }
+
+ private:
+  void grant(lockstep::GrantKind kind, Instant until);
+  [[nodiscard]] std::string names_of(const std::vector<std::uint32_t>& numbers) const;
+
+  std::vector<std::string> names_;
+  std::vector<std::uint32_t> numbers_;
+  Duration window_;
+  std::uint64_t run_, sequence_ = 0;
+  Instant now_;
+  ReachedBoard board_;
+  Writer<lockstep::TimeGrant> writer_;
+  std::unique_ptr<Connection> reader_;
+};
+
+/// A sample of any process, as a recorder in lock-step sees it.
+struct LockstepSample {
+  std::string_view process;
+  const BundleTopic& topic;
+  std::uint64_t sequence;  // counts the samples of this topic from this process, from 1
+  Instant window;          // start of the window in which it is delivered
+  std::span<const std::byte> cdr;
+};
+
+class SimulatedClockClient {
+ public:
+  /// The node's process name is this process's.
+  explicit SimulatedClockClient(Node& node);
+
+  /// Set-up, before `run`. What this output writes goes into the bundles, and on its topic of DDS for whoever
+  /// watches from outside, reliable and complete whatever its profile, so that fast simulated time loses nothing.
+  void bind(OutputPort& port);
+  /// Several may be bound to one topic.
+  void bind(InputPort& port);
+  /// Set-up. Sees every sample of every process, this one included, in one fixed order.
+  void tap(std::function<void(const LockstepSample&)> sink);
+
+  struct Run {
+    bool ended = false;   // the master said so
+    std::string failure;  // of the transport: nothing granted for so long, a malformed bundle
+  };
+  /// Serves grants until the master ends the run or `stop` is set. `advance` runs the executor up to a time; it
+  /// returns why it cannot go on, or an empty text. `is_finished` says that this process has no work left.
+  Run run(const std::function<std::string(Instant until)>& advance, const std::function<bool()>& is_finished,
+          const std::atomic<bool>& stop, Duration patience = Duration::milliseconds(120'000));
+
+ private:
+  struct Binding {
+    std::string topic;
+    std::shared_ptr<Inlet> inlet;
+  };
+  struct Peer {
+    std::string name;
+    std::vector<BundleTopic> topics;
+    std::vector<std::uint64_t> counts;
+    std::vector<std::vector<Inlet*>> inlets;  // by topic number
+  };
+  std::optional<lockstep::TimeGrant> next_grant(const std::atomic<bool>& stop, Duration patience);
+  void join(const lockstep::TimeGrant& grant);
+  /// Takes what all wrote in a window to ports and tap. Empty: done.
+  std::string deliver_all(const lockstep::TimeGrant& grant, std::uint64_t window,
+                          const std::atomic<bool>& stop, Duration patience);
+  std::string carry_out(const lockstep::TimeGrant& grant, const std::function<std::string(Instant)>& advance,
+                        const std::atomic<bool>& stop, Duration patience);
+  void answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples, bool finished,
+              const std::string& failure);
+  void learn(std::uint32_t process, const Membership& membership);
+  /// False: malformed.
+  bool deliver(std::uint32_t process, std::span<const std::uint8_t> bundle, Instant at);
+
+  Node& node_;
+  std::uint32_t number_;
+  std::uint64_t run_ = 0;
+  Membership membership_;
+  std::deque<bool> wanted_;  // by the number of our own topics; the addresses stay
+  Bundle bundle_;
+  std::vector<std::uint8_t> previous_;  // our own bundle of the window before, for the tap
+  std::vector<Binding> inputs_;
+  std::map<std::uint32_t, Peer> peers_;
+  std::function<void(const LockstepSample&)> tap_;
+  ReachedBoard board_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::deque<lockstep::TimeGrant> grants_;
+  Writer<lockstep::TimeReached> writer_;
+  std::unique_ptr<Connection> reached_reader_, grant_reader_;
+};
+
+}  // namespace invar::dds
