@@ -173,10 +173,8 @@ Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
         own.precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
     const Eigen::MatrixXd w = own.solved * change * own.solved.transpose();
     const Eigen::VectorXd u = own.solved * system.mean.segment(block.first, block.size());
-    const CovarianceSlopes slopes = coefficient_covariance_slopes(basis, prior, block.component);
-    const auto kind = static_cast<Eigen::Index>(kind_of(block.component));
-    result.slope[kind] += 0.5 * (u.dot(slopes.by_amplitude * u) + slopes.by_amplitude.cwiseProduct(w).sum());
-    result.slope[3 + kind] += 0.5 * (u.dot(slopes.by_length * u) + slopes.by_length.cwiseProduct(w).sum());
+    for (const auto& slope : coefficient_covariance_slopes(basis, prior, block.component))
+      result.slope[slope.strength] += 0.5 * (u.dot(slope.matrix * u) + slope.matrix.cwiseProduct(w).sum());
   }
   return result;
 }

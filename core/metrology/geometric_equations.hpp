@@ -45,14 +45,14 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
 Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
                      const GeometricPrior& prior);
 
-/// Log evidence of a prior and its gradient by log amplitudes and log lengths (six numbers).
+/// Log evidence of a prior and its gradient by the log strengths.
 struct Evidence {
   double value = 0.0;
-  Eigen::Matrix<double, 6, 1> slope = Eigen::Matrix<double, 6, 1>::Zero();
+  Strengths slope = Strengths::Zero();
 };
 Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior);
 
-/// The prior that explains the readings best, under weak log-normal expectations about `start`. About 30 evaluations.
+/// The prior that explains the readings best, under weak log-normal expectations about `expected`. About 30 evaluations.
 GeometricPrior most_evident(const NormalEquations& equations, const GeometricBasis& basis,
                             const GeometricPrior& expected, const GeometricPrior& start);
 

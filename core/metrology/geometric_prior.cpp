@@ -29,12 +29,37 @@ MotionKind kind_of(int component) {
   return is_positioning(component) ? MotionKind::positioning : MotionKind::straightness;
 }
 
+Strengths log_strengths(const GeometricPrior& prior) {
+  Strengths logs;
+  for (int k = 0; k < 3; ++k) {
+    logs[k] = std::log(prior.amplitude[static_cast<std::size_t>(k)]);
+    logs[3 + k] = std::log(prior.length[static_cast<std::size_t>(k)]);
+  }
+  logs[6] = std::log(prior.fine_amplitude[0]);
+  logs[7] = std::log(prior.fine_amplitude[1]);
+  logs[8] = std::log(prior.fine_length);
+  return logs;
+}
+
+GeometricPrior with_log_strengths(const GeometricPrior& prior, const Strengths& logs) {
+  GeometricPrior result = prior;
+  for (int k = 0; k < 3; ++k) {
+    result.amplitude[static_cast<std::size_t>(k)] = std::exp(logs[k]);
+    result.length[static_cast<std::size_t>(k)] = std::exp(logs[3 + k]);
+  }
+  result.fine_amplitude[0] = std::exp(logs[6]);
+  result.fine_amplitude[1] = std::exp(logs[7]);
+  result.fine_length = std::exp(logs[8]);
+  return result;
+}
+
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior,
                                        int component) {
   const auto axis = static_cast<std::size_t>(axis_of(component));
   const auto& spline = basis.splines[axis];
   const MotionKind kind = kind_of(component);
   const double variance = prior.amplitude[index(kind)] * prior.amplitude[index(kind)];
+  const double fine = prior.fine_amplitude[index(kind)] * prior.fine_amplitude[index(kind)];
   const double width = spline.interval().width();
   const double slope = kind == MotionKind::positioning ? prior.positioning_slope * width
                                                        : prior.angle_slope * prior.amplitude[index(kind)];
@@ -44,35 +69,39 @@ Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const Geomet
       const double gi = (spline.place(i) - basis.origin[axis]) / width;
       const double gj = (spline.place(j) - basis.origin[axis]) / width;
       const double distance = spline.place(i) - spline.place(j);
-      covariance(i, j) = covariance(j, i) = variance * matern52(distance, prior.length[index(kind)]).value +
-                                            slope * slope * gi * gj + offset * offset * variance;
+      double value = variance * (matern52(distance, prior.length[index(kind)]).value + offset * offset) +
+                     slope * slope * gi * gj;
+      if (fine > 0.0) value += fine * matern52(distance, prior.fine_length).value;
+      covariance(i, j) = covariance(j, i) = value;
     }
     covariance(i, i) += nugget * variance;
   }
   return covariance;
 }
 
-CovarianceSlopes coefficient_covariance_slopes(const GeometricBasis& basis, const GeometricPrior& prior,
-                                               int component) {
+std::vector<CovarianceSlope> coefficient_covariance_slopes(const GeometricBasis& basis,
+                                                           const GeometricPrior& prior, int component) {
   const auto axis = static_cast<std::size_t>(axis_of(component));
   const auto& spline = basis.splines[axis];
   const MotionKind kind = kind_of(component);
+  const int k = static_cast<int>(kind);
   const double variance = prior.amplitude[index(kind)] * prior.amplitude[index(kind)];
-  CovarianceSlopes slopes;
-  slopes.by_amplitude = 2.0 * coefficient_covariance(basis, prior, component);
-  slopes.by_length.resize(spline.size(), spline.size());
-  const double width = spline.interval().width();
-  const double fixed = kind == MotionKind::positioning ? prior.positioning_slope * width : 0.0;
-  for (int i = 0; i < spline.size(); ++i) {
-    for (int j = 0; j <= i; ++j) {
-      const double distance = spline.place(i) - spline.place(j);
-      const double by_length = variance * matern52(distance, prior.length[index(kind)]).slope;
-      slopes.by_length(i, j) = slopes.by_length(j, i) = by_length;
-    }
-    for (int j = 0; j < spline.size(); ++j)  // the slope of positioning does not scale with the amplitude
-      slopes.by_amplitude(i, j) -= 2.0 * fixed * fixed * (spline.place(i) - basis.origin[axis]) *
-                                   (spline.place(j) - basis.origin[axis]) / (width * width);
-  }
+  const double fine = prior.fine_amplitude[index(kind)] * prior.fine_amplitude[index(kind)];
+  GeometricPrior coarse = prior;  // only what scales with the amplitude
+  coarse.fine_amplitude[index(kind)] = 0.0;
+  coarse.positioning_slope = 0.0;
+  std::vector<CovarianceSlope> slopes;
+  slopes.push_back({k, 2.0 * coefficient_covariance(basis, coarse, component)});
+  const auto fill = [&](int strength, auto entry) {
+    Eigen::MatrixXd matrix(spline.size(), spline.size());
+    for (int i = 0; i < spline.size(); ++i)
+      for (int j = 0; j <= i; ++j) matrix(i, j) = matrix(j, i) = entry(spline.place(i) - spline.place(j));
+    slopes.push_back({strength, std::move(matrix)});
+  };
+  fill(3 + k, [&](double d) { return variance * matern52(d, prior.length[index(kind)]).slope; });
+  if (kind == MotionKind::angle) return slopes;
+  fill(6 + k, [&](double d) { return 2.0 * fine * matern52(d, prior.fine_length).value; });
+  fill(8, [&](double d) { return fine * matern52(d, prior.fine_length).slope; });
   return slopes;
 }
 

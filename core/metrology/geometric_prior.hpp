@@ -18,7 +18,10 @@ MotionKind kind_of(int component);
 struct GeometricPrior {
   std::array<double, 3> amplitude{2e-6, 2e-6, 8e-6};  // m, m, rad: sd of the waviness
   std::array<double, 3> length{0.07, 0.07, 0.07};     // m, over which it changes (Matern 5/2)
-  double positioning_slope = 2e-4;                    // sd of the scale error of an axis
+  /// On top of it what repeats over a few centimetres, as a screw's pitch does. Angles have none: it would move nothing.
+  std::array<double, 3> fine_amplitude{3e-7, 2e-7, 0.0};  // m, m, rad
+  double fine_length = 0.012;                             // m
+  double positioning_slope = 2e-4;                        // sd of the scale error of an axis
   double angle_slope = 2.0;  // sd of an angle's linear part over the axis' range, in amplitudes
   double squareness = 5e-3;  // rad, sd
 };
@@ -27,12 +30,18 @@ struct GeometricPrior {
 /// and offset (the gauge removes the latter).
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior,
                                        int component);
-/// Its derivative by log amplitude and by log length.
-struct CovarianceSlopes {
-  Eigen::MatrixXd by_amplitude;
-  Eigen::MatrixXd by_length;
+/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length.
+inline constexpr int strength_count = 9;
+using Strengths = Eigen::Matrix<double, strength_count, 1>;
+Strengths log_strengths(const GeometricPrior& prior);
+GeometricPrior with_log_strengths(const GeometricPrior& prior, const Strengths& logs);
+
+/// Derivatives of a component's covariance by the log strengths that act on it.
+struct CovarianceSlope {
+  int strength = 0;
+  Eigen::MatrixXd matrix;
 };
-CovarianceSlopes coefficient_covariance_slopes(const GeometricBasis& basis, const GeometricPrior& prior,
-                                               int component);
+std::vector<CovarianceSlope> coefficient_covariance_slopes(const GeometricBasis& basis,
+                                                           const GeometricPrior& prior, int component);
 
 }  // namespace invar::metrology
