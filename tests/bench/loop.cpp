@@ -44,13 +44,14 @@ class Stage final : public Component {
   std::array<double, 6> position_{}, velocity_{};
 };
 
+constexpr Duration warm_up = Duration::milliseconds(50);  // of each turn, not counted
+
 struct Block {
   HistogramCopy wake_up, compute;
-  std::uint64_t cycles = 0, overruns = 0;
+  std::uint64_t overruns = 0;
   void add(const Block& other) {
     wake_up.add(other.wake_up);
     compute.add(other.compute);
-    cycles += other.cycles;
     overruns += other.overruns;
   }
 };
@@ -67,18 +68,23 @@ Block run_bare(const ExecutorOptions& options, double seconds) {
     (void)claim_real_time(*options.real_time);
     const std::int64_t period = options.period.ns;
     Pacer pacer{options.period, OverrunPolicy::skip, 0, {(monotonic().ns / period + 2) * period}};
-    const Instant end = monotonic() + Duration::seconds(seconds);
+    const Instant begin = monotonic() + warm_up;
+    const Instant end = begin + Duration::seconds(seconds);
+    std::uint64_t before = 0;
     while (pacer.due() < end) {
       const Instant due = pacer.due();
       const timespec t{due.ns / 1'000'000'000, due.ns % 1'000'000'000};
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr);
       const Instant woke = monotonic();
       pacer.wake(woke);
-      block->wake_up.add(woke - due);
       pacer.finish(monotonic());
-      ++block->cycles;
+      if (due < begin) {
+        before = pacer.overruns();
+      } else {
+        block->wake_up.add(woke - due);
+      }
     }
-    block->overruns = pacer.overruns();
+    block->overruns = pacer.overruns() - before;
   }};
   thread.join();
   return *block;
@@ -99,6 +105,9 @@ Block run_executor(const ExecutorOptions& options, double seconds, int component
   (void)control.request("all", Transition::configure);
   (void)control.request("all", Transition::activate);
   executor.start();
+  std::this_thread::sleep_for(std::chrono::nanoseconds{warm_up.ns});
+  control.clear_statistics();
+  const std::uint64_t before = executor.counters().overruns;
   const Instant end = monotonic() + Duration::seconds(seconds);
   while (monotonic() < end) {
     if (hammer) {
@@ -108,8 +117,7 @@ Block run_executor(const ExecutorOptions& options, double seconds, int component
     }
   }
   executor.stop();
-  const LoopCounters counters = executor.counters();
-  return {executor.wake_up(), executor.compute(), counters.executed, counters.overruns};
+  return {executor.wake_up(), executor.compute(), executor.counters().overruns - before};
 }
 
 double us(Duration d) { return static_cast<double>(d.ns) * 1e-3; }
