@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include "core/base/contract.hpp"
@@ -34,65 +35,64 @@ Words split(std::uint32_t raw) {
   return {{static_cast<std::uint16_t>(raw >> 16), static_cast<std::uint16_t>(raw & 0xFFFFU)}};
 }
 
-}  // namespace
-
-double decode(const Register& reg, std::span<const std::uint16_t> words) {
-  INVAR_EXPECTS(words.size() >= reg.width(), reg.name, words.size());
-  double raw = 0.0;
-  if (reg.width() == 1) {
-    const std::uint16_t word = words[0];
-    switch (reg.type) {
-      case Type::boolean:
-        return reg.bit ? (word >> *reg.bit) & 1U : (word != 0 ? 1.0 : 0.0);
-      case Type::int16:
-        raw = static_cast<std::int16_t>(word);
-        break;
-      default:
-        raw = word;
-    }
-  } else {
-    const Words ordered = reordered(reg.word_order, {{words[0], words[1]}});
-    const std::uint32_t joined = (std::uint32_t{ordered.word[0]} << 16) | ordered.word[1];
-    switch (reg.type) {
-      case Type::int32:
-        raw = static_cast<std::int32_t>(joined);
-        break;
-      case Type::float32:
-        raw = static_cast<double>(std::bit_cast<float>(joined));
-        break;
-      default:
-        raw = joined;
-    }
-  }
-  return reg.scale * raw + reg.offset;
+/// Apart, since printing a broken contract would weigh on a function that runs for every value of every poll.
+[[noreturn, gnu::noinline]] void too_few_words(std::size_t words) {
+  INVAR_EXPECTS(false && "a 32-bit value needs two words, others one", words);
+  std::abort();
 }
 
-Words encode(const Register& reg, double value) {
-  const double raw = (value - reg.offset) / reg.scale;
-  INVAR_EXPECTS(reg.type == Type::float32 || !std::isnan(value), reg.name);
-  switch (reg.type) {
+}  // namespace
+
+double decode(const Encoding& how, std::span<const std::uint16_t> words) {
+  if (words.size() < how.width()) [[unlikely]]
+    too_few_words(words.size());
+  const auto joined = [&] {
+    const Words ordered = reordered(how.word_order, {{words[0], words[1]}});
+    return (std::uint32_t{ordered.word[0]} << 16) | ordered.word[1];
+  };
+  switch (how.type) {
     case Type::boolean:
-      return {{static_cast<std::uint16_t>(value != 0.0 ? 1U << reg.bit.value_or(0) : 0U), 0}};
+      return how.bit ? (unsigned{words[0]} >> *how.bit) & 1U : (words[0] != 0 ? 1.0 : 0.0);
+    case Type::int16:
+      return how.scale * static_cast<std::int16_t>(words[0]) + how.offset;
+    case Type::uint16:
+      return how.scale * words[0] + how.offset;
+    case Type::int32:
+      return how.scale * static_cast<std::int32_t>(joined()) + how.offset;
+    case Type::uint32:
+      return how.scale * joined() + how.offset;
+    case Type::float32:
+      break;
+  }
+  return how.scale * static_cast<double>(std::bit_cast<float>(joined())) + how.offset;
+}
+
+Words encode(const Encoding& how, double value) {
+  const double raw = (value - how.offset) / how.scale;
+  INVAR_EXPECTS(how.type == Type::float32 || !std::isnan(value), value);
+  switch (how.type) {
+    case Type::boolean:
+      return {{static_cast<std::uint16_t>(value != 0.0 ? 1U << how.bit.value_or(0) : 0U), 0}};
     case Type::int16:
       return {{static_cast<std::uint16_t>(rounded<std::int16_t>(raw)), 0}};
     case Type::uint16:
       return {{rounded<std::uint16_t>(raw), 0}};
     case Type::int32:
-      return reordered(reg.word_order, split(static_cast<std::uint32_t>(rounded<std::int32_t>(raw))));
+      return reordered(how.word_order, split(static_cast<std::uint32_t>(rounded<std::int32_t>(raw))));
     case Type::uint32:
-      return reordered(reg.word_order, split(rounded<std::uint32_t>(raw)));
+      return reordered(how.word_order, split(rounded<std::uint32_t>(raw)));
     case Type::float32:
       break;
   }
   constexpr double largest = std::numeric_limits<float>::max();
   const auto number = static_cast<float>(std::isnan(raw) ? raw : std::clamp(raw, -largest, largest));
-  return reordered(reg.word_order, split(std::bit_cast<std::uint32_t>(number)));
+  return reordered(how.word_order, split(std::bit_cast<std::uint32_t>(number)));
 }
 
-Range representable(const Register& reg) {
+Range representable(const Encoding& how) {
   double lower = 0.0;
   double upper = 1.0;
-  switch (reg.type) {
+  switch (how.type) {
     case Type::boolean:
       return {0.0, 1.0};
     case Type::int16:
@@ -114,8 +114,8 @@ Range representable(const Register& reg) {
       lower = -upper;
       break;
   }
-  const double a = reg.scale * lower + reg.offset;
-  const double b = reg.scale * upper + reg.offset;
+  const double a = how.scale * lower + how.offset;
+  const double b = how.scale * upper + how.offset;
   return {std::min(a, b), std::max(a, b)};
 }
 

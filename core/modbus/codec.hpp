@@ -16,15 +16,15 @@ struct Words {
 };
 
 /// The value in SI that `words` (at least `width()` of them) stand for. Real-time.
-[[nodiscard]] double decode(const Register& reg, std::span<const std::uint16_t> words);
+[[nodiscard]] double decode(const Encoding& how, std::span<const std::uint16_t> words);
 
 /// The nearest representation of `value` in SI, clamped to what the type holds; a boolean is set by anything
 /// but 0. A boolean inside a word gives the word with only its own bit. Precondition: `value` is no NaN
 /// unless the type is float32. Real-time. Worked: 30.1 in uint16 with scale 0.01 is 3010; 1.5f in cdab is
 /// 0x0000 0x3FC0.
-[[nodiscard]] Words encode(const Register& reg, double value);
+[[nodiscard]] Words encode(const Encoding& how, double value);
 
 /// The smallest and largest value in SI that the type can hold.
-[[nodiscard]] Range representable(const Register& reg);
+[[nodiscard]] Range representable(const Encoding& how);
 
 }  // namespace invar::modbus

@@ -45,6 +45,7 @@ Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value)
   Pending& slot = writes_[reg];
   if (slot.report.state == WriteState::queued) ++counters_.writes_superseded;
   slot = {{++written_, WriteState::queued, value, 0}, {}, false};
+  has_queued_ = true;
   if (threaded_) {
     const std::uint64_t one = 1;
     [[maybe_unused]] const auto ignored = ::write(wake_, &one, sizeof one);  // full means it is awake already

@@ -136,6 +136,7 @@ class Device {
   std::vector<Sample> samples_;
   std::vector<Pending> writes_;  // one slot a register
   std::uint64_t written_ = 0;
+  bool has_queued_ = false;
   bool refreshed_ = false;
   bool online_ = false;
   DeviceCounters counters_;

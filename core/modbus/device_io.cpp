@@ -39,7 +39,15 @@ DeviceIo::DeviceIo(Device& device, Backoff backoff, Duration answer_timeout)
       answer_timeout_{answer_timeout},
       plan_{plan_reads(device.map())},
       words_(longest_answer(plan_)),
-      read_this_round_(device.map().registers.size()) {}
+      read_in_round_(device.map().registers.size()) {
+  for (const auto& request : plan_) {
+    auto& fields = fields_.emplace_back();
+    for (const std::size_t index : request.registers) {
+      const Register& reg = device.map().registers[index];
+      fields.push_back({reg, static_cast<std::uint16_t>(reg.address - request.address), index});
+    }
+  }
+}
 
 void DeviceIo::take_in(Instant now) {
   const std::lock_guard lock{device_.mutex_};
@@ -49,6 +57,7 @@ void DeviceIo::take_in(Instant now) {
   }
   device_.refreshed_ = false;
   queue_.clear();
+  if (!device_.has_queued_) return;
   for (std::size_t i = 0; i < device_.writes_.size(); ++i) {
     auto& slot = device_.writes_[i];
     if (slot.report.state != WriteState::queued) continue;
@@ -63,6 +72,7 @@ void DeviceIo::take_in(Instant now) {
       queue_.push_back(i);
     }
   }
+  device_.has_queued_ = !queue_.empty();
   std::sort(queue_.begin(), queue_.end(), [&](std::size_t a, std::size_t b) {
     return device_.writes_[a].report.number < device_.writes_[b].report.number;
   });
@@ -168,9 +178,9 @@ Outcome DeviceIo::write_next(Link& link, const Clock& clock) {
 }
 
 Outcome DeviceIo::read_all(Link& link, const Clock& clock, bool& refused) {
-  const auto& registers = device_.map().registers;
-  std::fill(read_this_round_.begin(), read_this_round_.end(), false);
-  for (const auto& request : plan_) {
+  ++round_;
+  for (std::size_t i = 0; i < plan_.size(); ++i) {
+    const ReadRequest& request = plan_[i];
     const std::span words{words_.data(), request.count};
     const auto result = link.read(request.kind, request.address, words);
     const Instant now = clock();
@@ -180,10 +190,12 @@ Outcome DeviceIo::read_all(Link& link, const Clock& clock, bool& refused) {
       continue;
     }
     const std::lock_guard lock{device_.mutex_};
-    for (const std::size_t index : request.registers) {
-      const Register& reg = registers[index];
-      device_.samples_[index] = {decode(reg, words.subspan(reg.address - request.address)), now, true};
-      read_this_round_[index] = true;
+    for (const Field& field : fields_[i]) {
+      auto& sample = device_.samples_[field.reg];
+      sample.value = decode(field.how, words.subspan(field.at));
+      sample.stamp = now;
+      sample.seen = true;
+      read_in_round_[field.reg] = round_;
     }
   }
   judge_read_backs(clock());
@@ -199,7 +211,7 @@ void DeviceIo::judge_read_backs(Instant now) {
     auto& state = slot.report.state;
     if (state != WriteState::written && state != WriteState::uncertain) return true;
     const std::size_t by = *registers[index].read_back;
-    if (!read_this_round_[by]) return false;
+    if (read_in_round_[by] != round_) return false;
     if (shows(registers[index], slot.report.wanted, registers[by], device_.samples_[by].value)) {
       state = WriteState::confirmed;
       return true;

@@ -44,11 +44,19 @@ class DeviceIo {
   Device& device_;
   Backoff backoff_;
   Duration answer_timeout_;
+  /// A register in an answer.
+  struct Field {
+    Encoding how;
+    std::uint16_t at = 0;  // its first word, counted from the request's address
+    std::size_t reg = 0;
+  };
   std::vector<ReadRequest> plan_;
-  std::vector<std::uint16_t> words_;     // of one answer
-  std::vector<bool> read_this_round_;    // by register
-  std::vector<std::size_t> queue_;       // registers with a queued write, oldest first
-  std::vector<std::size_t> unresolved_;  // registers whose write awaits its read-back
+  std::vector<std::vector<Field>> fields_;    // by request
+  std::vector<std::uint16_t> words_;          // of one answer
+  std::uint64_t round_ = 0;                   // of reads
+  std::vector<std::uint64_t> read_in_round_;  // by register: the last round that brought it
+  std::vector<std::size_t> queue_;            // registers with a queued write, oldest first
+  std::vector<std::size_t> unresolved_;       // registers whose write awaits its read-back
   Instant next_poll_{INT64_MIN};
   Instant next_beat_{INT64_MIN};
   Instant beat_until_{INT64_MIN};  // the owner's refresh holds until then

@@ -388,10 +388,6 @@ std::string_view name_of(Type type) {
   return "float32";
 }
 
-unsigned Register::width() const {
-  return type == Type::int32 || type == Type::uint32 || type == Type::float32 ? 2 : 1;
-}
-
 std::optional<std::size_t> RegisterMap::find(std::string_view name) const {
   const auto found =
       std::find_if(registers.begin(), registers.end(), [&](const Register& reg) { return reg.name == name; });

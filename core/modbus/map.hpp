@@ -29,17 +29,26 @@ enum class WordOrder { abcd, cdab, badc, dcba };
 [[nodiscard]] std::string_view name_of(Kind kind);
 [[nodiscard]] std::string_view name_of(Type type);
 
-/// One named value of a device.
-struct Register {
-  std::string name;
-  std::string description;
-  std::uint16_t address = 0;
-  Kind kind = Kind::holding;
+/// How a value stands on the wire. Small, since every answer is decoded by a list of them.
+struct Encoding {
   Type type = Type::uint16;
   WordOrder word_order = WordOrder::abcd;
   std::optional<unsigned> bit;  // of a boolean inside a 16-bit register
   double scale = 1.0;           // SI = scale * raw + offset
   double offset = 0.0;
+
+  /// Registers (or bits, for coils and discrete inputs) that it occupies: 1 or 2.
+  [[nodiscard]] unsigned width() const {
+    return type == Type::int32 || type == Type::uint32 || type == Type::float32 ? 2 : 1;
+  }
+};
+
+/// One named value of a device.
+struct Register : Encoding {
+  std::string name;
+  std::string description;
+  std::uint16_t address = 0;
+  Kind kind = Kind::holding;
   std::string unit;      // as written in the file, for people
   Range range;           // SI; a write outside it is refused, by the client and by the simulated device
   double initial = 0.0;  // SI; what a simulated device shows before anything is written
@@ -50,8 +59,6 @@ struct Register {
   Duration stale_after;
 
   [[nodiscard]] bool is_bit() const { return kind == Kind::coil || kind == Kind::discrete; }
-  /// Registers (or bits, for coils and discrete inputs) that it occupies: 1 or 2.
-  [[nodiscard]] unsigned width() const;
 };
 
 /// The word that proves to the device that its master lives.
