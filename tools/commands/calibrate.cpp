@@ -9,6 +9,7 @@ void add_calibrate(CLI::App& program) {
   auto* group =
       program.add_subcommand("calibrate", "Identify an error from measurements and write its compensation");
   group->require_subcommand(1);
+  add_calibrate_camera(*group);
   group->footer("Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result");
   add_calibrate_thermal(*group);
   add_calibrate_geometric(*group);

@@ -19,5 +19,6 @@ void add_calibrate_thermal(CLI::App& group);
 recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_geometric(CLI::App& group);
 recording::Table predict_geometric(const config::Yaml& model, const recording::Table& inputs);
+void add_calibrate_camera(CLI::App& group);
 
 }  // namespace invar::tools

@@ -1,0 +1,260 @@
+#include "components/vision/blobs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+
+#include "components/vision/partition.hpp"
+
+namespace invar::vision {
+
+namespace {
+
+constexpr double round_enough =
+    0.965;  // of area^2 / (2 pi moment): two touching discs reach 0.6, a 1.4:1 ellipse 0.94
+
+struct Side {
+  int polarity = +1;
+  cv::Mat1i labels;
+  std::vector<Blob> blobs;
+  double round_area = 0.0;  // px^2 of the reduced image
+};
+
+bool at_border(const Blob& blob, const cv::Mat1b& image) {
+  return blob.left <= 0 || blob.top <= 0 || blob.right >= image.cols - 1 || blob.bottom >= image.rows - 1;
+}
+
+bool is_disc(const Blob& blob, const cv::Mat1b& image) {
+  const double w = blob.right - blob.left + 1, h = blob.bottom - blob.top + 1;
+  // Small discs are made of few pixels: their moments scatter.
+  const double slack = 0.5 / std::sqrt(blob.area);
+  return blob.roundness > round_enough - slack && std::max(w, h) < 1.35 * std::min(w, h) + 1.0 &&
+         !at_border(blob, image);
+}
+
+Side make_side(const cv::Mat1b& image, const cv::Mat1b& mask, int polarity, double smallest) {
+  Side side;
+  side.polarity = polarity;
+  side.blobs = label_blobs(mask, smallest, side.labels);
+  for (const Blob& blob : side.blobs)
+    if (is_disc(blob, image)) side.round_area += blob.area;
+  return side;
+}
+
+double weighted_median(std::vector<std::pair<double, double>> values) {  // (value, weight)
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  double total = 0.0;
+  for (const auto& [value, weight] : values) total += weight;
+  double sum = 0.0;
+  for (const auto& [value, weight] : values)
+    if ((sum += weight) >= 0.5 * total) return value;
+  return values.back().first;
+}
+
+struct OutlinePoint {
+  float x, y;    // px of the reduced image
+  float nx, ny;  // unit, from the ground into the thing
+  bool used;
+};
+
+std::vector<OutlinePoint> outline_of(const Blob& blob, const cv::Mat1b& image, const Side& side) {
+  std::vector<OutlinePoint> points;
+  const auto at = [&](int y, int x) {
+    return static_cast<int>(image(std::clamp(y, 0, image.rows - 1), std::clamp(x, 0, image.cols - 1)));
+  };
+  for (int y = std::max(1, blob.top); y <= std::min(image.rows - 2, blob.bottom); ++y)
+    for (int x = std::max(1, blob.left); x <= std::min(image.cols - 2, blob.right); ++x) {
+      const int label = blob.label + 1;
+      if (side.labels(y, x) != label) continue;
+      if (side.labels(y - 1, x) == label && side.labels(y + 1, x) == label &&
+          side.labels(y, x - 1) == label && side.labels(y, x + 1) == label)
+        continue;
+      const int gx = at(y - 1, x + 1) + 2 * at(y, x + 1) + at(y + 1, x + 1) - at(y - 1, x - 1) -
+                     2 * at(y, x - 1) - at(y + 1, x - 1);
+      const int gy = at(y + 1, x - 1) + 2 * at(y + 1, x) + at(y + 1, x + 1) - at(y - 1, x - 1) -
+                     2 * at(y - 1, x) - at(y - 1, x + 1);
+      const float length = std::hypot(static_cast<float>(gx), static_cast<float>(gy));
+      if (length < 1.0F) continue;
+      const auto sign = static_cast<float>(side.polarity);
+      points.push_back({static_cast<float>(x), static_cast<float>(y), sign * static_cast<float>(gx) / length,
+                        sign * static_cast<float>(gy) / length, false});
+    }
+  return points;
+}
+
+// Kasa's circle through the outline points that belong to it; three rounds from a rough start. The mask's
+// outermost pixel centres lie about 0.4 px inside the outline.
+struct Found {
+  double x, y, radius;
+  int support;
+};
+Found refine(const std::vector<OutlinePoint>& points, Found at) {
+  for (int round = 0; round < 3; ++round) {
+    const double tolerance = std::max(1.0, 0.2 * at.radius);
+    double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, sxz = 0, syz = 0, sz = 0;
+    for (const OutlinePoint& p : points) {
+      if (p.used) continue;
+      const double dx = static_cast<double>(p.x) - at.x, dy = static_cast<double>(p.y) - at.y;
+      const double r = std::hypot(dx, dy);
+      if (std::abs(r - at.radius) > tolerance ||
+          dx * static_cast<double>(p.nx) + dy * static_cast<double>(p.ny) > -0.8 * r)
+        continue;
+      const double z = dx * dx + dy * dy;
+      n += 1, sx += dx, sy += dy, sxx += dx * dx, sxy += dx * dy, syy += dy * dy, sxz += dx * z,
+          syz += dy * z, sz += z;
+    }
+    at.support = static_cast<int>(n);
+    if (n < 5) return at;
+    const cv::Matx33d normal(sxx, sxy, sx, sxy, syy, sy, sx, sy, n);
+    const cv::Vec3d rhs(-sxz, -syz, -sz);
+    cv::Vec3d s;
+    if (!cv::solve(normal, rhs, s, cv::DECOMP_CHOLESKY)) return at;
+    const double x = -0.5 * s[0], y = -0.5 * s[1], square = x * x + y * y - s[2];
+    // A short arc may throw the circle far off; then the start is better.
+    if (!(square > 0.0) || std::hypot(x, y) > 0.5 * at.radius ||
+        std::abs(std::sqrt(square) - at.radius) > 0.35 * at.radius)
+      return at;
+    at.x += x;
+    at.y += y;
+    at.radius = std::sqrt(square);
+  }
+  return at;
+}
+
+// Takes a blob apart: every outline point votes for centres along its normal; the best circle is taken, its points
+// are removed, and so on.
+std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Side& side, double radius) {
+  std::vector<Found> found;
+  auto points = outline_of(blob, image, side);
+  const int margin = static_cast<int>(std::ceil(radius)) + 1;
+  const int left = blob.left - margin, top = blob.top - margin;
+  cv::Mat1f votes(blob.bottom - blob.top + 1 + 2 * margin, blob.right - blob.left + 1 + 2 * margin);
+  cv::Mat1f smooth;
+  for (int circles = 0; circles < 200; ++circles) {
+    votes.setTo(0.0F);
+    for (const OutlinePoint& p : points) {
+      if (p.used) continue;
+      for (int k = -3; k <= 3; ++k) {
+        const float r = static_cast<float>(radius) * (1.0F + 0.08F * static_cast<float>(k));
+        const int x = static_cast<int>(std::lround(p.x + r * p.nx)) - left,
+                  y = static_cast<int>(std::lround(p.y + r * p.ny)) - top;
+        if (x >= 0 && y >= 0 && x < votes.cols && y < votes.rows) votes(y, x) += 1.0F;
+      }
+    }
+    const int size = 2 * std::max(1, static_cast<int>(0.15 * radius)) + 1;
+    cv::boxFilter(votes, smooth, CV_32F, {size, size}, {-1, -1}, false, cv::BORDER_CONSTANT);
+    cv::Point peak;
+    double height = 0.0;
+    cv::minMaxLoc(smooth, nullptr, &height, nullptr, &peak);
+    const double whole = 2.0 * std::numbers::pi * radius;
+    if (height < 0.15 * whole) break;
+    Found at = refine(
+        points, {static_cast<double>(peak.x + left), static_cast<double>(peak.y + top), radius - 0.4, 0});
+    const double reach = std::max(1.2, 0.22 * at.radius);
+    int removed = 0;
+    for (OutlinePoint& p : points) {
+      if (p.used) continue;
+      const double r = std::hypot(static_cast<double>(p.x) - at.x, static_cast<double>(p.y) - at.y);
+      // The votes that made the peak go, too, so that the same peak never comes twice.
+      const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x - left;
+      const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y - top;
+      if (std::abs(r - at.radius) < reach || std::hypot(vx, vy) < 0.25 * radius) p.used = true, ++removed;
+    }
+    if (removed == 0) break;
+    at.radius += 0.4;
+    if (at.support >= 0.18 * whole) found.push_back(at);
+  }
+  return found;
+}
+
+double inscribed_radius(const Blob& blob, const Side& side) {
+  const cv::Rect box(blob.left, blob.top, blob.right - blob.left + 1, blob.bottom - blob.top + 1);
+  cv::Mat1b mask;
+  cv::copyMakeBorder(side.labels(box) == blob.label + 1, mask, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
+  cv::Mat1f distance;
+  cv::distanceTransform(mask, distance, cv::DIST_L2, 5);
+  double largest = 0.0;
+  cv::minMaxLoc(distance, nullptr, &largest);
+  return largest;
+}
+
+struct Level {
+  cv::Mat1b image;
+  int halvings = 0;
+};
+
+Detection detect_at(const Level& level, int window) {
+  const cv::Mat1b& image = level.image;
+  const double scale = 1 << level.halvings;
+  Detection out;
+  const Partition parts = partition(image, window);
+  out.contrast = parts.contrast;
+  out.noise = parts.noise * scale;
+  if (!(parts.contrast > 0.0)) return out;
+  const double smallest = 3.0;
+  Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
+  // Things are round, what lies between them is not.
+  const Side* side = light.round_area >= dark.round_area ? &light : &dark;
+  if (light.round_area + dark.round_area <=
+      0.0) {  // everything touches: what borders the image less is the things
+    const auto inner = [&](const Side& s) {
+      double area = 0.0;
+      for (const Blob& blob : s.blobs)
+        if (!at_border(blob, image)) area += blob.area;
+      return area;
+    };
+    side = inner(light) >= inner(dark) ? &light : &dark;
+  }
+  out.polarity = side->polarity;
+
+  std::vector<std::pair<double, double>> radii;
+  for (const Blob& blob : side->blobs)
+    if (is_disc(blob, image)) radii.emplace_back(std::sqrt(blob.area / std::numbers::pi), blob.area);
+  if (radii.empty())
+    for (const Blob& blob : side->blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
+  const double radius = weighted_median(radii);
+  out.radius = radius * scale;
+  if (!(radius > 0.0)) return out;
+
+  const auto full = [&](double v) { return (v + 0.5) * scale - 0.5; };
+  for (const Blob& blob : side->blobs) {
+    if (is_disc(blob, image)) {
+      out.candidates.push_back(
+          {full(blob.x), full(blob.y), std::sqrt(blob.area / std::numbers::pi) * scale, true});
+    } else if (blob.area > 0.12 * std::numbers::pi * radius * radius) {
+      const auto parts_of = take_apart(blob, image, *side, radius);
+      for (const Found& f : parts_of)
+        out.candidates.push_back(
+            {full(f.x), full(f.y), f.radius * scale, parts_of.size() == 1 && !at_border(blob, image)});
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+Detection detect(const cv::Mat& image, const DetectionOptions& options) {
+  std::vector<Level> levels{{image, 0}};
+  const auto halve_to = [&](int halvings) {
+    while (levels.back().halvings < halvings) {
+      Level next{{}, levels.back().halvings + 1};
+      const cv::Mat1b& from = levels.back().image;
+      cv::resize(from(cv::Rect(0, 0, from.cols & ~1, from.rows & ~1)), next.image,
+                 {from.cols / 2, from.rows / 2}, 0, 0, cv::INTER_AREA);
+      levels.push_back(next);
+    }
+    return levels[static_cast<std::size_t>(halvings)];
+  };
+  if (options.level >= 0) return detect_at(halve_to(options.level), options.window);
+  // Coarse first: it is cheap and sees through noise. Finer where the things turn out small there.
+  int halvings = 0;
+  while (std::min(image.cols, image.rows) >> (halvings + 1) >= 150) ++halvings;
+  for (;; --halvings) {
+    Detection found = detect_at(halve_to(halvings), options.window);
+    if (halvings == 0 || (found.radius >= 4.5 * (1 << halvings) && !found.candidates.empty())) return found;
+  }
+}
+
+}  // namespace invar::vision

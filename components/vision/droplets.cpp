@@ -1,0 +1,223 @@
+#include "components/vision/droplets.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "components/vision/blobs.hpp"
+#include "core/base/contract.hpp"
+
+namespace invar::vision {
+
+namespace {
+
+struct Measured {
+  Shape shape;
+  OutlineFit fit;
+  Rays rays;
+  bool alive = true;
+};
+
+double median(std::vector<double> values, double otherwise) {
+  if (values.empty()) return otherwise;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double circularity_of(const Measured& drop) {
+  // The outline with what the smooth curve leaves of it, at the rays.
+  const double radius = drop.shape.radius,
+               wave = drop.shape.cos2 * drop.shape.cos2 + drop.shape.sin2 * drop.shape.sin2;
+  // Of r = R + a cos 2t: area pi (R^2 + a^2/2); perimeter 2 pi R (1 + (2 a)^2/(4 R^2)) to second order. Roughness of
+  // RMS q at a correlation length of three rays lengthens the perimeter likewise.
+  const double length = 6.0 * std::numbers::pi * radius / drop.rays.count;
+  const double rough = drop.fit.residual / std::max(1.0, length);
+  const double perimeter =
+      2.0 * std::numbers::pi * radius * (1.0 + wave / (radius * radius) + 0.5 * rough * rough);
+  const double area = std::numbers::pi * (radius * radius + 0.5 * wave);
+  return std::min(1.0, 4.0 * std::numbers::pi * area / (perimeter * perimeter));
+}
+
+// Of two fits of one drop the better stays.
+void drop_doubles(std::vector<Measured>& drops) {
+  std::sort(drops.begin(), drops.end(), [](const Measured& a, const Measured& b) {
+    return a.fit.coverage * a.shape.radius > b.fit.coverage * b.shape.radius;
+  });
+  for (std::size_t i = 0; i < drops.size(); ++i)
+    for (std::size_t j = 0; j < i && drops[i].alive; ++j) {
+      if (!drops[j].alive) continue;
+      const double apart =
+          std::hypot(drops[i].shape.x - drops[j].shape.x, drops[i].shape.y - drops[j].shape.y);
+      if (apart < 0.6 * std::max(drops[i].shape.radius, drops[j].shape.radius)) drops[i].alive = false;
+    }
+  std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
+}
+
+// What hides part of a drop's edge: its neighbours.
+void close_rays(std::vector<Measured>& drops, double reach, double guard) {
+  for (std::size_t i = 0; i < drops.size(); ++i)
+    for (std::size_t j = 0; j < drops.size(); ++j)
+      if (i != j) {
+        const Shape& other = drops[j].shape;
+        drops[i].rays.close(drops[i].shape, reach, other.x, other.y, other.radius, guard);
+      }
+}
+
+double outside_share(const Shape& shape, const cv::Mat& image) {
+  const double r = shape.radius;
+  const double beyond = std::max({-0.5 - (shape.x - r), -0.5 - (shape.y - r),
+                                  shape.x + r - (image.cols - 0.5), shape.y + r - (image.rows - 0.5)});
+  return beyond / r;
+}
+
+}  // namespace
+
+std::string_view name(DropletStatus status) {
+  switch (status) {
+    case DropletStatus::ok:
+      return "ok";
+    case DropletStatus::satellite:
+      return "satellite";
+    case DropletStatus::cut:
+      return "cut";
+    case DropletStatus::dust:
+      return "dust";
+  }
+  return "dust";
+}
+
+std::size_t Droplets::sound() const {
+  return static_cast<std::size_t>(std::count_if(
+      droplets.begin(), droplets.end(), [](const Droplet& d) { return d.status == DropletStatus::ok; }));
+}
+
+cv::Mat gray(const cv::Mat& image) {
+  cv::Mat out = image;
+  if (out.channels() == 3) cv::cvtColor(out, out, cv::COLOR_BGR2GRAY);
+  if (out.channels() == 4) cv::cvtColor(out, out, cv::COLOR_BGRA2GRAY);
+  if (out.depth() == CV_8U) return out;
+  double least = 0.0, most = 0.0;
+  cv::minMaxLoc(out, &least, &most);
+  const double factor = most > least ? 255.0 / (most - least) : 1.0;
+  cv::Mat scaled;
+  out.convertTo(scaled, CV_8U, factor, -least * factor);
+  return scaled;
+}
+
+Droplets measure_droplets(const cv::Mat& image) {
+  INVAR_EXPECTS(image.type() == CV_8UC1 && image.cols >= 16 && image.rows >= 16, image.type(), image.cols,
+                image.rows);
+  Droplets out;
+  const Detection found = detect(image);
+  out.polarity = found.polarity;
+  out.contrast = found.contrast;
+  if (!(found.contrast > 0.0)) return out;
+
+  std::vector<Measured> drops;
+  drops.reserve(found.candidates.size());
+  for (const Candidate& candidate : found.candidates) {
+    if (candidate.radius < 1.5) continue;
+    Measured drop;
+    drop.shape = {candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
+    drop.rays.choose(candidate.radius);
+    const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
+    drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
+    if (!drop.fit.valid || drop.fit.coverage < 0.2) continue;
+    drop.shape = drop.fit.shape;
+    drops.push_back(std::move(drop));
+  }
+  drop_doubles(drops);
+
+  // The blur is the camera's: from the best drops first, then for all.
+  double blur = 1.2;
+  for (int round = 0; round < 2; ++round) {
+    std::vector<double> blurs;
+    for (std::size_t i = 0; i < std::min<std::size_t>(drops.size(), 9); ++i) {
+      const EdgeFilter filter{blur, EdgeFilter::half_for(std::max(blur, 1.5), drops[i].shape.radius)};
+      Rays rays = drops[i].rays;
+      const OutlineFit fit = refine_outline(image, drops[i].shape, found.polarity, filter, rays);
+      if (fit.valid) blurs.push_back(fit.blur);
+    }
+    blur = std::clamp(median(blurs, blur), 0.5, 4.0);
+  }
+  out.blur = blur;
+
+  std::optional<EdgeFilter> filter;
+  const auto filter_for = [&](double radius) -> const EdgeFilter& {
+    const int half = EdgeFilter::half_for(blur, radius);
+    if (!filter || filter->half != half) filter.emplace(blur, half);
+    return *filter;
+  };
+  for (Measured& drop : drops) {
+    const auto weights = drop.rays.weight;
+    drop.rays.open.fill(true);
+    drop.rays.weight = weights;
+  }
+  close_rays(drops, 3.0 * blur + 3.0, 1.0 + 1.5 * blur);
+  std::vector<double> contrasts;
+  for (Measured& drop : drops) {
+    drop.alive = false;
+    for (int round = 0; round < 4; ++round) {
+      drop.fit = refine_outline(image, drop.shape, found.polarity, filter_for(drop.shape.radius), drop.rays);
+      if (!drop.fit.valid) break;
+      drop.shape = drop.fit.shape;
+      drop.alive = true;
+      if (drop.fit.moved < 0.1) break;
+    }
+    drop.alive = drop.alive && drop.fit.valid;
+    if (drop.alive) contrasts.push_back(drop.fit.contrast);
+  }
+  std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
+  drop_doubles(drops);
+  const double contrast = median(contrasts, 0.0);
+
+  std::vector<std::pair<double, double>> sizes;  // radius, area
+  for (Measured& drop : drops) {
+    // A blurred disc's edge lies inside the disc's by blur^2/(2 R): the curvature's pull.
+    drop.shape.radius +=
+        drop.fit.blur * drop.fit.blur / (2.0 * std::max(drop.shape.radius, 2.0 * drop.fit.blur));
+    if (outside_share(drop.shape, image) < 0.1 && drop.fit.support > 0.7)
+      sizes.emplace_back(drop.shape.radius, drop.shape.radius * drop.shape.radius);
+  }
+  std::sort(sizes.begin(), sizes.end());
+  double total = 0.0, sum = 0.0;
+  for (const auto& size : sizes) total += size.second;
+  for (const auto& size : sizes) {
+    out.radius = size.first;
+    if ((sum += size.second) >= 0.5 * total) break;
+  }
+
+  for (const Measured& drop : drops) {
+    Droplet d;
+    d.x = drop.shape.x;
+    d.y = drop.shape.y;
+    d.radius = drop.shape.equal_area_radius();
+    d.circularity = circularity_of(drop);
+    d.sigma = drop.fit.sigma;
+    d.outline = drop.shape;
+    const double strength = std::min(1.0, drop.fit.contrast / std::max(1e-9, 0.6 * contrast));
+    d.score =
+        std::clamp(drop.fit.support * std::sqrt(drop.fit.coverage) * d.circularity * strength, 0.0, 1.0);
+    const bool clean = drop.fit.support > 0.6 && drop.fit.coverage > 0.3 && strength > 0.4 &&
+                       drop.fit.residual < 0.3 + 0.03 * d.radius && drop.shape.axis_ratio() > 0.6;
+    if (!clean) {
+      d.status = DropletStatus::dust;
+    } else if (outside_share(drop.shape, image) > 0.1) {
+      d.status = DropletStatus::cut;
+    } else if (d.radius < 0.55 * out.radius) {
+      d.status = DropletStatus::satellite;
+    }
+    if (d.status == DropletStatus::dust && d.radius < 0.3 * out.radius) continue;
+    out.droplets.push_back(d);
+  }
+  std::sort(out.droplets.begin(), out.droplets.end(), [](const Droplet& a, const Droplet& b) {
+    return (a.status == DropletStatus::ok) != (b.status == DropletStatus::ok) ? a.status == DropletStatus::ok
+                                                                              : a.score > b.score;
+  });
+  return out;
+}
+
+}  // namespace invar::vision

@@ -1,0 +1,43 @@
+#include "components/vision/edge_filter.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/contract.hpp"
+
+namespace invar::vision {
+
+EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_px} {
+  INVAR_EXPECTS(blur > 0.0 && half >= 3 && half <= most_half, blur, half);
+  const int n = 2 * half + 1;
+  unit.resize(n), bump.resize(n), inner.resize(n), outer.resize(n);
+  Eigen::MatrixXd design(n, 6);  // 1, S, g, inner, outer, dS/dblur
+  for (int i = 0; i < n; ++i) {
+    const double k = i - half, u = k / blur;
+    const double density = std::exp(-0.5 * u * u) / (blur * std::sqrt(2.0 * std::numbers::pi));
+    const double beyond = 0.5 * std::erfc(u / std::numbers::sqrt2);  // Phi(-u)
+    unit(i) = beyond;
+    bump(i) = density;
+    inner(i) = k * beyond - blur * blur * density;  // a ramp on one side, blurred like the edge
+    outer(i) = k * (1.0 - beyond) + blur * blur * density;
+    design.row(i) << 1.0, beyond, density, inner(i), outer(i), density * u;
+  }
+  const auto inverse = [](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
+    return (a.transpose() * a).ldlt().solve(a.transpose());
+  };
+  step = inverse(design.leftCols(3));
+  sloped = inverse(design.leftCols(5));
+  Eigen::MatrixXd with_blur(n, 4);
+  with_blur << design.leftCols(3), design.col(5);
+  spread = inverse(with_blur);
+}
+
+int EdgeFilter::half_for(double blur, double radius) {
+  const int wanted = static_cast<int>(std::ceil(3.0 * blur)) + 3;
+  const int room = std::max(3, static_cast<int>(0.45 * radius));
+  return std::clamp(wanted, 3, std::min(room, most_half));
+}
+
+}  // namespace invar::vision

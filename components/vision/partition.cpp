@@ -1,0 +1,311 @@
+#include "components/vision/partition.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+namespace invar::vision {
+
+namespace {
+
+constexpr int tile = 8;  // px a side
+
+// Sums over tiles, then over windows of tiles, by one table of running sums.
+class TileSums {
+ public:
+  TileSums(int columns, int rows) : columns_{columns}, rows_{rows}, cells_(cells(columns, rows), 0.0F) {}
+  float& at(int i, int j) { return cells_[static_cast<std::size_t>(j * columns_ + i)]; }
+  [[nodiscard]] TileSums windowed(int reach) const {
+    TileSums across{columns_, rows_}, both{columns_, rows_};
+    smooth(cells_, across.cells_, columns_, rows_, 1, columns_, reach);
+    smooth(across.cells_, both.cells_, rows_, columns_, columns_, 1, reach);
+    return both;
+  }
+
+ private:
+  static std::size_t cells(int columns, int rows) { return static_cast<std::size_t>(columns * rows); }
+  static void smooth(const std::vector<float>& from, std::vector<float>& to, int length, int lines, int step,
+                     int stride, int reach) {
+    for (int line = 0; line < lines; ++line) {
+      const auto index = [&](int k) { return static_cast<std::size_t>(line * stride + k * step); };
+      float sum = 0.0F;
+      for (int k = 0; k < std::min(reach, length); ++k) sum += from[index(k)];
+      for (int k = 0; k < length; ++k) {
+        if (k + reach < length) sum += from[index(k + reach)];
+        if (k - reach - 1 >= 0) sum -= from[index(k - reach - 1)];
+        to[index(k)] = sum;
+      }
+    }
+  }
+  int columns_, rows_;
+  std::vector<float> cells_;
+};
+
+// A value a tile, read between the tiles' centres by bilinear interpolation, row by row.
+class TileField {
+ public:
+  TileField(int columns, int rows, int width)
+      : columns_{columns}, rows_{rows}, row_(static_cast<std::size_t>(width)) {
+    values_.resize(static_cast<std::size_t>(columns * rows));
+  }
+  float& at(int i, int j) { return values_[static_cast<std::size_t>(j * columns_ + i)]; }
+  const std::vector<float>& row(int y) {
+    const float v =
+        std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.0F, static_cast<float>(rows_ - 1));
+    const int j = std::min(static_cast<int>(v), std::max(0, rows_ - 2));
+    const float share = rows_ > 1 ? v - static_cast<float>(j) : 0.0F;
+    const int next = std::min(j + 1, rows_ - 1);
+    const auto mixed = [&](int i) { return at(i, j) + share * (at(i, next) - at(i, j)); };
+    const int width = static_cast<int>(row_.size());
+    float left = mixed(0);
+    for (int i = -1; i < columns_; ++i) {
+      const float right = mixed(std::min(i + 1, columns_ - 1));
+      const float slope = (right - left) / tile;
+      const int begin = i * tile + tile / 2;
+      const int from = std::max(0, begin), to = std::min(width, i == columns_ - 1 ? width : begin + tile);
+      for (int x = from; x < to; ++x)
+        row_[static_cast<std::size_t>(x)] = left + slope * (static_cast<float>(x - begin) + 0.5F);
+      left = right;
+    }
+    return row_;
+  }
+
+ private:
+  int columns_, rows_;
+  std::vector<float> values_;
+  std::vector<float> row_;
+};
+
+double median(std::vector<float>& values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
+double noise_of(const cv::Mat1b& image) {
+  // Second differences along rows: blind to slopes; every other row is enough.
+  std::array<int, 512> histogram{};
+  int count = 0;
+  for (int y = 0; y < image.rows; y += 2) {
+    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+    for (int x = 2; x < image.cols; x += 2, ++count)
+      ++histogram[static_cast<std::size_t>(std::abs(p[x - 2] - 2 * p[x - 1] + p[x]) & 511)];
+  }
+  int below = 0;
+  for (std::size_t value = 0; value < histogram.size(); ++value) {
+    if (2 * (below + histogram[value]) >= count) {
+      const double share = (0.5 * count - below) / std::max(1, histogram[value]);
+      return std::max(0.0, static_cast<double>(value) - 0.5 + share) * 1.4826 / std::sqrt(6.0);
+    }
+    below += histogram[value];
+  }
+  return 0.0;
+}
+
+}  // namespace
+
+Partition partition(const cv::Mat1b& image, int window) {
+  const int width = image.cols, height = image.rows;
+  const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
+  Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, noise_of(image)};
+
+  // What lies clearly above or below its surroundings' mean.
+  TileSums sum{columns, rows}, count{columns, rows};
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+    for (int i = 0; i < columns; ++i) {
+      const int end = std::min(width, (i + 1) * tile);
+      int total = 0;
+      for (int x = i * tile; x < end; ++x) total += p[x];
+      sum.at(i, y / tile) += static_cast<float>(total);
+      count.at(i, y / tile) += static_cast<float>(end - i * tile);
+    }
+  }
+  TileField mean{columns, rows, width};
+  {
+    TileSums s = sum.windowed(window), n = count.windowed(window);
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i) mean.at(i, j) = s.at(i, j) / n.at(i, j);
+  }
+  std::array<int, 256> histogram{};
+  for (int y = 0; y < height; y += 2) {
+    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+    const auto& level = mean.row(y);
+    for (int x = 0; x < width; x += 2)
+      ++histogram[static_cast<std::size_t>(
+          std::min(255.0F, std::abs(static_cast<float>(p[x]) - level[static_cast<std::size_t>(x)])))];
+  }
+  int left = static_cast<int>(0.001 * 0.25 * width * height), extreme = 255;
+  while (extreme > 0 && (left -= histogram[static_cast<std::size_t>(extreme)]) > 0) --extreme;
+  const double margin = std::max(5.0 * out.noise + 1.0, 0.2 * extreme);
+  if (extreme <= margin) return out.light.setTo(0), out.dark.setTo(0), out;
+
+  // Both classes' local levels, then the middle between them; twice, since the second time sees real classes.
+  TileField low{columns, rows, width}, high{columns, rows, width};
+  std::vector<float> low_row(static_cast<std::size_t>(width)), high_row(low_row);
+  for (int pass = 0; pass < 2; ++pass) {
+    TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
+    for (int y = 0; y < height; ++y) {
+      const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+      if (pass == 0) {
+        const auto& level = mean.row(y);
+        for (std::size_t x = 0; x < low_row.size(); ++x) {
+          low_row[x] = level[x] - static_cast<float>(margin);
+          high_row[x] = level[x] + static_cast<float>(margin);
+        }
+      } else {
+        low_row = low.row(y);
+        high_row = high.row(y);
+      }
+      for (int i = 0; i < columns; ++i) {
+        const int end = std::min(width, (i + 1) * tile);
+        int up = 0, up_n = 0, down = 0, down_n = 0;
+        for (int x = i * tile; x < end; ++x) {
+          const float value = p[x];
+          const int is_up = value > high_row[static_cast<std::size_t>(x)];
+          const int is_down = value < low_row[static_cast<std::size_t>(x)];
+          up += is_up * p[x];
+          up_n += is_up;
+          down += is_down * p[x];
+          down_n += is_down;
+        }
+        above.at(i, y / tile) += static_cast<float>(up);
+        above_n.at(i, y / tile) += static_cast<float>(up_n);
+        below.at(i, y / tile) += static_cast<float>(down);
+        below_n.at(i, y / tile) += static_cast<float>(down_n);
+      }
+    }
+    above = above.windowed(window), above_n = above_n.windowed(window);
+    below = below.windowed(window), below_n = below_n.windowed(window);
+    constexpr float enough = 12.0F;
+    std::vector<float> contrasts;
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i)
+        if (above_n.at(i, j) >= enough && below_n.at(i, j) >= enough)
+          contrasts.push_back(above.at(i, j) / above_n.at(i, j) - below.at(i, j) / below_n.at(i, j));
+    // A window without any thing has classes too, of noise or shading: they lie close together.
+    out.contrast = median(contrasts);
+    if (contrasts.empty()) break;
+    std::erase_if(contrasts, [&](float c) { return static_cast<double>(c) < 0.5 * out.contrast; });
+    out.contrast = median(contrasts);
+    const auto contrast = static_cast<float>(out.contrast);
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i) {
+        const float up_n = above_n.at(i, j), down_n = below_n.at(i, j);
+        const float up = above.at(i, j) / std::max(1.0F, up_n),
+                    down = below.at(i, j) / std::max(1.0F, down_n);
+        const bool two = up_n >= enough && down_n >= enough && up - down > 0.35F * contrast;
+        if (two) {
+          low.at(i, j) = high.at(i, j) = 0.5F * (up + down);
+        } else {  // one class: what is there is ground; only what differs from it by half the contrast is a thing
+          const float ground =
+              up_n + down_n > 0.0F ? (above.at(i, j) + below.at(i, j)) / (up_n + down_n) : mean.at(i, j);
+          const float level = up_n + down_n > 0.5F * static_cast<float>(tile * tile) ? ground : mean.at(i, j);
+          high.at(i, j) = level + 0.5F * contrast;
+          low.at(i, j) = level - 0.5F * contrast;
+        }
+      }
+  }
+  if (out.contrast <= std::max(4.0 * out.noise, 2.0)) {
+    out.contrast = 0.0;
+    return out.light.setTo(0), out.dark.setTo(0), out;
+  }
+  for (int y = 0; y < height; ++y) {
+    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+    std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
+    std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
+    const auto& down = low.row(y);
+    const auto& up = high.row(y);
+    for (int x = 0; x < width; ++x) {
+      light[x] = static_cast<float>(p[x]) > up[static_cast<std::size_t>(x)] ? 255 : 0;
+      dark[x] = static_cast<float>(p[x]) < down[static_cast<std::size_t>(x)] ? 255 : 0;
+    }
+  }
+  return out;
+}
+
+std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i& labels) {
+  struct Run {
+    int y, begin, end;  // end is exclusive
+  };
+  std::vector<Run> runs;
+  std::vector<int> parent;
+  const auto root = [&](int i) {
+    while (parent[static_cast<std::size_t>(i)] != i) {
+      parent[static_cast<std::size_t>(i)] =
+          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(i)])];
+      i = parent[static_cast<std::size_t>(i)];
+    }
+    return i;
+  };
+  std::size_t above_begin = 0, above_end = 0;
+  for (int y = 0; y < mask.rows; ++y) {
+    const std::uint8_t* p = mask.ptr<std::uint8_t>(y);
+    const std::size_t begin = runs.size();
+    std::size_t above = above_begin;
+    for (int x = 0; x < mask.cols;) {
+      if (p[x] == 0) {
+        const void* next = std::memchr(p + x, 255, static_cast<std::size_t>(mask.cols - x));
+        if (next == nullptr) break;
+        x = static_cast<int>(static_cast<const std::uint8_t*>(next) - p);
+      }
+      const int start = x;
+      while (x < mask.cols && p[x] != 0) ++x;
+      const int id = static_cast<int>(runs.size());
+      runs.push_back({y, start, x});
+      parent.push_back(id);
+      while (above < above_end && runs[above].end < start) ++above;
+      for (std::size_t k = above; k < above_end && runs[k].begin <= x; ++k) {
+        const int a = root(static_cast<int>(k)), b = root(id);
+        if (a != b) parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+      }
+    }
+    above_begin = begin;
+    above_end = runs.size();
+  }
+  struct Sums {
+    double n = 0, x = 0, y = 0, xx = 0, yy = 0;
+    int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
+  };
+  std::vector<Sums> sums(runs.size());
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Run& run = runs[i];
+    Sums& s = sums[static_cast<std::size_t>(root(static_cast<int>(i)))];
+    const double n = run.end - run.begin, middle = 0.5 * (run.begin + run.end - 1), y = run.y;
+    s.n += n;
+    s.x += n * middle;
+    s.y += n * y;
+    s.xx += n * (middle * middle + (n * n - 1.0) / 12.0);
+    s.yy += n * y * y;
+    s.left = std::min(s.left, run.begin);
+    s.right = std::max(s.right, run.end - 1);
+    s.top = std::min(s.top, run.y);
+    s.bottom = std::max(s.bottom, run.y);
+  }
+  std::vector<int> label(runs.size(), -1);
+  std::vector<Blob> blobs;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const Sums& s = sums[i];
+    if (s.n < std::max(1.0, smallest)) continue;
+    const double x = s.x / s.n, y = s.y / s.n;
+    // Each pixel is a square of its own second moment, 1/12 each way.
+    const double moment = s.xx - s.n * x * x + s.yy - s.n * y * y + s.n / 6.0;
+    label[i] = static_cast<int>(blobs.size());
+    blobs.push_back({label[i], s.n, x, y, s.n * s.n / (2.0 * std::numbers::pi * moment), s.left, s.top,
+                     s.right, s.bottom});
+  }
+  labels.create(mask.rows, mask.cols);
+  labels.setTo(0);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const int value = label[static_cast<std::size_t>(root(static_cast<int>(i)))] + 1;
+    if (value == 0) continue;
+    int* row = labels.ptr<int>(runs[i].y);
+    std::fill(row + runs[i].begin, row + runs[i].end, value);
+  }
+  return blobs;
+}
+
+}  // namespace invar::vision

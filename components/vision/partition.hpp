@@ -1,0 +1,33 @@
+// Divides a reduced image into thing and ground by a threshold that follows the light.
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace invar::vision {
+
+/// The image's two classes in local averages, in tiles of 8 px.
+struct Partition {
+  cv::Mat1b light;  // 255 where a pixel belongs to the lighter class as a thing would (see polarity), else 0
+  cv::Mat1b dark;   // 255 where it belongs to the darker class as a thing would
+  double contrast = 0.0;  // grey levels, median difference of the classes; 0: the image is even
+  double noise = 0.0;     // grey levels of this image, standard deviation from pixel to pixel
+};
+
+/// `image`: CV_8UC1, small. `window`: tiles each way within which the light is taken as even.
+Partition partition(const cv::Mat1b& image, int window);
+
+/// A connected set of pixels (8-neighbours) of one image.
+struct Blob {
+  int label = 0;
+  double area = 0.0;        // px^2
+  double x = 0.0, y = 0.0;  // centroid, px
+  double roundness = 0.0;   // area^2 / (2 pi (mu20 + mu02)): 1 for a full disc, less for everything else
+  int left = 0, top = 0, right = 0, bottom = 0;  // px, all inclusive
+};
+
+/// Blobs of a mask by runs and union-find; `labels` holds label + 1, 0 outside. Blobs below `smallest` px are left out.
+std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i& labels);
+
+}  // namespace invar::vision

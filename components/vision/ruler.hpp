@@ -1,0 +1,41 @@
+// Camera scale from a picture of circles of known radius.
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/vision/camera.hpp"
+#include "components/vision/outline.hpp"
+
+namespace invar::vision {
+
+struct RulerCircle {
+  Shape outline;          // px, as seen
+  double radius = 0.0;    // m, known
+  double residual = 0.0;  // px, measured minus modelled mean radius
+  double sigma = 0.0;     // px, standard deviation of the mean radius
+};
+
+struct RulerFit {
+  CameraModel camera;
+  bool distortion_identified = false;
+  bool aspect_identified = false;
+  double residual = 0.0;             // px, RMS of the edges about the modelled circles
+  std::vector<RulerCircle> circles;  // in the order of the radii that were given
+};
+
+/// What was found instead, where the picture does not show what the ruler says.
+struct RulerFailure {
+  std::string what;
+};
+
+/// `radii`: of every circle [m], any order of size. Circles are matched by their size. All edges are fitted at once:
+/// scale, radial distortion about the middle of the image and aspect are free together with every circle's centre;
+/// distortion and aspect stay in only where they are beyond three standard deviations and explain the edges better.
+/// `image`: CV_8UC1.
+std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<double>& radii,
+                                        RulerFailure& failure);
+
+}  // namespace invar::vision

@@ -1,0 +1,159 @@
+// `invar calibrate camera`: the scale of a camera from a picture of circles of known radius.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "components/vision/annotate.hpp"
+#include "components/vision/ruler.hpp"
+#include "core/config/yaml.hpp"
+#include "tools/command.hpp"
+#include "tools/commands/calibrate.hpp"
+#include "tools/commands/calibrate_camera.hpp"
+#include "tools/image/camera_file.hpp"
+#include "tools/image/image_file.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+std::vector<double> read_ruler(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  const config::Node circles = yaml.root().required("circles");
+  std::vector<double> radii;
+  if (circles.exists() && !circles.is_list())
+    circles.fault("is no list", "write circles: [{radius: 5.0e-4}, ...]");
+  if (circles.is_list())
+    for (const config::Node& circle : circles.children())
+      radii.push_back(circle.number("radius", "m", Range{1e-9, 10.0}));
+  if (circles.is_list() && radii.empty())
+    circles.fault("lists no circle", "give the radius of each circle of the ruler");
+  yaml.finish();
+  return radii;
+}
+
+struct Results {
+  const vision::RulerFit& fit;
+  const cv::Mat& image;
+};
+
+nlohmann::json report_json(const Results& r) {
+  const vision::CameraModel& camera = r.fit.camera;
+  nlohmann::json out;
+  out["scale"] = {{"value", camera.scale}, {"unit", "m/px"}, {"sigma", camera.scale_sigma}};
+  out["residual_px"] = r.fit.residual;
+  out["unidentified"] = nlohmann::json::array();
+  const double corner = camera.center.squaredNorm();
+  if (r.fit.distortion_identified) {
+    out["distortion"] = {{"value", camera.distortion}, {"unit", "1/px2"}, {"sigma", camera.distortion_sigma}};
+  } else {
+    out["unidentified"].push_back(
+        {{"what", "distortion"}, {"corner_share_2_sigma", 2.0 * camera.distortion_sigma * corner}});
+  }
+  if (r.fit.aspect_identified) {
+    out["aspect"] = {{"value", camera.aspect}, {"sigma", camera.aspect_sigma}};
+  } else {
+    out["unidentified"].push_back({{"what", "aspect"}, {"share_2_sigma", 2.0 * camera.aspect_sigma}});
+  }
+  for (const vision::RulerCircle& c : r.fit.circles)
+    out["circles"].push_back({{"radius_m", c.radius},
+                              {"x_px", c.outline.x},
+                              {"y_px", c.outline.y},
+                              {"radius_px", c.outline.equal_area_radius()},
+                              {"residual_px", c.residual}});
+  return out;
+}
+
+void write_report(const Results& r, const std::filesystem::path& file) {
+  using report::number;
+  const vision::CameraModel& camera = r.fit.camera;
+  report::Page page{"Camera", "Scale from circles of known radius"};
+  page.callout("Scale " + number(camera.scale * 1e6, 7) + " um/px, standard deviation " +
+                   number(camera.scale_sigma * 1e9, 2) + " nm/px (" +
+                   number(1e6 * camera.scale_sigma / camera.scale, 2) + " ppm)",
+               "good");
+  const double corner = camera.center.squaredNorm();
+  page.paragraph(r.fit.distortion_identified
+                     ? "Radial distortion: " + number(100.0 * camera.distortion * corner, 3) +
+                           " % in the corner, standard deviation " +
+                           number(100.0 * camera.distortion_sigma * corner, 2) + " %."
+                     : "Radial distortion is not identified: below " +
+                           number(200.0 * camera.distortion_sigma * corner, 2) +
+                           " % in the corner (two standard deviations). Left at zero.");
+  page.paragraph(r.fit.aspect_identified
+                     ? "Scale along y over scale along x: " + number(camera.aspect, 7) +
+                           ", standard deviation " + number(camera.aspect_sigma, 2) + "."
+                     : "Pixels are square within " + number(2.0 * camera.aspect_sigma, 2) +
+                           " (two standard deviations).");
+  std::vector<std::vector<std::string>> rows;
+  report::Series residual{"", report::Series::Style::points, {}, {}, {}, {}, ""};
+  for (const vision::RulerCircle& c : r.fit.circles) {
+    rows.push_back({number(c.radius * 1e3, 6), number(c.outline.x, 6), number(c.outline.y, 6),
+                    number(c.outline.equal_area_radius(), 6), number(1000.0 * c.residual, 2),
+                    number(1000.0 * c.sigma, 2)});
+    residual.x.push_back(c.radius * 1e3);
+    residual.y.push_back(1000.0 * c.residual);
+  }
+  page.table({"radius [mm]", "x [px]", "y [px]", "radius [px]", "residual [1/1000 px]", "sigma [1/1000 px]"},
+             rows);
+  std::vector<vision::AnnotatedOutline> outlines;
+  for (const vision::RulerCircle& c : r.fit.circles)
+    outlines.push_back({c.outline, vision::Colour::green, number(c.radius * 1e3, 4) + " mm"});
+  page.image(vision::encode_png(vision::annotate(r.image, outlines)), "image/png",
+             "The ruler with the outlines that were fitted");
+  page.plot({.title = "Radius: measured minus modelled",
+             .x_label = "radius [mm]",
+             .y_label = "difference [1/1000 px]",
+             .series = {residual},
+             .x_range = {},
+             .y_range = {}});
+  page.write(file);
+}
+
+void calibrate_by_ruler(const CameraOptions& options) {
+  const auto radii = read_ruler(*options.ruler);
+  const cv::Mat image = read_gray_image(*options.image);
+  vision::RulerFailure failure;
+  const auto fit = vision::calibrate_ruler(image, radii, failure);
+  if (!fit) throw InputError{options.image->string(), failure.what, "see " + options.ruler->string()};
+
+  std::filesystem::create_directories(options.out);
+  const Results results{*fit, image};
+  write_report(results, options.out / "report.html");
+  std::ofstream{options.out / "report.json"} << report_json(results).dump(2) << '\n';
+  std::ofstream{options.out / "camera.yaml"} << camera_yaml(fit->camera, image.cols, image.rows);
+  const vision::CameraModel& camera = fit->camera;
+  std::cout << "scale " << report::number(camera.scale * 1e6, 7) << " um/px, sigma "
+            << report::number(camera.scale_sigma * 1e9, 2) << " nm/px (" << fit->circles.size()
+            << " circles, edges " << report::number(fit->residual, 2) << " px RMS)\n";
+  if (fit->distortion_identified)
+    std::cout << "radial distortion "
+              << report::number(100.0 * camera.distortion * camera.center.squaredNorm(), 3)
+              << " % in the corner\n";
+  else
+    std::cout << "radial distortion not identified\n";
+  if (fit->aspect_identified) std::cout << "aspect " << report::number(camera.aspect, 7) << '\n';
+}
+
+}  // namespace
+
+void add_calibrate_camera(CLI::App& group) {
+  auto* command = group.add_subcommand("camera", "Scale and distortion of a camera from a ruler of circles");
+  command->footer("Example: invar calibrate camera --image ruler.png --ruler ruler.yaml --out result");
+  auto options = std::make_shared<CameraOptions>();
+  command->add_option("--image", options->image, "picture of circles of known radius");
+  command->add_option("--ruler", options->ruler,
+                      "ruler.yaml: circles: [{radius: 5.0e-4}, ...] in m, any order");
+  command->add_option("--out", options->out, "folder for camera.yaml, report.json and report.html")
+      ->required();
+  command->callback([options] {
+    if (!options->image) throw InputError{"--image", "is missing", "give the picture of the ruler"};
+    if (!options->ruler)
+      throw InputError{"--ruler", "is missing", "give ruler.yaml with the radii of the circles"};
+    calibrate_by_ruler(*options);
+  });
+}
+
+}  // namespace invar::tools

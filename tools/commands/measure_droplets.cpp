@@ -1,0 +1,95 @@
+// `invar measure droplets`: positions and sizes of droplets in images.
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "components/vision/droplets.hpp"
+#include "core/recording/table.hpp"
+#include "tools/command.hpp"
+#include "tools/image/camera_file.hpp"
+#include "tools/image/image_file.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  std::vector<std::filesystem::path> images;
+  std::optional<std::filesystem::path> camera;
+  std::filesystem::path output;
+};
+
+struct Rows {
+  std::vector<std::string> image, status;
+  std::vector<double> x, y, radius, circularity, score, sigma, x_metres, y_metres, diameter;
+};
+
+void measure(const Options& options) {
+  std::optional<vision::CameraModel> camera;
+  if (options.camera) camera = read_camera(*options.camera);
+  // Every image is read before anything is measured: a bad one must not cost the time of the good ones.
+  std::vector<cv::Mat> images;
+  for (const auto& file : options.images) images.push_back(read_gray_image(file));
+
+  Rows rows;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const vision::Droplets found = vision::measure_droplets(images[i]);
+    for (const vision::Droplet& drop : found.droplets) {
+      rows.image.push_back(options.images[i].string());
+      rows.status.emplace_back(vision::name(drop.status));
+      rows.x.push_back(drop.x);
+      rows.y.push_back(drop.y);
+      rows.radius.push_back(drop.radius);
+      rows.circularity.push_back(drop.circularity);
+      rows.score.push_back(drop.score);
+      rows.sigma.push_back(drop.sigma);
+      if (!camera) continue;
+      const Eigen::Vector2d at = camera->to_metres({drop.x, drop.y});
+      rows.x_metres.push_back(at.x());
+      rows.y_metres.push_back(at.y());
+      rows.diameter.push_back(2.0 * drop.radius * camera->local_scale({drop.x, drop.y}));
+    }
+    std::cout << options.images[i].string() << ": " << found.sound() << " droplets, "
+              << found.droplets.size() - found.sound() << " others marked\n";
+  }
+  recording::Table table;
+  table.add_texts("image", rows.image);
+  table.add("x", "px", rows.x);
+  table.add("y", "px", rows.y);
+  table.add("radius", "px", rows.radius);
+  table.add("circularity", "", rows.circularity);
+  table.add("score", "", rows.score);
+  table.add_texts("status", rows.status);
+  table.add("sigma", "px", rows.sigma);
+  if (camera) {
+    table.add("x", "m", rows.x_metres);
+    table.add("y", "m", rows.y_metres);
+    table.add("diameter", "m", rows.diameter);
+  }
+  table.write(options.output);
+}
+
+}  // namespace
+
+void add_measure(CLI::App& program) {
+  auto* group = program.add_subcommand("measure", "Measure what images show");
+  group->require_subcommand(1);
+  group->footer("Example: invar measure droplets --image print.png --output droplets.csv");
+  auto* command =
+      group->add_subcommand("droplets", "Find droplets in images and measure them to sub-pixel accuracy");
+  command->footer(
+      "Example: invar measure droplets --image a.png --image b.png --camera result/camera.yaml --output "
+      "droplets.csv\n"
+      "Best droplets first within each image; status says ok, satellite, cut (by the border) or dust.");
+  auto options = std::make_shared<Options>();
+  command->add_option("--image", options->images, "image of droplets; may be given several times")
+      ->required()
+      ->type_size(1)
+      ->expected(-1);
+  command->add_option("--camera", options->camera, "camera.yaml: adds positions and diameters in m");
+  command->add_option("--output", options->output, "table to write, .csv or .csv.gz")->required();
+  command->callback([options] { measure(*options); });
+}
+
+}  // namespace invar::tools
