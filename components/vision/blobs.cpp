@@ -190,9 +190,8 @@ Detection detect_at(const Level& level, int window) {
   const double scale = 1 << level.halvings;
   Detection out;
   const Partition parts = partition(image, window);
-  out.contrast = parts.contrast;
   out.noise = parts.noise * scale;
-  if (!(parts.contrast > 0.0)) return out;
+  if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return out;
   const double smallest = 3.0;
   Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
   // Things are round, what lies between them is not.
@@ -208,6 +207,7 @@ Detection detect_at(const Level& level, int window) {
     side = inner(light) >= inner(dark) ? &light : &dark;
   }
   out.polarity = side->polarity;
+  out.contrast = side->polarity > 0 ? parts.light_contrast : parts.dark_contrast;
 
   std::vector<std::pair<double, double>> radii;
   for (const Blob& blob : side->blobs)

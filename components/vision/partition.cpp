@@ -17,6 +17,9 @@ class TileSums {
  public:
   TileSums(int columns, int rows) : columns_{columns}, rows_{rows}, cells_(cells(columns, rows), 0.0F) {}
   float& at(int i, int j) { return cells_[static_cast<std::size_t>(j * columns_ + i)]; }
+  [[nodiscard]] float at(int i, int j) const { return cells_[static_cast<std::size_t>(j * columns_ + i)]; }
+  [[nodiscard]] int columns() const { return columns_; }
+  [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] TileSums windowed(int reach) const {
     TileSums across{columns_, rows_}, both{columns_, rows_};
     smooth(cells_, across.cells_, columns_, rows_, 1, columns_, reach);
@@ -105,12 +108,49 @@ double noise_of(const cv::Mat1b& image) {
   return 0.0;
 }
 
+// The threshold between the things and the rest of each window, halfway between their levels; returns the median
+// difference of the levels, signed. A window without a thing has its own mean and half the median difference.
+double set_thresholds(const TileSums& things, const TileSums& things_n, const TileSums& whole,
+                      const TileSums& whole_n, TileField& threshold) {
+  constexpr float enough = 12.0F;  // px; fewer say nothing
+  const auto difference = [&](int i, int j) {
+    const float n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
+    if (n < enough || rest < enough) return 0.0F;
+    return things.at(i, j) / n - (whole.at(i, j) - things.at(i, j)) / rest;
+  };
+  std::vector<float> differences;
+  for (int j = 0; j < things.rows(); ++j)
+    for (int i = 0; i < things.columns(); ++i)
+      if (const float d = difference(i, j); d != 0.0F) differences.push_back(d);
+  if (differences.empty()) {
+    for (int j = 0; j < things.rows(); ++j)
+      for (int i = 0; i < things.columns(); ++i) threshold.at(i, j) = 1e9F;
+    return 0.0;
+  }
+  // Windows that hold noise or shading alone have classes too, but they lie close together.
+  const auto usual = static_cast<float>(median(differences));
+  std::erase_if(differences, [&](float d) { return std::abs(d) < 0.5F * std::abs(usual); });
+  const auto contrast = static_cast<float>(median(differences));
+  for (int j = 0; j < things.rows(); ++j)
+    for (int i = 0; i < things.columns(); ++i) {
+      const float d = difference(i, j), n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
+      if (std::abs(d) > 0.35F * std::abs(contrast)) {
+        threshold.at(i, j) = things.at(i, j) / n - 0.5F * d;
+      } else if (rest < enough) {  // nothing but things
+        threshold.at(i, j) = whole.at(i, j) / whole_n.at(i, j) - 0.5F * contrast;
+      } else {
+        threshold.at(i, j) = (whole.at(i, j) - things.at(i, j)) / rest + 0.5F * contrast;
+      }
+    }
+  return static_cast<double>(contrast);
+}
+
 }  // namespace
 
 Partition partition(const cv::Mat1b& image, int window) {
   const int width = image.cols, height = image.rows;
   const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
-  Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, noise_of(image)};
+  Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, 0.0, noise_of(image)};
 
   // What lies clearly above or below its surroundings' mean.
   TileSums sum{columns, rows}, count{columns, rows};
@@ -143,30 +183,28 @@ Partition partition(const cv::Mat1b& image, int window) {
   const double margin = std::max(5.0 * out.noise + 1.0, 0.2 * extreme);
   if (extreme <= margin) return out.light.setTo(0), out.dark.setTo(0), out;
 
-  // Both classes' local levels, then the middle between them; twice, since the second time sees real classes.
-  TileField low{columns, rows, width}, high{columns, rows, width};
-  std::vector<float> low_row(static_cast<std::size_t>(width)), high_row(low_row);
+  // Light things against the rest, and dark things against the rest: each class's local level, then the middle between
+  // the two; twice, since the second time sees real classes.
+  TileField high{columns, rows, width}, low{columns, rows, width};
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < columns; ++i) {
+      high.at(i, j) = mean.at(i, j) + static_cast<float>(margin);
+      low.at(i, j) = mean.at(i, j) - static_cast<float>(margin);
+    }
+  const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
   for (int pass = 0; pass < 2; ++pass) {
     TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
     for (int y = 0; y < height; ++y) {
       const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-      if (pass == 0) {
-        const auto& level = mean.row(y);
-        for (std::size_t x = 0; x < low_row.size(); ++x) {
-          low_row[x] = level[x] - static_cast<float>(margin);
-          high_row[x] = level[x] + static_cast<float>(margin);
-        }
-      } else {
-        low_row = low.row(y);
-        high_row = high.row(y);
-      }
+      const auto& up_level = high.row(y);
+      const auto& down_level = low.row(y);
       for (int i = 0; i < columns; ++i) {
         const int end = std::min(width, (i + 1) * tile);
         int up = 0, up_n = 0, down = 0, down_n = 0;
         for (int x = i * tile; x < end; ++x) {
           const float value = p[x];
-          const int is_up = value > high_row[static_cast<std::size_t>(x)];
-          const int is_down = value < low_row[static_cast<std::size_t>(x)];
+          const int is_up = value > up_level[static_cast<std::size_t>(x)];
+          const int is_down = value < down_level[static_cast<std::size_t>(x)];
           up += is_up * p[x];
           up_n += is_up;
           down += is_down * p[x];
@@ -178,41 +216,15 @@ Partition partition(const cv::Mat1b& image, int window) {
         below_n.at(i, y / tile) += static_cast<float>(down_n);
       }
     }
-    above = above.windowed(window), above_n = above_n.windowed(window);
-    below = below.windowed(window), below_n = below_n.windowed(window);
-    constexpr float enough = 12.0F;
-    std::vector<float> contrasts;
-    for (int j = 0; j < rows; ++j)
-      for (int i = 0; i < columns; ++i)
-        if (above_n.at(i, j) >= enough && below_n.at(i, j) >= enough)
-          contrasts.push_back(above.at(i, j) / above_n.at(i, j) - below.at(i, j) / below_n.at(i, j));
-    // A window without any thing has classes too, of noise or shading: they lie close together.
-    out.contrast = median(contrasts);
-    if (contrasts.empty()) break;
-    std::erase_if(contrasts, [&](float c) { return static_cast<double>(c) < 0.5 * out.contrast; });
-    out.contrast = median(contrasts);
-    const auto contrast = static_cast<float>(out.contrast);
-    for (int j = 0; j < rows; ++j)
-      for (int i = 0; i < columns; ++i) {
-        const float up_n = above_n.at(i, j), down_n = below_n.at(i, j);
-        const float up = above.at(i, j) / std::max(1.0F, up_n),
-                    down = below.at(i, j) / std::max(1.0F, down_n);
-        const bool two = up_n >= enough && down_n >= enough && up - down > 0.35F * contrast;
-        if (two) {
-          low.at(i, j) = high.at(i, j) = 0.5F * (up + down);
-        } else {  // one class: what is there is ground; only what differs from it by half the contrast is a thing
-          const float ground =
-              up_n + down_n > 0.0F ? (above.at(i, j) + below.at(i, j)) / (up_n + down_n) : mean.at(i, j);
-          const float level = up_n + down_n > 0.5F * static_cast<float>(tile * tile) ? ground : mean.at(i, j);
-          high.at(i, j) = level + 0.5F * contrast;
-          low.at(i, j) = level - 0.5F * contrast;
-        }
-      }
+    out.light_contrast =
+        set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
+    out.dark_contrast = set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
   }
-  if (out.contrast <= std::max(4.0 * out.noise, 2.0)) {
-    out.contrast = 0.0;
-    return out.light.setTo(0), out.dark.setTo(0), out;
-  }
+  // What does not stand out from the noise is none.
+  const double least = std::max(4.0 * out.noise, 2.0);
+  if (out.light_contrast <= least) out.light_contrast = 0.0;
+  if (-out.dark_contrast <= least) out.dark_contrast = 0.0;
+  out.dark_contrast = -out.dark_contrast;
   for (int y = 0; y < height; ++y) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
@@ -224,6 +236,8 @@ Partition partition(const cv::Mat1b& image, int window) {
       dark[x] = static_cast<float>(p[x]) < down[static_cast<std::size_t>(x)] ? 255 : 0;
     }
   }
+  if (!(out.light_contrast > 0.0)) out.light.setTo(0);
+  if (!(out.dark_contrast > 0.0)) out.dark.setTo(0);
   return out;
 }
 

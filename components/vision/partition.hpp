@@ -11,8 +11,10 @@ namespace invar::vision {
 struct Partition {
   cv::Mat1b light;  // 255 where a pixel belongs to the lighter class as a thing would (see polarity), else 0
   cv::Mat1b dark;   // 255 where it belongs to the darker class as a thing would
-  double contrast = 0.0;  // grey levels, median difference of the classes; 0: the image is even
-  double noise = 0.0;     // grey levels of this image, standard deviation from pixel to pixel
+  double light_contrast =
+      0.0;  // grey levels, median over the image of light things minus their surroundings; 0: none
+  double dark_contrast = 0.0;  // grey levels, of surroundings minus dark things
+  double noise = 0.0;          // grey levels of this image, standard deviation from pixel to pixel
 };
 
 /// `image`: CV_8UC1, small. `window`: tiles each way within which the light is taken as even.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -78,29 +79,34 @@ std::vector<Circle> find_circles(const cv::Mat& image) {
   return circles;
 }
 
-// Gauss-Newton over 1/scale [px/m], distortion, aspect and the centres (ideal px). `free` tells which of the first three move.
+// What may be free beside the scale and the centres.
+enum Effect : std::size_t { distortion, aspect, offset, effects };
+using Free = std::array<bool, effects>;
+
+// Gauss-Newton over 1/scale [px/m], the effects and the centres (ideal px).
 struct Joint {
-  double per_metre = 0.0, distortion = 0.0, aspect = 1.0;
+  double per_metre = 0.0;                            // px/m
+  std::array<double, effects> value{0.0, 1.0, 0.0};  // 1/px^2, 1, px
+  std::array<double, effects> sigma{};               // 0 where held
+  double per_metre_sigma = 0.0;
   std::vector<Vector2d> centers;
   double chi = 0.0;  // sum of weighted squares, px^2
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };
 
 Joint solve(const std::vector<Circle>& circles, const std::vector<double>& radii, const Vector2d& middle,
-            bool free_distortion, bool free_aspect) {
-  const Index n = static_cast<Index>(circles.size()), size = 3 + 2 * n;
+            const Free& free) {
+  constexpr Index common = 1 + effects;
+  const Index n = static_cast<Index>(circles.size()), size = common + 2 * n;
   const double unit = 1.0 / (middle.squaredNorm() + 1.0);  // distortion in shares at the corner: well scaled
   Joint at;
-  double share = 0.0;
   double measured = 0.0, known = 0.0;
   for (std::size_t j = 0; j < circles.size(); ++j) {
     measured += circles[j].shape.radius * radii[j];
     known += radii[j] * radii[j];
     at.centers.emplace_back(circles[j].shape.x, circles[j].shape.y);
   }
-  at.per_metre = measured / known;
-  const double size_unit = at.per_metre;
-  double relative = 1.0;  // per_metre in units of the start
+  const double size_unit = measured / known;
+  double relative = 1.0, share = 0.0, stretch = 1.0, beyond = 0.0;
   Eigen::MatrixXd normal;
   double weight_sum = 0.0;
   for (int round = 0; round < 20; ++round) {
@@ -110,51 +116,56 @@ Joint solve(const std::vector<Circle>& circles, const std::vector<double>& radii
     for (Index j = 0; j < n; ++j) {
       const Circle& circle = circles[static_cast<std::size_t>(j)];
       const Vector2d center = at.centers[static_cast<std::size_t>(j)];
-      const double radius = size_unit * relative * radii[static_cast<std::size_t>(j)];
+      const double known_radius = size_unit * radii[static_cast<std::size_t>(j)];
       for (Index i = 0; i < circle.edges.cols(); ++i) {
         const double w = circle.weights(i);
         if (!(w > 0.0)) continue;
         const Vector2d away = circle.edges.col(i) - middle;
         const double square = away.squaredNorm();
         Vector2d delta = away * (1.0 + unit * share * square) - center + middle;
-        delta.y() *= at.aspect;
+        delta.y() *= stretch;
         const double distance = delta.norm();
         const Vector2d direction = delta / distance;
-        const double residual = distance - radius;
+        const double residual = distance - known_radius * relative - beyond;
         Eigen::VectorXd row = Eigen::VectorXd::Zero(size);
-        row(0) = -size_unit * radii[static_cast<std::size_t>(j)];
-        if (free_distortion)
-          row(1) = unit * square * (direction.x() * away.x() + direction.y() * at.aspect * away.y());
-        if (free_aspect) row(2) = direction.y() * delta.y() / at.aspect;
-        row(3 + 2 * j) = -direction.x();
-        row(4 + 2 * j) = -direction.y() * at.aspect;
+        row(0) = -known_radius;
+        if (free[distortion])
+          row(1) = unit * square * (direction.x() * away.x() + direction.y() * stretch * away.y());
+        if (free[aspect]) row(2) = direction.y() * delta.y() / stretch;
+        if (free[offset]) row(3) = -1.0;
+        row(common + 2 * j) = -direction.x();
+        row(common + 1 + 2 * j) = -direction.y() * stretch;
         normal += w * row * row.transpose();
         right -= w * residual * row;
         at.chi += w * residual * residual;
         weight_sum += w;
       }
     }
-    if (!free_distortion) normal(1, 1) = 1.0;
-    if (!free_aspect) normal(2, 2) = 1.0;
+    for (std::size_t e = 0; e < effects; ++e)
+      if (!free[e]) normal(static_cast<Index>(1 + e), static_cast<Index>(1 + e)) = 1.0;
     const Eigen::VectorXd step = normal.ldlt().solve(right);
-    relative += step(0);
-    share += step(1);
-    at.aspect += step(2);
-    for (Index j = 0; j < n; ++j) at.centers[static_cast<std::size_t>(j)] += step.segment<2>(3 + 2 * j);
-    if (step.head<3>().norm() < 1e-12) break;
+    relative += step(0), share += step(1), stretch += step(2), beyond += step(3);
+    for (Index j = 0; j < n; ++j) at.centers[static_cast<std::size_t>(j)] += step.segment<2>(common + 2 * j);
+    if (step.head<3>().norm() + step(3) / size_unit < 1e-12) break;
   }
   at.per_metre = size_unit * relative;
-  at.distortion = unit * share;
+  at.value = {unit * share, stretch, beyond};
   const double freedom = std::max(1.0, weight_sum - static_cast<double>(size));
-  Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
-  // Neighbouring rays share pixels, and what remains of an edge's shape is common to a circle: the residuals are
-  // not independent. A correlation over four rays is what simulated pictures show.
-  at.covariance = 4.0 * at.chi / freedom * inverse.topLeftCorner<3, 3>();
-  at.covariance.row(0) *= size_unit, at.covariance.col(0) *= size_unit;
-  at.covariance.row(1) *= unit, at.covariance.col(1) *= unit;
-  if (!free_distortion) at.covariance.row(1).setZero(), at.covariance.col(1).setZero();
-  if (!free_aspect) at.covariance.row(2).setZero(), at.covariance.col(2).setZero();
+  const Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  // Neighbouring rays share pixels, and what remains of an edge's shape is common to a circle: the residuals are not
+  // independent. A correlation over four rays is what simulated pictures show.
+  const double variance = 4.0 * at.chi / freedom;
+  const auto sigma = [&](Index k) { return std::sqrt(variance * inverse(k, k)); };
+  at.per_metre_sigma = size_unit * sigma(0);
+  at.sigma = {free[distortion] ? unit * sigma(1) : 0.0, free[aspect] ? sigma(2) : 0.0,
+              free[offset] ? sigma(3) : 0.0};
   return at;
+}
+
+// How many standard deviations an effect is from none.
+double strength(const Joint& fit, std::size_t effect) {
+  const double none = effect == aspect ? 1.0 : 0.0;
+  return std::abs(fit.value[effect] - none) / std::max(1e-300, fit.sigma[effect]);
 }
 
 }  // namespace
@@ -182,47 +193,44 @@ std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<
   for (std::size_t i = 0; i < n; ++i) sorted[i] = radii[order[i]];
   const Vector2d middle{0.5 * (image.cols - 1), 0.5 * (image.rows - 1)};
 
-  Joint best = solve(circles, sorted, middle, false, false);
+  // All effects first; the weakest goes until each is beyond doubt. An offset needs three sizes to show.
+  Free free{true, true, n >= 3 && sorted.front() > 1.5 * sorted.back()};
+  if (n < 2) free = {false, false, false};
+  const Joint all = solve(circles, sorted, middle, free);
+  Joint best = all;
+  for (;;) {
+    std::size_t weakest = effects;
+    for (std::size_t e = 0; e < effects; ++e)
+      if (free[e] && (weakest == effects || strength(best, e) < strength(best, weakest))) weakest = e;
+    if (weakest == effects || strength(best, weakest) > 3.5) break;
+    free[weakest] = false;
+    best = solve(circles, sorted, middle, free);
+  }
+  RulerFit fit;
+  fit.distortion_identified = free[distortion];
+  fit.aspect_identified = free[aspect];
+  fit.offset_identified = free[offset];
+  fit.offset = best.value[offset];
+  fit.offset_sigma = free[offset] ? best.sigma[offset] : all.sigma[offset];
+  CameraModel& camera = fit.camera;
+  camera.scale = 1.0 / best.per_metre;
+  camera.scale_sigma = best.per_metre_sigma / (best.per_metre * best.per_metre);
+  camera.distortion = best.value[distortion];
+  camera.distortion_sigma = free[distortion] ? best.sigma[distortion] : all.sigma[distortion];
+  camera.aspect = best.value[aspect];
+  camera.aspect_sigma = free[aspect] ? best.sigma[aspect] : all.sigma[aspect];
+  camera.center = middle;
   for (std::size_t i = 0; i < n; ++i) {
-    const double expected = best.per_metre * sorted[i];
-    if (std::abs(circles[i].shape.radius / expected - 1.0) > 0.03) {
-      failure.what = "the circles' sizes do not match the ruler: one has " +
-                     std::to_string(circles[i].shape.radius) + " px where " + std::to_string(expected) +
+    const Shape& shape = circles[i].shape;
+    const double expected = sorted[i] / camera.local_scale({shape.x, shape.y}) + fit.offset;
+    if (std::abs(shape.radius - expected) > std::max(0.5, 0.01 * expected) ||
+        std::abs(fit.offset) > 0.2 * circles.back().shape.radius) {
+      failure.what = "the circles' sizes do not match the ruler: one has a radius of " +
+                     std::to_string(shape.radius) + " px where " + std::to_string(expected) +
                      " px would fit the others";
       return std::nullopt;
     }
   }
-  RulerFit fit;
-  const auto beyond = [](double value, double variance) { return value * value > 9.0 * variance; };
-  if (n >= 2) {
-    const Joint both = solve(circles, sorted, middle, true, true);
-    fit.distortion_identified = beyond(both.distortion, both.covariance(1, 1));
-    fit.aspect_identified = beyond(both.aspect - 1.0, both.covariance(2, 2));
-    // One that does not stand alone may do so without the other.
-    if (!fit.distortion_identified || !fit.aspect_identified) {
-      const Joint bent = solve(circles, sorted, middle, true, false),
-                  uneven = solve(circles, sorted, middle, false, true);
-      if (!fit.aspect_identified) fit.distortion_identified = beyond(bent.distortion, bent.covariance(1, 1));
-      if (!fit.distortion_identified)
-        fit.aspect_identified = beyond(uneven.aspect - 1.0, uneven.covariance(2, 2));
-    }
-    const Joint alone = best;
-    best = solve(circles, sorted, middle, fit.distortion_identified, fit.aspect_identified);
-    if (!(best.chi < 0.98 * alone.chi)) {
-      best = alone;
-      fit.distortion_identified = fit.aspect_identified = false;
-    }
-    fit.camera.distortion_sigma = std::sqrt(both.covariance(1, 1));
-    fit.camera.aspect_sigma = std::sqrt(both.covariance(2, 2));
-  }
-  CameraModel& camera = fit.camera;
-  camera.scale = 1.0 / best.per_metre;
-  camera.scale_sigma = std::sqrt(best.covariance(0, 0)) / (best.per_metre * best.per_metre);
-  camera.distortion = best.distortion;
-  camera.aspect = best.aspect;
-  if (fit.distortion_identified) camera.distortion_sigma = std::sqrt(best.covariance(1, 1));
-  if (fit.aspect_identified) camera.aspect_sigma = std::sqrt(best.covariance(2, 2));
-  camera.center = middle;
   double weights = 0.0;
   fit.circles.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -232,7 +240,8 @@ std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<
     out.outline = c.shape;
     out.radius = sorted[i];
     out.sigma = 2.0 * c.residual / std::sqrt(std::max(1.0, c.weights.sum()));
-    out.residual = c.shape.equal_area_radius() - sorted[i] / camera.local_scale({c.shape.x, c.shape.y});
+    out.residual =
+        c.shape.equal_area_radius() - fit.offset - sorted[i] / camera.local_scale({c.shape.x, c.shape.y});
   }
   fit.residual = std::sqrt(best.chi / std::max(1.0, weights));
   return fit;

@@ -22,6 +22,9 @@ struct RulerFit {
   CameraModel camera;
   bool distortion_identified = false;
   bool aspect_identified = false;
+  bool offset_identified = false;
+  double offset = 0.0;  // px by which every outline lies outside its circle: exposure or print spreads it
+  double offset_sigma = 0.0;         // px
   double residual = 0.0;             // px, RMS of the edges about the modelled circles
   std::vector<RulerCircle> circles;  // in the order of the radii that were given
 };
@@ -32,8 +35,8 @@ struct RulerFailure {
 };
 
 /// `radii`: of every circle [m], any order of size. Circles are matched by their size. All edges are fitted at once:
-/// scale, radial distortion about the middle of the image and aspect are free together with every circle's centre;
-/// distortion and aspect stay in only where they are beyond three standard deviations and explain the edges better.
+/// scale, radial distortion about the middle of the image, aspect and an offset common to all outlines are free together
+/// with every circle's centre; each of the three effects stays in only where it is beyond 3.5 standard deviations.
 /// `image`: CV_8UC1.
 std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<double>& radii,
                                         RulerFailure& failure);

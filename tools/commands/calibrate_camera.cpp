@@ -57,6 +57,8 @@ nlohmann::json report_json(const Results& r) {
   } else {
     out["unidentified"].push_back({{"what", "aspect"}, {"share_2_sigma", 2.0 * camera.aspect_sigma}});
   }
+  if (r.fit.offset_identified)
+    out["outline_offset"] = {{"value", r.fit.offset}, {"unit", "px"}, {"sigma", r.fit.offset_sigma}};
   for (const vision::RulerCircle& c : r.fit.circles)
     out["circles"].push_back({{"radius_m", c.radius},
                               {"x_px", c.outline.x},
@@ -87,6 +89,11 @@ void write_report(const Results& r, const std::filesystem::path& file) {
                            ", standard deviation " + number(camera.aspect_sigma, 2) + "."
                      : "Pixels are square within " + number(2.0 * camera.aspect_sigma, 2) +
                            " (two standard deviations).");
+  if (r.fit.offset_identified)
+    page.paragraph("Every outline lies " + number(r.fit.offset, 3) +
+                   " px outside its circle (standard deviation " + number(r.fit.offset_sigma, 2) +
+                   " px): the exposure or the print spreads it. The scale is free of it; diameters of drops "
+                   "are not corrected by it.");
   std::vector<std::vector<std::string>> rows;
   report::Series residual{"", report::Series::Style::points, {}, {}, {}, {}, ""};
   for (const vision::RulerCircle& c : r.fit.circles) {
@@ -134,6 +141,8 @@ void calibrate_by_ruler(const CameraOptions& options) {
               << " % in the corner\n";
   else
     std::cout << "radial distortion not identified\n";
+  if (fit->offset_identified)
+    std::cout << "outlines lie " << report::number(fit->offset, 3) << " px outside their circles\n";
   if (fit->aspect_identified) std::cout << "aspect " << report::number(camera.aspect, 7) << '\n';
 }
 
