@@ -1,0 +1,145 @@
+#include "core/dds/cell_client.hpp"
+
+#include <chrono>
+#include <random>
+
+#include "core/dds/simulated_clock.hpp"
+
+namespace invar::dds {
+
+namespace {
+constexpr std::size_t notices_kept = 5000;
+}
+
+ServiceTopics::ServiceTopics(const std::string& cell) {
+  const std::string base = "cell/" + cell + "/process/";
+  process_status = base + "status";
+  component_status = base + "components";
+  notices = base + "notices";
+  lifecycle_request = base + "lifecycle_request";
+  lifecycle_reply = base + "lifecycle_reply";
+  parameter_request = base + "parameter_request";
+  parameter_reply = base + "parameter_reply";
+}
+
+CellClient::CellClient(Node& node)
+    : client_{(std::uint64_t{std::random_device{}()} << 32U) | std::random_device{}()},
+      lifecycle_{node.writer<lifecycle::LifecycleRequest>(
+          ServiceTopics{node.options().cell}.lifecycle_request, "request")},
+      parameter_{node.writer<lifecycle::ParameterRequest>(
+          ServiceTopics{node.options().cell}.parameter_request, "request")} {
+  const ServiceTopics topics{node.options().cell};
+  readers_.push_back(listen(node, topics.lifecycle_reply, lifecycle_replies_));
+  readers_.push_back(listen(node, topics.parameter_reply, parameter_replies_));
+  readers_.push_back(
+      node.reader<lifecycle::ProcessStatus>(topics.process_status, "state", [this](const auto& status) {
+        const std::lock_guard lock{mutex_};
+        processes_[status.process_name().c_str()] = status;
+      }));
+  readers_.push_back(
+      node.reader<lifecycle::ComponentStatus>(topics.component_status, "state", [this](const auto& status) {
+        const std::lock_guard lock{mutex_};
+        components_[status.component_name().c_str()] = status;
+      }));
+  readers_.push_back(node.reader<event::Notice>(topics.notices, "event", [this](const auto& notice) {
+    const std::lock_guard lock{mutex_};
+    if (notices_.size() == notices_kept) notices_.pop_front();
+    notices_.push_back(notice);
+  }));
+}
+
+template <class Reply>
+std::unique_ptr<Connection> CellClient::listen(Node& node, const std::string& topic,
+                                               std::map<std::uint64_t, Reply>& replies) {
+  return node.reader<Reply>(topic, "request", [this, &replies](const Reply& reply) {
+    if (reply.client() != client_) return;
+    const std::lock_guard lock{mutex_};
+    replies[reply.request()] = reply;
+    news_.notify_all();
+  });
+}
+
+template <class Request, class Reply>
+std::optional<Reply> CellClient::call(Writer<Request>& writer, std::map<std::uint64_t, Reply>& replies,
+                                      Request request, const std::string& process, Duration patience) {
+  std::unique_lock lock{mutex_};
+  request.client(client_);
+  request.request(++requests_);
+  request.process_id(name_number(process));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::nanoseconds{patience.ns};
+  while (std::chrono::steady_clock::now() < end) {
+    lock.unlock();
+    writer.write(request);  // again, where the process was not yet connected or its reply went astray
+    lock.lock();
+    const auto has_reply = [&] { return replies.contains(request.request()); };
+    if (news_.wait_for(lock, std::chrono::milliseconds{200}, has_reply)) {
+      auto reply = replies.extract(request.request());
+      return std::move(reply.mapped());
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<lifecycle::LifecycleReply> CellClient::request(const std::string& process,
+                                                             const std::string& component,
+                                                             lifecycle::Transition wanted,
+                                                             Duration patience) {
+  lifecycle::LifecycleRequest request;
+  request.component_name(component);
+  request.wanted(wanted);
+  return call(lifecycle_, lifecycle_replies_, std::move(request), process, patience);
+}
+
+std::optional<lifecycle::ParameterReply> CellClient::parameter(const std::string& process,
+                                                               const std::string& component,
+                                                               lifecycle::ParameterAction action,
+                                                               const std::string& path,
+                                                               const std::string& value, Duration patience) {
+  lifecycle::ParameterRequest request;
+  request.component_name(component);
+  request.action(action);
+  request.path(path);
+  request.value(value);
+  return call(parameter_, parameter_replies_, std::move(request), process, patience);
+}
+
+std::vector<lifecycle::ProcessStatus> CellClient::processes() const {
+  const std::lock_guard lock{mutex_};
+  std::vector<lifecycle::ProcessStatus> out;
+  for (const auto& [name, status] : processes_) out.push_back(status);
+  return out;
+}
+
+std::vector<lifecycle::ComponentStatus> CellClient::components() const {
+  const std::lock_guard lock{mutex_};
+  std::vector<lifecycle::ComponentStatus> out;
+  for (const auto& [name, status] : components_) out.push_back(status);
+  return out;
+}
+
+std::vector<event::Notice> CellClient::take_notices() {
+  const std::lock_guard lock{mutex_};
+  std::vector<event::Notice> out{notices_.begin(), notices_.end()};
+  notices_.clear();
+  return out;
+}
+
+std::string CellClient::process_of(const std::string& component) const {
+  const std::lock_guard lock{mutex_};
+  const auto found = components_.find(component);
+  return found == components_.end() ? "" : found->second.process_name().c_str();
+}
+
+std::optional<lifecycle::Transition> parse_wire_transition(std::string_view text) {
+  using namespace lifecycle;
+  constexpr std::pair<std::string_view, Transition> words[] = {
+      {"configure", TRANSITION_CONFIGURE},   {"activate", TRANSITION_ACTIVATE},
+      {"deactivate", TRANSITION_DEACTIVATE}, {"cleanup", TRANSITION_CLEANUP},
+      {"reset", TRANSITION_RESET},           {"shutdown", TRANSITION_SHUTDOWN},
+      {"stop", TRANSITION_STOP_PROCESS}};
+  for (const auto& [word, transition] : words)
+    if (word == text) return transition;
+  return std::nullopt;
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,291 @@
+#include "core/dds/process_service.hpp"
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <sstream>
+
+#include "core/dds/simulated_clock.hpp"
+
+namespace invar::dds {
+
+namespace {
+
+lifecycle::Percentiles on_wire(const Percentiles& p) {
+  lifecycle::Percentiles out;
+  out.p50_ns(p.p50.ns);
+  out.p99_ns(p.p99.ns);
+  out.p999_ns(p.p999.ns);
+  out.max_ns(p.max.ns);
+  return out;
+}
+
+lifecycle::ComponentState on_wire(LifecycleState state) {
+  return static_cast<lifecycle::ComponentState>(state);
+}
+
+/// Nothing: stop the process.
+std::optional<Transition> from_wire(lifecycle::Transition transition) {
+  switch (transition) {
+    case lifecycle::TRANSITION_CONFIGURE:
+      return Transition::configure;
+    case lifecycle::TRANSITION_ACTIVATE:
+      return Transition::activate;
+    case lifecycle::TRANSITION_DEACTIVATE:
+      return Transition::deactivate;
+    case lifecycle::TRANSITION_CLEANUP:
+      return Transition::cleanup;
+    case lifecycle::TRANSITION_RESET:
+      return Transition::reset;
+    case lifecycle::TRANSITION_SHUTDOWN:
+      return Transition::shutdown;
+    case lifecycle::TRANSITION_STOP_PROCESS:
+      break;
+  }
+  return std::nullopt;
+}
+
+std::string shown(double value) {
+  std::ostringstream text;
+  text.precision(12);
+  text << value;
+  return text.str();
+}
+
+lifecycle::Parameter on_wire(const std::string& component, const ParameterStatus& status) {
+  lifecycle::Parameter out;
+  out.component_name(component);
+  out.path(status.info.path);
+  out.kind(status.info.type);
+  out.unit_text(status.info.unit);
+  out.value(status.value ? shown(*status.value) : status.info.otherwise);
+  out.bounds("[" + shown(status.info.range.lower) + ", " + shown(status.info.range.upper) + "]");
+  out.description(status.info.description);
+  out.changeable(status.info.changeable);
+  return out;
+}
+
+std::string joined(const std::vector<std::string>& lines) {
+  std::string text;
+  for (const auto& line : lines) text += (text.empty() ? "" : "; ") + line;
+  return text;
+}
+
+}  // namespace
+
+ProcessService::ProcessService(Node& node, ProcessControl& control, Options options)
+    : node_{node},
+      control_{control},
+      options_{std::move(options)},
+      number_{name_number(node.options().process)},
+      process_{
+          node.writer<lifecycle::ProcessStatus>(ServiceTopics{node.options().cell}.process_status, "state")},
+      component_{node.writer<lifecycle::ComponentStatus>(ServiceTopics{node.options().cell}.component_status,
+                                                         "state")},
+      notice_{node.writer<event::Notice>(ServiceTopics{node.options().cell}.notices, "event")},
+      lifecycle_{node.writer<lifecycle::LifecycleReply>(ServiceTopics{node.options().cell}.lifecycle_reply,
+                                                        "request")},
+      parameter_{node.writer<lifecycle::ParameterReply>(ServiceTopics{node.options().cell}.parameter_reply,
+                                                        "request")} {
+  const ServiceTopics topics{node.options().cell};
+  const auto take = [this](const auto& request) {
+    if (request.process_id() == number_) enqueue(request);
+  };
+  readers_.push_back(node.reader<lifecycle::LifecycleRequest>(topics.lifecycle_request, "request", take));
+  readers_.push_back(node.reader<lifecycle::ParameterRequest>(topics.parameter_request, "request", take));
+  thread_ = std::thread{[this] { run(); }};
+}
+
+ProcessService::~ProcessService() {
+  readers_.clear();
+  {
+    const std::lock_guard lock{mutex_};
+    stopping_ = true;
+  }
+  news_.notify_all();
+  thread_.join();
+  publish_news();
+  publish_status();
+}
+
+void ProcessService::enqueue(Request request) {
+  const std::lock_guard lock{mutex_};
+  requests_.push_back(std::move(request));
+  news_.notify_all();
+}
+
+void ProcessService::run() {
+  auto next = std::chrono::steady_clock::now();
+  for (;;) {
+    std::unique_lock lock{mutex_};
+    news_.wait_for(lock, std::chrono::milliseconds{50}, [this] { return stopping_ || !requests_.empty(); });
+    if (stopping_) return;
+    std::deque<Request> requests;
+    requests.swap(requests_);
+    lock.unlock();
+    for (const auto& request : requests) std::visit([this](const auto& r) { serve(r); }, request);
+    publish_news();
+    if (std::chrono::steady_clock::now() >= next || !requests.empty()) {
+      publish_status();
+      next = std::chrono::steady_clock::now() + std::chrono::nanoseconds{options_.interval.ns};
+    }
+  }
+}
+
+base::Stamp ProcessService::stamp() const {
+  base::Stamp at;
+  const LoopCounters counters = control_.executor().counters();
+  at.cycle(counters.cycle);
+  if (control_.executor().options().simulated) {
+    at.time_ns(control_.executor().now().ns);
+  } else {
+    timespec now{};
+    clock_gettime(CLOCK_REALTIME, &now);
+    at.time_ns(now.tv_sec * 1'000'000'000 + now.tv_nsec);
+  }
+  return at;
+}
+
+void ProcessService::publish(event::Severity level, const std::string& source, const std::string& text) {
+  event::Notice notice;
+  notice.cell(options_.cell);
+  notice.component_id(number_);
+  notice.at(stamp());
+  notice.level(level);
+  notice.source(source);
+  notice.text(text);
+  notice_.write(notice);
+}
+
+void ProcessService::publish_news() {
+  for (const auto& alarm : node_.take_alarms())
+    publish(event::SEVERITY_FAULT, node_.options().process, alarm.text);
+  for (StateChange change; control_.executor().take_change(change);) {
+    const std::string name = control_.executor().component(change.component).name;
+    const bool failed = change.to == LifecycleState::error;
+    std::string text{to_text(change.from)};
+    text += " -> " + std::string{to_text(change.to)} + (failed ? ": " + std::string{change.why.data()} : "");
+    publish(failed ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, name, text);
+  }
+}
+
+void ProcessService::publish_status() {
+  const ProcessStatus status = control_.status();
+  lifecycle::ProcessStatus process;
+  process.cell(options_.cell);
+  process.process_id(number_);
+  process.at(stamp());
+  process.process_name(node_.options().process);
+  process.host(options_.host);
+  process.pid(static_cast<std::uint32_t>(getpid()));
+  process.realtime_asked(control_.executor().options().real_time.has_value());
+  process.realtime_granted(process.realtime_asked() && status.not_granted.empty());
+  process.realtime_text(joined(status.not_granted));
+  process.simulated(status.simulated);
+  process.rate(1.0 / status.period.in_seconds());
+  process.cycles(status.counters.executed);
+  process.overruns(status.counters.overruns);
+  process.skipped(status.counters.skipped);
+  process.trip_reason(status.trip_reason);
+  process.wake_up(on_wire(status.wake_up));
+  process.compute(on_wire(status.compute));
+  process.lost(node_.lost());
+  process_.write(process);
+
+  for (std::size_t i = 0; i < status.components.size(); ++i) {
+    const auto& from = status.components[i];
+    lifecycle::ComponentStatus out;
+    out.cell(options_.cell);
+    out.component_id(control_.executor().component(i).id);
+    out.at(process.at());
+    out.component_name(from.name);
+    out.component_type(from.type);
+    out.process_name(node_.options().process);
+    out.state(on_wire(from.state));
+    out.failure(from.failure);
+    out.steps(from.steps);
+    out.every(from.every);
+    out.compute(on_wire(from.compute));
+    component_.write(out);
+  }
+}
+
+void ProcessService::serve(const lifecycle::LifecycleRequest& request) {
+  lifecycle::LifecycleReply reply;
+  reply.client(request.client());
+  reply.process_id(number_);
+  reply.request(request.request());
+  if (const auto transition = from_wire(request.wanted())) {
+    // Repeated requests are known by their id and not carried out again.
+    const std::uint64_t id = request.client() ^ (request.request() * 0x9E3779B97F4A7C15U);
+    const Outcome outcome = control_.request(request.component_name().c_str(), *transition, id);
+    reply.done(outcome.ok());
+    reply.state(on_wire(outcome.state));
+    reply.text(outcome.reason);
+  } else if (options_.stop_process) {
+    reply.done(true);
+    reply.state(lifecycle::STATE_FINALIZED);
+    options_.stop_process();
+  } else {
+    reply.text("this process is not stopped by request");
+  }
+  reply.at(stamp());
+  lifecycle_.write(reply);
+}
+
+void ProcessService::serve(const lifecycle::ParameterRequest& request) {
+  for (const auto& known : answered_)
+    if (known.client() == request.client() && known.request() == request.request()) {
+      parameter_.write(known);
+      return;
+    }
+  lifecycle::ParameterReply reply = answer(request);
+  reply.client(request.client());
+  reply.process_id(number_);
+  reply.request(request.request());
+  reply.at(stamp());
+  parameter_.write(reply);
+  if (request.action() != lifecycle::PARAMETER_SET) return;
+  answered_.push_back(std::move(reply));
+  if (answered_.size() > 64) answered_.pop_front();
+}
+
+lifecycle::ParameterReply ProcessService::answer(const lifecycle::ParameterRequest& request) {
+  lifecycle::ParameterReply reply;
+  const std::string component = request.component_name().c_str();
+  const std::string path = request.path().c_str();
+  if (!component.empty() && !control_.executor().find(component)) {
+    reply.text("process `" + node_.options().process + "` has no component `" + component + "`");
+    return reply;
+  }
+  if (request.action() == lifecycle::PARAMETER_SET) {
+    const std::string text = request.value().c_str();
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    if (end == text.c_str()) {
+      reply.text("`" + text + "` is no number");
+      return reply;
+    }
+    std::string unit{end};
+    unit.erase(0, unit.find_first_not_of(' '));
+    const std::string why = control_.set_parameter(component, path, value, unit);
+    if (!why.empty()) {
+      reply.text(why);
+      return reply;
+    }
+  }
+  for (std::size_t i = 0; i < control_.executor().size(); ++i) {
+    const std::string& name = control_.executor().component(i).name;
+    if (!component.empty() && name != component) continue;
+    for (const auto& parameter : control_.parameters(name))
+      if ((path.empty() || parameter.info.path == path) && reply.parameters().size() < 512)
+        reply.parameters().push_back(on_wire(name, parameter));
+  }
+  reply.done(!reply.parameters().empty() || path.empty());
+  if (!reply.done()) reply.text("`" + component + "` has no parameter `" + path + "`");
+  return reply;
+}
+
+}  // namespace invar::dds

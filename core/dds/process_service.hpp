@@ -1,0 +1,69 @@
+// ProcessService: puts the control of one process on the wire - its status, its notices, requests to it.
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "core/dds/cell_client.hpp"
+#include "core/dds/node.hpp"
+#include "core/executor/process_control.hpp"
+
+namespace invar::dds {
+
+/// Has a thread of its own; nothing of it runs on the loop's.
+class ProcessService {
+ public:
+  struct Options {
+    std::uint32_t cell = 0;                           // number of the cell, for keys
+    std::string host;                                 // name of the host in the cell file
+    Duration interval = Duration::milliseconds(500);  // between two status samples
+    /// Called when somebody asks the process to stop; on the service's thread.
+    std::function<void()> stop_process;
+  };
+  ProcessService(Node& node, ProcessControl& control, Options options);
+  ~ProcessService();
+  ProcessService(const ProcessService&) = delete;
+  ProcessService& operator=(const ProcessService&) = delete;
+
+  /// Publishes a notice in this process's name. Any thread but the loop's.
+  void publish(event::Severity level, const std::string& source, const std::string& text);
+  /// Publishes all statuses now, as after a transition.
+  void publish_status();
+
+ private:
+  using Request = std::variant<lifecycle::LifecycleRequest, lifecycle::ParameterRequest>;
+  void enqueue(Request request);
+  void run();
+  void publish_news();
+  void serve(const lifecycle::LifecycleRequest& request);
+  void serve(const lifecycle::ParameterRequest& request);
+  [[nodiscard]] lifecycle::ParameterReply answer(const lifecycle::ParameterRequest& request);
+  [[nodiscard]] base::Stamp stamp() const;
+
+  Node& node_;
+  ProcessControl& control_;
+  Options options_;
+  std::uint32_t number_;
+  Writer<lifecycle::ProcessStatus> process_;
+  Writer<lifecycle::ComponentStatus> component_;
+  Writer<event::Notice> notice_;
+  Writer<lifecycle::LifecycleReply> lifecycle_;
+  Writer<lifecycle::ParameterReply> parameter_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::deque<Request> requests_;
+  bool stopping_ = false;
+  std::deque<lifecycle::ParameterReply> answered_;  // repeated requests get the same answer
+  std::vector<std::unique_ptr<Connection>> readers_;
+  std::thread thread_;
+};
+
+}  // namespace invar::dds
