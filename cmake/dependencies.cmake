@@ -1,6 +1,7 @@
 # Everything comes from Debian 12; tools/packages.txt is the one list of packages.
 find_package(fastcdr REQUIRED)
 find_package(fastrtps REQUIRED)
+find_package(CycloneDDS REQUIRED)
 find_package(Eigen3 REQUIRED)
 find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs calib3d)
 find_package(Ceres REQUIRED)

@@ -1,90 +1,72 @@
-// A child process with pipes to its stdin and from its stdout, for tests against foreign programs.
+// A child process whose output is read.
 #pragma once
 
 #include <fcntl.h>
-#include <poll.h>
-#include <signal.h>
+#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-namespace invar::test {
+namespace invar::testing {
 
-class Process {
+class Child {
  public:
-  explicit Process(std::vector<std::string> command) {
-    std::array<int, 2> in{};
-    std::array<int, 2> out{};
-    if (pipe2(in.data(), O_CLOEXEC) != 0 || pipe2(out.data(), O_CLOEXEC) != 0)
-      throw std::runtime_error{"pipe"};
-    std::vector<char*> words;
-    for (auto& word : command) words.push_back(word.data());
-    words.push_back(nullptr);
-    pid_ = fork();
-    if (pid_ < 0) throw std::runtime_error{"fork"};
-    if (pid_ == 0) {
-      dup2(in[0], 0);
-      dup2(out[1], 1);
-      execvp(words[0], words.data());
-      _exit(127);
-    }
-    close(in[0]);
-    close(out[1]);
-    to_ = in[1];
-    from_ = out[0];
+  /// `environment` is added to ours, as "NAME=value".
+  Child(std::vector<std::string> words, const std::vector<std::string>& environment = {}) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) return;
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+    std::vector<char*> arguments;
+    for (auto& word : words) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    std::vector<std::string> all = environment;
+    for (char** entry = environ; *entry != nullptr; ++entry) all.emplace_back(*entry);
+    std::vector<char*> entries;
+    for (auto& entry : all) entries.push_back(entry.data());
+    entries.push_back(nullptr);
+    posix_spawnp(&pid_, words.front().c_str(), &actions, nullptr, arguments.data(), entries.data());
+    posix_spawn_file_actions_destroy(&actions);
+    close(ends[1]);
+    output_ = ends[0];
+    fcntl(output_, F_SETFL, O_NONBLOCK);
   }
-  ~Process() { kill(); }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
+  ~Child() {
+    if (pid_ > 0 && !has_ended()) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    if (output_ >= 0) close(output_);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
 
-  void send(const std::string& line) const {
-    const std::string text = line + "\n";
-    if (write(to_, text.data(), text.size()) < 0) throw std::runtime_error{"the process does not listen"};
+  /// All that it wrote so far.
+  const std::string& output() {
+    char buffer[4096];
+    for (ssize_t n = 0; (n = read(output_, buffer, sizeof buffer)) > 0;)
+      text_.append(buffer, static_cast<std::size_t>(n));
+    return text_;
   }
-  /// The next line of its output; throws when it ends or says nothing for a minute.
-  std::string line() {
-    for (;;) {
-      if (const auto end = buffer_.find('\n'); end != std::string::npos) {
-        std::string result = buffer_.substr(0, end);
-        buffer_.erase(0, end + 1);
-        return result;
-      }
-      if (!read_some()) throw std::runtime_error{"the process ended or hangs; it said: " + buffer_};
-    }
+  bool has_ended() {
+    if (!ended_ && pid_ > 0) ended_ = waitpid(pid_, &status_, WNOHANG) == pid_;
+    return ended_;
   }
-  /// All that is left of its output, once it ended by itself.
-  std::string rest() {
-    while (read_some()) {
-    }
-    return std::move(buffer_);
+  /// Exit status; valid when it has ended.
+  [[nodiscard]] int status() const {
+    return WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_);
   }
-  void kill() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);
-    waitpid(pid_, nullptr, 0);
-    close(to_);
-    close(from_);
-    pid_ = 0;
-  }
+  [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:
-  bool read_some() {
-    pollfd readable{from_, POLLIN, 0};
-    if (poll(&readable, 1, 60'000) <= 0) return false;
-    std::array<char, 4096> bytes;
-    const ssize_t size = read(from_, bytes.data(), bytes.size());
-    if (size > 0) buffer_.append(bytes.data(), static_cast<std::size_t>(size));
-    return size > 0;
-  }
-
-  pid_t pid_ = 0;
-  int to_ = -1;
-  int from_ = -1;
-  std::string buffer_;
+  pid_t pid_ = -1;
+  int output_ = -1;
+  int status_ = 0;
+  bool ended_ = false;
+  std::string text_;
 };
 
-}  // namespace invar::test
+}  // namespace invar::testing
