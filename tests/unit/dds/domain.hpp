@@ -12,8 +12,9 @@
 
 namespace invar::dds::testing {
 
-/// Programs that run at the same time get different domains, as far as process ids differ.
-inline std::uint32_t test_domain() { return 20U + static_cast<std::uint32_t>(getpid()) % 200U; }
+/// Programs that run at the same time get different domains, as far as process ids differ. Ports of domains up to
+/// 100 stay below those that the system gives to others.
+inline std::uint32_t test_domain() { return 1U + static_cast<std::uint32_t>(getpid()) % 100U; }
 
 inline NodeOptions local(const std::string& process) {
   NodeOptions options;
