@@ -1,5 +1,6 @@
 // The executor by the clock: one thread that sleeps to absolute times.
 #include <pthread.h>
+#include <signal.h>
 #include <time.h>
 
 #include <algorithm>
@@ -59,6 +60,9 @@ bool Executor::sleep_until(Instant due) noexcept {
 
 void Executor::loop(std::promise<bool>& ready) {
   const std::lock_guard turn{stepping_};
+  sigset_t signals;
+  sigfillset(&signals);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);  // handlers run on some other thread
   pthread_setname_np(pthread_self(), options_.process.substr(0, 15).c_str());
   if (options_.real_time) grants_ = claim_real_time(*options_.real_time);
   const bool refused = std::any_of(grants_.begin(), grants_.end(), [](const Grant& g) { return !g.granted; });
