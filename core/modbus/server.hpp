@@ -17,6 +17,8 @@
 // The map's watchdog runs in the device's own clock, the `now` of `exchange`: before the first heartbeat, and
 // when none has come for `timeout`, the comm-loss action of the map is in force (again at every exchange) and
 // its flag set. Only a changed heartbeat counts. A register that both sides write keeps the later write.
+//
+// Not for real-time loops: `exchange` takes a lock that the answering thread holds while it builds an answer.
 #pragma once
 
 #include <cstdint>
