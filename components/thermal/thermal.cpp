@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace invar::thermal {
 
@@ -19,8 +20,11 @@ Thermal::Thermal(const Parameters& parameters)
 }
 
 void Thermal::configure() {
-  bus_ = std::make_unique<modbus::Bus>(modbus::BusOptions{
-      .host = parameters_.modbus.host, .port = static_cast<std::uint16_t>(parameters_.modbus.port)});
+  modbus::BusOptions options{.host = parameters_.modbus.host,
+                             .port = static_cast<std::uint16_t>(parameters_.modbus.port)};
+  // Waits are real also in simulated time, where a busy host must not look like a dead heater.
+  if (simulated_time) options.answer_timeout = Duration::seconds(20);
+  bus_ = std::make_unique<modbus::Bus>(std::move(options));
   device_ = &bus_->add(modbus::load_map(parameters_.modbus.map));
   if (!simulated_time) bus_->start();
 }
