@@ -1,6 +1,7 @@
 #include "components/vision/droplets.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
@@ -73,6 +74,57 @@ double outside_share(const Shape& shape, const cv::Mat& image) {
   return beyond / r;
 }
 
+// Edge filters of one blur, by their half widths, made when first wanted.
+class Filters {
+ public:
+  explicit Filters(double blur) : blur_{blur} {}
+  const EdgeFilter& at(double radius) {
+    const int half = EdgeFilter::half_for(blur_, radius);
+    auto& filter = made_[static_cast<std::size_t>(half)];
+    if (!filter) filter.emplace(blur_, half);
+    return *filter;
+  }
+
+ private:
+  double blur_;
+  std::array<std::optional<EdgeFilter>, EdgeFilter::most_half + 1> made_;
+};
+
+// Every candidate to a few tenths of a pixel. One that stands alone is known well enough to go straight to its edge
+// with few rays; any other is sought.
+std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filters& filters) {
+  std::vector<Measured> drops;
+  drops.reserve(found.candidates.size());
+  for (const Candidate& candidate : found.candidates) {
+    if (candidate.radius < 1.5) continue;
+    Measured drop;
+    const Shape start{candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
+    bool done = false;
+    if (candidate.alone) {
+      drop.rays.choose(0.5 * candidate.radius);
+      drop.shape = start;
+      for (int round = 0; round < 3 && !done; ++round) {
+        drop.fit =
+            refine_outline(image, drop.shape, found.polarity, filters.at(drop.shape.radius), drop.rays);
+        if (!drop.fit.valid || drop.fit.support < 0.8) break;
+        drop.shape = drop.fit.shape;
+        done = drop.fit.moved < 0.8;
+      }
+      done = done && drop.fit.coverage > 0.8;
+    }
+    if (!done) {
+      drop.shape = start;
+      drop.rays.choose(candidate.radius);
+      const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
+      drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
+      if (!drop.fit.valid || drop.fit.coverage < 0.2) continue;
+      drop.shape = drop.fit.shape;
+    }
+    drops.push_back(drop);
+  }
+  return drops;
+}
+
 }  // namespace
 
 std::string_view name(DropletStatus status) {
@@ -116,56 +168,43 @@ Droplets measure_droplets(const cv::Mat& image) {
   out.contrast = found.contrast;
   if (!(found.contrast > 0.0)) return out;
 
-  std::vector<Measured> drops;
-  drops.reserve(found.candidates.size());
-  for (const Candidate& candidate : found.candidates) {
-    if (candidate.radius < 1.5) continue;
-    Measured drop;
-    drop.shape = {candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
-    drop.rays.choose(candidate.radius);
-    const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
-    drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
-    if (!drop.fit.valid || drop.fit.coverage < 0.2) continue;
-    drop.shape = drop.fit.shape;
-    drops.push_back(std::move(drop));
-  }
+  Filters filters{1.2};
+  std::vector<Measured> drops = rough(image, found, filters);
   drop_doubles(drops);
 
-  // The blur is the camera's: from the best drops first, then for all.
-  double blur = 1.2;
+  // The blur is the camera's: from the best drops, then for all.
+  std::vector<double> blurs;
+  for (const Measured& drop : drops)
+    if (drop.fit.blur > 0.0 && drop.fit.support > 0.8) blurs.push_back(drop.fit.blur);
+  double blur = std::clamp(median(blurs, 1.2), 0.4, 4.0);
   for (int round = 0; round < 2; ++round) {
-    std::vector<double> blurs;
-    for (std::size_t i = 0; i < std::min<std::size_t>(drops.size(), 9); ++i) {
-      const EdgeFilter filter{blur, EdgeFilter::half_for(std::max(blur, 1.5), drops[i].shape.radius)};
+    filters = Filters{blur};
+    blurs.clear();
+    for (std::size_t i = 0; i < std::min<std::size_t>(drops.size(), 5); ++i) {
       Rays rays = drops[i].rays;
-      const OutlineFit fit = refine_outline(image, drops[i].shape, found.polarity, filter, rays);
+      const OutlineFit fit =
+          refine_outline(image, drops[i].shape, found.polarity, filters.at(drops[i].shape.radius), rays);
       if (fit.valid) blurs.push_back(fit.blur);
     }
-    blur = std::clamp(median(blurs, blur), 0.5, 4.0);
+    const double before = blur;
+    blur = std::clamp(median(blurs, blur), 0.4, 4.0);
+    if (std::abs(blur - before) < 0.1 * blur) break;
   }
+  filters = Filters{blur};
   out.blur = blur;
 
-  std::optional<EdgeFilter> filter;
-  const auto filter_for = [&](double radius) -> const EdgeFilter& {
-    const int half = EdgeFilter::half_for(blur, radius);
-    if (!filter || filter->half != half) filter.emplace(blur, half);
-    return *filter;
-  };
-  for (Measured& drop : drops) {
-    const auto weights = drop.rays.weight;
-    drop.rays.open.fill(true);
-    drop.rays.weight = weights;
-  }
+  for (Measured& drop : drops) drop.rays.choose(drop.shape.radius);
   close_rays(drops, 3.0 * blur + 3.0, 1.0 + 1.5 * blur);
   std::vector<double> contrasts;
   for (Measured& drop : drops) {
     drop.alive = false;
     for (int round = 0; round < 4; ++round) {
-      drop.fit = refine_outline(image, drop.shape, found.polarity, filter_for(drop.shape.radius), drop.rays);
+      drop.fit = refine_outline(image, drop.shape, found.polarity, filters.at(drop.shape.radius), drop.rays);
       if (!drop.fit.valid) break;
       drop.shape = drop.fit.shape;
       drop.alive = true;
-      if (drop.fit.moved < 0.1) break;
+      // A ray that was found foreign has spoilt the common slopes: once more without it.
+      if (drop.fit.moved < 0.25 * blur && (round > 0 || drop.fit.support == 1.0)) break;
     }
     drop.alive = drop.alive && drop.fit.valid;
     if (drop.alive) contrasts.push_back(drop.fit.contrast);

@@ -32,6 +32,16 @@ EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_p
   Eigen::MatrixXd with_blur(n, 4);
   with_blur << design.leftCols(3), design.col(5);
   spread = inverse(with_blur);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    ground_f[k] = static_cast<float>(step(0, i));
+    height_f[k] = static_cast<float>(step(1, i));
+    shift_f[k] = static_cast<float>(step(2, i));
+    unit_f[k] = static_cast<float>(unit(i));
+    bump_f[k] = static_cast<float>(bump(i));
+    inner_f[k] = static_cast<float>(inner(i));
+    outer_f[k] = static_cast<float>(outer(i));
+  }
 }
 
 int EdgeFilter::half_for(double blur, double radius) {

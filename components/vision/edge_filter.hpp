@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace invar::vision {
 
@@ -21,6 +22,9 @@ struct EdgeFilter {
   Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most>
       spread;                        // the same as step and contrast * (change of blur)
   Profile unit, bump, inner, outer;  // S, g, the ramps of slope inside and outside
+
+  // The same in single precision for the loop over rays: rows of `step`, and the profiles.
+  std::array<float, most + 1> ground_f{}, height_f{}, shift_f{}, unit_f{}, bump_f{}, inner_f{}, outer_f{};
 
   /// `half`: at least 3. Set-up only, or once a frame (some microseconds).
   EdgeFilter(double blur, int half);

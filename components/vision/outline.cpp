@@ -66,74 +66,103 @@ double median_of(std::array<double, Rays::most>& values, int count) {
   return *middle;
 }
 
-// Offsets as a + b cos + c sin + d cos2 + e sin2 with Tukey's weights; `usable` rays only. Updates the shape, weights,
-// residual, support and coverage. `floor` is the smallest scale [px] that a residual is judged by.
+struct Harmonics {
+  Matrix5 normal;
+  Vector5 right;
+};
+
+// Weighted normal equations of a + b cos + c sin + d cos2 + e sin2 for the residuals `r`; without the last two where an
+// arc is too short to tell an ellipse from a shift.
+Harmonics assemble(const std::array<Direction, Rays::most>& table, const std::array<double, Rays::most>& r,
+                   const std::array<double, Rays::most>& weight, int count, bool ellipse) {
+  std::array<double, 15> n{};
+  std::array<double, 5> b{};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
+    const double w = weight[k];
+    if (w == 0.0) continue;
+    const Direction& d = table[k];
+    const double wc = w * d.c, ws = w * d.s, wc2 = w * d.c2, ws2 = w * d.s2;
+    n[0] += w, n[1] += wc, n[2] += ws, n[3] += wc2, n[4] += ws2;
+    n[5] += wc * d.c, n[6] += wc * d.s, n[7] += wc * d.c2, n[8] += wc * d.s2;
+    n[9] += ws * d.s, n[10] += ws * d.c2, n[11] += ws * d.s2;
+    n[12] += wc2 * d.c2, n[13] += wc2 * d.s2, n[14] += ws2 * d.s2;
+    b[0] += w * r[k], b[1] += wc * r[k], b[2] += ws * r[k], b[3] += wc2 * r[k], b[4] += ws2 * r[k];
+  }
+  Harmonics out;
+  std::size_t next = 0;
+  for (int i = 0; i < 5; ++i) {
+    for (int k = i; k < 5; ++k) out.normal(i, k) = out.normal(k, i) = n[next++];
+    out.right(i) = b[static_cast<std::size_t>(i)];
+  }
+  if (!ellipse) {
+    out.normal.bottomRows<2>().setZero();
+    out.normal.rightCols<2>().setZero();
+    out.normal(3, 3) = out.normal(4, 4) = 1.0;
+    out.right.tail<2>().setZero();
+  }
+  return out;
+}
+
+// The offsets of the usable rays as a smooth curve: least squares where they all agree, else with Tukey's weights.
+// Updates the shape, weights, residual, support and coverage. `floor` is the smallest scale [px] that a residual is
+// judged by.
 bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double floor, OutlineFit& fit) {
   const auto& table = directions(rays.count);
+  const auto count = static_cast<std::size_t>(rays.count);
   int open = 0, used = 0;
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+  for (std::size_t k = 0; k < count; ++k) {
     open += rays.open[k];
     used += usable[k];
     rays.weight[k] = usable[k] ? 1.0 : 0.0;
   }
   if (used < 8) return false;
-  const bool whole = used >= 0.6 * rays.count;  // on a shorter arc an ellipse is not told from a shift
-  std::array<double, Rays::most> sizes{};
-  Vector5 p = Vector5::Zero();
-  {  // the median is a safe start
+  const bool ellipse = used >= 0.6 * rays.count;
+  std::array<double, Rays::most> sizes{}, rest{};
+  const auto residuals = [&](const Vector5& p) {
     int n = 0;
-    for (int i = 0; i < rays.count; ++i)
-      if (usable[static_cast<std::size_t>(i)])
-        sizes[static_cast<std::size_t>(n++)] = rays.offset[static_cast<std::size_t>(i)];
+    for (std::size_t k = 0; k < count; ++k) {
+      if (!usable[k]) continue;
+      const Direction& d = table[k];
+      rest[k] = rays.offset[k] - (p(0) + p(1) * d.c + p(2) * d.s + p(3) * d.c2 + p(4) * d.s2);
+      sizes[static_cast<std::size_t>(n++)] = std::abs(rest[k]);
+    }
+    return n;
+  };
+  residuals(Vector5::Zero());
+  Harmonics h = assemble(table, rest, rays.weight, rays.count, ellipse);
+  Vector5 p = h.normal.ldlt().solve(h.right);
+  int n = residuals(p);
+  double scale = std::max(floor, 1.4826 * median_of(sizes, n));
+  if (!p.allFinite() || *std::max_element(sizes.begin(), sizes.begin() + n) > 3.7 * scale) {
+    p.setZero();  // the median is a safe start
+    n = 0;
+    for (std::size_t k = 0; k < count; ++k)
+      if (usable[k]) sizes[static_cast<std::size_t>(n++)] = rays.offset[k];
     p(0) = median_of(sizes, n);
-  }
-  double scale = 0.0;
-  Matrix5 normal;
-  for (int round = 0; round < 12; ++round) {
-    int n = 0;
-    for (int i = 0; i < rays.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (!usable[k]) continue;
-      const Direction& d = table[k];
-      const double r = rays.offset[k] - (p(0) + p(1) * d.c + p(2) * d.s + p(3) * d.c2 + p(4) * d.s2);
-      sizes[static_cast<std::size_t>(n++)] = std::abs(r);
-      rays.weight[k] = r;  // until the scale is known
+    for (int round = 0; round < 14; ++round) {
+      n = residuals(p);
+      const double previous = scale;
+      scale = std::max(floor, 1.4826 * median_of(sizes, n));
+      for (std::size_t k = 0; k < count; ++k) {
+        if (!usable[k]) continue;
+        // Cauchy's weight while far off keeps every ray's say; Tukey's drops what does not belong.
+        const double u = rest[k] / (scale * (round < 4 ? 2.4 : 4.7));
+        rays.weight[k] =
+            round < 4 ? 1.0 / (1.0 + u * u) : (std::abs(u) < 1.0 ? (1.0 - u * u) * (1.0 - u * u) : 0.0);
+      }
+      h = assemble(table, rest, rays.weight, rays.count, ellipse);
+      const Vector5 step = h.normal.ldlt().solve(h.right);
+      if (!step.allFinite()) return false;
+      p += step;
+      if (round >= 5 && step.norm() < 1e-3 && std::abs(scale - previous) < 0.03 * scale) break;
     }
-    const double previous = scale;
-    scale = std::max(floor, 1.4826 * median_of(sizes, n));
-    normal.setZero();
-    Vector5 right = Vector5::Zero();
-    for (int i = 0; i < rays.count; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (!usable[k]) continue;
-      // Cauchy's weight while far off keeps every ray's say; Tukey's drops what does not belong.
-      const double r = rays.weight[k], u = r / (scale * (round < 4 ? 2.4 : 4.7));
-      const double w =
-          round < 4 ? 1.0 / (1.0 + u * u) : (std::abs(u) < 1.0 ? (1.0 - u * u) * (1.0 - u * u) : 0.0);
-      rays.weight[k] = w;
-      const Direction& d = table[k];
-      Vector5 row;
-      row << 1.0, d.c, d.s, d.c2, d.s2;
-      if (!whole) row.tail<2>().setZero();
-      normal += w * row * row.transpose();
-      right += w * r * row;
-    }
-    if (!whole) normal.diagonal().tail<2>().setOnes();
-    const Vector5 step = normal.ldlt().solve(right);
-    if (!step.allFinite()) return false;
-    p += step;
-    if (round >= 5 && step.norm() < 2e-4 && std::abs(scale - previous) < 0.02 * scale) break;
+    residuals(p);
   }
   double sum = 0.0, square = 0.0;
   int agree = 0;
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!usable[k]) continue;
-    const Direction& d = table[k];
-    const double r = rays.offset[k] - (p(0) + p(1) * d.c + p(2) * d.s + p(3) * d.c2 + p(4) * d.s2);
+  for (std::size_t k = 0; k < count; ++k) {
     sum += rays.weight[k];
-    square += rays.weight[k] * r * r;
+    square += rays.weight[k] * rest[k] * rest[k];
     agree += rays.weight[k] > 0.2;
   }
   if (!(sum > 5.0)) return false;
@@ -141,8 +170,9 @@ bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double fl
   fit.support = agree / static_cast<double>(std::max(1, open));
   fit.coverage = agree / static_cast<double>(rays.count);
   fit.moved = std::abs(p(0)) + std::hypot(p(1), p(2)) + std::hypot(p(3), p(4));
-  const Matrix5 inverse = normal.ldlt().solve(Matrix5::Identity());
-  fit.sigma = fit.residual * std::sqrt(std::max(inverse(1, 1), inverse(2, 2)));
+  const Vector5 x_direction = h.normal.ldlt().solve(Vector5::Unit(1)),
+                y_direction = h.normal.ldlt().solve(Vector5::Unit(2));
+  fit.sigma = fit.residual * std::sqrt(std::max(x_direction(1), y_direction(2)));
   fit.shape.x += p(1);
   fit.shape.y += p(2);
   fit.shape.radius += p(0);
@@ -247,13 +277,16 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
                           Rays& rays) {
   const Samples samples{image};
   const auto& table = directions(rays.count);
-  const int half = filter.half, length = 2 * half + 1;
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, EdgeFilter::most, Rays::most>;
-  Matrix profiles(length, rays.count);  // a column a ray
+  const auto count = static_cast<std::size_t>(rays.count);
+  const int half = filter.half;
+  const auto length = static_cast<std::size_t>(2 * half + 1);
+  constexpr std::size_t stride = 32;  // EdgeFilter::most, rounded up
+  static_assert(EdgeFilter::most <= static_cast<int>(stride));
+  std::array<float, stride * Rays::most> profiles;  // a row a ray, written before it is read
   std::array<bool, Rays::most> usable{};
-  std::array<double, Rays::most> sorted{};
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  std::array<float, stride> level{}, cosine{}, sine{};  // sums over the rays
+  for (std::size_t k = 0; k < count; ++k) {
     if (!rays.open[k]) continue;
     const Direction& d = table[k];
     const double begin = radius_at(shape, d) - half, end = begin + 2 * half;
@@ -264,65 +297,83 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
     }
     auto x = static_cast<float>(shape.x + begin * d.c), y = static_cast<float>(shape.y + begin * d.s);
     const auto step_x = static_cast<float>(d.c), step_y = static_cast<float>(d.s);
-    for (int j = 0; j < length; ++j, x += step_x, y += step_y)
-      profiles(j, i) = static_cast<double>(samples.at(x, y));
+    float* f = &profiles[k * stride];
+    for (std::size_t j = 0; j < length; ++j, x += step_x, y += step_y) f[j] = samples.at(x, y);
     usable[k] = true;
-  }
-
-  // Slopes: the profile at each k over the angle as constant and first harmonic, then the sloped step on each of these.
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, EdgeFilter::most> moments(3, length);
-  moments.setZero();
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const double w = usable[k] ? rays.weight[k] : 0.0;
+    const double w = rays.weight[k];
     if (!(w > 0.0)) continue;
-    const Eigen::Vector3d row{1.0, table[k].c, table[k].s};
-    normal += w * row * row.transpose();
-    moments += (w * row) * profiles.col(i).transpose();
+    normal(0, 0) += w, normal(0, 1) += w * d.c, normal(0, 2) += w * d.s;
+    normal(1, 1) += w * d.c * d.c, normal(1, 2) += w * d.c * d.s, normal(2, 2) += w * d.s * d.s;
+    const auto w1 = static_cast<float>(w), wc = static_cast<float>(w * d.c), ws = static_cast<float>(w * d.s);
+    for (std::size_t j = 0; j < length; ++j) {
+      level[j] += w1 * f[j];
+      cosine[j] += wc * f[j];
+      sine[j] += ws * f[j];
+    }
   }
   OutlineFit fit;
   fit.shape = shape;
   if (!(normal(0, 0) > 5.0)) return fit;
-  const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, EdgeFilter::most> harmonics =
-      normal.ldlt().solve(moments);
-  const Eigen::Matrix<double, 5, 3> sloped = filter.sloped * harmonics.transpose();
-  const Eigen::Vector3d inside = sloped.row(3).transpose(), outside = sloped.row(4).transpose();
+  normal(1, 0) = normal(0, 1), normal(2, 0) = normal(0, 2), normal(2, 1) = normal(1, 2);
 
-  EdgeFilter::Profile level = harmonics.row(0).transpose();
-  level -= inside(0) * filter.inner + outside(0) * filter.outer;
-  const Eigen::Vector4d common = filter.spread * level;
+  // Slopes: the profile at each sample over the angle as constant and first harmonic, then the sloped step on each.
+  const Eigen::Matrix3d inverse = normal.inverse();
+  std::array<Eigen::Matrix<double, 5, 1>, 3> sloped{Eigen::Matrix<double, 5, 1>::Zero(),
+                                                    Eigen::Matrix<double, 5, 1>::Zero(),
+                                                    Eigen::Matrix<double, 5, 1>::Zero()};
+  EdgeFilter::Profile mean(static_cast<Eigen::Index>(length));
+  for (std::size_t j = 0; j < length; ++j) {
+    const auto column = static_cast<Eigen::Index>(j);
+    const Eigen::Vector3d harmonic =
+        inverse * Eigen::Vector3d{static_cast<double>(level[j]), static_cast<double>(cosine[j]),
+                                  static_cast<double>(sine[j])};
+    for (std::size_t m = 0; m < 3; ++m)
+      sloped[m] += harmonic(static_cast<Eigen::Index>(m)) * filter.sloped.col(column);
+    mean(column) = harmonic(0);
+  }
+  const Eigen::Vector3d inside{sloped[0](3), sloped[1](3), sloped[2](3)},
+      outside{sloped[0](4), sloped[1](4), sloped[2](4)};
+  mean -= inside(0) * filter.inner + outside(0) * filter.outer;
+  const Eigen::Vector4d common = filter.spread * mean;
   fit.contrast = polarity * common(1);
-  fit.blur = std::clamp(filter.blur + (common(1) != 0.0 ? common(3) / common(1) : 0.0), 0.5 * filter.blur,
-                        2.0 * filter.blur);
   if (!(fit.contrast > 0.0)) return fit;
+  fit.blur = std::clamp(filter.blur + common(3) / common(1), 0.5 * filter.blur, 2.0 * filter.blur);
 
   int n = 0;
-  std::array<double, Rays::most> misfit{};
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+  std::array<double, Rays::most> misfit{}, sorted{};
+  std::array<float, stride> y{};
+  for (std::size_t k = 0; k < count; ++k) {
     if (!usable[k]) continue;
-    const Eigen::Vector3d row{1.0, table[k].c, table[k].s};
-    const EdgeFilter::Profile y =
-        profiles.col(i) - row.dot(inside) * filter.inner - row.dot(outside) * filter.outer;
-    const Eigen::Vector3d p = filter.step * y;
-    const double contrast = polarity * p(1);
+    const Direction& d = table[k];
+    const auto in = static_cast<float>(inside(0) + inside(1) * d.c + inside(2) * d.s);
+    const auto out = static_cast<float>(outside(0) + outside(1) * d.c + outside(2) * d.s);
+    const float* f = &profiles[k * stride];
+    float ground = 0.0F, height = 0.0F, shift = 0.0F, square = 0.0F;
+    for (std::size_t j = 0; j < length; ++j) {
+      y[j] = f[j] - in * filter.inner_f[j] - out * filter.outer_f[j];
+      ground += filter.ground_f[j] * y[j];
+      height += filter.height_f[j] * y[j];
+      shift += filter.shift_f[j] * y[j];
+    }
+    const double contrast = polarity * static_cast<double>(height);
     if (contrast < 0.4 * fit.contrast || contrast > 2.5 * fit.contrast) {
       usable[k] = false;
       continue;
     }
+    for (std::size_t j = 0; j < length; ++j) {
+      const float r = y[j] - ground - height * filter.unit_f[j] - shift * filter.bump_f[j];
+      square += r * r;
+    }
     const double limit = 2.0 * filter.blur + 0.5;  // the linear step reaches no farther
-    rays.offset[k] = std::clamp(p(2) / p(1), -limit, limit);
-    misfit[k] = (y - (p(0) + p(1) * filter.unit.array() + p(2) * filter.bump.array()).matrix()).norm();
+    rays.offset[k] = std::clamp(static_cast<double>(shift / height), -limit, limit);
+    misfit[k] = std::sqrt(static_cast<double>(square));
     sorted[static_cast<std::size_t>(n++)] = misfit[k];
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.
   const double usual = median_of(sorted, n);
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (usable[k] && misfit[k] > 2.5 * usual + 0.01 * fit.contrast) usable[k] = false;
-  }
-  fit.valid = fit_shape(rays, usable, 0.01, fit);
+  for (std::size_t k = 0; k < count; ++k)
+    if (usable[k] && misfit[k] > 2.5 * usual + 0.03 * fit.contrast) usable[k] = false;
+  fit.valid = fit_shape(rays, usable, 0.015, fit);
   return fit;
 }
 
