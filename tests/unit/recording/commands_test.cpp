@@ -15,14 +15,14 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct Run {
+struct Outcome {
   int status = 0;
   std::string text;  // both streams
 };
 
-Run invar(const std::string& arguments) {
+Outcome invar(const std::string& arguments) {
   FILE* pipe = popen((std::string{INVAR_PROGRAM} + " " + arguments + " 2>&1").c_str(), "r");
-  Run run;
+  Outcome run;
   std::array<char, 4096> block{};
   for (std::size_t got = 0; (got = fread(block.data(), 1, block.size(), pipe)) > 0;)
     run.text.append(block.data(), got);
@@ -52,7 +52,7 @@ class RecordingCommands : public ::testing::Test {
 };
 
 TEST_F(RecordingCommands, InfoShowsChannelsCountsAndLosses) {
-  const Run run = invar("recording info " + file.string());
+  const Outcome run = invar("recording info " + file.string());
   EXPECT_EQ(run.status, 0);
   EXPECT_THAT(run.text, HasSubstr("99 messages in 0.099 s"));
   EXPECT_THAT(run.text, HasSubstr("cell/a/stage/state"));
@@ -67,7 +67,7 @@ TEST_F(RecordingCommands, InfoShowsChannelsCountsAndLosses) {
 TEST_F(RecordingCommands, RecoverMakesACutFileWhole) {
   std::filesystem::resize_file(file, std::filesystem::file_size(file) - 10);
   EXPECT_THAT(invar("recording info " + file.string()).text, HasSubstr("not closed"));
-  const Run run = invar("recording recover " + file.string());
+  const Outcome run = invar("recording recover " + file.string());
   EXPECT_EQ(run.status, 0);
   EXPECT_THAT(
       run.text,
@@ -76,7 +76,7 @@ TEST_F(RecordingCommands, RecoverMakesACutFileWhole) {
 }
 
 TEST_F(RecordingCommands, ExportWritesUnitsIntoTheHeader) {
-  const Run run =
+  const Outcome run =
       invar("export " + file.string() + " --out " + (folder / "out").string() + " --from 0.01 --to 0.02");
   EXPECT_EQ(run.status, 0) << run.text;
   EXPECT_THAT(run.text, HasSubstr("cell.a.stage.state.csv: 10 rows"));
@@ -90,7 +90,7 @@ TEST_F(RecordingCommands, ExportWritesUnitsIntoTheHeader) {
 
 TEST_F(RecordingCommands, FaultsAreOneLineAndStatusTwo) {
   const auto expect_fault = [&](const std::string& arguments, const std::string& words) {
-    const Run run = invar(arguments);
+    const Outcome run = invar(arguments);
     EXPECT_EQ(run.status, 2) << run.text;
     EXPECT_THAT(run.text, HasSubstr(words));
     EXPECT_EQ(std::count(run.text.begin(), run.text.end(), '\n'), 1) << run.text;
