@@ -1,6 +1,9 @@
 #include "components/all.hpp"
 
+#include "components/calibration/calibration.hpp"
+#include "components/compensation/compensation.hpp"
 #include "components/interferometer/interferometer.hpp"
+#include "components/recorder/recorder.hpp"
 #include "components/stage/axis_stage.hpp"
 #include "components/thermal/thermal.hpp"
 #include "components/world/simulated_heater.hpp"
@@ -13,6 +16,9 @@ void add_all_components(Registry& registry) {
   registry.add<world::SimulatedHeater>("simulated_heater", "pad, slide and base behind a heater controller's registers");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
+  registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
+  registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
+  registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
   registry.add<stage::Stage>("stage", "servo of one axis");
 }
 

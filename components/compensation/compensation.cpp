@@ -1,13 +1,26 @@
 #include "components/compensation/compensation.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 
-#include "core/machine/geometric_file.hpp"
+#include "core/compensation/geometric_file.hpp"
 
 namespace invar::compensation {
+
+namespace {
+
+/// The checksum that seals the file, as a number for the wire.
+std::uint32_t file_checksum(const std::filesystem::path& file) {
+  const std::string seal = config::Yaml::load(file).root().text("checksum");
+  std::uint32_t number = 0;
+  (void)std::from_chars(seal.data(), seal.data() + seal.size(), number, 16);
+  return number;
+}
+
+}  // namespace
 
 struct Compensation::Axis {
   Axis(Compensation& owner, std::size_t number)
@@ -73,9 +86,8 @@ std::string Compensation::refusal(const metrology::GeometricModel& model) const 
 Compensation::Model* Compensation::load(const std::filesystem::path& file) {
   auto model = std::make_unique<Model>();
   try {
-    const machine::GeometricFile content = machine::load_geometric(file);
-    model->geometric = content.model;
-    model->checksum = content.checksum;
+    model->geometric = load_geometric(file);
+    model->checksum = file_checksum(file);
     model->refusal = refusal(model->geometric);
   } catch (const std::exception& error) {
     model->refusal = error.what();

@@ -1,9 +1,12 @@
 // Recorder: writes what the cell says to an MCAP file, with a ledger of what was lost.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
-#include <functional>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,7 +16,16 @@
 
 namespace invar::recorder {
 
-/// What the recorder writes; the process that runs it connects it to the middleware.
+/// A topic to record.
+struct Source {
+  std::string topic;
+  std::string type;     // a::b::T
+  std::string profile;  // name of its QoS
+  std::string idl;      // self-contained text that defines the type
+};
+
+/// Writes samples as they travel, in CDR. The process that runs it knows the cell's topics and hands the samples over:
+/// `offer` says which are wanted, `record` takes one. Not real-time.
 class Recorder final : public Component {
  public:
   struct Parameters {
@@ -29,11 +41,21 @@ class Recorder final : public Component {
   explicit Recorder(const Parameters& parameters) : parameters_{parameters} {}
   void configure() override;
   void cleanup() noexcept override;
-  void step(const Tick& tick) noexcept override;
+  void step(const Tick&) noexcept override {}
+
+  [[nodiscard]] bool is_wanted(const std::string& topic) const;
+  /// Any thread: one sample of one writer. `sequence` counts that writer's samples from 1. Nothing is written unless the
+  /// component is configured.
+  void record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant at,
+              std::span<const std::byte> cdr);
+  /// Set-up, after configure: a file that belongs to the recording.
+  void attach(const std::filesystem::path& file);
 
  private:
   const Parameters& parameters_;
+  std::mutex mutex_;
   std::unique_ptr<recording::RecordingWriter> writer_;
+  std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;  // by topic and writer
 };
 
 }  // namespace invar::recorder

@@ -1,0 +1,50 @@
+#include "components/recorder/recorder.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+
+namespace invar::recorder {
+
+void Recorder::configure() {
+  std::filesystem::create_directories(parameters_.out);
+  const std::scoped_lock lock{mutex_};
+  writer_ = std::make_unique<recording::RecordingWriter>(std::filesystem::path{parameters_.out} / parameters_.name);
+  channels_.clear();
+}
+
+void Recorder::cleanup() noexcept {
+  const std::scoped_lock lock{mutex_};
+  writer_.reset();  // writes what waits, the ledger and the summary
+}
+
+bool Recorder::is_wanted(const std::string& topic) const {
+  return parameters_.topics.empty() ||
+         std::any_of(parameters_.topics.begin(), parameters_.topics.end(),
+                     [&](const std::string& part) { return topic.find(part) != std::string::npos; });
+}
+
+void Recorder::record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant at,
+                      std::span<const std::byte> cdr) {
+  const std::scoped_lock lock{mutex_};
+  if (!writer_) return;
+  auto [channel, is_new] = channels_.try_emplace({source.topic, writer}, std::uint16_t{0});
+  if (is_new)
+    channel->second = writer_->add_channel({.topic = source.topic,
+                                            .type = source.type,
+                                            .idl = source.idl,
+                                            .qos = source.profile,
+                                            .partitions = "",
+                                            .more = {{"writer", writer}}});
+  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), at, at, cdr);
+}
+
+void Recorder::attach(const std::filesystem::path& file) {
+  std::ifstream stream{file, std::ios::binary};
+  const std::vector<char> content{std::istreambuf_iterator<char>{stream}, {}};
+  const std::scoped_lock lock{mutex_};
+  if (writer_)
+    writer_->attach(file.filename().string(), "application/yaml", std::as_bytes(std::span{content}), Instant{0});
+}
+
+}  // namespace invar::recorder
