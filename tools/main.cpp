@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
   invar::tools::add_job(program);
   invar::tools::add_measure(program);
   invar::tools::add_predict(program);
+  invar::tools::add_run(program);
   invar::tools::add_recording(program);
   invar::tools::add_simulate(program);
   try {

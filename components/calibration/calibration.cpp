@@ -90,18 +90,18 @@ void Calibration::start(const job::JobCommand& command) {
     return;
   }
   if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
-  const std::string name = command.name();
+  const std::string wanted{command.name().c_str()};
   const auto found = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
-                                  [&](const GeometricJob& job) { return job.name == name; });
+                                  [&](const GeometricJob& job) { return job.name == wanted; });
   if (task_.running()) {
-    report(job::JOB_RUNNING, "job `" + sample_.name() + "` is running; cancel it first");
+    report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
     return;
   }
   sample_.id(command.id());
-  sample_.name(name);
+  sample_.name(wanted);
   progress_ = 0.0;
   if (found == parameters_.jobs.end()) {
-    report(job::JOB_FAILED, "`" + name + "` is no job of this component");
+    report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
     return;
   }
   sample_.result_path(std::filesystem::absolute(found->out).string());
@@ -259,7 +259,7 @@ Task Calibration::command_model(compensation::ModelCommandKind kind, const std::
     const auto* status = model_status_.latest();
     if (status != nullptr && status->command_id() == command.id()) {
       if (status->state() == compensation::MODEL_REFUSED)
-        throw std::runtime_error{"the compensation refused the model: " + std::string{status->text()}};
+        throw std::runtime_error{"the compensation refused the model: " + std::string{status->text().c_str()}};
       co_return;
     }
     if (now() > give_up) throw std::runtime_error{"the compensation does not answer"};

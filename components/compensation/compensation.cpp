@@ -131,7 +131,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
     case MODEL_STAGE: {
       Request request;
       request.command = command.id();
-      std::strncpy(request.path.data(), command.path().c_str(), request.path.size() - 1);
+      std::memcpy(request.path.data(), command.path().c_str(), std::min(command.path().size(), request.path.size() - 1));
       reply_.path(command.path());
       if (simulated_time) {
         take_loaded({request.command, load(request.path.data())});

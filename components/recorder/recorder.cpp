@@ -36,7 +36,8 @@ void Recorder::record(const Source& source, const std::string& writer, std::uint
                                             .qos = source.profile,
                                             .partitions = "",
                                             .more = {{"writer", writer}}});
-  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), at, at, cdr);
+  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), at, at,
+                 {reinterpret_cast<const std::uint8_t*>(cdr.data()), cdr.size()});
 }
 
 void Recorder::attach(const std::filesystem::path& file) {
@@ -44,7 +45,8 @@ void Recorder::attach(const std::filesystem::path& file) {
   const std::vector<char> content{std::istreambuf_iterator<char>{stream}, {}};
   const std::scoped_lock lock{mutex_};
   if (writer_)
-    writer_->attach(file.filename().string(), "application/yaml", std::as_bytes(std::span{content}), Instant{0});
+    writer_->attach(file.filename().string(), "application/yaml",
+                    {reinterpret_cast<const std::uint8_t*>(content.data()), content.size()}, Instant{0});
 }
 
 }  // namespace invar::recorder

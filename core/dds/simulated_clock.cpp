@@ -179,7 +179,7 @@ SimulatedClockClient::SimulatedClockClient(Node& node)
                                                    });
 }
 
-void SimulatedClockClient::bind(OutputPort& port) {
+void SimulatedClockClient::bind(OutputPort& port, Duration separation) {
   const WireType* type = WireTypes::all().find(port.type());
   if (type == nullptr)
     throw InputError{"topic `" + port.topic + "`", "carries a type that no IDL describes", "add it to idl/"};
@@ -187,7 +187,13 @@ void SimulatedClockClient::bind(OutputPort& port) {
   membership_.written.push_back({port.topic, type->name()});
   const bool& wanted = wanted_.emplace_back(false);
   type->attach_cdr(
-      port, [&wanted] { return wanted; },
+      port,
+      [&wanted, &port, separation, due = Instant{INT64_MIN}]() mutable {
+        const Instant now = port.owner().now();
+        if (!wanted || now < due) return false;
+        due = now + separation;
+        return true;
+      },
       [this, number](std::span<const std::byte> cdr) { bundle_.add(number, cdr); });
 
   Profile outside = node_.profile(port.profile);
@@ -197,7 +203,7 @@ void SimulatedClockClient::bind(OutputPort& port) {
   outside.lifespan = {};
   outside.flow = 0;
   outside.blocking = Duration::milliseconds(10'000);
-  node_.bind(port, {.period = {}, .separation = {}, .watched_only = true}, outside);
+  node_.bind(port, {.period = {}, .separation = separation, .watched_only = true}, outside);
 }
 
 void SimulatedClockClient::bind(InputPort& port) {

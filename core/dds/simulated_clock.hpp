@@ -112,7 +112,8 @@ class SimulatedClockClient {
 
   /// Set-up, before `run`. What this output writes goes into the bundles, and on its topic of DDS for whoever
   /// watches from outside, reliable and complete whatever its profile, so that fast simulated time loses nothing.
-  void bind(OutputPort& port);
+  /// `separation`: the least simulated time between two samples; those between are left out. Zero: every sample.
+  void bind(OutputPort& port, Duration separation = {});
   /// Several may be bound to one topic.
   void bind(InputPort& port);
   /// Set-up. Sees every sample of every process, this one included, in one fixed order.

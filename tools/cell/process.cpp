@@ -3,10 +3,17 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
 #include <thread>
 
+#include "components/recorder/recorder.hpp"
 #include "core/dds/node.hpp"
+#include "core/dds/simulated_clock.hpp"
+#include "core/dds/wire_type.hpp"
 #include "core/executor/process_control.hpp"
+#include "core/recording/type_book.hpp"
 #include "idl/job.h"
 #include "tools/cell/loaded_cell.hpp"
 
@@ -26,70 +33,229 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const config::CellProces
   return options;
 }
 
-/// Joins signals of one process directly. Commands (inboxes) travel by DDS, also within a process, so that every sender
-/// takes the same way.
-void join_directly(Executor& executor) {
-  for (std::size_t i = 0; i < executor.size(); ++i)
-    for (Port* port : executor.component(i).ports()) {
-      if (port->direction() != Port::Direction::output || port->topic.empty()) continue;
-      for (std::size_t k = 0; k < executor.size(); ++k)
-        for (Port* other : executor.component(k).ports())
-          if (other->direction() == Port::Direction::input && other->topic == port->topic)
-            static_cast<OutputPort*>(port)->connect(*static_cast<InputPort*>(other));
+/// What one process is made of while it runs.
+class RunningProcess {
+ public:
+  RunningProcess(const ProcessOptions& options, LoadedCell& loaded, LoadedProcess& process)
+      : options_{options},
+        loaded_{loaded},
+        file_{*process.file},
+        executor_{executor_options(file_, options.simulated)},
+        control_{executor_},
+        node_{node_options(loaded, file_), dds::load_profiles(loaded.cell->profiles)} {
+    for (LoadedComponent& member : process.components) {
+      member.component->simulated_time = options.simulated;
+      if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
+      executor_.add(std::move(member.component), {.type = member.file->type,
+                                                  .parameters = std::move(member.prepared.infos),
+                                                  .storage = member.prepared.parameters,
+                                                  .every = static_cast<std::uint32_t>(member.file->every)});
     }
-}
+    join_directly();
+    watch_job();
+  }
 
-bool is_written_here(const Executor& executor, const std::string& topic) {
-  for (std::size_t i = 0; i < executor.size(); ++i)
-    for (const Port* port : executor.component(i).ports())
-      if (port->direction() == Port::Direction::output && port->topic == topic) return true;
-  return false;
-}
+  int run(const std::atomic<bool>& stop) {
+    const int status = options_.simulated ? run_simulated(stop) : run_by_the_clock(stop);
+    write_outcome();
+    return status;
+  }
 
-void bind_ports(Executor& executor, const config::CellProcess& process, dds::Node& node) {
-  const bool paced = process.realtime.has_value();
-  for (std::size_t i = 0; i < executor.size(); ++i) {
-    const auto& rates = process.components[i].publish_rates;
-    for (Port* port : executor.component(i).ports()) {
-      if (port->topic.empty()) continue;
-      if (port->direction() == Port::Direction::output) {
-        dds::OutputBinding binding;
-        if (paced) binding.period = process.period;
-        if (const auto rate = rates.find(port->name()); rate != rates.end())
-          binding.separation = Duration::seconds(1.0 / rate->second);
-        node.bind(*static_cast<OutputPort*>(port), binding);
-      } else if (port->direction() == Port::Direction::inbox || !is_written_here(executor, port->topic)) {
-        node.bind(*static_cast<InputPort*>(port));
+ private:
+  template <class Visit>
+  void each_port(Visit visit) {
+    for (std::size_t i = 0; i < executor_.size(); ++i)
+      for (Port* port : executor_.component(i).ports())
+        if (!port->topic.empty()) visit(i, *port);
+  }
+
+  /// Joins signals of one process directly. Commands (inboxes) travel by DDS, also within a process, so that every
+  /// sender takes the same way.
+  void join_directly() {
+    each_port([&](std::size_t, Port& output) {
+      if (output.direction() != Port::Direction::output) return;
+      each_port([&](std::size_t, Port& input) {
+        if (input.direction() == Port::Direction::input && input.topic == output.topic)
+          static_cast<OutputPort&>(output).connect(static_cast<InputPort&>(input));
+      });
+    });
+  }
+
+  bool is_written_here(const std::string& topic) {
+    bool found = false;
+    each_port([&](std::size_t, Port& port) {
+      found = found || (port.direction() == Port::Direction::output && port.topic == topic);
+    });
+    return found;
+  }
+
+  /// Puts the command that starts the job into the inbox of the component that runs it, and follows its status.
+  void watch_job() {
+    const auto found = loaded_.cell->jobs.find(options_.job);
+    if (found == loaded_.cell->jobs.end()) return;
+    const auto index = executor_.find(found->second);
+    if (!index) return;
+    Component& component = executor_.component(*index);
+    auto* inbox = dynamic_cast<Inbox<job::JobCommand>*>(component.find_port("job"));
+    auto* status = dynamic_cast<Output<job::JobStatus>*>(component.find_port("status"));
+    if (inbox == nullptr || status == nullptr)
+      throw InputError{loaded_.cell->file.string() + ": jobs." + options_.job,
+                       "`" + found->second + "` runs no jobs", "name a component with the ports `job` and `status`"};
+    runs_job_ = true;
+    status->add_sink([this](const job::JobStatus& sample, Instant) {
+      const std::scoped_lock lock{job_mutex_};
+      job_ = sample;
+      job_ended_ = sample.phase() == job::JOB_DONE || sample.phase() == job::JOB_FAILED ||
+                   sample.phase() == job::JOB_CANCELLED;
+    });
+    job::JobCommand command;
+    command.cell(loaded_.cell->id);
+    command.id(1);
+    command.kind(job::JOB_RUN);
+    command.name(options_.job);
+    inbox->add_lane()(command, Instant{0});
+  }
+
+  Duration separation(std::size_t component, const Port& port) const {
+    const auto& rates = file_.components[component].publish_rates;
+    const auto rate = rates.find(port.name());
+    return rate == rates.end() ? Duration{} : Duration::seconds(1.0 / rate->second);
+  }
+
+  bool bring_up() {
+    for (const Transition transition : {Transition::configure, Transition::activate}) {
+      const Outcome outcome = control_.request("", transition);
+      if (outcome.ok()) continue;
+      spdlog::error("{}: cannot {}: {}", file_.name, to_text(transition), outcome.reason);
+      return false;
+    }
+    return true;
+  }
+
+  int run_by_the_clock(const std::atomic<bool>& stop) {
+    each_port([&](std::size_t index, Port& port) {
+      if (port.direction() == Port::Direction::output)
+        node_.bind(static_cast<OutputPort&>(port), {.period = file_.realtime ? file_.period : Duration{},
+                                                    .separation = separation(index, port)});
+      else if (port.direction() == Port::Direction::inbox || !is_written_here(port.topic))
+        node_.bind(static_cast<InputPort&>(port));
+    });
+    record_topics();
+    node_.start();
+    executor_.start();
+    const bool up = bring_up();
+    while (up && !stop.load() && executor_.is_running() && !job_ended_) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      for (const dds::Alarm& alarm : node_.take_alarms())
+        spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
+    }
+    status_ = control_.status();
+    control_.stop();
+    topics_.clear();
+    node_.stop();
+    return up && job_succeeded() ? 0 : 1;
+  }
+
+  int run_simulated(const std::atomic<bool>& stop) {
+    dds::SimulatedClockClient clock{node_};
+    each_port([&](std::size_t index, Port& port) {
+      if (port.direction() == Port::Direction::output)
+        clock.bind(static_cast<OutputPort&>(port), separation(index, port));
+      else if (port.direction() == Port::Direction::inbox || !is_written_here(port.topic))
+        clock.bind(static_cast<InputPort&>(port));
+    });
+    if (recorder_ != nullptr)
+      clock.tap([this](const dds::LockstepSample& sample) {
+        if (!recorder_->is_wanted(sample.topic.topic)) return;
+        recorder_->record(source(sample.topic.topic, sample.topic.type, "simulated"), std::string{sample.process},
+                          sample.sequence, sample.window, sample.cdr);
+      });
+    node_.start();
+    const bool up = bring_up();
+    const auto outcome = clock.run(
+        [&](Instant until) {
+          if (!up) return std::string{"a component of `" + file_.name + "` did not come up"};
+          executor_.advance_to(until);
+          return std::string{};
+        },
+        [&] { return !runs_job_ || job_ended_.load(); }, stop);
+    if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
+    status_ = control_.status();
+    control_.stop();
+    node_.stop();
+    return up && outcome.failure.empty() && job_succeeded() ? 0 : 1;
+  }
+
+  bool job_succeeded() {
+    const std::scoped_lock lock{job_mutex_};
+    return !runs_job_ || !job_ended_ || job_.phase() == job::JOB_DONE;
+  }
+
+  static recorder::Source source(const std::string& topic, const std::string& type, const std::string& profile) {
+    const auto* known = recording::built_in_type(type);
+    return {topic, type, profile, known != nullptr ? std::string{known->idl} : ""};
+  }
+
+  /// Every output of the cell, read as it travels.
+  void record_topics() {
+    if (recorder_ == nullptr) return;
+    for (LoadedProcess& process : loaded_.processes)
+      for (LoadedComponent& member : process.components) {
+        if (!member.component) continue;
+        for (const Port* port : member.component->ports()) record_topic(*port);
       }
+    each_port([&](std::size_t, Port& port) { record_topic(port); });
+  }
+
+  void record_topic(const Port& port) {
+    if (port.direction() != Port::Direction::output || !recorder_->is_wanted(port.topic)) return;
+    const auto* type = dds::WireTypes::all().find(port.type());
+    if (type == nullptr) return;
+    dds::Profile profile = node_.profile(port.profile);
+    profile.deadline = {};  // a recorder takes what comes
+    const recorder::Source from = source(port.topic, type->name(), port.profile);
+    topics_.push_back(node_.raw_reader(port.topic, from.type, profile, [this, from](const dds::RawSample& sample) {
+      recorder_->record(from, std::string{sample.writer}, sample.sequence, Instant{sample.sent_ns}, sample.cdr);
+    }));
+  }
+
+  void write_outcome() {
+    if (options_.outcome.empty()) return;
+    nlohmann::json outcome{{"process", file_.name},
+                           {"cycles", status_.counters.executed},
+                           {"overruns", status_.counters.overruns},
+                           {"skipped", status_.counters.skipped},
+                           {"rate", 1.0 / file_.period.in_seconds()},
+                           {"compute_p50_ns", status_.compute.p50.ns},
+                           {"compute_p99_ns", status_.compute.p99.ns},
+                           {"wake_up_p50_ns", status_.wake_up.p50.ns},
+                           {"wake_up_p99_ns", status_.wake_up.p99.ns},
+                           {"not_granted", status_.not_granted}};
+    if (runs_job_) {
+      const std::scoped_lock lock{job_mutex_};
+      outcome["job"] = {{"name", job_.name().c_str()},
+                        {"done", job_.phase() == job::JOB_DONE},
+                        {"text", job_.text().c_str()},
+                        {"result", job_.result_path().c_str()},
+                        {"simulated_seconds", static_cast<double>(job_.at().time_ns()) * 1e-9}};
     }
+    std::ofstream{options_.outcome} << outcome.dump(2) << '\n';
   }
-}
 
-/// The command that starts a job, put into the inbox of the component that runs it.
-void start_job(const LoadedCell& loaded, Executor& executor, const std::string& job) {
-  const auto found = loaded.cell->jobs.find(job);
-  if (found == loaded.cell->jobs.end()) return;
-  const auto index = executor.find(found->second);
-  if (!index) return;
-  auto* inbox = dynamic_cast<Inbox<job::JobCommand>*>(executor.component(*index).find_port("job"));
-  if (inbox == nullptr) return;
-  job::JobCommand command;
-  command.cell(loaded.cell->id);
-  command.id(1);
-  command.kind(job::JOB_RUN);
-  command.name(job);
-  inbox->add_lane()(command, Instant{0});
-}
-
-bool bring_up(ProcessControl& control, const std::string& process) {
-  for (const Transition transition : {Transition::configure, Transition::activate}) {
-    const Outcome outcome = control.request("", transition);
-    if (outcome.ok()) continue;
-    spdlog::error("{}: {}", process, outcome.text());
-    return false;
-  }
-  return true;
-}
+  const ProcessOptions& options_;
+  LoadedCell& loaded_;
+  const config::CellProcess& file_;
+  Executor executor_;
+  ProcessControl control_;
+  dds::Node node_;
+  recorder::Recorder* recorder_ = nullptr;
+  std::vector<std::unique_ptr<dds::Connection>> topics_;
+  ProcessStatus status_;
+  bool runs_job_ = false;
+  std::mutex job_mutex_;
+  job::JobStatus job_;
+  std::atomic<bool> job_ended_{false};
+};
 
 }  // namespace
 
@@ -99,31 +265,7 @@ int run_process(const ProcessOptions& options, const std::atomic<bool>& stop) {
   if (process == nullptr)
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
                      "use one of the names below `processes`"};
-  ExecutorOptions executor_options = executor_options_of(*process->file);
-  executor_options.simulated = options.simulated;
-  Executor executor{executor_options};
-  for (LoadedComponent& member : process->components) {
-    member.component->simulated_time = options.simulated;
-    executor.add(std::move(member.component), {.type = member.file->type,
-                                               .parameters = std::move(member.prepared.infos),
-                                               .storage = member.prepared.parameters,
-                                               .every = static_cast<std::uint32_t>(member.file->every)});
-  }
-  join_directly(executor);
-  if (!options.job.empty()) start_job(loaded, executor, options.job);
-  dds::Node node{node_options(loaded, *process->file), dds::load_profiles(loaded.cell->profiles)};
-  bind_ports(executor, *process->file, node);
-  ProcessControl control{executor};
-  node.start();
-  executor.start();
-  const bool up = bring_up(control, options.process);
-  while (up && !stop.load() && executor.is_running()) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    for (const dds::Alarm& alarm : node.take_alarms()) spdlog::warn("{}: {}: {}", options.process, alarm.topic, alarm.text);
-  }
-  control.stop();
-  node.stop();
-  return up ? 0 : 1;
+  return RunningProcess{options, loaded, *process}.run(stop);
 }
 
 }  // namespace invar::tools

@@ -11,11 +11,12 @@ struct ProcessOptions {
   std::filesystem::path cell;
   std::string process;
   bool simulated = false;
-  std::string job;  // started at time 0 where this process has the component that runs it
+  std::string job;                // started at once where this process has the component that runs it; ends with it
+  std::filesystem::path outcome;  // file for what became of it, as JSON; empty: none
 };
 
-/// Runs until `stop` is set, or in simulated time until the master ends the run. Checks the whole cell first. Throws
-/// InputError; returns the exit status: 0 in order, 1 a component failed to come up.
+/// Runs until `stop` is set, the job has ended, or in simulated time the master ends the run. Checks the whole cell first.
+/// Throws InputError. Exit status: 0 in order; 1 a component failed to come up, the job failed, or time stood still.
 int run_process(const ProcessOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace invar::tools

@@ -1,0 +1,159 @@
+#include "tools/cell/launcher.hpp"
+
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+
+#include "core/dds/node.hpp"
+#include "core/dds/simulated_clock.hpp"
+#include "tools/cell/loaded_cell.hpp"
+
+extern char** environ;  // NOLINT: POSIX names it so
+
+namespace invar::tools {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+struct Child {
+  std::string name;
+  pid_t pid = -1;
+  bool running = true;
+  int status = 0;
+
+  void poll(bool wait) {
+    int raw = 0;
+    if (!running || waitpid(pid, &raw, wait ? 0 : WNOHANG) != pid) return;
+    running = false;
+    status = WIFEXITED(raw) ? WEXITSTATUS(raw) : 128 + WTERMSIG(raw);
+  }
+};
+
+Child spawn(const LaunchOptions& options, const std::string& process, bool simulated, const std::filesystem::path& folder) {
+  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  std::vector<std::string> words{program, "run", options.cell.string(), "--process", process,
+                                 simulated ? "--simulated" : "--real-time", "--outcome",
+                                 (folder / (process + ".json")).string()};
+  if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  // A group of its own: Ctrl-C reaches the launcher alone, which stops the cell in order.
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  Child child{process};
+  const int error = posix_spawn(&child.pid, program.c_str(), nullptr, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  if (error != 0) throw std::runtime_error{"process `" + process + "` cannot be started"};
+  return child;
+}
+
+/// SIGTERM, patience, SIGKILL.
+void stop_child(Child& child) {
+  if (!child.running) return;
+  kill(child.pid, SIGTERM);
+  const auto begin = Clock::now();
+  while (child.running && seconds_since(begin) < 10.0) {
+    child.poll(false);
+    if (child.running) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  if (!child.running) return;
+  kill(child.pid, SIGKILL);
+  child.poll(true);
+}
+
+bool any_ended(std::vector<Child>& children) {
+  bool ended = false;
+  for (Child& child : children) {
+    child.poll(false);
+    ended = ended || !child.running;
+  }
+  return ended;
+}
+
+dds::NodeOptions node_options(const config::Cell& cell) {
+  dds::NodeOptions options;
+  options.cell = cell.name;
+  options.process = "launcher";
+  options.domain = static_cast<std::uint32_t>(cell.domain);
+  options.shared_memory = cell.shared_memory;
+  for (const auto& host : cell.hosts) options.addresses.push_back(host.address);
+  std::sort(options.addresses.begin(), options.addresses.end());
+  options.addresses.erase(std::unique(options.addresses.begin(), options.addresses.end()), options.addresses.end());
+  return options;
+}
+
+std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell, std::vector<Child>& children,
+                                const std::atomic<bool>& stop, Clock::time_point begin, LaunchOutcome& outcome) {
+  dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
+  std::vector<std::string> names;
+  for (const Child& child : children) names.push_back(child.name);
+  dds::SimulatedClockMaster master{node, names, Duration::milliseconds(20)};
+  node.start();
+  const auto given_up = [&] { return stop.load() || any_ended(children); };
+  std::string failure = master.wait_for_all(Duration::seconds(30.0), given_up);
+  outcome.start_seconds = seconds_since(begin);
+  if (failure.empty() && !stop) {
+    const double most = options.duration > 0.0 ? options.duration : 1e9;
+    failure = master.advance_to(Instant{} + Duration::seconds(most), Duration::seconds(120.0), given_up).failure;
+  }
+  master.end();
+  const auto ending = Clock::now();
+  while (seconds_since(ending) < 5.0 &&
+         std::any_of(children.begin(), children.end(), [](const Child& child) { return child.running; })) {
+    any_ended(children);
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return stop ? "" : failure;
+}
+
+}  // namespace
+
+LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop) {
+  const auto begin = Clock::now();
+  LaunchOutcome outcome;
+  const LoadedCell loaded = load_cell(options.cell);
+  const config::Cell& cell = *loaded.cell;
+  if (!options.job.empty() && !cell.jobs.contains(options.job))
+    throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell", "add it to `jobs`"};
+  if (!options.host.empty() && std::none_of(cell.hosts.begin(), cell.hosts.end(),
+                                            [&](const auto& host) { return host.name == options.host; }))
+    throw InputError{"--host", "`" + options.host + "` is no host of " + cell.file.string(), "use a name below `hosts`"};
+  outcome.simulated = options.simulated.value_or(cell.simulated_time);
+
+  std::string pattern = (std::filesystem::temp_directory_path() / "invar-run-XXXXXX").string();
+  const std::filesystem::path folder = mkdtemp(pattern.data());
+  std::vector<Child> children;
+  for (const auto& process : cell.processes)
+    if (options.host.empty() || process.host == options.host)
+      children.push_back(spawn(options, process.name, outcome.simulated, folder));
+
+  if (outcome.simulated) {
+    outcome.failure = keep_simulated_time(options, cell, children, stop, begin, outcome);
+  } else {
+    while (!stop && !any_ended(children) && (options.duration <= 0.0 || seconds_since(begin) < options.duration))
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  for (Child& child : children) {
+    const bool by_itself = !child.running;
+    stop_child(child);
+    outcome.processes.push_back({child.name, child.status, folder / (child.name + ".json")});
+    if (by_itself && child.status != 0 && outcome.failure.empty())
+      outcome.failure = "process `" + child.name + "` ended with status " + std::to_string(child.status);
+  }
+  outcome.wall_seconds = seconds_since(begin);
+  return outcome;
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,38 @@
+// Launcher: starts the processes of a cell that belong to this PC, keeps simulated time, stops them in a safe order.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace invar::tools {
+
+struct LaunchOptions {
+  std::filesystem::path cell;
+  std::string host;  // only processes of this host; empty: all that have an address of this PC
+  std::optional<bool> simulated;  // otherwise what the cell file says
+  std::string job;                // run it, then stop
+  double duration = 0.0;          // s of the cell's time; 0: until stopped
+};
+
+struct ProcessOutcome {
+  std::string process;
+  int status = 0;                // of its end
+  std::filesystem::path report;  // JSON that it left; may not exist
+};
+
+struct LaunchOutcome {
+  std::vector<ProcessOutcome> processes;
+  double wall_seconds = 0.0;
+  double start_seconds = 0.0;  // until every process was there
+  bool simulated = false;
+  std::string failure;  // empty: in order
+};
+
+/// Runs until the job has ended, `stop` is set, the time is over or a process ended by itself. Stops in the order of the cell
+/// file, each process with its components downstream first: the file names what moves first and the recorder last.
+LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace invar::tools

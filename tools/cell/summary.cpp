@@ -1,0 +1,192 @@
+#include "tools/cell/summary.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+
+#include "core/recording/export.hpp"
+#include "core/recording/recording_reader.hpp"
+#include "core/recording/table.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using report::number;
+using report::Plot;
+using report::Series;
+using report::si;
+
+/// Error of displacement along each verification line.
+struct Verification {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> way;    // m, from the line's start
+  std::vector<std::vector<double>> error;  // m
+  double rms = 0.0;
+  double maximum = 0.0;
+};
+
+Verification read_verification(const std::filesystem::path& file) {
+  Verification result;
+  const auto table = recording::Table::read(file, {"line"});
+  const auto& names = table.find("line")->texts;
+  const auto x = table.in("x", "m");
+  const auto y = table.in("y", "m");
+  const auto z = table.in("z", "m");
+  const auto displacement = table.in("displacement", "m");
+  std::size_t start = 0;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    if (result.names.empty() || result.names.back() != names[i]) {
+      result.names.push_back(names[i]);
+      result.way.emplace_back();
+      result.error.emplace_back();
+      start = i;
+    }
+    const double way = std::hypot(x[i] - x[start], y[i] - y[start], z[i] - z[start]);
+    const double error = displacement[i] - way;
+    result.way.back().push_back(way);
+    result.error.back().push_back(error);
+    squares += error * error;
+    result.maximum = std::max(result.maximum, std::abs(error));
+  }
+  result.rms = std::sqrt(squares / static_cast<double>(table.rows()));
+  return result;
+}
+
+Series line_of(const std::vector<double>& x, const std::vector<double>& y, double x_factor, double y_factor,
+               const std::string& label, Series::Style style = Series::Style::line) {
+  Series series;
+  series.label = label;
+  series.style = style;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    series.x.push_back(x[i] * x_factor);
+    series.y.push_back(y[i] * y_factor);
+  }
+  return series;
+}
+
+void add_verification(report::Page& page, const Verification& before, const Verification& after) {
+  page.heading("Lines that were not used to identify the error");
+  std::vector<Plot> plots;
+  for (std::size_t k = 0; k < before.names.size() && k < after.names.size(); ++k) {
+    Plot plot;
+    plot.title = before.names[k];
+    plot.x_label = "way along the line [mm]";
+    plot.y_label = "error of displacement [um]";
+    plot.series = {line_of(before.way[k], before.error[k], 1e3, 1e6, "before"),
+                   line_of(after.way[k], after.error[k], 1e3, 1e6, "after")};
+    plots.push_back(plot);
+  }
+  page.plots(plots, "Read by the laser, each line forth and back, before and after the compensation was activated.");
+}
+
+/// The heater's trace out of the recording; nothing where none was made.
+void add_heater(report::Page& page, const std::filesystem::path& folder, std::ostream& out) {
+  const auto file = folder / "recording.mcap";
+  if (!std::filesystem::exists(file)) return;
+  const auto recording = recording::Recording::open(file);
+  recording::ExportOptions how;
+  for (const auto& [number_, channel] : recording.channels())
+    if (channel.topic.ends_with("/thermal/state")) how.selection.topics.insert(channel.topic);
+  if (how.selection.topics.empty()) return;
+  const auto tables = folder / "tables";
+  const auto exported = recording::export_recording(recording, tables, how);
+  for (const auto& topic : exported.topics) {
+    if (topic.file.empty()) continue;
+    const auto table = recording::Table::read(topic.file);
+    std::vector<double> time(table.rows());
+    const auto stamps = table.in("at.time_ns", "");
+    for (std::size_t i = 0; i < time.size(); ++i) time[i] = (stamps[i] - stamps.front()) * 1e-9;
+    const auto temperature = table.in("temperature", "degC");
+    const auto setpoint = table.in("setpoint", "degC");
+    const auto power = table.in("heater_power", "W");
+    Plot trace;
+    trace.title = "Slide temperature";
+    trace.x_label = "t [s]";
+    trace.y_label = "T [degC]";
+    trace.series = {line_of(time, temperature, 1, 1, "slide"),
+                    line_of(time, setpoint, 1, 1, "setpoint", Series::Style::dashed)};
+    Plot drive = trace;
+    drive.title = "Heater power";
+    drive.y_label = "P [W]";
+    drive.series = {line_of(time, power, 1, 1, "")};
+    page.heading("Heater, over Modbus TCP");
+    page.plots({trace, drive});
+    double worst = 0.0;
+    for (std::size_t i = 0; i < time.size(); ++i)
+      if (time[i] > 0.5 * time.back()) worst = std::max(worst, std::abs(temperature[i] - setpoint[i]));
+    out << "heater          " << number(temperature.back(), 4) << " degC at the end, within " << number(worst, 2)
+        << " K of " << number(setpoint.back(), 4) << " degC over the second half\n";
+  }
+}
+
+void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, report::Page& page, std::ostream& out) {
+  const std::filesystem::path folder = job.value("result", "");
+  out << "job             " << job.value("name", "") << ": " << job.value("text", "") << '\n';
+  const auto before_file = folder / "verify_before.csv";
+  const auto after_file = folder / "verify_after.csv";
+  if (std::filesystem::exists(before_file) && std::filesystem::exists(after_file)) {
+    const auto before = read_verification(before_file);
+    const auto after = read_verification(after_file);
+    out << "error before    rms " << si(before.rms, "m") << ", max " << si(before.maximum, "m") << "   (lines not fitted)\n"
+        << "error after     rms " << si(after.rms, "m") << ", max " << si(after.maximum, "m") << "   ("
+        << number(before.rms / after.rms, 2) << " times less)\n";
+    page.callout("On lines that were not used to identify it, the error fell from " + si(before.rms, "m") + " to " +
+                     si(after.rms, "m") + " RMS (largest " + si(before.maximum, "m") + " to " + si(after.maximum, "m") + ").",
+                 after.rms < before.rms ? "good" : "bad");
+    add_verification(page, before, after);
+  }
+  add_heater(page, folder, out);
+  (void)outcome;
+}
+
+}  // namespace
+
+void summarise(const LaunchOutcome& outcome, std::ostream& out) {
+  report::Page page{"Invar: a cell and its job", outcome.simulated ? "in simulated time" : "by the wall clock"};
+  std::vector<std::vector<std::string>> loops;
+  std::filesystem::path folder;
+  nlohmann::json job;
+  for (const ProcessOutcome& process : outcome.processes) {
+    std::ifstream stream{process.report};
+    const auto report = nlohmann::json::parse(stream, nullptr, false);
+    if (report.is_discarded()) {
+      loops.push_back({process.process, "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
+      continue;
+    }
+    const auto us = [&](const char* key) { return number(report.value(key, 0.0) * 1e-3, 3) + " us"; };
+    loops.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
+                     std::to_string(report.value("cycles", 0ULL)), std::to_string(report.value("overruns", 0ULL)),
+                     us("compute_p50_ns") + " / " + us("compute_p99_ns"),
+                     outcome.simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
+    if (report.contains("job")) job = report["job"];
+  }
+  const std::vector<std::string> header{"process", "rate", "cycles", "overruns", "compute p50 / p99", "wake-up p50 / p99"};
+  const std::vector<int> widths{16, 10, 10, 10, 22, 22};
+  for (std::size_t i = 0; i < header.size(); ++i) out << std::left << std::setw(widths[i]) << header[i];
+  out << '\n';
+  for (const auto& row : loops) {
+    for (std::size_t i = 0; i < row.size(); ++i) out << std::left << std::setw(widths[i]) << row[i];
+    out << '\n';
+  }
+  out << '\n';
+  if (!job.is_null()) {
+    folder = job.value("result", "");
+    summarise_job(job, outcome, page, out);
+  }
+  page.heading("Processes");
+  page.table(header, loops);
+  out << "time            " << number(outcome.wall_seconds, 3) << " s";
+  if (!job.is_null()) out << " for " << number(job.value("simulated_seconds", 0.0), 4) << " s of the cell";
+  out << '\n';
+  if (folder.empty()) return;
+  page.write(folder / "report.html");
+  out << "report          " << (folder / "report.html").string() << '\n';
+  if (std::filesystem::exists(folder / "recording.mcap"))
+    out << "recording       " << (folder / "recording.mcap").string() << '\n';
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,71 @@
+// `invar run`: brings a cell up, keeps it running, runs a job, stops it in a safe order.
+#include <signal.h>
+
+#include <atomic>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+
+#include "tools/cell/launcher.hpp"
+#include "tools/cell/process.hpp"
+#include "tools/cell/summary.hpp"
+#include "tools/command.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+std::atomic<bool> stop_requested{false};
+
+void request_stop(int) { stop_requested = true; }
+
+struct Options {
+  LaunchOptions launch;
+  std::string process;
+  std::filesystem::path outcome;
+  bool simulated = false;
+  bool real_time = false;
+};
+
+int run(Options& options) {
+  struct sigaction action {};
+  action.sa_handler = request_stop;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  if (options.simulated || options.real_time) options.launch.simulated = options.simulated;
+  if (!options.process.empty())
+    return run_process({.cell = options.launch.cell,
+                        .process = options.process,
+                        .simulated = options.simulated,
+                        .job = options.launch.job,
+                        .outcome = options.outcome},
+                       stop_requested);
+  const LaunchOutcome outcome = launch(options.launch, stop_requested);
+  summarise(outcome, std::cout);
+  if (!outcome.failure.empty()) std::cerr << "invar run: " << outcome.failure << '\n';
+  return outcome.failure.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_run(CLI::App& program) {
+  auto* command = program.add_subcommand("run", "Run a cell: all its processes on this PC, or one of them");
+  command->footer(
+      "Example: invar run deployment/xy-table.yaml --job calibrate-geometry\n"
+      "Ctrl-C stops the cell in the order of its file. Exit status: 0 in order, 1 something failed, 2 the file has faults");
+  auto options = std::make_shared<Options>();
+  command->add_option("file", options->launch.cell, "the cell file")->required();
+  command->add_option("--host", options->launch.host, "only the processes of this host");
+  command->add_option("--process", options->process, "only this process, here and now (no children)");
+  command->add_option("--job", options->launch.job, "run this job, then stop");
+  command->add_option("--duration", options->launch.duration, "stop after this time of the cell [s]")
+      ->check(CLI::PositiveNumber);
+  auto* simulated = command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
+  command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
+  command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
+  command->callback([options] {
+    if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);
+  });
+}
+
+}  // namespace invar::tools
