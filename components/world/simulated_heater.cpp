@@ -1,17 +1,20 @@
 #include "components/world/simulated_heater.hpp"
 
+#include <utility>
+
 namespace invar::world {
 
 SimulatedHeater::SimulatedHeater(const Parameters& parameters) : parameters_{parameters} {
   if (parameters.map.empty()) throw InputError{"map", "missing", "name the heater's register map"};
-  (void)modbus::load_map(parameters.map);
+  const auto map = modbus::load_map(parameters.map);
+  if (!parameters.faults.empty()) (void)modbus::load_faults(parameters.faults, map);
 }
 
 void SimulatedHeater::configure() {
-  server_ = std::make_unique<modbus::Server>(
-      modbus::load_map(parameters_.map),
-      modbus::ServerOptions{
-          .host = parameters_.host, .port = static_cast<std::uint16_t>(parameters_.port), .faults = {}});
+  auto map = modbus::load_map(parameters_.map);
+  modbus::ServerOptions options{.host = parameters_.host, .port = static_cast<std::uint16_t>(parameters_.port)};
+  if (!parameters_.faults.empty()) options.faults = modbus::load_faults(parameters_.faults, map);
+  server_ = std::make_unique<modbus::Server>(std::move(map), std::move(options));
   const Parameters& p = parameters_;
   plant_.emplace(
       std::vector<physics::ThermalNode>{

@@ -25,6 +25,7 @@ class SimulatedHeater final : public Component {
     std::filesystem::path map;
     std::string host = "127.0.0.1";
     std::int64_t port = 1502;
+    std::filesystem::path faults;
     double ambient = 23.0;
     double pad_capacity = 60.0;
     double slide_capacity = 850.0;
@@ -39,6 +40,7 @@ class SimulatedHeater final : public Component {
       p(map, "map", "register map to serve");
       p(host, "host", "address to listen on");
       p(port, "port", 1, 65535, "TCP port to listen on");
+      p(faults, "faults", "fault script: when its Modbus side refuses, drops, delays or lies");
       p(ambient, "ambient", "degC", Range{-50.0, 100.0}, "of the room", while_running);
       p(pad_capacity, "pad_capacity", "J/K", Range{0.1, 1e6}, "heat capacity of the pad");
       p(slide_capacity, "slide_capacity", "J/K", Range{0.1, 1e6}, "of the slide");

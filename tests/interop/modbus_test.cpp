@@ -8,7 +8,7 @@
 #include "core/modbus/bus.hpp"
 #include "core/modbus/clock.hpp"
 #include "core/modbus/server.hpp"
-#include "tests/interop/process.hpp"
+#include "tests/support/process.hpp"
 
 namespace invar::modbus {
 namespace {

@@ -1,0 +1,171 @@
+// The temperature loop on the simulated heater over real Modbus TCP, in simulated time.
+#include "components/thermal/thermal.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "components/world/simulated_heater.hpp"
+#include "tests/support/free_port.hpp"
+
+namespace invar::thermal {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Bench final : Component {
+  Output<ThermalCommand> command{*this, "command"};
+  Input<NodeTemperature> state{*this, "state"};
+
+  world::SimulatedHeater::Parameters heater_parameters;
+  Thermal::Parameters thermal_parameters;
+  std::unique_ptr<world::SimulatedHeater> heater;
+  std::unique_ptr<Thermal> thermal;
+  std::uint64_t cycle = 0;
+  static constexpr double period = 0.1;
+
+  explicit Bench(const fs::path& faults = {}) {
+    const auto port = test::free_port();
+    heater_parameters.map = INVAR_SOURCE_DIR "/deployment/maps/heater.yaml";
+    heater_parameters.port = port;
+    heater_parameters.faults = faults;
+    heater_parameters.noise = 0.0;
+    thermal_parameters.modbus.map = heater_parameters.map;
+    thermal_parameters.modbus.port = port;
+    thermal_parameters.power_limit = 120.0;
+    thermal_parameters.pid.kp = 60.0;
+    thermal_parameters.pid.ki = 0.4;
+  }
+  void bring_up() {
+    heater = std::make_unique<world::SimulatedHeater>(heater_parameters);
+    thermal = std::make_unique<Thermal>(thermal_parameters);
+    for (Component* component :
+         {static_cast<Component*>(heater.get()), static_cast<Component*>(thermal.get())}) {
+      component->simulated_time = true;
+      component->configure();
+    }
+    static_cast<OutputPort*>(thermal->find_port("state"))->connect(state);
+    command.connect(*static_cast<InputPort*>(thermal->find_port("command")));
+    heater->activate();
+    thermal->activate();
+  }
+  void step(const Tick&) noexcept override {}
+
+  [[nodiscard]] Instant at() const {
+    return Instant{} + Duration::milliseconds(100) * static_cast<std::int64_t>(cycle);
+  }
+  const NodeTemperature& cycle_once(bool owner_lives = true) {
+    const Tick tick{at(), period, cycle++};
+    for (Component* component : {static_cast<Component*>(this), static_cast<Component*>(heater.get()),
+                                 static_cast<Component*>(thermal.get())})
+      component->set_now(tick.now);
+    heater->step(tick);
+    if (owner_lives) thermal->step(tick);
+    return *state.latest();
+  }
+  /// What the pad gets in fact, asked from the device by a master of its own.
+  [[nodiscard]] double heater_power() const {
+    modbus::Bus bus{{.port = static_cast<std::uint16_t>(heater_parameters.port)}};
+    const modbus::Device& device = bus.add(modbus::load_map(heater_parameters.map));
+    EXPECT_TRUE(bus.exchange(at()));
+    return device.value("delivered_power").value;
+  }
+  NodeTemperature run_for(double seconds) {
+    NodeTemperature last;
+    for (const Instant end = at() + Duration::seconds(seconds); at() < end;) last = cycle_once();
+    return last;
+  }
+};
+
+/// A fault script in a folder that goes with the test.
+class Script {
+ public:
+  explicit Script(const std::string& faults) {
+    std::string name = (fs::temp_directory_path() / "invar-thermal-XXXXXX").string();
+    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"no temporary folder"};
+    folder_ = name;
+    std::ofstream{file()} << "invar_modbus_faults: 1\nfaults:\n" << faults;
+  }
+  ~Script() { fs::remove_all(folder_); }
+  Script(const Script&) = delete;
+  Script& operator=(const Script&) = delete;
+  [[nodiscard]] fs::path file() const { return folder_ / "faults.yaml"; }
+
+ private:
+  fs::path folder_;
+};
+
+TEST(Thermal, BringsTheSlideToItsSetpointAndHoldsIt) {
+  Bench bench;
+  bench.bring_up();
+  double highest = 0.0;
+  for (int i = 0; i < 12'000; ++i) highest = std::max(highest, bench.cycle_once().heater_power());
+  EXPECT_LE(highest, 120.0);
+  for (int i = 0; i < 3'000; ++i) ASSERT_NEAR(bench.cycle_once().temperature(), 30.0, 0.02);
+}
+
+TEST(Thermal, TwoRunsAgreeBitForBit) {
+  const Script script{"  - {at: 20, for: 5, do: drop}\n  - {at: 40, for: 3, do: refuse}\n"};
+  const auto run = [&] {
+    Bench bench{script.file()};
+    bench.heater_parameters.noise = 0.003;
+    bench.bring_up();
+    std::vector<double> trace;
+    for (int i = 0; i < 800; ++i) {
+      const NodeTemperature& state = bench.cycle_once();
+      trace.insert(trace.end(), {state.temperature(), state.heater_power(), state.stale() ? 1.0 : 0.0});
+    }
+    return trace;
+  };
+  EXPECT_EQ(run(), run());
+}
+
+TEST(Thermal, LetsGoOfTheHeaterWhileItsDeviceIsGoneAndGoesOnWhenItIsBack) {
+  const Script script{"  - {at: 60, for: 20, do: refuse}\n"};
+  Bench bench{script.file()};
+  bench.bring_up();
+  EXPECT_TRUE(bench.run_for(60.0).enabled());
+  const NodeTemperature gone = bench.run_for(10.0);
+  EXPECT_TRUE(gone.stale());
+  EXPECT_FALSE(gone.enabled());
+  EXPECT_EQ(gone.heater_power(), 0.0);
+  const NodeTemperature back = bench.run_for(1200.0);
+  EXPECT_FALSE(back.stale());
+  EXPECT_NEAR(back.temperature(), 30.0, 0.05);
+}
+
+TEST(Thermal, DeviceSwitchesOffByItselfWhenTheLoopNoLongerRuns) {
+  Bench bench;
+  bench.bring_up();
+  const NodeTemperature last = bench.run_for(60.0);
+  EXPECT_GT(last.heater_power(), 50.0);
+  for (int i = 0; i < 30; ++i) bench.cycle_once(false);
+  EXPECT_EQ(bench.heater_power(), 0.0);
+  EXPECT_TRUE(bench.cycle_once().watchdog_tripped());
+  EXPECT_NEAR(bench.run_for(1200.0).temperature(), 30.0, 0.05);
+}
+
+TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
+  Bench bench;
+  bench.thermal_parameters.over_temperature = 26.0;
+  bench.thermal_parameters.setpoint = 25.5;
+  bench.thermal_parameters.pid.ki = 5.0;  // a bad tuning that overshoots
+  bench.bring_up();
+  NodeTemperature state;
+  for (int i = 0; i < 6000 && !state.over_temperature(); ++i) state = bench.cycle_once();
+  ASSERT_TRUE(state.over_temperature());
+  state = bench.run_for(600.0);
+  EXPECT_TRUE(state.over_temperature());
+  EXPECT_EQ(state.heater_power(), 0.0);
+  ThermalCommand reset;
+  reset.setpoint(24.0);
+  reset.enabled(true);
+  reset.reset_latch(true);
+  bench.command.write(reset);
+  EXPECT_FALSE(bench.cycle_once().over_temperature());
+}
+
+}  // namespace
+}  // namespace invar::thermal
