@@ -57,7 +57,8 @@ async def serve(port):
     threading.Thread(target=answer_questions, daemon=True).start()
     try:
         await task
-    except asyncio
-.CancelledError : pass
+    except asyncio.CancelledError:
+        pass
 
-                      asyncio.run(serve(int(sys.argv[1])))
+
+asyncio.run(serve(int(sys.argv[1])))
