@@ -33,6 +33,11 @@ const WireType& wire_type_of(std::type_index type, const std::string& topic) {
   return *found;
 }
 
+/// Where only the latest counts, reading instead of taking costs the receiving thread no allocation.
+bool is_kept(const Profile& profile) {
+  return profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
+}
+
 struct BoundOutput {
   std::unique_ptr<WriterConnection> connection;
   std::unique_ptr<Outlet> outlet;
@@ -109,17 +114,15 @@ void Node::bind(OutputPort& port, OutputBinding binding, const Profile& qos) {
 void Node::bind(InputPort& port, Clock clock) {
   const Profile& qos = profile(port.profile);
   const WireType& type = wire_type_of(port.type(), port.topic);
-  // An input wants the latest only: reading instead of taking costs the receiving thread no allocation.
-  const bool keep = qos.traffic == Traffic::realtime && !qos.keep_all && qos.depth == 1;
-  std::shared_ptr<Inlet> inlet = type.attach(port, keep);
+  std::shared_ptr<Inlet> inlet = type.attach(port, is_kept(qos));
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
       [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }));
 }
 
 void Node::start(std::function<Instant()> ended) {
-  parts_->realtime_publishing.start(parts_->options.realtime_priority, ended);
-  parts_->general_publishing.start(0, ended);
+  parts_->realtime_publishing.start(parts_->options.realtime_priority, parts_->options.realtime_cpu, ended);
+  parts_->general_publishing.start(0, std::nullopt, ended);
 }
 
 void Node::stop() {
@@ -161,7 +164,7 @@ std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::typ
                                               const Profile& profile, std::function<void(const void*)> take) {
   const WireType& wire = wire_type_of(type, topic);
   std::shared_ptr<Inlet> inlet =
-      wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, false);
+      wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, is_kept(profile));
   return std::make_unique<ReaderConnection>(
       parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,
       [inlet](fdds::DataReader& reader) { inlet->receive(reader, monotonic_now()); });

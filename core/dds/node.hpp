@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <typeindex>
@@ -28,6 +29,9 @@ struct NodeOptions {
   std::uint32_t segment_size = 16U << 20U;
   /// SCHED_FIFO priority of the middleware's threads that carry real-time traffic; 0: the usual scheduling.
   int realtime_priority = 0;
+  /// The core of the loop: the thread that publishes its samples then shares it and, with a lower priority, runs the
+  /// moment the loop sleeps.
+  std::optional<int> realtime_cpu;
 };
 
 /// How the samples of an output come from its loop to the middleware.

@@ -26,11 +26,17 @@ void Publishing::add(Outlet& outlet, Duration period) {
   period_ = std::min(period_, period);
 }
 
-void Publishing::start(int priority, std::function<Instant()> ended) {
+void Publishing::start(int priority, std::optional<int> cpu, std::function<Instant()> ended) {
   if (outlets_.empty() || thread_.joinable()) return;
   ended_ = std::move(ended);
   stopping_ = false;
   thread_ = std::thread{[this] { run(); }};
+  if (cpu) {
+    cpu_set_t cores;
+    CPU_ZERO(&cores);
+    CPU_SET(static_cast<std::size_t>(*cpu), &cores);
+    (void)pthread_setaffinity_np(thread_.native_handle(), sizeof cores, &cores);
+  }
   if (priority > 0) {
     sched_param parameters{};
     parameters.sched_priority = priority;
@@ -61,7 +67,7 @@ Instant Publishing::newest() const {
 void Publishing::run() {
   prctl(PR_SET_NAME, "invar-publish");
   prctl(PR_SET_TIMERSLACK, 1);
-  const Duration nap = std::clamp(period_ / 8, Duration::microseconds(10), Duration::microseconds(50));
+  const Duration nap = std::clamp(period_ / 16, Duration::microseconds(10), Duration::microseconds(20));
   Duration lag{};  // from a cycle's start to its usual end
   Instant last{INT64_MIN};
   int naps = 0;

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -22,7 +23,7 @@ class Publishing {
   void add(Outlet& outlet, Duration period);
   /// `ended` gives the nominal start of the loop's newest finished cycle; wait-free. Without it the thread goes by
   /// the samples, and may look in the middle of a cycle.
-  void start(int priority, std::function<Instant()> ended);
+  void start(int priority, std::optional<int> cpu, std::function<Instant()> ended);
   /// Drains what is left.
   void stop();
 
