@@ -5,6 +5,7 @@
 #include "components/interferometer/interferometer.hpp"
 #include "components/recorder/recorder.hpp"
 #include "components/stage/axis_stage.hpp"
+#include "components/supervisor/supervisor.hpp"
 #include "components/thermal/thermal.hpp"
 #include "components/world/simulated_heater.hpp"
 #include "components/world/simulated_stage.hpp"
@@ -12,14 +13,18 @@
 namespace invar {
 
 void add_all_components(Registry& registry) {
-  registry.add<world::SimulatedStage>("simulated_stage", "drives, encoders and true tool position of a machine");
-  registry.add<world::SimulatedHeater>("simulated_heater", "pad, slide and base behind a heater controller's registers");
+  registry.add<world::SimulatedStage>("simulated_stage",
+                                      "drives, encoders and true tool position of a machine");
+  registry.add<world::SimulatedHeater>("simulated_heater",
+                                       "pad, slide and base behind a heater controller's registers");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
   registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
   registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
   registry.add<stage::Stage>("stage", "servo of one axis");
+  registry.add<supervisor::Supervisor>(
+      "supervisor", "watches processes and components, makes safe what depends on lost ones");
 }
 
 }  // namespace invar

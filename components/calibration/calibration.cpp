@@ -259,7 +259,8 @@ Task Calibration::command_model(compensation::ModelCommandKind kind, const std::
     const auto* status = model_status_.latest();
     if (status != nullptr && status->command_id() == command.id()) {
       if (status->state() == compensation::MODEL_REFUSED)
-        throw std::runtime_error{"the compensation refused the model: " + std::string{status->text().c_str()}};
+        throw std::runtime_error{"the compensation refused the model: " +
+                                 std::string{status->text().c_str()}};
       co_return;
     }
     if (now() > give_up) throw std::runtime_error{"the compensation does not answer"};

@@ -24,7 +24,8 @@ std::uint32_t file_checksum(const std::filesystem::path& file) {
 
 struct Compensation::Axis {
   Axis(Compensation& owner, std::size_t number)
-      : state{owner, std::string{"state_"} + "xyz"[number]}, correction{owner, std::string{"correction_"} + "xyz"[number]} {}
+      : state{owner, std::string{"state_"} + "xyz"[number]},
+        correction{owner, std::string{"correction_"} + "xyz"[number]} {}
   Input<stage::AxisState> state;
   Output<AxisCorrection> correction;
 };
@@ -40,7 +41,8 @@ void Compensation::configure() {
   active_ = staged_ = previous_ = nullptr;
   if (!parameters_.model.empty()) {
     const Model* model = load(parameters_.model);
-    if (!model->refusal.empty()) throw InputError{parameters_.model.string(), model->refusal, "calibrate again"};
+    if (!model->refusal.empty())
+      throw InputError{parameters_.model.string(), model->refusal, "calibrate again"};
     active_ = model;
   }
   ending_ = false;
@@ -67,7 +69,10 @@ std::string Compensation::refusal(const metrology::GeometricModel& model) const 
            std::to_string(axes_.size());
   constexpr int steps = 20;
   Eigen::Vector3d middle;
-  for (int i = 0; i < 3; ++i) middle[i] = (model.travel[static_cast<std::size_t>(i)].lower + model.travel[static_cast<std::size_t>(i)].upper) / 2;
+  for (int i = 0; i < 3; ++i)
+    middle[i] =
+        (model.travel[static_cast<std::size_t>(i)].lower + model.travel[static_cast<std::size_t>(i)].upper) /
+        2;
   for (int i = 0; i <= steps; ++i)
     for (int k = 0; k <= steps; ++k) {
       Eigen::Vector3d at = middle;
@@ -105,7 +110,8 @@ void Compensation::run_loader() {
   }
 }
 
-void Compensation::answer(std::uint64_t command, ModelState state, const Model* model, const char* text) noexcept {
+void Compensation::answer(std::uint64_t command, ModelState state, const Model* model,
+                          const char* text) noexcept {
   reply_.cell(cell);
   reply_.component_id(id);
   reply_.at().time_ns(now().ns);
@@ -131,7 +137,8 @@ void Compensation::obey(const ModelCommand& command) noexcept {
     case MODEL_STAGE: {
       Request request;
       request.command = command.id();
-      std::memcpy(request.path.data(), command.path().c_str(), std::min(command.path().size(), request.path.size() - 1));
+      std::memcpy(request.path.data(), command.path().c_str(),
+                  std::min(command.path().size(), request.path.size() - 1));
       reply_.path(command.path());
       if (simulated_time) {
         take_loaded({request.command, load(request.path.data())});
@@ -164,7 +171,8 @@ void Compensation::correct(const Tick& tick) noexcept {
   bool stale = false;
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const auto* state = axes_[i]->state.latest();
-    stale = stale || state == nullptr || axes_[i]->state.age(tick.now) > Duration::seconds(20.0 * tick.period);
+    stale =
+        stale || state == nullptr || axes_[i]->state.age(tick.now) > Duration::seconds(20.0 * tick.period);
     if (state != nullptr) setpoint_[static_cast<Eigen::Index>(i)] = state->setpoint_position();
   }
   if (active_ != nullptr && !stale) {

@@ -35,10 +35,12 @@ class Compensation final : public Component {
     void describe(auto& p) {
       p(axes, "axes", 1, 3, "how many axes are corrected");
       p(model, "model", "compensation.yaml that is active from the start; none: nothing is corrected");
-      p(bound, "bound", "m", Range{0.0, 0.1}, "a model that corrects more anywhere in the travels is refused");
-      p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0}, "how fast a correction may change beside the motion itself",
-        while_running);
-      p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1}, "a model less certain than this at mid travel is refused");
+      p(bound, "bound", "m", Range{0.0, 0.1},
+        "a model that corrects more anywhere in the travels is refused");
+      p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0},
+        "how fast a correction may change beside the motion itself", while_running);
+      p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1},
+        "a model less certain than this at mid travel is refused");
     }
   };
   explicit Compensation(const Parameters& parameters);
@@ -88,8 +90,8 @@ class Compensation final : public Component {
   Eigen::Vector3d setpoint_ = Eigen::Vector3d::Zero();
   bool easing_ = false;  // on the way to another model's correction
 
-  Ring<Request> requests_{8};  // loop to loader
-  Ring<Loaded> loaded_{8};     // loader to loop
+  Ring<Request> requests_{8};                   // loop to loader
+  Ring<Loaded> loaded_{8};                      // loader to loop
   std::vector<std::unique_ptr<Model>> models_;  // the loader's
   std::atomic<bool> ending_{false};
   std::thread loader_;

@@ -9,7 +9,8 @@ namespace invar::recorder {
 void Recorder::configure() {
   std::filesystem::create_directories(parameters_.out);
   const std::scoped_lock lock{mutex_};
-  writer_ = std::make_unique<recording::RecordingWriter>(std::filesystem::path{parameters_.out} / parameters_.name);
+  writer_ =
+      std::make_unique<recording::RecordingWriter>(std::filesystem::path{parameters_.out} / parameters_.name);
   channels_.clear();
 }
 

@@ -204,7 +204,7 @@ void Stage::step(const Tick& tick) noexcept {
     stop_blindly(tick);
     current_ = feedforward(setpoint(tick));
   } else if (driving && blind_) {
-    mode_ = AXIS_MODE_FAULT;  // sight came back too late: stay stopped until somebody clears the fault
+    mode_ = AXIS_MODE_FAULT;      // sight came back too late: stay stopped until somebody clears the fault
   } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;

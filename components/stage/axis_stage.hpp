@@ -123,7 +123,7 @@ class Stage final : public Component {
   double following_error_ = 0.0;
   bool settled_ = false;
   std::uint64_t received_ = 0;  // samples of feedback so far
-  Instant outside_at_;  // when the following error was last outside the settling window
+  Instant outside_at_;          // when the following error was last outside the settling window
 };
 
 }  // namespace invar::stage

@@ -22,7 +22,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 struct Child {
   std::string name;
@@ -38,10 +40,16 @@ struct Child {
   }
 };
 
-Child spawn(const LaunchOptions& options, const std::string& process, bool simulated, const std::filesystem::path& folder) {
+Child spawn(const LaunchOptions& options, const std::string& process, bool simulated,
+            const std::filesystem::path& folder) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  std::vector<std::string> words{program, "run", options.cell.string(), "--process", process,
-                                 simulated ? "--simulated" : "--real-time", "--outcome",
+  std::vector<std::string> words{program,
+                                 "run",
+                                 options.cell.string(),
+                                 "--process",
+                                 process,
+                                 simulated ? "--simulated" : "--real-time",
+                                 "--outcome",
                                  (folder / (process + ".json")).string()};
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
   std::vector<char*> arguments;
@@ -90,12 +98,14 @@ dds::NodeOptions node_options(const config::Cell& cell) {
   options.shared_memory = cell.shared_memory;
   for (const auto& host : cell.hosts) options.addresses.push_back(host.address);
   std::sort(options.addresses.begin(), options.addresses.end());
-  options.addresses.erase(std::unique(options.addresses.begin(), options.addresses.end()), options.addresses.end());
+  options.addresses.erase(std::unique(options.addresses.begin(), options.addresses.end()),
+                          options.addresses.end());
   return options;
 }
 
-std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell, std::vector<Child>& children,
-                                const std::atomic<bool>& stop, Clock::time_point begin, LaunchOutcome& outcome) {
+std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell,
+                                std::vector<Child>& children, const std::atomic<bool>& stop,
+                                Clock::time_point begin, LaunchOutcome& outcome) {
   dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const Child& child : children) names.push_back(child.name);
@@ -106,7 +116,8 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   outcome.start_seconds = seconds_since(begin);
   if (failure.empty() && !stop) {
     const double most = options.duration > 0.0 ? options.duration : 1e9;
-    failure = master.advance_to(Instant{} + Duration::seconds(most), Duration::seconds(120.0), given_up).failure;
+    failure =
+        master.advance_to(Instant{} + Duration::seconds(most), Duration::seconds(120.0), given_up).failure;
   }
   master.end();
   const auto ending = Clock::now();
@@ -126,10 +137,12 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   const LoadedCell loaded = load_cell(options.cell);
   const config::Cell& cell = *loaded.cell;
   if (!options.job.empty() && !cell.jobs.contains(options.job))
-    throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell", "add it to `jobs`"};
+    throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell",
+                     "add it to `jobs`"};
   if (!options.host.empty() && std::none_of(cell.hosts.begin(), cell.hosts.end(),
                                             [&](const auto& host) { return host.name == options.host; }))
-    throw InputError{"--host", "`" + options.host + "` is no host of " + cell.file.string(), "use a name below `hosts`"};
+    throw InputError{"--host", "`" + options.host + "` is no host of " + cell.file.string(),
+                     "use a name below `hosts`"};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
 
   std::string pattern = (std::filesystem::temp_directory_path() / "invar-run-XXXXXX").string();
@@ -142,7 +155,8 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   if (outcome.simulated) {
     outcome.failure = keep_simulated_time(options, cell, children, stop, begin, outcome);
   } else {
-    while (!stop && !any_ended(children) && (options.duration <= 0.0 || seconds_since(begin) < options.duration))
+    while (!stop && !any_ended(children) &&
+           (options.duration <= 0.0 || seconds_since(begin) < options.duration))
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   for (Child& child : children) {

@@ -11,7 +11,7 @@ namespace invar::tools {
 
 struct LaunchOptions {
   std::filesystem::path cell;
-  std::string host;  // only processes of this host; empty: all that have an address of this PC
+  std::string host;               // only processes of this host; empty: all that have an address of this PC
   std::optional<bool> simulated;  // otherwise what the cell file says
   std::string job;                // run it, then stop
   double duration = 0.0;          // s of the cell's time; 0: until stopped

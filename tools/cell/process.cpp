@@ -9,7 +9,10 @@
 #include <thread>
 
 #include "components/recorder/recorder.hpp"
+#include "components/supervisor/supervisor.hpp"
+#include "core/dds/cell_client.hpp"
 #include "core/dds/node.hpp"
+#include "core/dds/process_service.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "core/dds/wire_type.hpp"
 #include "core/executor/process_control.hpp"
@@ -46,6 +49,7 @@ class RunningProcess {
     for (LoadedComponent& member : process.components) {
       member.component->simulated_time = options.simulated;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
+      if (auto* found = dynamic_cast<supervisor::Supervisor*>(member.component.get())) supervisor_ = found;
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
@@ -53,9 +57,15 @@ class RunningProcess {
     }
     join_directly();
     watch_job();
+    service_ = std::make_unique<dds::ProcessService>(
+        node_, control_,
+        dds::ProcessService::Options{
+            .cell = loaded.cell->id, .host = file_.host, .stop_process = [this] { asked_to_stop_ = true; }});
+    if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 
   int run(const std::atomic<bool>& stop) {
+    if (supervisor_ != nullptr) client_ = std::make_unique<dds::CellClient>(node_);
     const int status = options_.simulated ? run_simulated(stop) : run_by_the_clock(stop);
     write_outcome();
     return status;
@@ -100,7 +110,8 @@ class RunningProcess {
     auto* status = dynamic_cast<Output<job::JobStatus>*>(component.find_port("status"));
     if (inbox == nullptr || status == nullptr)
       throw InputError{loaded_.cell->file.string() + ": jobs." + options_.job,
-                       "`" + found->second + "` runs no jobs", "name a component with the ports `job` and `status`"};
+                       "`" + found->second + "` runs no jobs",
+                       "name a component with the ports `job` and `status`"};
     runs_job_ = true;
     status->add_sink([this](const job::JobStatus& sample, Instant) {
       const std::scoped_lock lock{job_mutex_};
@@ -144,13 +155,16 @@ class RunningProcess {
     node_.start();
     executor_.start();
     const bool up = bring_up();
-    while (up && !stop.load() && executor_.is_running() && !job_ended_) {
+    while (up && !stop.load() && !asked_to_stop_ && executor_.is_running() && !job_ended_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      for (const dds::Alarm& alarm : node_.take_alarms())
+      for (const dds::Alarm& alarm : node_.take_alarms()) {
         spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
+        service_->publish(event::SEVERITY_FAULT, file_.name, alarm.topic + ": " + alarm.text);
+      }
     }
     status_ = control_.status();
     control_.stop();
+    service_.reset();
     topics_.clear();
     node_.stop();
     return up && job_succeeded() ? 0 : 1;
@@ -167,8 +181,8 @@ class RunningProcess {
     if (recorder_ != nullptr)
       clock.tap([this](const dds::LockstepSample& sample) {
         if (!recorder_->is_wanted(sample.topic.topic)) return;
-        recorder_->record(source(sample.topic.topic, sample.topic.type, "simulated"), std::string{sample.process},
-                          sample.sequence, sample.window, sample.cdr);
+        recorder_->record(source(sample.topic.topic, sample.topic.type, "simulated"),
+                          std::string{sample.process}, sample.sequence, sample.window, sample.cdr);
       });
     node_.start();
     const bool up = bring_up();
@@ -182,8 +196,63 @@ class RunningProcess {
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
     status_ = control_.status();
     control_.stop();
+    service_.reset();
     node_.stop();
     return up && outcome.failure.empty() && job_succeeded() ? 0 : 1;
+  }
+
+  /// Who feeds whom, and how to look and act by DDS.
+  supervisor::CellView view_of_cell() {
+    supervisor::CellView view;
+    std::map<std::string, std::string> writer;  // topic -> component
+    const auto each = [&](auto visit) {
+      for (LoadedProcess& process : loaded_.processes)
+        for (LoadedComponent& member : process.components)
+          if (member.component)
+            for (const Port* port : member.component->ports()) visit(member.file->name, *port);
+      each_port([&](std::size_t index, const Port& port) { visit(executor_.component(index).name, port); });
+    };
+    each([&](const std::string& component, const Port& port) {
+      if (port.direction() == Port::Direction::output) writer[port.topic] = component;
+    });
+    each([&](const std::string& component, const Port& port) {
+      if (port.direction() != Port::Direction::input ||
+          static_cast<const InputPort&>(port).options().optional)
+        return;
+      if (const auto found = writer.find(port.topic); found != writer.end() && found->second != component)
+        view.dependents[found->second].push_back(component);
+    });
+    for (const auto& process : loaded_.cell->processes) {
+      view.processes.push_back(process.name);
+      for (const auto& component : process.components) view.process_of[component.name] = process.name;
+    }
+    view.heard = [this] {
+      std::set<std::string> heard{file_.name};
+      for (const auto& status : client_->processes()) {
+        auto& last = last_status_[status.process_name().c_str()];
+        if (status.at().time_ns() != last) heard.insert(status.process_name().c_str());
+        last = status.at().time_ns();
+      }
+      return heard;
+    };
+    view.components = [this] {
+      std::map<std::string, supervisor::CellView::Seen> seen;
+      for (const auto& status : client_->components())
+        seen[status.component_name().c_str()] = {status.failure().c_str(),
+                                                 status.lifecycle_state() == lifecycle::STATE_ERROR};
+      return seen;
+    };
+    view.deactivate = [this](const std::string& component) -> std::string {
+      const auto reply = client_->request(client_->process_of(component), component,
+                                          lifecycle::TRANSITION_DEACTIVATE, Duration::seconds(1.0));
+      if (!reply) return "its process does not answer";
+      return reply->done() ? "" : reply->text().c_str();
+    };
+    view.notify = [this](bool is_fault, const std::string& from, const std::string& text) {
+      spdlog::log(is_fault ? spdlog::level::warn : spdlog::level::info, text);
+      service_->publish(is_fault ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, from, text);
+    };
+    return view;
   }
 
   bool job_succeeded() {
@@ -191,7 +260,8 @@ class RunningProcess {
     return !runs_job_ || !job_ended_ || job_.phase() == job::JOB_DONE;
   }
 
-  static recorder::Source source(const std::string& topic, const std::string& type, const std::string& profile) {
+  static recorder::Source source(const std::string& topic, const std::string& type,
+                                 const std::string& profile) {
     const auto* known = recording::built_in_type(type);
     return {topic, type, profile, known != nullptr ? std::string{known->idl} : ""};
   }
@@ -214,9 +284,11 @@ class RunningProcess {
     dds::Profile profile = node_.profile(port.profile);
     profile.deadline = {};  // a recorder takes what comes
     const recorder::Source from = source(port.topic, type->name(), port.profile);
-    topics_.push_back(node_.raw_reader(port.topic, from.type, profile, [this, from](const dds::RawSample& sample) {
-      recorder_->record(from, std::string{sample.writer}, sample.sequence, Instant{sample.sent_ns}, sample.cdr);
-    }));
+    topics_.push_back(
+        node_.raw_reader(port.topic, from.type, profile, [this, from](const dds::RawSample& sample) {
+          recorder_->record(from, std::string{sample.writer}, sample.sequence, Instant{sample.sent_ns},
+                            sample.cdr);
+        }));
   }
 
   void write_outcome() {
@@ -248,7 +320,12 @@ class RunningProcess {
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
+  std::unique_ptr<dds::ProcessService> service_;
+  std::unique_ptr<dds::CellClient> client_;  // the supervisor's
+  std::map<std::string, std::int64_t> last_status_;
+  std::atomic<bool> asked_to_stop_{false};
   recorder::Recorder* recorder_ = nullptr;
+  supervisor::Supervisor* supervisor_ = nullptr;
   std::vector<std::unique_ptr<dds::Connection>> topics_;
   ProcessStatus status_;
   bool runs_job_ = false;

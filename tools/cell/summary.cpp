@@ -80,7 +80,8 @@ void add_verification(report::Page& page, const Verification& before, const Veri
                    line_of(after.way[k], after.error[k], 1e3, 1e6, "after")};
     plots.push_back(plot);
   }
-  page.plots(plots, "Read by the laser, each line forth and back, before and after the compensation was activated.");
+  page.plots(plots,
+             "Read by the laser, each line forth and back, before and after the compensation was activated.");
 }
 
 /// The heater's trace out of the recording; nothing where none was made.
@@ -118,12 +119,13 @@ void add_heater(report::Page& page, const std::filesystem::path& folder, std::os
     double worst = 0.0;
     for (std::size_t i = 0; i < time.size(); ++i)
       if (time[i] > 0.5 * time.back()) worst = std::max(worst, std::abs(temperature[i] - setpoint[i]));
-    out << "heater          " << number(temperature.back(), 4) << " degC at the end, within " << number(worst, 2)
-        << " K of " << number(setpoint.back(), 4) << " degC over the second half\n";
+    out << "heater          " << number(temperature.back(), 4) << " degC at the end, within "
+        << number(worst, 2) << " K of " << number(setpoint.back(), 4) << " degC over the second half\n";
   }
 }
 
-void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, report::Page& page, std::ostream& out) {
+void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, report::Page& page,
+                   std::ostream& out) {
   const std::filesystem::path folder = job.value("result", "");
   out << "job             " << job.value("name", "") << ": " << job.value("text", "") << '\n';
   const auto before_file = folder / "verify_before.csv";
@@ -131,11 +133,13 @@ void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, repo
   if (std::filesystem::exists(before_file) && std::filesystem::exists(after_file)) {
     const auto before = read_verification(before_file);
     const auto after = read_verification(after_file);
-    out << "error before    rms " << si(before.rms, "m") << ", max " << si(before.maximum, "m") << "   (lines not fitted)\n"
+    out << "error before    rms " << si(before.rms, "m") << ", max " << si(before.maximum, "m")
+        << "   (lines not fitted)\n"
         << "error after     rms " << si(after.rms, "m") << ", max " << si(after.maximum, "m") << "   ("
         << number(before.rms / after.rms, 2) << " times less)\n";
-    page.callout("On lines that were not used to identify it, the error fell from " + si(before.rms, "m") + " to " +
-                     si(after.rms, "m") + " RMS (largest " + si(before.maximum, "m") + " to " + si(after.maximum, "m") + ").",
+    page.callout("On lines that were not used to identify it, the error fell from " + si(before.rms, "m") +
+                     " to " + si(after.rms, "m") + " RMS (largest " + si(before.maximum, "m") + " to " +
+                     si(after.maximum, "m") + ").",
                  after.rms < before.rms ? "good" : "bad");
     add_verification(page, before, after);
   }
@@ -146,7 +150,8 @@ void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, repo
 }  // namespace
 
 void summarise(const LaunchOutcome& outcome, std::ostream& out) {
-  report::Page page{"Invar: a cell and its job", outcome.simulated ? "in simulated time" : "by the wall clock"};
+  report::Page page{"Invar: a cell and its job",
+                    outcome.simulated ? "in simulated time" : "by the wall clock"};
   std::vector<std::vector<std::string>> loops;
   std::filesystem::path folder;
   nlohmann::json job;
@@ -154,17 +159,20 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
     std::ifstream stream{process.report};
     const auto report = nlohmann::json::parse(stream, nullptr, false);
     if (report.is_discarded()) {
-      loops.push_back({process.process, "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
+      loops.push_back(
+          {process.process, "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
       continue;
     }
     const auto us = [&](const char* key) { return number(report.value(key, 0.0) * 1e-3, 3) + " us"; };
     loops.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
-                     std::to_string(report.value("cycles", 0ULL)), std::to_string(report.value("overruns", 0ULL)),
+                     std::to_string(report.value("cycles", 0ULL)),
+                     std::to_string(report.value("overruns", 0ULL)),
                      us("compute_p50_ns") + " / " + us("compute_p99_ns"),
                      outcome.simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
     if (report.contains("job")) job = report["job"];
   }
-  const std::vector<std::string> header{"process", "rate", "cycles", "overruns", "compute p50 / p99", "wake-up p50 / p99"};
+  const std::vector<std::string> header{"process",          "rate", "cycles", "overruns", "compute p50 / p99",
+                                        "wake-up p50 / p99"};
   const std::vector<int> widths{16, 10, 10, 10, 22, 22};
   for (std::size_t i = 0; i < header.size(); ++i) out << std::left << std::setw(widths[i]) << header[i];
   out << '\n';

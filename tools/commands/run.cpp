@@ -52,7 +52,8 @@ void add_run(CLI::App& program) {
   auto* command = program.add_subcommand("run", "Run a cell: all its processes on this PC, or one of them");
   command->footer(
       "Example: invar run deployment/xy-table.yaml --job calibrate-geometry\n"
-      "Ctrl-C stops the cell in the order of its file. Exit status: 0 in order, 1 something failed, 2 the file has faults");
+      "Ctrl-C stops the cell in the order of its file. Exit status: 0 in order, 1 something failed, 2 the "
+      "file has faults");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");
@@ -60,7 +61,8 @@ void add_run(CLI::App& program) {
   command->add_option("--job", options->launch.job, "run this job, then stop");
   command->add_option("--duration", options->launch.duration, "stop after this time of the cell [s]")
       ->check(CLI::PositiveNumber);
-  auto* simulated = command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
+  auto* simulated =
+      command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
   command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
   command->callback([options] {

@@ -1,0 +1,88 @@
+#include "components/supervisor/supervisor.hpp"
+
+#include <algorithm>
+
+namespace invar::supervisor {
+
+namespace {
+
+void visit(const std::map<std::string, std::vector<std::string>>& dependents, const std::string& component,
+           std::set<std::string>& seen, std::vector<std::string>& order) {
+  if (!seen.insert(component).second) return;
+  if (const auto found = dependents.find(component); found != dependents.end())
+    for (const std::string& next : found->second) visit(dependents, next, seen, order);
+  order.push_back(component);  // after all that it feeds
+}
+
+}  // namespace
+
+std::vector<std::string> downstream(const std::map<std::string, std::vector<std::string>>& dependents,
+                                    const std::set<std::string>& failed) {
+  std::set<std::string> seen;
+  std::vector<std::string> order;
+  for (const std::string& component : failed) visit(dependents, component, seen, order);
+  std::erase_if(order, [&](const std::string& component) { return failed.contains(component); });
+  return order;
+}
+
+void Supervisor::activate() {
+  last_heard_.clear();
+  lost_.clear();
+  failed_.clear();
+  for (const std::string& process : view_.processes) last_heard_[process] = now();
+}
+
+void Supervisor::step(const Tick& tick) noexcept {
+  if (simulated_time || !view_.heard) return;  // in simulated time a process that is lost stops time itself
+  try {
+    watch_processes(tick);
+    watch_components();
+  } catch (const std::exception&) {
+    fail("the supervisor lost its view of the cell");
+  }
+}
+
+void Supervisor::watch_processes(const Tick& tick) {
+  for (const std::string& process : view_.heard()) last_heard_[process] = tick.now;
+  for (const std::string& process : view_.processes) {
+    const bool silent = tick.now - last_heard_[process] > Duration::seconds(parameters_.timeout);
+    if (silent && lost_.insert(process).second) {
+      view_.notify(true, process,
+                   "process `" + process + "` is lost: not heard of for " +
+                       std::to_string(parameters_.timeout) + " s");
+      std::set<std::string> components;
+      for (const auto& [component, home] : view_.process_of)
+        if (home == process) components.insert(component);
+      make_safe(components);
+    } else if (!silent && lost_.erase(process) > 0) {
+      view_.notify(false, process, "process `" + process + "` is back");
+    }
+  }
+}
+
+void Supervisor::watch_components() {
+  std::set<std::string> newly;
+  for (const auto& [component, seen] : view_.components()) {
+    if (!seen.in_error) {
+      failed_.erase(component);
+    } else if (failed_.insert(component).second) {
+      view_.notify(true, component, "component `" + component + "` is in error: " + seen.failure);
+      newly.insert(component);
+    }
+  }
+  if (!newly.empty()) make_safe(newly);
+}
+
+void Supervisor::make_safe(const std::set<std::string>& failed) {
+  if (!parameters_.make_safe) return;
+  for (const std::string& component : downstream(view_.dependents, failed)) {
+    const auto home = view_.process_of.find(component);
+    if (home == view_.process_of.end() || lost_.contains(home->second)) continue;
+    const std::string refusal = view_.deactivate(component);
+    view_.notify(!refusal.empty(), component,
+                 refusal.empty() ? "component `" + component + "` was deactivated: it needs what was lost"
+                                 : "component `" + component + "` cannot be deactivated: " + refusal);
+  }
+}
+
+}  // namespace invar::supervisor

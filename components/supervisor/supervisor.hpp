@@ -1,0 +1,70 @@
+// Supervisor: watches the processes and components of a cell, says what went wrong, and makes safe what depended on it.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+
+namespace invar::supervisor {
+
+/// What the supervisor sees of the cell, and what it may do; the process that runs it connects it to the middleware.
+struct CellView {
+  struct Seen {
+    std::string failure;  // of a component in error; empty otherwise
+    bool in_error = false;
+  };
+  /// Processes heard of since the last call, by name.
+  std::function<std::set<std::string>()> heard;
+  std::function<std::map<std::string, Seen>()> components;
+  /// Deactivates a component; an empty text when that was done.
+  std::function<std::string(const std::string& component)> deactivate;
+  std::function<void(bool is_fault, const std::string& source, const std::string& text)> notify;
+  std::vector<std::string> processes;                          // all that should be there
+  std::map<std::string, std::string> process_of;               // component -> process
+  std::map<std::string, std::vector<std::string>> dependents;  // component -> those that need its outputs
+};
+
+/// A process that is not heard of for `timeout`, or a component in error: everything that needs its outputs, directly
+/// or through others, is deactivated, downstream first, and notices say so. The devices' own watchdogs and the
+/// components' deadlines have acted long before; this keeps the rest of the cell from going on as if nothing were.
+class Supervisor final : public Component {
+ public:
+  struct Parameters {
+    double timeout = 2.0;
+    bool make_safe = true;
+    void describe(auto& p) {
+      p(timeout, "timeout", "s", Range{0.5, 600.0}, "a process not heard of for so long is lost",
+        while_running);
+      p(make_safe, "make_safe", "deactivate what depends on a lost process or a failed component");
+    }
+  };
+  explicit Supervisor(const Parameters& parameters) : parameters_{parameters} {}
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+
+  /// Before the first step.
+  void connect(CellView view) { view_ = std::move(view); }
+
+ private:
+  void watch_processes(const Tick& tick);
+  void watch_components();
+  void make_safe(const std::set<std::string>& failed);
+
+  const Parameters& parameters_;
+  CellView view_;
+  std::map<std::string, Instant> last_heard_;
+  std::set<std::string> lost_;
+  std::set<std::string> failed_;
+};
+
+/// Everything downstream of `failed` in `dependents`, those furthest downstream first, `failed` itself left out.
+std::vector<std::string> downstream(const std::map<std::string, std::vector<std::string>>& dependents,
+                                    const std::set<std::string>& failed);
+
+}  // namespace invar::supervisor
