@@ -239,7 +239,7 @@ class RunningProcess {
       std::map<std::string, supervisor::CellView::Seen> seen;
       for (const auto& status : client_->components())
         seen[status.component_name().c_str()] = {status.failure().c_str(),
-                                                 status.lifecycle_state() == lifecycle::STATE_ERROR};
+                                                 status.state() == lifecycle::STATE_ERROR};
       return seen;
     };
     view.deactivate = [this](const std::string& component) -> std::string {
