@@ -149,15 +149,33 @@ void calibrate_by_ruler(const CameraOptions& options) {
 }  // namespace
 
 void add_calibrate_camera(CLI::App& group) {
-  auto* command = group.add_subcommand("camera", "Scale and distortion of a camera from a ruler of circles");
-  command->footer("Example: invar calibrate camera --image ruler.png --ruler ruler.yaml --out result");
+  auto* command = group.add_subcommand(
+      "camera", "Scale of a camera from a ruler of circles, or its lens from views of a target");
+  command->footer(
+      "Examples: invar calibrate camera --image ruler.png --ruler ruler.yaml --out result\n"
+      "          invar calibrate camera --target target.csv --view view1.csv --view view2.csv ... --out "
+      "result\n"
+      "target.csv has x and y on the flat target, each view the same points as u [px], v [px]; the lens is "
+      "chosen by held-out views.");
   auto options = std::make_shared<CameraOptions>();
   command->add_option("--image", options->image, "picture of circles of known radius");
   command->add_option("--ruler", options->ruler,
                       "ruler.yaml: circles: [{radius: 5.0e-4}, ...] in m, any order");
+  command->add_option("--target", options->target, "points of a flat target: x [m], y [m]");
+  command
+      ->add_option("--view", options->views,
+                   "the same points in one picture: u [px], v [px]; at least four times")
+      ->type_size(1)
+      ->expected(-1);
   command->add_option("--out", options->out, "folder for camera.yaml, report.json and report.html")
       ->required();
   command->callback([options] {
+    if (options->target) {
+      if (options->image || options->ruler)
+        throw InputError{"--target", "goes with --view alone", "give either a ruler or a target"};
+      return calibrate_by_target(*options);
+    }
+    if (!options->views.empty()) throw InputError{"--target", "is missing", "give the points of the target"};
     if (!options->image) throw InputError{"--image", "is missing", "give the picture of the ruler"};
     if (!options->ruler)
       throw InputError{"--ruler", "is missing", "give ruler.yaml with the radii of the circles"};

@@ -14,4 +14,6 @@ struct CameraOptions {
   std::filesystem::path out;
 };
 
+void calibrate_by_target(const CameraOptions& options);
+
 }  // namespace invar::tools

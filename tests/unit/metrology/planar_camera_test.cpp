@@ -1,0 +1,98 @@
+#include "core/metrology/planar_camera.hpp"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+namespace invar::metrology {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix2Xd;
+using Eigen::Vector3d;
+
+// A grid of 8 x 8 points, 20 mm apart.
+Matrix2Xd grid() {
+  Matrix2Xd out(2, 64);
+  for (Index i = 0; i < 64; ++i)
+    out.col(i) << 0.02 * static_cast<double>(i % 8), 0.02 * static_cast<double>(i / 8);
+  return out;
+}
+
+PinholeCamera camera() { return {832.5, 832.53, 303.96, 206.59, 0.2, {-0.2286, 0.1904, 0.0}, {}}; }
+
+std::vector<Matrix2Xd> views(const PinholeCamera& camera, double noise, unsigned seed) {
+  const Vector3d turns[] = {
+      {0.5, 0.1, 0.0}, {-0.4, 0.3, 0.1}, {0.1, -0.6, 0.05}, {0.3, 0.4, 1.0}, {0.02, 0.1, -0.3}};
+  std::mt19937_64 random{seed};
+  std::normal_distribution<double> normal{0.0, noise};
+  std::vector<Matrix2Xd> out;
+  for (const Vector3d& turn : turns) {
+    const Eigen::Matrix3d rotation = Eigen::AngleAxisd{turn.norm(), turn.normalized()}.toRotationMatrix();
+    Matrix2Xd view(2, 64);
+    for (Index i = 0; i < 64; ++i) {
+      Vector3d point;
+      point << grid().col(i), 0.0;
+      view.col(i) = camera.project(rotation * (point - Vector3d{0.07, 0.07, 0.0}) + Vector3d{0.0, 0.0, 0.35});
+      view(0, i) += normal(random);
+      view(1, i) += normal(random);
+    }
+    out.push_back(view);
+  }
+  return out;
+}
+
+TEST(PlanarCamera, ExactViewsGiveTheCameraBack) {
+  const auto fit = calibrate_planar(grid(), views(camera(), 0.0, 1), Lens::radial_2);
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->camera.fx, camera().fx, 1e-5);
+  EXPECT_NEAR(fit->camera.fy, camera().fy, 1e-5);
+  EXPECT_NEAR(fit->camera.u0, camera().u0, 1e-5);
+  EXPECT_NEAR(fit->camera.v0, camera().v0, 1e-5);
+  EXPECT_NEAR(fit->camera.skew, camera().skew, 1e-5);
+  EXPECT_NEAR(fit->camera.radial[0], camera().radial[0], 1e-7);
+  EXPECT_NEAR(fit->camera.radial[1], camera().radial[1], 1e-6);
+  EXPECT_LT(fit->rms, 1e-6);
+}
+
+TEST(PlanarCamera, NoisyViewsGiveItBackWithinTheStatedSigmas) {
+  double chi = 0.0;
+  constexpr int trials = 12;
+  std::printf("seeds 100..%d\n", 99 + trials);
+  for (unsigned i = 0; i < trials; ++i) {
+    const auto fit = calibrate_planar(grid(), views(camera(), 0.2, 100 + i), Lens::radial_2);
+    ASSERT_TRUE(fit);
+    chi += std::pow((fit->camera.fx - camera().fx) / fit->sigma.fx, 2) +
+           std::pow((fit->camera.u0 - camera().u0) / fit->sigma.u0, 2) +
+           std::pow((fit->camera.radial[0] - camera().radial[0]) / fit->sigma.radial[0], 2);
+    EXPECT_NEAR(fit->rms, 0.2 * std::sqrt(2.0), 0.03);
+  }
+  EXPECT_NEAR(chi / (3.0 * trials), 1.0, 0.7);
+}
+
+TEST(PlanarCamera, HeldOutViewsTellTheLensFromAPinholeAndFromMoreThanItIs) {
+  const auto seen = views(camera(), 0.1, 7);
+  const auto score = [&](Lens lens) {
+    const auto left_out = leave_one_view_out(grid(), seen, lens);
+    if (!left_out) return std::nan("");
+    double sum = 0.0;
+    for (const double rms : *left_out) sum += rms * rms / 5.0;
+    return std::sqrt(sum);
+  };
+  EXPECT_GT(score(Lens::pinhole), 3.0 * score(Lens::radial_2));
+  EXPECT_LT(score(Lens::radial_2), 0.16);  // 0.141 is the noise itself
+}
+
+TEST(PlanarCamera, WhatDoesNotDetermineACameraIsRefused) {
+  const auto seen = views(camera(), 0.0, 1);
+  EXPECT_FALSE(calibrate_planar(grid(), {seen[0], seen[1]}, Lens::pinhole));
+  Matrix2Xd line = grid();
+  line.row(1).setZero();
+  EXPECT_FALSE(calibrate_planar(line, seen, Lens::pinhole));
+}
+
+}  // namespace
+}  // namespace invar::metrology

@@ -1,0 +1,198 @@
+// `invar calibrate camera --target --view`: a pinhole camera with its lens from views of a flat target.
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "core/metrology/planar_camera.hpp"
+#include "core/recording/table.hpp"
+#include "tools/commands/calibrate_camera.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix2Xd;
+
+// Two columns of coordinates. Headers are `x [in]` as everywhere, or `X_in`, as many target files have it.
+Matrix2Xd read_points(const std::filesystem::path& file, const std::array<std::string, 2>& names,
+                      const std::string& unit) {
+  recording::Table table = recording::Table::read(file);
+  for (recording::Column& column : table.columns) {
+    const auto bar = column.name.find('_');
+    if (!column.unit.empty() || bar == std::string::npos) continue;
+    column.unit = column.name.substr(bar + 1);
+    column.name = column.name.substr(0, bar);
+  }
+  Matrix2Xd out(2, static_cast<Index>(table.rows()));
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    for (recording::Column& column : table.columns) {
+      if (column.name.size() == 1 && std::tolower(column.name[0]) == names[axis][0])
+        column.name = names[axis];
+      if (column.unit == "in") {  // the inch is no unit of ours: 25.4 mm exactly
+        for (double& value : column.values) value *= 0.0254;
+        column.unit = "m";
+      }
+    }
+    const auto values = table.in(names[axis], unit);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i]))
+        throw InputError{file.string() + ": column `" + names[axis] + "`, row " + std::to_string(i + 1),
+                         "is not a finite number", "every point needs both coordinates"};
+      out(static_cast<Index>(axis), static_cast<Index>(i)) = values[i];
+    }
+  }
+  return out;
+}
+
+struct Rival {
+  metrology::PlanarCalibration fit;
+  std::vector<double> left_out;  // px, a view
+  double held_out = 0.0;         // px, RMS over the views
+};
+
+nlohmann::json numbers(const metrology::PinholeCamera& c) {
+  return {{"fx", c.fx},
+          {"fy", c.fy},
+          {"u0", c.u0},
+          {"v0", c.v0},
+          {"skew", c.skew},
+          {"radial", c.radial},
+          {"tangential", c.tangential}};
+}
+
+std::string camera_yaml(const Rival& best) {
+  const metrology::PinholeCamera &c = best.fit.camera, &s = best.fit.sigma;
+  const auto digits = [](double v) { return report::number(v, 10); };
+  const auto entry = [&](const char* name, double value, double sigma, const char* unit) {
+    return "  " + std::string{name} + ": {value: " + digits(value) + ", unit: " + unit +
+           ", sigma: " + report::number(sigma, 3) + "}\n";
+  };
+  return "invar_camera: 1\nmodel: pinhole  # lens " + std::string{metrology::name(best.fit.lens)} +
+         "\npinhole:\n" + entry("fx", c.fx, s.fx, "px") + entry("fy", c.fy, s.fy, "px") +
+         entry("u0", c.u0, s.u0, "px") + entry("v0", c.v0, s.v0, "px") + entry("skew", c.skew, s.skew, "px") +
+         entry("k1", c.radial[0], s.radial[0], "\"1\"") + entry("k2", c.radial[1], s.radial[1], "\"1\"") +
+         entry("k3", c.radial[2], s.radial[2], "\"1\"") +
+         entry("p1", c.tangential[0], s.tangential[0], "\"1\"") +
+         entry("p2", c.tangential[1], s.tangential[1], "\"1\"");
+}
+
+void write_report(const std::vector<Rival>& rivals, const Rival& best, const std::vector<Matrix2Xd>& views,
+                  const CameraOptions& options) {
+  using report::number;
+  report::Page page{"Camera",
+                    "Pinhole and lens from " + std::to_string(views.size()) + " views of a flat target"};
+  const Rival& nominal = rivals.front();
+  page.callout("Held-out views: " + number(nominal.held_out, 4) + " px with an ideal pinhole, " +
+                   number(best.held_out, 4) + " px with " + metrology::name(best.fit.lens) +
+                   " (chosen by it)",
+               "good");
+  std::vector<std::vector<std::string>> rows;
+  for (const Rival& r : rivals) {
+    std::vector<std::string> row{metrology::name(r.fit.lens), number(r.fit.rms, 4), number(r.held_out, 4)};
+    for (const double rms : r.left_out) row.push_back(number(rms, 3));
+    rows.push_back(row);
+  }
+  std::vector<std::string> header{"lens", "fitted RMS [px]", "held-out RMS [px]"};
+  for (const auto& view : options.views) header.push_back("without " + view.stem().string());
+  page.table(header, rows);
+  const metrology::PinholeCamera &c = best.fit.camera, &s = best.fit.sigma;
+  const auto row = [](const char* name, double value, double sigma, const char* unit) {
+    return std::vector<std::string>{name, number(value, 7), number(sigma, 2), unit};
+  };
+  page.table({"", "value", "sigma", "unit"},
+             {row("fx", c.fx, s.fx, "px"), row("fy", c.fy, s.fy, "px"), row("u0", c.u0, s.u0, "px"),
+              row("v0", c.v0, s.v0, "px"), row("skew", c.skew, s.skew, "px"),
+              row("k1", c.radial[0], s.radial[0], ""), row("k2", c.radial[1], s.radial[1], ""),
+              row("k3", c.radial[2], s.radial[2], ""), row("p1", c.tangential[0], s.tangential[0], ""),
+              row("p2", c.tangential[1], s.tangential[1], "")});
+  constexpr double exaggeration = 30.0;
+  const auto arrows = [&](const Rival& rival, const std::string& title) {
+    report::Series series{"", report::Series::Style::vectors, {}, {}, {}, {}, ""};
+    for (std::size_t v = 0; v < views.size(); ++v)
+      for (Index i = 0; i < views[v].cols(); ++i) {
+        series.x.push_back(views[v](0, i));
+        series.y.push_back(-views[v](1, i));
+        series.u.push_back(exaggeration * rival.fit.views[v].residuals(0, i));
+        series.v.push_back(-exaggeration * rival.fit.views[v].residuals(1, i));
+      }
+    return report::Plot{.title = title,
+                        .x_label = "u [px]",
+                        .y_label = "-v [px]",
+                        .series = {series},
+                        .x_range = {},
+                        .y_range = {},
+                        .equal_axes = true,
+                        .width = 560,
+                        .height = 440};
+  };
+  page.plots({arrows(nominal, "Ideal pinhole"), arrows(best, metrology::name(best.fit.lens))},
+             "Seen minus projected, all views, 30 times enlarged");
+  page.write(options.out / "report.html");
+}
+
+}  // namespace
+
+void calibrate_by_target(const CameraOptions& options) {
+  const Matrix2Xd target = read_points(*options.target, {"x", "y"}, "m");
+  if (target.cols() < 6)
+    throw InputError{options.target->string(), "has only " + std::to_string(target.cols()) + " points",
+                     "at least 6 are needed"};
+  std::vector<Matrix2Xd> views;
+  for (const auto& file : options.views) {
+    views.push_back(read_points(file, {"u", "v"}, "px"));
+    if (views.back().cols() != target.cols())
+      throw InputError{file.string(),
+                       "has " + std::to_string(views.back().cols()) + " points, the target " +
+                           std::to_string(target.cols()),
+                       "give the same points in the same order"};
+  }
+  if (views.size() < 4)
+    throw InputError{options.views.empty() ? std::string{"--view"} : options.views.back().string(),
+                     "only " + std::to_string(views.size()) + " views are given",
+                     "three fix a camera, a fourth tells whether it holds: give at least 4"};
+  std::vector<Rival> rivals;
+  for (const metrology::Lens lens : metrology::lenses) {
+    const auto fit = metrology::calibrate_planar(target, views, lens);
+    const auto left_out = metrology::leave_one_view_out(target, views, lens);
+    if (!fit || !left_out) continue;
+    Rival rival{*fit, *left_out, 0.0};
+    for (const double rms : *left_out) rival.held_out += rms * rms / static_cast<double>(left_out->size());
+    rival.held_out = std::sqrt(rival.held_out);
+    rivals.push_back(std::move(rival));
+  }
+  if (rivals.empty() || rivals.front().fit.lens != metrology::Lens::pinhole)
+    throw InputError{options.target->string(), "the views do not determine a camera",
+                     "tilt the target differently from view to view"};
+  const Rival& best = *std::min_element(
+      rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.held_out < b.held_out; });
+
+  std::filesystem::create_directories(options.out);
+  write_report(rivals, best, views, options);
+  nlohmann::json json;
+  json["model"] = metrology::name(best.fit.lens);
+  json["camera"] = numbers(best.fit.camera);
+  json["sigma"] = numbers(best.fit.sigma);
+  json["rms_px"] = best.fit.rms;
+  json["held_out_rms_px"] = best.held_out;
+  json["unidentified"] = nlohmann::json::array();
+  for (const Rival& r : rivals)
+    json["lenses"].push_back({{"lens", metrology::name(r.fit.lens)},
+                              {"rms_px", r.fit.rms},
+                              {"held_out_rms_px", r.held_out},
+                              {"left_out_px", r.left_out}});
+  std::ofstream{options.out / "report.json"} << json.dump(2) << '\n';
+  std::ofstream{options.out / "camera.yaml"} << camera_yaml(best);
+  for (const Rival& r : rivals)
+    std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
+              << " px, held-out views " << report::number(r.held_out, 4) << " px"
+              << (&r == &best ? "  <- chosen" : "") << '\n';
+}
+
+}  // namespace invar::tools
