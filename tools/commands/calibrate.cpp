@@ -11,6 +11,8 @@ void add_calibrate(CLI::App& program) {
   group->require_subcommand(1);
   add_calibrate_camera(*group);
   group->footer("Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result");
+  add_calibrate_dispenser(*group);
+  add_calibrate_fusion(*group);
   add_calibrate_thermal(*group);
   add_calibrate_geometric(*group);
 }

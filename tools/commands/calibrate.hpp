@@ -15,6 +15,10 @@ namespace invar::tools {
 using Predict = recording::Table (*)(const config::Yaml& model, const recording::Table& inputs);
 
 // One file each: tools/commands/calibrate_KIND.cpp. The first adds the subcommand to the group.
+void add_calibrate_dispenser(CLI::App& group);
+recording::Table predict_dispenser(const config::Yaml& model, const recording::Table& inputs);
+void add_calibrate_fusion(CLI::App& group);
+recording::Table predict_fusion(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_thermal(CLI::App& group);
 recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_geometric(CLI::App& group);

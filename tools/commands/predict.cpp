@@ -13,6 +13,8 @@ namespace {
 
 const std::map<std::string, Predict>& kinds() {
   static const std::map<std::string, Predict> table{
+      {"dispenser", predict_dispenser},
+      {"fusion", predict_fusion},
       {"thermal", predict_thermal},
       {"geometric", predict_geometric},
   };

@@ -8,6 +8,7 @@
 
 #include "core/numerics/lookup_table.hpp"
 #include "core/numerics/rbf_descent.hpp"
+#include "core/numerics/rbf_kernel.hpp"
 #include "core/numerics/rbf_network.hpp"
 #include "core/numerics/rbf_refine.hpp"
 #include "core/numerics/rbf_ridge.hpp"
@@ -144,6 +145,38 @@ TEST(RbfRidge, LearnsASurfaceOfTwoInputs) {
   const RidgeFit fit = fit_ridge(x, y, options);
   EXPECT_NEAR(fit.network(Eigen::Vector2d{0.0975, 28.25}), surface(0.0975, 1.25), 5e-3);
   EXPECT_NEAR(fit.network(Eigen::Vector2d{0.0975, 35.0}), fit.network(Eigen::Vector2d{0.0975, 30.0}), 1e-12);
+}
+
+TEST(RbfKernel, LeaveOneOutInClosedFormEqualsFittingWithoutEachReading) {
+  std::mt19937 random{8};
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd x(2, 20);
+  Eigen::VectorXd y(20);
+  for (Eigen::Index i = 0; i < 20; ++i) {
+    x.col(i) << normal(random), normal(random);
+    y(i) = std::sin(x(0, i)) + 0.3 * x(1, i) * x(1, i) + 0.05 * normal(random);
+  }
+  y.array() -= y.mean();  // the mean is taken from all readings
+  KernelOptions options;
+  options.input_scale = {1.0, 2.0};
+  options.lengths = {1.1};
+  options.ridges = {0.02};
+  const KernelFit all = fit_kernel(x, y, options);
+  Eigen::MatrixXd k(19, 19);
+  Eigen::VectorXd t(19);
+  const auto kernel = [&](Eigen::Index i, Eigen::Index j) {
+    const double a = x(0, i) - x(0, j);
+    const double b = (x(1, i) - x(1, j)) / 2.0;
+    return std::exp(-0.5 * (a * a + b * b) / (1.1 * 1.1));
+  };
+  for (Eigen::Index i = 0; i < 19; ++i) {
+    t(i) = y(i + 1);
+    for (Eigen::Index j = 0; j < 19; ++j) k(i, j) = kernel(i + 1, j + 1) + (i == j ? 0.02 : 0.0);
+  }
+  const Eigen::VectorXd w = k.ldlt().solve(t);
+  double predicted = 0.0;
+  for (Eigen::Index i = 0; i < 19; ++i) predicted += w(i) * kernel(0, i + 1);
+  EXPECT_NEAR(all.leave_one_out(0), y(0) - predicted, 1e-9);
 }
 
 TEST(RbfDescent, MovingCentresRunAwayAndFixedOnesApproachTheCurve) {

@@ -1,0 +1,41 @@
+#include "core/compensation/trajectory_file.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace invar::compensation {
+
+void write_trajectory(ModelText& text, const metrology::DropletTrajectory& trajectory) {
+  const Eigen::Vector3d covariance{trajectory.covariance(0, 0), trajectory.covariance(0, 1),
+                                   trajectory.covariance(1, 1)};
+  text.comment("landed - aimed = placement + height * (slope + slowness * stage velocity); m, m/m, s/m")
+      .numbers("placement", Eigen::VectorXd{trajectory.placement})
+      .numbers("slope", Eigen::VectorXd{trajectory.slope})
+      .number("slowness", trajectory.slowness)
+      .comment("of (placement, slope) in one direction: xx, xy, yy")
+      .numbers("covariance", Eigen::VectorXd{covariance});
+  if (std::isfinite(trajectory.slowness_sigma)) text.number("slowness_sigma", trajectory.slowness_sigma);
+  text.open("heights")
+      .number("least", trajectory.least_height)
+      .number("most", trajectory.most_height)
+      .close();
+}
+
+metrology::DropletTrajectory read_trajectory(const config::Node& root) {
+  metrology::DropletTrajectory trajectory;
+  const auto placement = exactly(root.required("placement"), 2, "m");
+  const auto slope = exactly(root.required("slope"), 2, "1");
+  const auto covariance = exactly(root.required("covariance"), 3, "1");
+  trajectory.placement << placement[0], placement[1];
+  trajectory.slope << slope[0], slope[1];
+  trajectory.covariance << covariance[0], covariance[1], covariance[1], covariance[2];
+  trajectory.slowness = root.number("slowness", "s/m", Range::not_negative());
+  trajectory.slowness_sigma =
+      root.number("slowness_sigma", "s/m", Range::not_negative(), std::numeric_limits<double>::infinity());
+  const auto heights = root.required("heights");
+  trajectory.least_height = heights.number("least", "m");
+  trajectory.most_height = heights.number("most", "m");
+  return trajectory;
+}
+
+}  // namespace invar::compensation

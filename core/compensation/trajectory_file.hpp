@@ -1,0 +1,14 @@
+// The droplet trajectory as a file.
+#pragma once
+
+#include "core/compensation/model_file.hpp"
+#include "core/metrology/droplet_trajectory.hpp"
+
+namespace invar::compensation {
+
+void write_trajectory(ModelText& text, const metrology::DropletTrajectory& trajectory);
+
+/// Reads what `write_trajectory` wrote. Faults go to the document's list; the caller ends with `finish`.
+metrology::DropletTrajectory read_trajectory(const config::Node& root);
+
+}  // namespace invar::compensation

@@ -1,0 +1,160 @@
+// Droplet trajectories: golden numbers, recovery of known parameters, what one height leaves open.
+#include "core/metrology/droplet_trajectory.hpp"
+
+#include <gmock/gmock.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace invar::metrology {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+DropletTrajectory seed_trajectory() {
+  DropletTrajectory path;
+  path.placement << 2.0e-6, 118.2e-6;
+  const double tilt = 0.304 * degree;
+  const double azimuth = 0.9739 * degree;
+  path.slope << std::tan(tilt) * std::cos(azimuth), std::tan(tilt) * std::sin(azimuth);
+  return path;
+}
+
+/// Droplets at each height with scatter s0 and s1 per height; every `satellite`-th one a satellite (0: none).
+Droplets print(const DropletTrajectory& path, const std::vector<double>& heights, int each, double s0,
+               double s1, int satellite, unsigned seed, double stage_speed = 0.0) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  const auto n = static_cast<Eigen::Index>(heights.size()) * each;
+  Droplets drops{Eigen::Matrix2Xd(2, n), Eigen::Matrix2Xd(2, n), Eigen::VectorXd(n), {}, Eigen::VectorXd(n)};
+  if (stage_speed > 0.0) drops.stage_velocity = Eigen::Matrix2Xd::Zero(2, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double h = heights[static_cast<std::size_t>(i / each)];
+    drops.target.col(i) << 1e-3 * static_cast<double>(i % 10), 1e-3 * static_cast<double>(i / 10);
+    drops.height(i) = h;
+    Eigen::Vector2d velocity = Eigen::Vector2d::Zero();
+    if (stage_speed > 0.0) {
+      velocity.x() = i % 2 == 0 ? stage_speed : -stage_speed;
+      drops.stage_velocity.col(i) = velocity;
+    }
+    const double s = std::hypot(s0, s1 * h);
+    drops.landed.col(i) =
+        drops.target.col(i) + path.offset(h, velocity) + s * Eigen::Vector2d{normal(random), normal(random)};
+    drops.diameter(i) = 0.62e-3 + 8e-6 * normal(random);
+    if (satellite > 0 && i % satellite == 2) {
+      drops.landed.col(i) += 4e-4 * Eigen::Vector2d{normal(random), normal(random)}.normalized();
+      drops.diameter(i) = 0.15e-3;
+    }
+  }
+  return drops;
+}
+
+TEST(DropletTrajectory, HasTheGoldenOffsets) {
+  const DropletTrajectory path = seed_trajectory();
+  EXPECT_NEAR(path.slope.x(), 5.30508e-3, 1e-8);
+  EXPECT_NEAR(path.slope.y(), 9.01832e-5, 1e-9);
+  EXPECT_TRUE(path.offset(2e-3).isApprox(Eigen::Vector2d{12.610e-6, 118.380e-6}, 1e-4));
+  EXPECT_TRUE(path.offset(20e-3).isApprox(Eigen::Vector2d{108.102e-6, 120.004e-6}, 1e-5));
+  EXPECT_NEAR(path.tilt() / degree, 0.304, 1e-9);
+  EXPECT_NEAR(path.azimuth() / degree, 0.9739, 1e-9);
+  // Carry by the stage: 72 mm/s, 2 m/s, 2 mm and 20 mm.
+  DropletTrajectory moving = path;
+  moving.slowness = 0.5;
+  EXPECT_NEAR((moving.offset(2e-3, {0.072, 0.0}) - path.offset(2e-3)).x(), 72e-6, 1e-12);
+  EXPECT_NEAR((moving.offset(20e-3, {0.072, 0.0}) - path.offset(20e-3)).x(), 720e-6, 1e-12);
+}
+
+TEST(TrajectoryIdentification, FindsTheParametersWithTheSigmasItStates) {
+  // Section 11: 20 um of scatter, 20 droplets at 2 and at 20 mm: tilt 0.020 deg, xe 5.0 um (1 sigma).
+  const DropletTrajectory truth = seed_trajectory();
+  double tilt_squares = 0.0;
+  double placement_squares = 0.0;
+  constexpr int trials = 60;
+  for (unsigned seed = 1; seed <= trials; ++seed) {
+    const TrajectoryFit fit = identify_trajectory(print(truth, {2e-3, 20e-3}, 20, 20e-6, 0.0, 0, seed));
+    EXPECT_THAT(fit.unidentified, ::testing::IsEmpty());
+    tilt_squares += std::pow((fit.trajectory.slope - truth.slope).x(), 2) / trials;
+    placement_squares += std::pow((fit.trajectory.placement - truth.placement).x(), 2) / trials;
+    EXPECT_NEAR(fit.tilt_sigma / degree, 0.020, 0.008);
+  }
+  EXPECT_NEAR(std::sqrt(tilt_squares) / degree, 0.020, 0.006);
+  EXPECT_NEAR(std::sqrt(placement_squares), 5.0e-6, 1.5e-6);
+}
+
+TEST(TrajectoryIdentification, RejectsSatellitesWithAndWithoutTheirDiameter) {
+  const DropletTrajectory truth = seed_trajectory();
+  for (const bool with_diameter : {true, false})
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      Droplets drops = print(truth, {2e-3, 20e-3}, 20, 10e-6, 0.5e-3, 5, seed);
+      if (!with_diameter) drops.diameter.resize(0);
+      const TrajectoryFit fit = identify_trajectory(drops);
+      for (Eigen::Index i = 2; i < 40; i += 5) EXPECT_EQ(fit.kept(i), 0.0) << seed;
+      EXPECT_GE(fit.kept.sum(), 28.0) << seed;
+      for (const double h : {2e-3, 10e-3, 20e-3})
+        EXPECT_LT((fit.trajectory.offset(h) - truth.offset(h)).norm(),
+                  4.5 * std::max(fit.trajectory.sigma(h), 1e-6))
+            << seed;
+    }
+}
+
+TEST(TrajectoryIdentification, WeighsDropletsByTheScatterOfTheirHeight) {
+  const DropletTrajectory truth = seed_trajectory();
+  double weighted = 0.0;
+  double plain = 0.0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const Droplets drops = print(truth, {1e-3, 10e-3, 30e-3}, 20, 2e-6, 2e-3, 0, seed);
+    weighted += (identify_trajectory(drops).trajectory.placement - truth.placement).squaredNorm();
+    Eigen::MatrixXd a(60, 2);
+    a << Eigen::VectorXd::Ones(60), drops.height;
+    const Eigen::VectorXd y = (drops.landed - drops.target).row(0).transpose();
+    const Eigen::VectorXd z = (drops.landed - drops.target).row(1).transpose();
+    const Eigen::Matrix2d inverse = (a.transpose() * a).inverse();
+    const Eigen::Vector2d at{(inverse * a.transpose() * y)(0), (inverse * a.transpose() * z)(0)};
+    plain += (at - truth.placement).squaredNorm();
+  }
+  EXPECT_LT(weighted, 0.5 * plain);
+}
+
+TEST(TrajectoryIdentification, SaysThatOneHeightCannotTellPlacementFromTilt) {
+  const DropletTrajectory truth = seed_trajectory();
+  const TrajectoryFit fit = identify_trajectory(print(truth, {5e-3}, 20, 10e-6, 0.0, 6, 3));
+  ASSERT_EQ(fit.unidentified.size(), 1U);
+  EXPECT_THAT(fit.unidentified.front(), ::testing::HasSubstr("placement"));
+  EXPECT_THAT(fit.unidentified.front(), ::testing::HasSubstr("tilt"));
+  EXPECT_LT((fit.trajectory.offset(5e-3) - truth.offset(5e-3)).norm(), 10e-6);
+  EXPECT_GT(fit.trajectory.sigma(20e-3), 10.0 * fit.trajectory.sigma(5e-3));
+}
+
+TEST(TrajectoryIdentification, FindsTheEjectionSpeedFromBothDirections) {
+  DropletTrajectory truth = seed_trajectory();
+  truth.slowness = 0.5;  // 2 m/s
+  const TrajectoryFit fit = identify_trajectory(print(truth, {2e-3, 20e-3}, 20, 10e-6, 0.0, 0, 4, 0.072));
+  EXPECT_NEAR(1.0 / fit.trajectory.slowness, 2.0, 0.05);
+}
+
+TEST(TrajectoryIdentification, AcceptsOneDropletAtEachOfSeveralHeights) {
+  const DropletTrajectory truth = seed_trajectory();
+  const TrajectoryFit fit = identify_trajectory(print(truth, {2e-3, 8e-3, 14e-3, 20e-3}, 1, 5e-6, 0.0, 0, 5));
+  EXPECT_EQ(fit.kept.sum(), 4.0);
+  EXPECT_LT((fit.trajectory.offset(10e-3) - truth.offset(10e-3)).norm(), 15e-6);
+}
+
+TEST(DropletStatistics, AreThoseOfTheSeedsSecondCase) {
+  // 400 readings of a normal distribution: 68.3 and 95.4 %, compatible with normal.
+  std::mt19937 random{6};
+  std::normal_distribution<double> normal{0.664e-3, 0.008e-3};
+  Eigen::VectorXd d(400);
+  for (double& value : d) value = normal(random);
+  const DropletStatistics statistics = droplet_statistics(d);
+  EXPECT_NEAR(statistics.mean, 0.664e-3, 2e-6);
+  EXPECT_NEAR(statistics.deviation, 0.008e-3, 1e-6);
+  EXPECT_NEAR(statistics.mean_error, 0.4e-6, 0.05e-6);
+  EXPECT_NEAR(statistics.within_one, 0.683, 0.06);
+  EXPECT_NEAR(statistics.within_two, 0.954, 0.03);
+  EXPECT_GT(statistics.probability, 0.05);
+}
+
+}  // namespace
+}  // namespace invar::metrology
