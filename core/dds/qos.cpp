@@ -73,7 +73,7 @@ Profile described_common(const Qos& qos) {
 fdds::DataWriterQos writer_qos(const Profile& p) {
   fdds::DataWriterQos qos;
   set_common(qos, p);
-  if (p.liveliness == Liveliness::automatic && p.lease.ns != 0)
+  if (p.lease.ns != 0)
     qos.liveliness().announcement_period = wire_time(p.lease / 3);
   qos.ownership_strength().value = static_cast<std::uint32_t>(p.strength);
   qos.reliability().max_blocking_time = wire_time(p.blocking);
