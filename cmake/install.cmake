@@ -1,0 +1,19 @@
+# `cmake --install build --prefix DIR` makes a package for components outside the tree: find_package(invar).
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# What a component needs: the API, the types. Tools and devices stay inside.
+set(INVAR_PACKAGE invar_base invar_config invar_component invar_idl)
+install(TARGETS ${INVAR_PACKAGE} EXPORT invar
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/idl/generated/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar
+  FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+install(TARGETS invar RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(EXPORT invar NAMESPACE invar:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar FILE invar-targets.cmake)
+configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/invar-config.cmake.in ${CMAKE_BINARY_DIR}/invar-config.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/invar-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/invar-config.cmake ${CMAKE_BINARY_DIR}/invar-config-version.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)
+install(DIRECTORY deployment/ DESTINATION ${CMAKE_INSTALL_DATADIR}/invar/deployment)
