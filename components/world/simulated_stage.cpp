@@ -16,7 +16,7 @@ struct SimulatedStage::Device {
                .motor_constant = parameters.motor_constant,
                .viscous_damping = parameters.viscous_damping},
               {}},
-        motor{owner, "motor_" + letter(axis_number)},
+        motor{owner, "motor_" + letter(axis_number), {.optional = true}},
         feedback{owner, "feedback_" + letter(axis_number)} {}
 
   static std::string letter(int axis) {

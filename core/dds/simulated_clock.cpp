@@ -199,7 +199,8 @@ void SimulatedClockClient::bind(OutputPort& port, Duration separation) {
   Profile outside = node_.profile(port.profile);
   outside.reliable = true;
   outside.keep_all = true;
-  outside.depth = 2000;
+  outside.depth = 1000;
+  outside.max_instances = 2;  // Fast DDS allocates depth times instances at once; a port has one
   outside.lifespan = {};
   outside.flow = 0;
   outside.blocking = Duration::milliseconds(10'000);

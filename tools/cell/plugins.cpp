@@ -8,7 +8,7 @@ void load_plugins(const config::Cell& cell, Registry& registry, const config::No
   const auto places = root["plugins"].children();
   for (std::size_t i = 0; i < cell.plugins.size(); ++i) {
     if (!std::filesystem::is_regular_file(cell.plugins[i])) continue;  // read_cell has said so
-    void* library = dlopen(cell.plugins[i].c_str(), RTLD_NOW | RTLD_LOCAL);
+    void* library = dlopen(std::filesystem::absolute(cell.plugins[i]).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
       places[i].fault(std::string{"cannot be loaded: "} + dlerror(),
                       "build it against this version of Invar");

@@ -192,7 +192,7 @@ class RunningProcess {
           executor_.advance_to(until);
           return std::string{};
         },
-        [&] { return !runs_job_ || job_ended_.load(); }, stop);
+        [&] { return !options_.job.empty() && (!runs_job_ || job_ended_.load()); }, stop);
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
     status_ = control_.status();
     control_.stop();
