@@ -34,6 +34,8 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
   text.close();
   text.numbers("tool", model.tool.data(), 3);
   text.text("outside", "end values are held");
+  text.comment("Lost motion of each axis [m], forward minus backward.");
+  text.numbers("reversal", model.reversal.data(), 3);
   text.open("squareness");
   for (int pair = 0; pair < squareness_count; ++pair) {
     const double cosine = model.squareness[index(pair)];
@@ -88,6 +90,8 @@ GeometricModel read_geometric(const config::Node& root) {
     if (model.chain.has(k)) model.travel[index(k)] = travel.required(letter(k)).as_range("m");
   const auto tool = exactly(root.required("tool"), 3, "m");
   model.tool = {tool[0], tool[1], tool[2]};
+  const auto reversal = exactly(root.required("reversal"), 3, "m");
+  for (std::size_t k = 0; k < 3; ++k) model.reversal[k] = reversal[k];
   const config::Node squareness = root.required("squareness");
   for (int pair = 0; pair < squareness_count; ++pair) {
     const config::Node one = squareness[metrology::squareness_iso_name(pair)];

@@ -31,6 +31,9 @@ struct GeometricModel {
   std::array<Eigen::VectorXd, component_count> sigma;  // of the component at its splines' knots
   Squareness squareness{};
   Squareness squareness_sigma{};
+  /// Lost motion of each axis [m]: where it stands after moving forward minus after moving backward, half to either side
+  /// of `error`. Zero where no line along the axis was measured both ways.
+  std::array<double, 3> reversal{};
   SigmaGrid field_sigma;
 
   [[nodiscard]] double component(int component, double q) const noexcept;

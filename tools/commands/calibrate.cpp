@@ -15,6 +15,8 @@ void add_calibrate(CLI::App& program) {
   add_calibrate_fusion(*group);
   add_calibrate_thermal(*group);
   add_calibrate_geometric(*group);
+  add_calibrate_plan(*group);
+  add_calibrate_controller(*group);
 }
 
 }  // namespace invar::tools

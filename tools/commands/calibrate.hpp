@@ -22,6 +22,8 @@ recording::Table predict_fusion(const config::Yaml& model, const recording::Tabl
 void add_calibrate_thermal(CLI::App& group);
 recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_geometric(CLI::App& group);
+void add_calibrate_plan(CLI::App& group);
+void add_calibrate_controller(CLI::App& group);
 recording::Table predict_geometric(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_camera(CLI::App& group);
 

@@ -22,6 +22,7 @@ struct Options {
   std::filesystem::path out;
   std::string method = "full";
   double interval = 0.0;
+  bool study = false;
 };
 
 void calibrate(const Options& options) {
@@ -36,6 +37,7 @@ void calibrate(const Options& options) {
                                         : metrology::IdentificationMethod::displacement;
   result.found = metrology::identify(result.machine, result.input.lines, how);
   evaluate(result);
+  if (options.study) study_intervals(result);
 
   compensation::ModelText text{"geometric", {options.machine, options.lines}};
   describe_identification(result, text);
@@ -67,6 +69,7 @@ void add_calibrate_geometric(CLI::App& group) {
       ->capture_default_str();
   command->add_option("--interval", options->interval, "use only readings at this interval along a line [m]")
       ->check(CLI::PositiveNumber);
+  command->add_flag("--interval-study", options->study, "also report the accuracy at coarser data intervals");
   command->callback([options] { calibrate(*options); });
 }
 

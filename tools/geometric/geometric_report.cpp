@@ -79,6 +79,60 @@ void evaluate(GeometricResult& result) {
   result.unseen_rms = std::sqrt(unseen / points);
   result.knowledge = metrology::identifiability(found.basis, found.posterior, found.model.squareness,
                                                 found.model.travel, found.model.tool);
+  if (result.method == "full") result.next = metrology::next_lines(result.machine, found, 3);
+}
+
+void study_intervals(GeometricResult& result) {
+  const Identification& all = result.found;
+  for (const std::size_t step : {1U, 2U, 4U, 8U}) {
+    std::vector<metrology::DisplacementLine> kept;
+    double interval = 0.0;
+    double length = 0.0;
+    int points = 0;
+    for (std::size_t l = 0; l < all.lines.size(); ++l) {
+      const auto& line = all.lines[l];
+      const auto source = std::find_if(result.input.lines.begin(), result.input.lines.end(),
+                                       [&](const auto& one) { return one.name == line.name; });
+      // Points by their order along the beam; every step-th stays.
+      std::vector<std::pair<double, std::size_t>> order;
+      for (std::size_t j = 0; j < line.points.size(); ++j)
+        order.emplace_back(line.beam.direction.dot(line.points[j] - line.beam.start), j);
+      std::sort(order.begin(), order.end());
+      std::vector<bool> stays(line.points.size(), false);
+      for (std::size_t i = 0; i < order.size(); i += step) stays[order[i].second] = true;
+      if (line.beam.length > length) {
+        length = line.beam.length;
+        interval = line.beam.length * static_cast<double>(step) / static_cast<double>(order.size() - 1);
+      }
+      metrology::DisplacementLine thinned{line.name, {}};
+      for (std::size_t i = 0; i < source->readings.size(); ++i)
+        if (stays[static_cast<std::size_t>(line.point_of[i])])
+          thinned.readings.push_back(source->readings[i]);
+      points += static_cast<int>((order.size() + step - 1) / step);
+      if (order.size() > 2 * step && !thinned.readings.empty()) kept.push_back(std::move(thinned));
+    }
+    if (kept.size() < all.lines.size()) break;
+    metrology::IdentificationOptions how;
+    how.search_prior = false;
+    how.prior = all.prior;
+    how.misfit = all.misfit;
+    const auto found = metrology::identify(result.machine, kept, how);
+    double square = 0.0;
+    double count = 0.0;
+    for (const auto& line : all.lines) {
+      Eigen::VectorXd rest = line.deviation - metrology::predicted_readings(found.model, line);
+      std::vector<double> good;
+      for (Eigen::Index j = 0; j < rest.size(); ++j)
+        if (std::isfinite(rest[j])) good.push_back(rest[j]);
+      double mean = 0.0;
+      for (const double value : good) mean += value / static_cast<double>(good.size());
+      for (const double value : good) square += (value - mean) * (value - mean);
+      count += static_cast<double>(good.size());
+    }
+    const auto knowledge = metrology::identifiability(found.basis, found.posterior, found.model.squareness,
+                                                      found.model.travel, found.model.tool);
+    result.intervals.push_back({interval, points, std::sqrt(square / count), knowledge.volumetric_rms});
+  }
 }
 
 nlohmann::json report_json(const GeometricResult& result) {
@@ -102,6 +156,16 @@ nlohmann::json report_json(const GeometricResult& result) {
   for (const auto& component : result.knowledge.components)
     json["components"][component.name] = {{"sigma", component.sigma},
                                           {"prior_variance_left", component.left}};
+  for (const auto& next : result.next)
+    json["next_lines"].push_back({{"line", next.line.name},
+                                  {"from", {next.line.from.x(), next.line.from.y(), next.line.from.z()}},
+                                  {"to", {next.line.to.x(), next.line.to.y(), next.line.to.z()}},
+                                  {"volumetric_rms_predicted", next.volumetric_rms}});
+  for (const auto& one : result.intervals)
+    json["intervals"].push_back({{"interval", one.interval},
+                                 {"points", one.points},
+                                 {"points_rms", one.points_rms},
+                                 {"volumetric_rms_predicted", one.expected_rms}});
   for (int pair = 0; pair < metrology::squareness_count; ++pair) {
     const auto p = static_cast<std::size_t>(pair);
     if (found.model.squareness_sigma[p] <= 0.0) continue;
@@ -137,6 +201,9 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   out << " (RMS)\nexpected over the volume: " << micro(result.knowledge.volumetric_rms)
       << " um (RMS of the vector)\n";
   for (const auto& one : result.knowledge.unidentified) out << "not identified: " << one.words() << '\n';
+  if (!result.next.empty() && !result.knowledge.unidentified.empty())
+    out << "the next line that would help most: " << result.next.front().line.name << ", expected then "
+        << micro(result.next.front().volumetric_rms) << " um\n";
 }
 
 void describe_identification(const GeometricResult& result, compensation::ModelText& text) {

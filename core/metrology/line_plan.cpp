@@ -1,0 +1,241 @@
+#include "core/metrology/line_plan.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace invar::metrology {
+
+namespace {
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+/// A point whose coordinates along the chain's axes are parts of their travels.
+Eigen::Vector3d at(const Machine& machine, double a, double b, double c) {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  const std::array<double, 3> parts{a, b, c};
+  for (int place = 0; place < machine.chain.axes; ++place) {
+    const int axis = machine.chain.order[index(place)];
+    const Range r = machine.travel[index(axis)];
+    point[axis] = r.lower + parts[index(place)] * r.width();
+  }
+  return point;
+}
+
+/// "y along", "x at y", "xy diagonal": built from what moves and what stands off.
+std::string name_of(const Machine& machine, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  std::string moving;
+  std::string beside;
+  for (int place = 0; place < machine.chain.axes; ++place) {
+    const int axis = machine.chain.order[index(place)];
+    const Range r = machine.travel[index(axis)];
+    const double part = (to[axis] - from[axis]) / r.width();
+    const std::string letter(1, metrology::axis_letters[index(axis)]);
+    if (std::abs(part) > 1e-9) {
+      moving +=
+          (part < 0 ? "-" : (moving.empty() ? "" : "+")) + (std::abs(part) < 0.9 ? letter + "/2" : letter);
+    } else if (from[axis] > r.lower + 1e-9) {
+      beside += (beside.empty() ? " at " : " ") + letter + "=" +
+                std::to_string(std::lround(from[axis] * 1e3)) + "mm";
+    }
+  }
+  return moving + beside;
+}
+
+PlannedLine line(const Machine& machine, const std::array<double, 3>& from, const std::array<double, 3>& to) {
+  PlannedLine result;
+  result.from = at(machine, from[0], from[1], from[2]);
+  result.to = at(machine, to[0], to[1], to[2]);
+  result.tool = machine.tool;
+  result.name = name_of(machine, result.from, result.to);
+  return result;
+}
+
+/// Directions of the field's shape at a grid: V'V summed, so that the trace with a covariance is a squared RMS.
+Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
+                             const std::array<Range, 3>& travel, const Eigen::Vector3d& tool) {
+  const auto grid = volume_grid(basis.chain, travel, 5);
+  const RigidPart rigid = rigid_part(basis, squareness, grid, tool);
+  Eigen::MatrixXd all(3 * static_cast<Eigen::Index>(grid.size()), basis.size);
+  for (std::size_t g = 0; g < grid.size(); ++g) {
+    Eigen::MatrixXd map = shape_map(basis, squareness, rigid, grid[g], tool);
+    for (int k = 0; k < 3; ++k)
+      if (!basis.chain.has(k)) map.row(k).setZero();
+    all.middleRows<3>(3 * static_cast<Eigen::Index>(g)) = map;
+  }
+  return all.transpose() * all / static_cast<double>(grid.size());
+}
+
+}  // namespace
+
+std::vector<PlannedLine> recipe_lines(const Machine& machine, int level) {
+  using P = std::array<double, 3>;
+  using Ends = std::pair<P, P>;
+  std::vector<Ends> ends;
+  if (machine.chain.axes == 2) {
+    ends = {{P{0, 0, 0}, P{1, 0, 0}},
+            {P{0, 0, 0}, P{0, 1, 0}},
+            {P{0, 1, 0}, P{1, 1, 0}},
+            {P{0, 0, 0}, P{1, 1, 0}},
+            {P{0, 0, 0}, P{.5, 1, 0}}};
+    if (level >= 1) ends.emplace_back(P{1, 0, 0}, P{0, 1, 0});
+    if (level >= 2) ends.emplace_back(P{0, 0, 0}, P{1, .5, 0});
+  } else {
+    ends = {{P{0, 0, 0}, P{1, 0, 0}},  {P{0, 0, 0}, P{0, 1, 0}},  {P{0, 0, 0}, P{0, 0, 1}},
+            {P{0, 1, 0}, P{1, 1, 0}},  {P{0, 0, 1}, P{1, 0, 1}},  {P{0, 0, 1}, P{0, 1, 1}},
+            {P{0, 0, 0}, P{1, 1, 0}},  {P{0, 0, 0}, P{1, .5, 0}}, {P{0, 0, 0}, P{1, 0, 1}},
+            {P{0, 0, 0}, P{1, 0, .5}}, {P{0, 0, 0}, P{0, 1, 1}},  {P{0, 0, 0}, P{0, 1, .5}},
+            {P{0, 1, 0}, P{1, 1, 1}},  {P{0, 0, 1}, P{1, 1, 1}}};
+    if (level >= 1) {
+      ends.emplace_back(P{1, 0, 0}, P{0, 1, 0});
+      ends.emplace_back(P{1, 0, 0}, P{0, 0, 1});
+      ends.emplace_back(P{0, 1, 0}, P{0, 0, 1});
+    }
+    if (level >= 2) {
+      ends.emplace_back(P{0, 0, 0}, P{.5, 1, 0});
+      ends.emplace_back(P{0, 0, 0}, P{.5, 0, 1});
+      ends.emplace_back(P{0, 0, 0}, P{0, .5, 1});
+    }
+  }
+  std::vector<PlannedLine> lines;
+  for (const auto& [from, to] : ends) lines.push_back(line(machine, from, to));
+  return lines;
+}
+
+std::vector<PlannedLine> candidate_lines(const Machine& machine) {
+  std::vector<PlannedLine> lines = recipe_lines(machine, 2);
+  const bool space = machine.chain.axes == 3;
+  for (int place = 0; place < machine.chain.axes; ++place) {  // the edges
+    for (int other = 0; other < (space ? 4 : 2); ++other) {
+      std::array<double, 3> from{};
+      from[index((place + 1) % machine.chain.axes)] = other % 2;
+      if (space) from[index((place + 2) % 3)] = other / 2;
+      std::array<double, 3> to = from;
+      to[index(place)] = 1.0;
+      lines.push_back(line(machine, from, to));
+    }
+  }
+  using P = std::array<double, 3>;
+  if (space) {
+    lines.push_back(line(machine, P{0, 0, 0}, P{1, 1, 1}));
+    lines.push_back(line(machine, P{1, 0, 0}, P{0, 1, 1}));
+    lines.push_back(line(machine, P{0, 1, 0}, P{1, 0, 1}));
+    lines.push_back(line(machine, P{0, 0, 1}, P{1, 1, 0}));
+    lines.push_back(line(machine, P{0, .5, 0}, P{1, 0, 1}));
+    lines.push_back(line(machine, P{.5, 0, 0}, P{0, 1, 1}));
+    lines.push_back(line(machine, P{0, 0, .5}, P{1, 1, 0}));
+  } else {
+    lines.push_back(line(machine, P{1, 0, 0}, P{.5, 1, 0}));
+    lines.push_back(line(machine, P{0, 1, 0}, P{1, .5, 0}));
+    lines.push_back(line(machine, P{0, .5, 0}, P{1, 0, 0}));
+  }
+  std::vector<PlannedLine> unique;
+  for (auto& one : lines)
+    if (std::none_of(unique.begin(), unique.end(), [&](const PlannedLine& u) {
+          return ((u.from - one.from).norm() < 1e-9 && (u.to - one.to).norm() < 1e-9) ||
+                 ((u.from - one.to).norm() < 1e-9 && (u.to - one.from).norm() < 1e-9);
+        }))
+      unique.push_back(std::move(one));
+  return unique;
+}
+
+int points_of(const PlannedLine& planned, double interval) {
+  return std::max(2, static_cast<int>(std::lround((planned.to - planned.from).norm() / interval)) + 1);
+}
+
+CondensedLine planned_equations(const PlannedLine& planned, const Effort& effort) {
+  CondensedLine result;
+  result.name = planned.name;
+  result.beam.start = planned.from;
+  result.beam.start_tool = planned.tool;
+  result.beam.length = (planned.to - planned.from).norm();
+  result.beam.direction = (planned.to - planned.from) / result.beam.length;
+  const int points = points_of(planned, effort.interval);
+  for (int j = 0; j < points; ++j) {
+    result.points.push_back(planned.from + (planned.to - planned.from) * j / (points - 1));
+    result.tools.push_back(planned.tool);
+  }
+  const double mass = effort.passes / (effort.noise * effort.noise);
+  result.information = -mass / points * Eigen::MatrixXd::Ones(points, points);
+  result.information.diagonal().array() += mass;
+  result.weighted = Eigen::VectorXd::Zero(points);
+  result.deviation = Eigen::VectorXd::Zero(points);
+  result.deviation_sigma = Eigen::VectorXd::Constant(points, 1.0 / std::sqrt(mass));
+  result.noise.noise = effort.noise;
+  result.noise.readings = points * effort.passes;
+  return result;
+}
+
+Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
+                   const GeometricPrior& given, double misfit) {
+  Expectation result;
+  GeometricPrior prior = given;
+  double longest = 0.0;
+  std::array<int, 3> intervals{1, 1, 1};
+  for (int k = 0; k < 3; ++k) {
+    if (!machine.chain.has(k)) continue;
+    const double width = machine.travel[index(k)].width();
+    longest = std::max(longest, width);
+    intervals[index(k)] = std::clamp(static_cast<int>(std::lround(width / effort.interval)), 8, 20);
+  }
+  for (double& length : prior.length)
+    if (!(length > 0.0)) length = longest / 3.0;
+  std::vector<Eigen::Vector3d> tools{machine.tool};
+  for (const auto& one : lines) tools.push_back(one.tool);
+  const GeometricBasis basis = make_basis(machine.chain, machine.travel, intervals, tools);
+  std::vector<CondensedLine> equations;
+  std::vector<LineRows> rows;
+  for (const auto& one : lines) {
+    equations.push_back(planned_equations(one, effort));
+    rows.push_back(rows_of(equations.back(), basis, {}));
+    result.readings += equations.back().noise.readings;
+  }
+  const Posterior posterior = solve(assemble(equations, rows, basis.size, misfit), basis, prior);
+  result.knowledge = identifiability(basis, posterior, {}, machine.travel, machine.tool);
+  return result;
+}
+
+std::vector<NextLine> next_lines(const Machine& machine, const Identification& found, std::size_t count) {
+  const auto& basis = found.basis;
+  const Eigen::MatrixXd weight =
+      shape_weight(basis, found.model.squareness, found.model.travel, found.model.tool);
+  const Eigen::MatrixXd& covariance = found.posterior.covariance;
+  const double now = covariance.cwiseProduct(weight).sum();
+  const Eigen::MatrixXd spread = covariance * weight * covariance;
+  double readings = 0.0;
+  double points = 0.0;
+  for (const auto& one : found.lines) {
+    readings += one.noise.readings;
+    points += static_cast<double>(one.points.size());
+  }
+  constexpr int coarse = 12;  // points are enough to rank; each stands for its share of the readings
+  const double per_point = readings / points * (points / static_cast<double>(found.lines.size())) / coarse;
+  const double variance = found.noise * found.noise / per_point + found.misfit * found.misfit;
+  std::vector<NextLine> result;
+  for (PlannedLine& candidate : candidate_lines(machine)) {
+    const bool measured =
+        std::any_of(found.lines.begin(), found.lines.end(), [&](const CondensedLine& known) {
+          const Eigen::Vector3d end = known.beam.start + known.beam.length * known.beam.direction;
+          return ((known.beam.start - candidate.from).norm() < 1e-4 && (end - candidate.to).norm() < 1e-4) ||
+                 ((known.beam.start - candidate.to).norm() < 1e-4 && (end - candidate.from).norm() < 1e-4);
+        });
+    if (measured) continue;
+    Effort effort;
+    effort.interval = (candidate.to - candidate.from).norm() / (coarse - 1);
+    const LineRows rows = rows_of(planned_equations(candidate, effort), basis, found.model.squareness);
+    const Eigen::MatrixXd part = covariance(rows.unknowns, rows.unknowns);
+    Eigen::MatrixXd inner = rows.rows * part * rows.rows.transpose();
+    inner.diagonal().array() += variance;
+    inner.array() += 1e-6;  // m^2: the zero point is free
+    const Eigen::MatrixXd spread_part = spread(rows.unknowns, rows.unknowns);
+    const Eigen::MatrixXd gain = rows.rows * spread_part * rows.rows.transpose();
+    const double less = inner.llt().solve(gain).trace();
+    result.push_back({std::move(candidate), std::sqrt(std::max(now - less, 0.0))});
+  }
+  std::sort(result.begin(), result.end(),
+            [](const NextLine& a, const NextLine& b) { return a.volumetric_rms < b.volumetric_rms; });
+  if (result.size() > count) result.resize(count);
+  return result;
+}
+
+}  // namespace invar::metrology

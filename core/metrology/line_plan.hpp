@@ -1,0 +1,56 @@
+// Which displacement lines to measure, and how accurate the result will be, before anybody unpacks the laser.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/metrology/geometric_identification.hpp"
+#include "core/metrology/identifiability.hpp"
+
+namespace invar::metrology {
+
+struct PlannedLine {
+  std::string name;
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // m
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();    // m
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();  // m, offset of the reflector
+};
+
+/// The recipe of metrology.md 3.5 for a chain a, b, c (full rank for every order): 14 lines, 17 with the anti-diagonals, 20
+/// with the steep diagonals; for an XY table 5, 6 and 7 (the seed's four with y = x/2, + anti-diagonal, + y = 2x).
+/// `level` is 0, 1 or 2.
+std::vector<PlannedLine> recipe_lines(const Machine& machine, int level);
+
+/// Lines worth considering beside the recipe's: parallels along every edge, both body diagonals and their like.
+std::vector<PlannedLine> candidate_lines(const Machine& machine);
+
+struct Effort {
+  double interval = 0.02;  // m, along a line
+  int passes = 6;          // readings of each point
+  double noise = 1e-6;     // m, sd of one reading
+};
+
+/// Readings a line takes at an interval: end points included, at least two.
+int points_of(const PlannedLine& line, double interval);
+
+/// The line as equations without readings, for predicting accuracy: zero point and reversal free.
+CondensedLine planned_equations(const PlannedLine& line, const Effort& effort);
+
+/// What to expect from a set of lines under a prior (defaults are a decent machine; better: those of a pilot).
+struct Expectation {
+  Identifiability knowledge;
+  int readings = 0;
+};
+Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
+                   const GeometricPrior& prior, double misfit = 5e-8);
+
+/// A line not yet measured and what it would leave of the expected volumetric error.
+struct NextLine {
+  PlannedLine line;
+  double volumetric_rms = 0.0;  // m, expected with it
+};
+/// The candidates in order of what they would help, best first, measured as finely as the identification's own lines.
+std::vector<NextLine> next_lines(const Machine& machine, const Identification& found, std::size_t count);
+
+}  // namespace invar::metrology

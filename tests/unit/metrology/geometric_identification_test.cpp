@@ -1,0 +1,258 @@
+#include "core/metrology/geometric_identification.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/metrology/identifiability.hpp"
+#include "core/metrology/line_plan.hpp"
+#include "core/metrology/volumetric_table.hpp"
+#include "tests/unit/metrology/simulated_machine.hpp"
+
+namespace invar::metrology {
+namespace {
+
+using testing::Laser;
+using testing::measure;
+using testing::random_machine;
+
+const Chain xy{{1, 0, 2}, 2};
+const Chain yxz{{1, 0, 2}, 3};
+
+std::vector<DisplacementLine> measured(const Machine& machine, const std::vector<PlannedLine>& plan,
+                                       int points, std::mt19937_64& random, const Laser& laser = {}) {
+  std::vector<DisplacementLine> lines;
+  for (const auto& one : plan)
+    lines.push_back(measure(machine, one.name, one.from, one.to, points, one.tool, random, laser));
+  return lines;
+}
+
+/// RMS of truth minus model over a grid, best rigid motion removed, and the share of components within two sigma.
+struct Left {
+  double rms;
+  double inside;
+};
+Left left_over(const Machine& machine, const GeometricModel* model) {
+  const auto directions = axis_directions(machine.chain, machine.errors->squareness);
+  const auto grid = volume_grid(machine.chain, machine.travel, 7);
+  Eigen::MatrixXd modes(3 * static_cast<long>(grid.size()), 6);
+  Eigen::VectorXd field(modes.rows());
+  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(modes.rows());
+  for (std::size_t g = 0; g < grid.size(); ++g) {
+    const long r = 3 * static_cast<long>(g);
+    Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool);
+    if (model != nullptr) {
+      e -= model->error(grid[g], machine.tool);
+      sigma.segment<3>(r) = model->sigma_at(grid[g], machine.tool);
+    }
+    for (int k = 0; k < 3; ++k)
+      if (!machine.chain.has(k)) e[k] = 0.0;
+    field.segment<3>(r) = e;
+    modes.middleRows<3>(r) = RigidPart::rigid(machine.chain, grid[g]);
+  }
+  field -= modes * modes.completeOrthogonalDecomposition().solve(field).eval();
+  double inside = 0.0;
+  double all = 0.0;
+  for (long r = 0; r < field.size(); ++r) {
+    if (!machine.chain.has(static_cast<int>(r % 3))) continue;
+    all += 1.0;
+    inside += std::abs(field[r]) <= 2.0 * sigma[r] ? 1.0 : 0.0;
+  }
+  return {std::sqrt(field.squaredNorm() / static_cast<double>(grid.size())), inside / all};
+}
+
+TEST(Identification, FindsTheFieldOfAnXyTableToTheNoise) {
+  std::mt19937_64 random{1};
+  RecordProperty("seed", 1);
+  double inside = 0.0;
+  for (int m = 0; m < 4; ++m) {
+    const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+    const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), 41, random));
+    const Left left = left_over(machine, &found.model);
+    EXPECT_LT(left.rms, 1.0e-6);
+    EXPECT_LT(left.rms, 0.3 * left_over(machine, nullptr).rms);
+    inside += left.inside / 4;
+  }
+  EXPECT_GT(inside, 0.85);
+}
+
+TEST(Identification, FindsTheFieldOfEveryChainWithTheFourteenLinesOfTheRecipe) {
+  std::mt19937_64 random{2};
+  RecordProperty("seed", 2);
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    const Machine machine = random_machine({order, 3}, {0.2, 0.15, 0.1}, random);
+    const auto found = identify(machine, measured(machine, recipe_lines(machine, 0), 11, random));
+    EXPECT_LT(left_over(machine, &found.model).rms, 0.5 * left_over(machine, nullptr).rms);
+  } while (std::next_permutation(order.begin(), order.end()));
+}
+
+TEST(Identification, KeepsTheExactDirectionsOfALargeSquareness) {
+  std::mt19937_64 random{3};
+  RecordProperty("seed", 3);
+  testing::MachineSpread spread;
+  spread.squareness = 0.0;
+  Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random, spread);
+  machine.errors->squareness[0] = 4.36314e-3;  // 900 arcsec: 1.9 um would be lost by a linear form
+  const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), 21, random));
+  EXPECT_NEAR(found.model.squareness[0], 4.36314e-3, 2e-5);
+  EXPECT_LT(left_over(machine, &found.model).rms, 1.0e-6);
+}
+
+TEST(Identification, SurvivesOutliersReversalDriftAndABeamBreak) {
+  std::mt19937_64 random{4};
+  RecordProperty("seed", 4);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  Laser laser;
+  laser.reversal = 3e-6;
+  laser.drift = 2e-6;
+  laser.outliers = 0.02;
+  auto lines = measured(machine, recipe_lines(machine, 2), 21, random, laser);
+  for (std::size_t i = 60; i < lines[3].readings.size(); ++i) lines[3].readings[i].displacement += 7e-6;
+  const auto found = identify(machine, lines);
+  EXPECT_LT(left_over(machine, &found.model).rms, 1.0e-6);
+  EXPECT_EQ(found.lines[3].noise.breaks.size(), 1U);
+  EXPECT_NEAR(found.lines[3].noise.breaks.front(), 60, 2);
+  EXPECT_NEAR(found.model.reversal[0], 3e-6, 4e-7);
+  EXPECT_NEAR(found.lines[0].noise.drift, 2e-6, 1e-6);
+  EXPECT_NEAR(found.noise, std::hypot(1e-6, 0.5e-6), 0.2e-6);
+}
+
+TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
+  std::mt19937_64 random{5};
+  RecordProperty("seed", 5);
+  double before = 0.0;
+  double steps = 0.0;
+  double full = 0.0;
+  for (int m = 0; m < 4; ++m) {
+    const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+    auto plan = recipe_lines(machine, 1);
+    plan.erase(plan.begin() + 4, plan.end());  // the seed's four
+    const auto lines = measured(machine, plan, 41, random);
+    IdentificationOptions options;
+    before += left_over(machine, nullptr).rms;
+    full += left_over(machine, &identify(machine, lines, options).model).rms;
+    options.method = IdentificationMethod::displacement;
+    steps += left_over(machine, &identify(machine, lines, options).model).rms;
+  }
+  EXPECT_LT(steps, 0.8 * before);
+  EXPECT_LT(full, 1.15 * steps);
+}
+
+TEST(Identifiability, NamesWhatTwoLinesAndFourLinesLeaveOpen) {
+  std::mt19937_64 random{6};
+  RecordProperty("seed", 6);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  auto plan = recipe_lines(machine, 1);
+  const auto open_with = [&](std::size_t count) {
+    const std::vector<PlannedLine> some{plan.begin(), plan.begin() + static_cast<long>(count)};
+    const auto found = identify(machine, measured(machine, some, 21, random));
+    std::string words;
+    for (const auto& one :
+         identifiability(found.basis, found.posterior, found.model.squareness, machine.travel, machine.tool)
+             .unidentified)
+      words += one.words() + "\n";
+    return words;
+  };
+  const std::string two = open_with(2);
+  for (const char* name : {"EC0Y", "ECY", "EXY", "EYX"}) EXPECT_NE(two.find(name), std::string::npos) << two;
+  EXPECT_EQ(two.find("EXX"), std::string::npos) << two;
+  const std::string four = open_with(4);
+  EXPECT_NE(four.find("EXY"), std::string::npos) << four;
+  EXPECT_NE(four.find("combination"), std::string::npos) << four;
+  EXPECT_EQ(open_with(6), "");
+}
+
+TEST(LinePlan, ExpectsWhatIsFoundAndProposesTheMissingLine) {
+  std::mt19937_64 random{7};
+  RecordProperty("seed", 7);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  auto plan = recipe_lines(machine, 1);
+  plan.erase(plan.begin() + 4, plan.end());
+  const auto found = identify(machine, measured(machine, plan, 21, random));
+  const auto next = next_lines(machine, found, 3);
+  ASSERT_FALSE(next.empty());
+  const double now =
+      identifiability(found.basis, found.posterior, found.model.squareness, machine.travel, machine.tool)
+          .volumetric_rms;
+  EXPECT_LT(next.front().volumetric_rms, 0.6 * now);
+  // Taking that line gives about what was promised.
+  plan.push_back(next.front().line);
+  const auto better = identify(machine, measured(machine, plan, 21, random));
+  const double then =
+      identifiability(better.basis, better.posterior, better.model.squareness, machine.travel, machine.tool)
+          .volumetric_rms;
+  EXPECT_NEAR(then, next.front().volumetric_rms, 0.35 * then);
+}
+
+TEST(LinePlan, TheRecipeLeavesNothingOpenForAnyChain) {
+  std::array<int, 3> order{0, 1, 2};
+  GeometricPrior prior;
+  prior.length = {0.0, 0.0, 0.0};
+  do {
+    Machine machine;
+    machine.chain = {order, 3};
+    machine.travel = {Range{0, 0.3}, Range{0, 0.2}, Range{0, 0.15}};
+    const auto fourteen = expect(machine, recipe_lines(machine, 0), {0.02, 6, 5e-7}, prior);
+    const auto seventeen = expect(machine, recipe_lines(machine, 1), {0.02, 6, 5e-7}, prior);
+    EXPECT_LT(seventeen.knowledge.volumetric_rms, fourteen.knowledge.volumetric_rms);
+    EXPECT_LT(fourteen.knowledge.volumetric_rms, 0.05 * fourteen.knowledge.volumetric_rms_prior);
+    EXPECT_TRUE(seventeen.knowledge.unidentified.empty());
+  } while (std::next_permutation(order.begin(), order.end()));
+}
+
+TEST(VolumetricTable, StaysWithinItsProvenBound) {
+  std::mt19937_64 random{8};
+  RecordProperty("seed", 8);
+  Machine machine = random_machine(yxz, {0.2, 0.2, 0.1}, random);
+  machine.tool = {0.03, 0.0, -0.08};
+  auto plan = recipe_lines(machine, 0);
+  const auto found = identify(machine, measured(machine, plan, 11, random));
+  for (const double tolerance : {1e-7, 1e-8}) {
+    const VolumetricTable table{found.model, tolerance};
+    EXPECT_LE(table.bound(), tolerance * 1.0001);
+    std::uniform_real_distribution<double> at{-0.02, 0.22};
+    double worst = 0.0;
+    for (int i = 0; i < 5000; ++i) {
+      const Eigen::Vector3d position{at(random), at(random), at(random)};
+      worst = std::max(worst, (table.error(position) - found.model.error(position, machine.tool)).norm());
+    }
+    EXPECT_LE(worst, table.bound());
+    EXPECT_GT(worst, 0.01 * table.bound());
+  }
+}
+
+TEST(VolumetricTable, CommandsSoThatTheToolStandsWhereWanted) {
+  std::mt19937_64 random{9};
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), 21, random));
+  const VolumetricTable table{found.model};
+  const Eigen::Vector3d wanted{0.12, 0.07, 0.0};
+  const Eigen::Vector3d command = table.command_for(wanted, machine.tool);
+  EXPECT_LT((command + table.error(command) - wanted).norm(), 1e-12);
+  EXPECT_TRUE(table.contains(wanted));
+  EXPECT_FALSE(table.contains({0.3, 0.0, 0.0}));
+  EXPECT_EQ(VolumetricTable{}.error(wanted), Eigen::Vector3d::Zero());
+}
+
+TEST(Evidence, ItsGradientIsThatOfFiniteDifferences) {
+  std::mt19937_64 random{10};
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  const auto found = identify(machine, measured(machine, recipe_lines(machine, 0), 11, random));
+  const Strengths logs = log_strengths(found.prior);
+  const Strengths slope = evidence(found.equations, found.basis, found.prior).slope;
+  for (int i = 0; i < strength_count; ++i) {
+    Strengths up = logs;
+    Strengths down = logs;
+    up[i] += 1e-3;
+    down[i] -= 1e-3;
+    const double difference =
+        (evidence(found.equations, found.basis, with_log_strengths(found.prior, up)).value -
+         evidence(found.equations, found.basis, with_log_strengths(found.prior, down)).value) /
+        2e-3;
+    EXPECT_NEAR(slope[i], difference, 1e-3 + 1e-3 * std::abs(difference)) << "strength " << i;
+  }
+}
+
+}  // namespace
+}  // namespace invar::metrology

@@ -1,0 +1,121 @@
+// Random machines and laser readings for tests and benches: band-limited curves that no estimator's prior knows.
+#pragma once
+
+#include <cmath>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/machine.hpp"
+
+namespace invar::metrology::testing {
+
+struct MachineSpread {
+  double straightness = 2e-6;  // m, RMS
+  double angle = 8e-6;         // rad, RMS
+  double positioning = 2e-6;   // m, RMS, beside
+  double slope = 5e-5;         // scale error, one sigma
+  double pitch = 0.4e-6;       // m, at 32 mm
+  double squareness = 30e-6;   // rad, one sigma
+};
+
+/// Zero at the start (and at the end where `no_slope`), `rms` over the travel: five harmonics of twice the travel,
+/// amplitudes falling as 1/h, sampled at 81 places.
+inline std::vector<double> random_curve(double travel, bool no_slope, double rms, std::mt19937_64& random,
+                                        std::vector<double>& places) {
+  std::normal_distribution<double> normal;
+  constexpr int count = 81;
+  std::vector<double> values(count, 0.0);
+  places.clear();
+  for (int i = 0; i < count; ++i) places.push_back(travel * i / (count - 1));
+  for (int h = 1; h <= 5; ++h) {
+    const double in = normal(random) / h;
+    const double out = normal(random) / h;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double angle = 3.141592653589793 * h * places[i] / travel;
+      values[i] += in * std::sin(angle) + out * std::cos(angle);
+    }
+  }
+  const double first = values.front();
+  const double last = values.back();
+  double power = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    values[i] -= first + (no_slope ? (last - first) * places[i] / travel : 0.0);
+    power += values[i] * values[i] / count;
+  }
+  for (double& value : values) value *= rms / std::sqrt(power);
+  return values;
+}
+
+/// The machine of metrology.md section 6.
+inline Machine random_machine(const Chain& chain, const std::array<double, 3>& travel,
+                              std::mt19937_64& random, const MachineSpread& spread = {}) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  Machine machine;
+  machine.chain = chain;
+  MachineErrors errors;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!chain.has(axis)) continue;
+    const auto a = static_cast<std::size_t>(axis);
+    machine.travel[a] = {0.0, travel[a]};
+    for (int c = 6 * axis; c < 6 * axis + 6; ++c) {
+      const double rms =
+          is_rotation(c) ? spread.angle : (is_positioning(c) ? spread.positioning : spread.straightness);
+      std::vector<double> places;
+      std::vector<double> values = random_curve(travel[a], !is_rotation(c), rms, random, places);
+      std::vector<ErrorFunction::Harmonic> waves;
+      std::vector<double> polynomial;
+      if (is_positioning(c)) {
+        polynomial = {0.0, spread.slope * normal(random)};
+        waves.push_back({spread.pitch, 0.032, 6.283185307179586 * uniform(random)});
+      }
+      errors.functions[static_cast<std::size_t>(c)] = ErrorFunction{polynomial, waves, places, values};
+    }
+  }
+  for (double& s : errors.squareness) s = spread.squareness * normal(random);
+  machine.errors = errors;
+  return machine;
+}
+
+struct Laser {
+  double noise = 1e-6;            // m, white, each reading
+  double repeatability = 0.5e-6;  // m, of the machine, each stop
+  int passes = 6;                 // forward and backward in turn
+  double reversal = 0.0;          // m
+  double drift = 0.0;             // m over the line
+  double outliers = 0.0;          // share of readings 20 um off
+};
+
+/// A line of `points` readings from `from` to `to` (m), measured as a laser zeroed at the first one would.
+inline DisplacementLine measure(const Machine& machine, const std::string& name, const Eigen::Vector3d& from,
+                                const Eigen::Vector3d& to, int points, const Eigen::Vector3d& tool,
+                                std::mt19937_64& random, const Laser& laser = {}) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  const Eigen::Matrix3d directions = axis_directions(machine.chain, machine.errors->squareness);
+  const Eigen::Vector3d beam = (to - from).normalized();
+  DisplacementLine line{name, {}};
+  double zero = 0.0;
+  const int rows = points * laser.passes;
+  for (int row = 0; row < rows; ++row) {
+    const int pass = row / points;
+    const int step = pass % 2 == 0 ? row % points : points - 1 - row % points;
+    Reading reading;
+    reading.position = from + (to - from) * step / (points - 1);
+    reading.tool = tool;
+    reading.direction = pass % 2 == 0 ? 1 : -1;
+    const Eigen::Vector3d actual =
+        reading.position + simulated_error(machine, directions, reading.position, tool);
+    double value = beam.dot(actual) + laser.noise * normal(random) + laser.repeatability * normal(random) +
+                   0.5 * laser.reversal * reading.direction + laser.drift * row / rows;
+    if (row > 0 && uniform(random) < laser.outliers) value += 20e-6;
+    if (row == 0) zero = value;
+    reading.displacement = value - zero;
+    line.readings.push_back(reading);
+  }
+  return line;
+}
+
+}  // namespace invar::metrology::testing

@@ -1,0 +1,70 @@
+#include "tools/geometric/controller_files.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <sstream>
+
+#include "core/metrology/geometric_identification.hpp"
+#include "core/metrology/line_plan.hpp"
+#include "tests/unit/metrology/simulated_machine.hpp"
+
+namespace invar::tools {
+namespace {
+
+metrology::GeometricModel some_model() {
+  std::mt19937_64 random{12};
+  const auto machine = metrology::testing::random_machine({{1, 0, 2}, 3}, {0.2, 0.15, 0.1}, random);
+  std::vector<metrology::DisplacementLine> lines;
+  metrology::testing::Laser laser;
+  laser.reversal = 2e-6;
+  for (const auto& one : metrology::recipe_lines(machine, 0))
+    lines.push_back(
+        metrology::testing::measure(machine, one.name, one.from, one.to, 11, one.tool, random, laser));
+  return metrology::identify(machine, lines).model;
+}
+
+TEST(ControllerFiles, TheIsgGridReadsBackAsTheSameField) {
+  const auto model = some_model();
+  const IsgTable table{isg_volumetric_csv(model, 41)};
+  std::mt19937_64 random{13};
+  std::uniform_real_distribution<double> part;
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d position{0.2 * part(random), 0.15 * part(random), 0.1 * part(random)};
+    EXPECT_LT((table.error(position) - model.error(position, model.tool)).norm(), 1e-7);
+  }
+  const Eigen::Vector3d node{0.1, 0.075, 0.05};
+  EXPECT_LT((table.error(node) - model.error(node, model.tool)).norm(), 1e-12);
+}
+
+TEST(ControllerFiles, TheLinuxCncFileHoldsBothDirectionsInAtMost256Points) {
+  const auto model = some_model();
+  const std::string text = linuxcnc_compensation(model, 0);
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 256);
+  EXPECT_NEAR(model.reversal[0], 2e-6, 5e-7);
+  for (const double x : {0.0, 0.033, 0.1, 0.171, 0.2}) {
+    const double error = model.error({x, 0.0, 0.0}, model.tool).x();
+    EXPECT_NEAR(linuxcnc_error(text, x, 1), error + 0.5 * model.reversal[0], 5e-8);
+    EXPECT_NEAR(linuxcnc_error(text, x, -1), error - 0.5 * model.reversal[0], 5e-8);
+  }
+}
+
+TEST(ControllerFiles, SkewIsTheAngleBetweenTheAxes) {
+  auto model = some_model();
+  model.squareness = {1e-3, 0.0, 0.0};
+  std::istringstream text{skew_numbers(model)};
+  std::string line;
+  while (std::getline(text, line) && line.rfind("XY", 0) != 0) {
+  }
+  std::istringstream cells{line};
+  std::string pair, iso;
+  double arcsec = 0.0;
+  double urad = 0.0;
+  cells >> pair >> iso >> arcsec >> urad;
+  EXPECT_EQ(iso, "EC0Y");
+  EXPECT_NEAR(arcsec, -206.265, 1e-3);  // the positive axes enclose less than a right angle
+  EXPECT_NEAR(urad, -1000.0, 1e-2);
+}
+
+}  // namespace
+}  // namespace invar::tools

@@ -1,0 +1,65 @@
+// `invar calibrate controller`: a geometric model in the forms that machine controllers read.
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "core/compensation/geometric_file.hpp"
+#include "tools/command.hpp"
+#include "tools/commands/calibrate.hpp"
+#include "tools/geometric/controller_files.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  std::filesystem::path model;
+  std::filesystem::path out;
+  int nodes = 21;
+};
+
+void write(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream stream{file, std::ios::binary};
+  stream << text;
+  stream.close();
+  if (!stream) throw InputError{file.string(), "cannot be written", "check the folder and the space left"};
+  std::cout << file.string() << '\n';
+}
+
+void export_model(const Options& options) {
+  const auto model = compensation::load_geometric(options.model);
+  std::error_code failed;
+  std::filesystem::create_directories(options.out, failed);
+  if (failed)
+    throw InputError{options.out.string(), "cannot be made", "name a folder that may be written to"};
+  write(options.out / "volcomp-isg.csv", isg_volumetric_csv(model, options.nodes));
+  for (int axis = 0; axis < 3; ++axis)
+    if (model.chain.has(axis))
+      write(options.out / ("linuxcnc-" +
+                           std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]) + ".comp"),
+            linuxcnc_compensation(model, axis));
+  write(options.out / "skew.txt", skew_numbers(model));
+}
+
+}  // namespace
+
+void add_calibrate_controller(CLI::App& group) {
+  auto* command = group.add_subcommand("controller",
+                                       "Write a geometric model in the forms that machine controllers read");
+  command->footer(
+      "Example: invar calibrate controller --model result/compensation.yaml --out controller\n"
+      "Writes a grid for ISG and TwinCAT CNC (ISG_CSV), one COMP_FILE an axis for LinuxCNC (COMP_FILE_TYPE = "
+      "0), and the\n"
+      "squareness as numbers for skew parameters.");
+  auto options = std::make_shared<Options>();
+  command->add_option("--model", options->model, "compensation.yaml of kind geometric")->required();
+  command->add_option("--out", options->out, "folder to write to")->required();
+  command->add_option("--nodes", options->nodes, "nodes an axis of the ISG grid")
+      ->check(CLI::Range(2, 101))
+      ->capture_default_str();
+  command->callback([options] { export_model(*options); });
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,157 @@
+// `invar calibrate plan`: the lines, interval and passes to measure for a wanted accuracy, and what to expect of them.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "core/machine/machine_file.hpp"
+#include "core/metrology/line_plan.hpp"
+#include "core/recording/table.hpp"
+#include "tools/command.hpp"
+#include "tools/commands/calibrate.hpp"
+#include "tools/geometric/lines_file.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::Effort;
+using metrology::PlannedLine;
+
+struct Options {
+  std::filesystem::path machine;
+  std::filesystem::path pilot;
+  std::filesystem::path output;
+  double accuracy = 0.0;
+  double noise = 1e-6;
+  double setup_minutes = 15.0;
+  double reading_seconds = 3.0;
+};
+
+struct Choice {
+  std::vector<PlannedLine> lines;
+  Effort effort;
+  metrology::Expectation expectation;
+  double minutes = 0.0;
+};
+
+std::string um(double value) { return report::number(1e6 * value, 3) + " um"; }
+
+void write_lines(const Choice& choice, const std::filesystem::path& file) {
+  recording::Table table;
+  std::vector<std::string> names;
+  std::array<std::vector<double>, 9> columns;
+  std::vector<double> interval;
+  std::vector<double> passes;
+  for (const PlannedLine& line : choice.lines) {
+    names.push_back(line.name);
+    for (int k = 0; k < 3; ++k) {
+      columns[static_cast<std::size_t>(k)].push_back(line.from[k]);
+      columns[static_cast<std::size_t>(k) + 3].push_back(line.to[k]);
+      columns[static_cast<std::size_t>(k) + 6].push_back(line.tool[k]);
+    }
+    const int points = metrology::points_of(line, choice.effort.interval);
+    interval.push_back((line.to - line.from).norm() / (points - 1));
+    passes.push_back(choice.effort.passes);
+  }
+  table.add_texts("line", names);
+  const std::array<const char*, 9> titles{"from_x", "from_y", "from_z", "to_x",  "to_y",
+                                          "to_z",   "tool_x", "tool_y", "tool_z"};
+  for (std::size_t c = 0; c < 9; ++c) table.add(titles[c], "m", columns[c]);
+  table.add("interval", "m", interval);
+  table.add("passes", "", passes);
+  table.write(file);
+}
+
+void plan(const Options& options) {
+  metrology::Machine machine = machine::load_machine(options.machine);
+  metrology::GeometricPrior prior;
+  prior.length = {0.0, 0.0, 0.0};
+  double noise = options.noise;
+  double misfit = 5e-8;
+  if (!options.pilot.empty()) {
+    const auto pilot = metrology::identify(machine, read_lines(options.pilot, machine).lines);
+    prior = pilot.prior;
+    noise = pilot.noise;
+    misfit = pilot.misfit;
+    std::cout << "pilot " << options.pilot.filename().string() << ": noise " << um(noise)
+              << ", error motions " << um(prior.amplitude[0]) << ", " << um(prior.amplitude[1]) << ", "
+              << report::number(1e6 * prior.amplitude[2], 3) << " urad\n";
+  }
+  double longest = 0.0;
+  for (int k = 0; k < 3; ++k)
+    if (machine.chain.has(k))
+      longest = std::max(longest, machine.travel[static_cast<std::size_t>(k)].width());
+  std::vector<Choice> choices;
+  for (int level = 0; level < 3; ++level) {
+    for (const double pieces : {10.0, 20.0, 40.0}) {
+      for (const int passes : {2, 6}) {
+        Choice choice;
+        choice.lines = metrology::recipe_lines(machine, level);
+        choice.effort = {longest / pieces, passes, noise};
+        choice.expectation = metrology::expect(machine, choice.lines, choice.effort, prior, misfit);
+        choice.minutes = static_cast<double>(choice.lines.size()) * options.setup_minutes +
+                         choice.expectation.readings * options.reading_seconds / 60.0;
+        choices.push_back(std::move(choice));
+      }
+    }
+  }
+  const Choice* best = nullptr;
+  const Choice* finest = &choices.front();
+  std::printf("%6s %10s %7s %9s %8s %12s\n", "lines", "interval", "passes", "readings", "minutes",
+              "expected RMS");
+  for (const Choice& choice : choices) {
+    const double expected = choice.expectation.knowledge.volumetric_rms;
+    std::printf("%6zu %7.1f mm %7d %9d %8.0f %9.2f um\n", choice.lines.size(), 1e3 * choice.effort.interval,
+                choice.effort.passes, choice.expectation.readings, choice.minutes, 1e6 * expected);
+    if (expected < finest->expectation.knowledge.volumetric_rms) finest = &choice;
+    if (expected <= options.accuracy && (best == nullptr || choice.minutes < best->minutes)) best = &choice;
+  }
+  std::fflush(stdout);
+  if (best == nullptr) {
+    std::cout << um(options.accuracy) << " is out of reach with these lines: the best is "
+              << um(finest->expectation.knowledge.volumetric_rms)
+              << "; a quieter laser, more passes or a machine that repeats better would be needed\n";
+    throw CLI::RuntimeError(1);
+  }
+  std::cout << "\nmeasure " << best->lines.size() << " lines every "
+            << report::number(1e3 * best->effort.interval, 3) << " mm in " << best->effort.passes
+            << " passes (forward and backward in turn): expect "
+            << um(best->expectation.knowledge.volumetric_rms) << " over the volume (RMS of the vector)\n";
+  for (const PlannedLine& line : best->lines)
+    std::printf("  %-16s (%g, %g, %g) to (%g, %g, %g) mm, %d points\n", line.name.c_str(),
+                1e3 * line.from.x(), 1e3 * line.from.y(), 1e3 * line.from.z(), 1e3 * line.to.x(),
+                1e3 * line.to.y(), 1e3 * line.to.z(), metrology::points_of(line, best->effort.interval));
+  for (const auto& open : best->expectation.knowledge.unidentified)
+    std::cout << "left open: " << open.words() << '\n';
+  if (!options.output.empty()) write_lines(*best, options.output);
+}
+
+}  // namespace
+
+void add_calibrate_plan(CLI::App& group) {
+  auto* command =
+      group.add_subcommand("plan", "Propose the displacement lines to measure for a wanted accuracy");
+  command->footer("Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --output plan.csv");
+  auto options = std::make_shared<Options>();
+  command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
+  command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
+      ->required()
+      ->check(CLI::PositiveNumber);
+  command->add_option("--pilot", options->pilot,
+                      "lines already measured: noise and roughness are taken from them");
+  command->add_option("--noise", options->noise, "standard deviation of one reading [m], without a pilot")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_option("--setup", options->setup_minutes, "time to set up a line [min]")
+      ->capture_default_str();
+  command->add_option("--reading", options->reading_seconds, "time a reading takes [s]")
+      ->capture_default_str();
+  command->add_option("--output", options->output, "table of the lines to measure, .csv");
+  command->callback([options] { plan(*options); });
+}
+
+}  // namespace invar::tools

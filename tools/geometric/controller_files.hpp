@@ -1,0 +1,36 @@
+// Geometric models in the forms that machine controllers read; each can be read back and compared.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/metrology/geometric_model.hpp"
+
+namespace invar::tools {
+
+/// ISG kernel and TwinCAT CNC (TF5280), file_format ISG_CSV: one record a node of a grid over the travels, `X Y Z EXX EYY
+/// EZZ` in mm, the error at the calibration's tool (actual minus commanded). `count` nodes an axis.
+std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count);
+
+/// LinuxCNC [JOINT_n]COMP_FILE with COMP_FILE_TYPE = 0: nominal, actual forward, actual backward in mm, at most 256 points,
+/// along `axis` with the others at the origin of the travels.
+std::string linuxcnc_compensation(const metrology::GeometricModel& model, int axis);
+
+/// Squareness as plain numbers: angle between the axes, its standard deviation, and mm per m.
+std::string skew_numbers(const metrology::GeometricModel& model);
+
+/// The field that an ISG table says at a position [m], trilinear; for checking what was written. Throws InputError.
+class IsgTable {
+ public:
+  explicit IsgTable(const std::string& text);
+  [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position) const;
+
+ private:
+  std::array<std::vector<double>, 3> nodes_;  // m
+  std::vector<Eigen::Vector3d> values_;       // m, x fastest
+};
+
+/// Actual minus nominal position [m] along the axis that a LinuxCNC file says, moving forward (+1) or backward (-1).
+double linuxcnc_error(const std::string& text, double nominal, int direction);
+
+}  // namespace invar::tools
