@@ -162,8 +162,10 @@ void fill_sigma(Identification& work) {
     Eigen::Vector3d sigma;
     const Eigen::MatrixXd moved = map * work.posterior.covariance;
     for (int k = 0; k < 3; ++k)
-      sigma[k] = model.chain.has(k) ? std::sqrt(std::max(moved.row(k).dot(map.row(k)), 0.0))
-                                    : std::numeric_limits<double>::infinity();
+      // What repeats but no smooth model explains is error of the machine too, at every point.
+      sigma[k] = model.chain.has(k)
+                     ? std::hypot(std::sqrt(std::max(moved.row(k).dot(map.row(k)), 0.0)), work.misfit)
+                     : std::numeric_limits<double>::infinity();
     grid.values.push_back(sigma);
   }
 }

@@ -1,4 +1,5 @@
 // The HTML page of a geometric calibration: what was found, how sure it is, what it leaves, what is still open.
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -108,9 +109,28 @@ Plot field_plot(const GeometricModel& model) {
     position[a] = model.travel[index(a)].lower + model.travel[index(a)].width() * (i % nodes) / (nodes - 1);
     position[b] = model.travel[index(b)].lower + model.travel[index(b)].width() * (i / nodes) / (nodes - 1);
     errors.push_back(model.error(position, model.tool));
-    longest = std::max(longest, std::hypot(errors.back()[a], errors.back()[b]));
     arrows.x.push_back(1e3 * position[a]);
     arrows.y.push_back(1e3 * position[b]);
+  }
+  // The frame is a convention: shift and turn of the plane are taken out, so that the shape shows.
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  const auto modes = [&](std::size_t i) {
+    Eigen::Matrix<double, 2, 3> m;
+    m << 1.0, 0.0, -arrows.y[i], 0.0, 1.0, arrows.x[i];
+    return m;
+  };
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    normal += modes(i).transpose() * modes(i);
+    right += modes(i).transpose() * Eigen::Vector2d{errors[i][a], errors[i][b]};
+  }
+  const Eigen::Vector3d motion = normal.ldlt().solve(right);
+  longest = 0.0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    const Eigen::Vector2d taken = modes(i) * motion;
+    errors[i][a] -= taken[0];
+    errors[i][b] -= taken[1];
+    longest = std::max(longest, std::hypot(errors[i][a], errors[i][b]));
   }
   const double scale = longest > 0.0 ? 1e3 * model.travel[index(a)].width() / (nodes - 1) / longest : 0.0;
   for (const auto& e : errors) {
@@ -118,7 +138,7 @@ Plot field_plot(const GeometricModel& model) {
     arrows.v.push_back(scale * e[b]);
   }
   Plot plot;
-  plot.title = "error vectors, the longest is " + report::si(longest, "m");
+  plot.title = "error vectors less rigid motion, the longest is " + report::si(longest, "m");
   plot.x_label = letter(a) + " [mm]";
   plot.y_label = letter(b) + " [mm]";
   plot.series = {arrows};

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 
 #include "core/metrology/identifiability.hpp"
@@ -131,9 +133,11 @@ TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
     const auto lines = measured(machine, plan, 41, random);
     IdentificationOptions options;
     before += left_over(machine, nullptr).rms;
-    full += left_over(machine, &identify(machine, lines, options).model).rms;
+    const GeometricModel at_once = identify(machine, lines, options).model;
     options.method = IdentificationMethod::displacement;
-    steps += left_over(machine, &identify(machine, lines, options).model).rms;
+    const GeometricModel in_steps = identify(machine, lines, options).model;
+    full += left_over(machine, &at_once).rms;
+    steps += left_over(machine, &in_steps).rms;
   }
   EXPECT_LT(steps, 0.8 * before);
   EXPECT_LT(full, 1.15 * steps);

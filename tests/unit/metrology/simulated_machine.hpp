@@ -20,16 +20,16 @@ struct MachineSpread {
   double squareness = 30e-6;   // rad, one sigma
 };
 
-/// Zero at the start (and at the end where `no_slope`), `rms` over the travel: five harmonics of twice the travel,
-/// amplitudes falling as 1/h, sampled at 81 places.
-inline std::vector<double> random_curve(double travel, bool no_slope, double rms, std::mt19937_64& random,
+/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as 1/h, sampled at 81
+/// places; `rms` about its best straight line where `straight`, else about its mean.
+inline std::vector<double> random_curve(double travel, bool straight, double rms, std::mt19937_64& random,
                                         std::vector<double>& places) {
   std::normal_distribution<double> normal;
   constexpr int count = 81;
   std::vector<double> values(count, 0.0);
   places.clear();
   for (int i = 0; i < count; ++i) places.push_back(travel * i / (count - 1));
-  for (int h = 1; h <= 5; ++h) {
+  for (int h = 1; h <= 6; ++h) {
     const double in = normal(random) / h;
     const double out = normal(random) / h;
     for (std::size_t i = 0; i < count; ++i) {
@@ -37,14 +37,24 @@ inline std::vector<double> random_curve(double travel, bool no_slope, double rms
       values[i] += in * std::sin(angle) + out * std::cos(angle);
     }
   }
-  const double first = values.front();
-  const double last = values.back();
+  double mean = 0.0;
+  double slope = 0.0;
+  double moment = 0.0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double t = places[i] - 0.5 * travel;
+    mean += values[i] / count;
+    slope += t * values[i];
+    moment += t * t;
+  }
+  slope = straight ? slope / moment : 0.0;
   double power = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
-    values[i] -= first + (no_slope ? (last - first) * places[i] / travel : 0.0);
-    power += values[i] * values[i] / count;
+    const double rest = values[i] - mean - slope * (places[i] - 0.5 * travel);
+    power += rest * rest / count;
   }
-  for (double& value : values) value *= rms / std::sqrt(power);
+  const double first = values.front();
+  for (std::size_t i = 0; i < count; ++i)
+    values[i] = (values[i] - first - slope * places[i]) * rms / std::sqrt(power);
   return values;
 }
 
