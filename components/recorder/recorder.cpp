@@ -6,8 +6,26 @@
 
 namespace invar::recorder {
 
+namespace {
+
+/// An earlier recording of that name, of a run before or of a recorder that was killed, is never overwritten.
+void keep_earlier(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return;
+  std::filesystem::path kept;
+  int number = 1;
+  do {
+    kept = file.parent_path() /
+           (file.stem().string() + "-" + std::to_string(number++) + file.extension().string());
+  } while (std::filesystem::exists(kept));
+  std::filesystem::rename(file, kept);
+}
+
+}  // namespace
+
 void Recorder::configure() {
   std::filesystem::create_directories(parameters_.out);
+  const std::filesystem::path file = std::filesystem::path{parameters_.out} / parameters_.name;
+  keep_earlier(file);
   const std::scoped_lock lock{mutex_};
   writer_ =
       std::make_unique<recording::RecordingWriter>(std::filesystem::path{parameters_.out} / parameters_.name);

@@ -5,6 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
@@ -31,6 +33,7 @@ struct Child {
   pid_t pid = -1;
   bool running = true;
   int status = 0;
+  int restarts = 0;
 
   void poll(bool wait) {
     int raw = 0;
@@ -79,6 +82,23 @@ void stop_child(Child& child) {
   if (!child.running) return;
   kill(child.pid, SIGKILL);
   child.poll(true);
+}
+
+/// Starts a process again that was killed or failed: at most `most_restarts` times, so that one that cannot live does
+/// not burn the PC. True while the cell goes on.
+bool keep_alive(std::vector<Child>& children, const LaunchOptions& options,
+                const std::filesystem::path& folder) {
+  constexpr int most_restarts = 10;
+  for (Child& child : children) {
+    child.poll(false);
+    if (child.running) continue;
+    if (child.status == 0 || child.status == 2 || child.restarts == most_restarts) return false;
+    spdlog::warn("process `{}` ended with status {}; starting it again", child.name, child.status);
+    const int restarts = child.restarts + 1;
+    child = spawn(options, child.name, false, folder);
+    child.restarts = restarts;
+  }
+  return true;
 }
 
 bool any_ended(std::vector<Child>& children) {
@@ -155,8 +175,8 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   if (outcome.simulated) {
     outcome.failure = keep_simulated_time(options, cell, children, stop, begin, outcome);
   } else {
-    while (!stop && !any_ended(children) &&
-           (options.duration <= 0.0 || seconds_since(begin) < options.duration))
+    while (!stop && (options.duration <= 0.0 || seconds_since(begin) < options.duration) &&
+           (options.job.empty() ? keep_alive(children, options, folder) : !any_ended(children)))
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   for (Child& child : children) {
