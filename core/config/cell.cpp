@@ -83,7 +83,7 @@ void check_identities(const Node& root, const Cell& cell) {
   for (const CellProcess& process : cell.processes) {
     const bool known = std::any_of(cell.hosts.begin(), cell.hosts.end(),
                                    [&](const CellHost& host) { return host.name == process.host; });
-    if (!known && !process.host.empty()) {
+    if (!known && !process.host.empty() && !cell.hosts.empty()) {
       std::vector<std::string> hosts;
       for (const CellHost& host : cell.hosts) hosts.push_back(host.name);
       const std::string near = nearest(process.host, hosts);

@@ -3,6 +3,7 @@
 #include "components/all.hpp"
 #include "tools/cell/connections.hpp"
 #include "tools/cell/plugins.hpp"
+#include "tools/cell/qos.hpp"
 
 namespace invar::tools {
 
@@ -73,6 +74,7 @@ LoadedCell load_cell(const std::filesystem::path& file) {
     for (const config::CellComponent& component : process.components) prepare(loaded, component);
   }
   connect_ports(loaded);
+  check_qos(loaded);
   loaded.yaml.finish();
   return loaded;
 }
