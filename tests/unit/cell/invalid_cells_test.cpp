@@ -42,7 +42,7 @@ TEST_P(InvalidCell, GivesTheOneExpectedLine) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Files, InvalidCell, ::testing::ValuesIn(names()),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& file) { return file.param; });
 
 TEST(Cell, TheOneThatTheyAreMadeFromIsSound) { EXPECT_NO_THROW((void)load_cell(folder / "sound.yaml")); }
 
