@@ -44,17 +44,32 @@ double circularity_of(const Measured& drop) {
 
 // Of two fits of one drop the better stays.
 void drop_doubles(std::vector<Measured>& drops) {
-  std::sort(drops.begin(), drops.end(), [](const Measured& a, const Measured& b) {
-    return a.fit.coverage * a.shape.radius > b.fit.coverage * b.shape.radius;
+  std::vector<Measured*> order;
+  for (Measured& drop : drops) order.push_back(&drop);
+  std::sort(order.begin(), order.end(), [](const Measured* a, const Measured* b) {
+    return a->fit.coverage * a->shape.radius > b->fit.coverage * b->shape.radius;
   });
-  for (std::size_t i = 0; i < drops.size(); ++i)
-    for (std::size_t j = 0; j < i && drops[i].alive; ++j) {
-      if (!drops[j].alive) continue;
-      const double apart =
-          std::hypot(drops[i].shape.x - drops[j].shape.x, drops[i].shape.y - drops[j].shape.y);
-      if (apart < 0.6 * std::max(drops[i].shape.radius, drops[j].shape.radius)) drops[i].alive = false;
+  for (std::size_t i = 0; i < order.size(); ++i)
+    for (std::size_t j = 0; j < i && order[i]->alive; ++j) {
+      if (!order[j]->alive) continue;
+      const Shape &a = order[i]->shape, &b = order[j]->shape;
+      const double dx = a.x - b.x, dy = a.y - b.y, least = 0.6 * std::max(a.radius, b.radius);
+      if (dx * dx + dy * dy < least * least) order[i]->alive = false;
     }
-  std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
+  if (std::any_of(drops.begin(), drops.end(), [](const Measured& drop) { return !drop.alive; }))
+    std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
+}
+
+// The `most` drops whose outline was seen best.
+std::vector<const Measured*> clearest(const std::vector<Measured>& drops, std::size_t most) {
+  std::vector<const Measured*> order;
+  for (const Measured& drop : drops) order.push_back(&drop);
+  const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(most, order.size()));
+  std::partial_sort(order.begin(), end, order.end(), [](const Measured* a, const Measured* b) {
+    return a->fit.coverage * a->shape.radius > b->fit.coverage * b->shape.radius;
+  });
+  order.erase(end, order.end());
+  return order;
 }
 
 // What hides part of a drop's edge: its neighbours.
@@ -180,10 +195,10 @@ Droplets measure_droplets(const cv::Mat& image) {
   for (int round = 0; round < 2; ++round) {
     filters = Filters{blur};
     blurs.clear();
-    for (std::size_t i = 0; i < std::min<std::size_t>(drops.size(), 5); ++i) {
-      Rays rays = drops[i].rays;
+    for (const Measured* drop : clearest(drops, 5)) {
+      Rays rays = drop->rays;
       const OutlineFit fit =
-          refine_outline(image, drops[i].shape, found.polarity, filters.at(drops[i].shape.radius), rays);
+          refine_outline(image, drop->shape, found.polarity, filters.at(drop->shape.radius), rays);
       if (fit.valid) blurs.push_back(fit.blur);
     }
     const double before = blur;

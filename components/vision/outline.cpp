@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/contract.hpp"
+
 namespace invar::vision {
 
 namespace {
@@ -32,26 +34,34 @@ const std::array<Direction, Rays::most>& directions(int count) {
   return tables[static_cast<std::size_t>(count / 16)];
 }
 
+// Reads the image between its pixels, bilinearly. Positions along a ray count in 1/65536 px.
 struct Samples {
   const std::uint8_t* data;
   std::ptrdiff_t stride;
-  float right, bottom;  // the last coordinates that bilinear reading allows
+  double right, bottom;  // the last coordinates that bilinear reading allows
   explicit Samples(const cv::Mat& image)
       : data{image.ptr<std::uint8_t>()},
         stride{static_cast<std::ptrdiff_t>(image.step)},
-        right{static_cast<float>(image.cols) - 1.001F},
-        bottom{static_cast<float>(image.rows) - 1.001F} {}
-  [[nodiscard]] bool holds(double x, double y) const {
-    return x >= 0.0 && y >= 0.0 && x <= static_cast<double>(right) && y <= static_cast<double>(bottom);
+        right{image.cols - 1.01},
+        bottom{image.rows - 1.01} {
+    INVAR_EXPECTS(image.type() == CV_8UC1 && image.cols < 32768 && image.rows < 32768, image.type(),
+                  image.cols, image.rows);
   }
-  [[nodiscard]] float at(float x, float y) const {
-    const int i = static_cast<int>(x), j = static_cast<int>(y);
-    const float u = x - static_cast<float>(i), v = y - static_cast<float>(j);
-    const std::uint8_t* p = data + j * stride + i;
-    const auto a = static_cast<float>(p[0]), b = static_cast<float>(p[1]);
-    const auto c = static_cast<float>(p[stride]), d = static_cast<float>(p[stride + 1]);
-    const float upper = a + u * (b - a), lower = c + u * (d - c);
-    return upper + v * (lower - upper);
+  [[nodiscard]] bool holds(double x, double y) const {
+    return x >= 0.0 && y >= 0.0 && x <= right && y <= bottom;
+  }
+  // `count` samples a pixel apart from (x, y) in direction (dx, dy).
+  void read(double x, double y, double dx, double dy, std::size_t count, float* out) const {
+    constexpr double unit = 65536.0;
+    auto u = static_cast<std::int32_t>(x * unit + 0.5), v = static_cast<std::int32_t>(y * unit + 0.5);
+    const auto step_u = static_cast<std::int32_t>(std::floor(dx * unit + 0.5)),
+               step_v = static_cast<std::int32_t>(std::floor(dy * unit + 0.5));
+    for (std::size_t j = 0; j < count; ++j, u += step_u, v += step_v) {
+      const std::uint8_t* p = data + static_cast<std::ptrdiff_t>(v >> 16) * stride + (u >> 16);
+      const int a = (u >> 8) & 255, b = (v >> 8) & 255;
+      const int upper = p[0] * (256 - a) + p[1] * a, lower = p[stride] * (256 - a) + p[stride + 1] * a;
+      out[j] = static_cast<float>(upper * (256 - b) + lower * b) * (1.0F / 65536.0F);
+    }
   }
 };
 
@@ -59,8 +69,14 @@ double radius_at(const Shape& shape, const Direction& d) {
   return shape.radius + shape.cos2 * d.c2 + shape.sin2 * d.s2;
 }
 
+// Of the first `count` values, which are reordered; of every other one where there are many.
 double median_of(std::array<double, Rays::most>& values, int count) {
   if (count == 0) return 0.0;
+  if (count >= 40) {
+    count /= 2;
+    for (int i = 0; i < count; ++i)
+      values[static_cast<std::size_t>(i)] = values[static_cast<std::size_t>(2 * i)];
+  }
   const auto middle = values.begin() + count / 2;
   std::nth_element(values.begin(), middle, values.begin() + count);
   return *middle;
@@ -132,8 +148,9 @@ bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double fl
   Harmonics h = assemble(table, rest, rays.weight, rays.count, ellipse);
   Vector5 p = h.normal.ldlt().solve(h.right);
   int n = residuals(p);
+  const double largest = *std::max_element(sizes.begin(), sizes.begin() + n);
   double scale = std::max(floor, 1.4826 * median_of(sizes, n));
-  if (!p.allFinite() || *std::max_element(sizes.begin(), sizes.begin() + n) > 3.7 * scale) {
+  if (!p.allFinite() || largest > 3.7 * scale) {
     p.setZero();  // the median is a safe start
     n = 0;
     for (std::size_t k = 0; k < count; ++k)
@@ -193,7 +210,7 @@ double Shape::axis_ratio() const {
 }
 
 void Rays::choose(double radius) {
-  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 16.0)), 2, most / 16);
+  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 2, most / 16);
   open.fill(true);
   weight.fill(1.0);
 }
@@ -202,7 +219,8 @@ double ray_angle(const Rays& rays, int i) { return 2.0 * std::numbers::pi * (i +
 
 void Rays::close(const Shape& shape, double reach, double x, double y, double radius, double guard) {
   const double dx = x - shape.x, dy = y - shape.y, limit = radius + guard;
-  if (std::hypot(dx, dy) > shape.radius + reach + limit) return;
+  const double near = shape.radius + reach + limit;
+  if (dx * dx + dy * dy > near * near) return;
   const auto& table = directions(count);
   for (int i = 0; i < count; ++i) {
     const Direction& d = table[static_cast<std::size_t>(i)];
@@ -234,10 +252,8 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
       continue;
     }
     const int length = inward + half + 5;
-    auto x = static_cast<float>(shape.x + begin * d.c), y = static_cast<float>(shape.y + begin * d.s);
-    const auto step_x = static_cast<float>(d.c), step_y = static_cast<float>(d.s);
-    for (int j = 0; j < length; ++j, x += step_x, y += step_y)
-      f[static_cast<std::size_t>(j)] = samples.at(x, y);
+    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, static_cast<std::size_t>(length),
+                 f.data());
     // Differences of two samples each side; an edge nearer to where it is expected wins over an equal one farther off.
     double best = 0.0, height = 0.0;
     int at = -1;
@@ -295,10 +311,8 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
       rays.open[k] = false;
       continue;
     }
-    auto x = static_cast<float>(shape.x + begin * d.c), y = static_cast<float>(shape.y + begin * d.s);
-    const auto step_x = static_cast<float>(d.c), step_y = static_cast<float>(d.s);
     float* f = &profiles[k * stride];
-    for (std::size_t j = 0; j < length; ++j, x += step_x, y += step_y) f[j] = samples.at(x, y);
+    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, length, f);
     usable[k] = true;
     const double w = rays.weight[k];
     if (!(w > 0.0)) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <numeric>
 
 namespace invar::vision {
 
@@ -54,22 +55,27 @@ class TileField {
     values_.resize(static_cast<std::size_t>(columns * rows));
   }
   float& at(int i, int j) { return values_[static_cast<std::size_t>(j * columns_ + i)]; }
-  const std::vector<float>& row(int y) {
+  [[nodiscard]] const std::vector<std::uint8_t>& last() const { return row_; }
+  /// The row at y, rounded and within 0..255, for comparison with pixels.
+  const std::vector<std::uint8_t>& row(int y) {
     const float v =
         std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.0F, static_cast<float>(rows_ - 1));
     const int j = std::min(static_cast<int>(v), std::max(0, rows_ - 2));
     const float share = rows_ > 1 ? v - static_cast<float>(j) : 0.0F;
     const int next = std::min(j + 1, rows_ - 1);
-    const auto mixed = [&](int i) { return at(i, j) + share * (at(i, next) - at(i, j)); };
+    const auto mixed = [&](int i) {
+      return std::clamp(at(i, j) + share * (at(i, next) - at(i, j)), 0.0F, 255.0F);
+    };
     const int width = static_cast<int>(row_.size());
     float left = mixed(0);
     for (int i = -1; i < columns_; ++i) {
       const float right = mixed(std::min(i + 1, columns_ - 1));
-      const float slope = (right - left) / tile;
+      const int slope = static_cast<int>((right - left) * (65536.0F / tile));  // 16 bits below the point
       const int begin = i * tile + tile / 2;
       const int from = std::max(0, begin), to = std::min(width, i == columns_ - 1 ? width : begin + tile);
-      for (int x = from; x < to; ++x)
-        row_[static_cast<std::size_t>(x)] = left + slope * (static_cast<float>(x - begin) + 0.5F);
+      int value = static_cast<int>(left * 65536.0F) + slope / 2 + 32768 + slope * (from - begin);
+      for (int x = from; x < to; ++x, value += slope)
+        row_[static_cast<std::size_t>(x)] = static_cast<std::uint8_t>(std::clamp(value >> 16, 0, 255));
       left = right;
     }
     return row_;
@@ -78,7 +84,7 @@ class TileField {
  private:
   int columns_, rows_;
   std::vector<float> values_;
-  std::vector<float> row_;
+  std::vector<std::uint8_t> row_;
 };
 
 double median(std::vector<float>& values) {
@@ -86,6 +92,24 @@ double median(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return static_cast<double>(*middle);
+}
+
+// Adds one row's pixels above and below their thresholds to sums down the columns.
+void add_columns(const std::uint8_t* p, const std::vector<std::uint8_t>& high,
+                 const std::vector<std::uint8_t>& low, std::vector<std::uint16_t>& up,
+                 std::vector<std::uint16_t>& up_n, std::vector<std::uint16_t>& down,
+                 std::vector<std::uint16_t>& down_n) {
+  const std::size_t width = up.size();
+  const std::uint8_t *h = high.data(), *l = low.data();
+  std::uint16_t *a = up.data(), *an = up_n.data(), *b = down.data(), *bn = down_n.data();
+  for (std::size_t x = 0; x < width; ++x) {
+    const auto is_up = static_cast<std::uint16_t>(p[x] > h[x]),
+               is_down = static_cast<std::uint16_t>(p[x] < l[x]);
+    a[x] = static_cast<std::uint16_t>(a[x] + is_up * p[x]);
+    an[x] = static_cast<std::uint16_t>(an[x] + is_up);
+    b[x] = static_cast<std::uint16_t>(b[x] + is_down * p[x]);
+    bn[x] = static_cast<std::uint16_t>(bn[x] + is_down);
+  }
 }
 
 double noise_of(const cv::Mat1b& image) {
@@ -154,7 +178,7 @@ Partition partition(const cv::Mat1b& image, int window) {
 
   // What lies clearly above or below its surroundings' mean.
   TileSums sum{columns, rows}, count{columns, rows};
-  for (int y = 0; y < height; ++y) {
+  for (int y = 0; y < height; y += 2) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     for (int i = 0; i < columns; ++i) {
       const int end = std::min(width, (i + 1) * tile);
@@ -175,8 +199,7 @@ Partition partition(const cv::Mat1b& image, int window) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     const auto& level = mean.row(y);
     for (int x = 0; x < width; x += 2)
-      ++histogram[static_cast<std::size_t>(
-          std::min(255.0F, std::abs(static_cast<float>(p[x]) - level[static_cast<std::size_t>(x)])))];
+      ++histogram[static_cast<std::size_t>(std::abs(p[x] - level[static_cast<std::size_t>(x)]))];
   }
   int left = static_cast<int>(0.001 * 0.25 * width * height), extreme = 255;
   while (extreme > 0 && (left -= histogram[static_cast<std::size_t>(extreme)]) > 0) --extreme;
@@ -194,26 +217,21 @@ Partition partition(const cv::Mat1b& image, int window) {
   const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
   for (int pass = 0; pass < 2; ++pass) {
     TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
-    for (int y = 0; y < height; ++y) {
-      const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-      const auto& up_level = high.row(y);
-      const auto& down_level = low.row(y);
+    // Sums down the columns of a row of tiles first: they run over whole rows at once. Every other row is enough.
+    std::vector<std::uint16_t> up(static_cast<std::size_t>(width)), up_n(up), down(up), down_n(up);
+    for (int j = 0; j < rows; ++j) {
+      std::fill(up.begin(), up.end(), 0), std::fill(up_n.begin(), up_n.end(), 0);
+      std::fill(down.begin(), down.end(), 0), std::fill(down_n.begin(), down_n.end(), 0);
+      for (int y = j * tile; y < std::min(height, (j + 1) * tile); y += 2)
+        add_columns(image.ptr<std::uint8_t>(y), high.row(y), low.row(y), up, up_n, down, down_n);
       for (int i = 0; i < columns; ++i) {
-        const int end = std::min(width, (i + 1) * tile);
-        int up = 0, up_n = 0, down = 0, down_n = 0;
-        for (int x = i * tile; x < end; ++x) {
-          const float value = p[x];
-          const int is_up = value > up_level[static_cast<std::size_t>(x)];
-          const int is_down = value < down_level[static_cast<std::size_t>(x)];
-          up += is_up * p[x];
-          up_n += is_up;
-          down += is_down * p[x];
-          down_n += is_down;
-        }
-        above.at(i, y / tile) += static_cast<float>(up);
-        above_n.at(i, y / tile) += static_cast<float>(up_n);
-        below.at(i, y / tile) += static_cast<float>(down);
-        below_n.at(i, y / tile) += static_cast<float>(down_n);
+        const auto begin = static_cast<std::ptrdiff_t>(i) * tile,
+                   end = std::min<std::ptrdiff_t>(width, begin + tile);
+        const auto total = [&](const std::vector<std::uint16_t>& column) {
+          return static_cast<float>(std::accumulate(column.begin() + begin, column.begin() + end, 0));
+        };
+        above.at(i, j) = total(up), above_n.at(i, j) = total(up_n);
+        below.at(i, j) = total(down), below_n.at(i, j) = total(down_n);
       }
     }
     out.light_contrast =
@@ -229,11 +247,11 @@ Partition partition(const cv::Mat1b& image, int window) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
     std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
-    const auto& down = low.row(y);
-    const auto& up = high.row(y);
+    const std::uint8_t* down = (y % 2 == 0 ? low.row(y) : low.last()).data();  // two rows hardly differ
+    const std::uint8_t* up = (y % 2 == 0 ? high.row(y) : high.last()).data();
     for (int x = 0; x < width; ++x) {
-      light[x] = static_cast<float>(p[x]) > up[static_cast<std::size_t>(x)] ? 255 : 0;
-      dark[x] = static_cast<float>(p[x]) < down[static_cast<std::size_t>(x)] ? 255 : 0;
+      light[x] = p[x] > up[x] ? 255 : 0;
+      dark[x] = p[x] < down[x] ? 255 : 0;
     }
   }
   if (!(out.light_contrast > 0.0)) out.light.setTo(0);
