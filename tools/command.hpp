@@ -17,5 +17,6 @@ void add_predict(CLI::App& program);
 void add_run(CLI::App& program);
 void add_recording(CLI::App& program);
 void add_simulate(CLI::App& program);
+void add_diagnose(CLI::App& program);
 
 }  // namespace invar::tools

@@ -36,9 +36,12 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
     if (term.kind->command != nullptr) commands_.push_back(&term);
     if (term.kind->friction != nullptr) frictions_.push_back(&term);
     if (term.kind->reading != nullptr) readings_.push_back(&term);
-    if (!term.curve.knots.empty())
-      (term.kind->info->site == "actuator" ? motor_curves_ : force_curves_)
-          .emplace_back(&term, code_of(term.curve.over));
+    if (!term.curve.knots.empty()) {
+      auto& curves = term.kind->info->site == "actuator"      ? motor_curves_
+                     : term.kind->info->site == "measurement" ? reading_curves_
+                                                              : force_curves_;
+      curves.emplace_back(&term, code_of(term.curve.over));
+    }
     switch (term.kind->memory) {
       case AxisMemory::none:
         break;
@@ -275,6 +278,8 @@ double AxisPlant::reading() const noexcept {
   if (age_ > 0.0) shown = delayed_position(age_);
   double error = 0.0;
   for (const auto* term : readings_) error += term->kind->reading(shown, term->parameters.data());
+  const AxisPoint at{time_, shown, velocity_, current_, temperature_};
+  for (const auto& [term, code] : reading_curves_) error += term->curve(variable(code, at));
   return shown + error;
 }
 

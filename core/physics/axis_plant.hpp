@@ -96,7 +96,7 @@ class AxisPlant {
   AxisParameters parameters_;
   std::vector<AxisTerm> terms_;
   std::vector<const AxisTerm*> forces_, motors_, commands_, frictions_, readings_, bristles_;
-  std::vector<std::pair<const AxisTerm*, int>> force_curves_, motor_curves_;
+  std::vector<std::pair<const AxisTerm*, int>> force_curves_, motor_curves_, reading_curves_;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;
   Mode mode_{};

@@ -62,6 +62,8 @@ constexpr std::array unmodelled_infos{
     unnamed(Plant::equations, "state"),
 };
 
+constexpr TermInfo axis_unmodelled_reading_info = unnamed(Plant::axis, "measurement");
+constexpr AxisTermKind axis_unmodelled_reading{.info = &axis_unmodelled_reading_info};
 constexpr AxisTermKind axis_unmodelled_force{.info = &unmodelled_infos[0]};
 constexpr AxisTermKind axis_unmodelled_motor{.info = &unmodelled_infos[1]};
 constexpr ThermalTermKind thermal_unmodelled_loss{.info = &unmodelled_infos[2]};
@@ -114,6 +116,7 @@ const TermInfo* find_term(Plant plant, std::string_view name) {
 }
 
 const TermInfo* unmodelled(Plant plant, std::string_view site) {
+  if (plant == Plant::axis && site == axis_unmodelled_reading_info.site) return &axis_unmodelled_reading_info;
   const TermInfo* any = nullptr;
   for (const auto& info : unmodelled_infos) {
     if (info.plant != plant) continue;
@@ -125,6 +128,7 @@ const TermInfo* unmodelled(Plant plant, std::string_view site) {
 
 const AxisTermKind* axis_kind(const TermInfo& info) {
   if (&info == axis_unmodelled_force.info) return &axis_unmodelled_force;
+  if (&info == axis_unmodelled_reading.info) return &axis_unmodelled_reading;
   if (&info == axis_unmodelled_motor.info) return &axis_unmodelled_motor;
   for (const auto* kind : axis_terms)
     if (kind->info == &info) return kind;

@@ -1,0 +1,81 @@
+// `invar diagnose`: what physics does the model leave out? Writes report.json, report.html and patched.yaml.
+#include "tools/diagnose/data.hpp"
+
+#include <unistd.h>
+
+#include <fstream>
+#include <iostream>
+#include <memory>
+
+#include "core/model/model_file.hpp"
+#include "tools/command.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  std::filesystem::path model;
+  std::vector<std::filesystem::path> recordings;
+  std::filesystem::path out = "diagnosis";
+  bool json = false;
+  unsigned seed = 1;
+};
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  const auto temporary = std::filesystem::path{file.string() + ".part"};
+  {
+    std::ofstream out{temporary};
+    out << text;
+    if (!out.flush()) throw InputError{file.string(), "cannot be written", "choose another --out"};
+  }
+  std::filesystem::rename(temporary, file);
+}
+
+void run(const Options& options) {
+  const auto yaml = config::Yaml::load(options.model);
+  const auto model = model::read(yaml);
+  yaml.finish();
+  auto data = diagnose::load_case(model, options.recordings);
+  const bool terminal = isatty(STDERR_FILENO) == 1;
+  const auto progress = [&](double share, const std::string& what) {
+    if (terminal) std::cerr << "\r\033[K" << static_cast<int>(100.0 * share) << " %  " << what << std::flush;
+  };
+  const auto diagnosis = diagnose::search(data, progress);
+  if (terminal) std::cerr << "\r\033[K";
+  std::error_code error;
+  std::filesystem::create_directories(options.out, error);
+  if (error)
+    throw InputError{options.out.string(), "cannot be made: " + error.message(), "choose another --out"};
+  const auto json = diagnose::report_json(data, diagnosis);
+  write_text(options.out / "patched.yaml", model::patched(yaml, diagnosis.best.model));
+  diagnose::write_page(data, diagnosis, options.model.string(), options.out / "report.html");
+  write_text(options.out / "report.json", json + "\n");
+  if (options.json)
+    std::cout << json << '\n';
+  else
+    std::cout << diagnose::summary(data, diagnosis) << "  " << (options.out / "report.html").string() << '\n';
+}
+
+}  // namespace
+
+void add_diagnose(CLI::App& program) {
+  auto* command =
+      program.add_subcommand("diagnose", "Find the physics that a model leaves out, and prove it");
+  command->footer("Example: invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis");
+  auto options = std::make_shared<Options>();
+  command->add_option("--model", options->model, "model.yaml: what you believe")->required();
+  command
+      ->add_option("--recording", options->recordings,
+                   "recording of the machine, .csv or .csv.gz; may be repeated")
+      ->required();
+  command->add_option("--out", options->out, "folder for report.json, report.html and patched.yaml")
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "print report.json instead of the summary");
+  command->add_option("--seed", options->seed, "accepted for scripts; the search draws no random numbers")
+      ->capture_default_str();
+  command->callback([options] { run(*options); });
+}
+
+}  // namespace invar::tools

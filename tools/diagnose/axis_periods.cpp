@@ -1,0 +1,175 @@
+// Which pitch or frequency would explain most of an axis's residual: the residual is carried back through the
+// closed loop to the force (or the reading) that would have caused it, and that is looked at along position and time.
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <unsupported/Eigen/FFT>
+
+#include "core/physics/library.hpp"
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using Complex = std::complex<double>;
+using Spectrum = std::vector<Complex>;
+
+std::size_t power_of_two(std::size_t n) {
+  std::size_t p = 1;
+  while (p < n) p *= 2;
+  return p;
+}
+
+Spectrum transform(std::vector<double> values, std::size_t size) {
+  values.resize(size, 0.0);
+  std::vector<Complex> in(values.begin(), values.end()), out;
+  Eigen::FFT<double> fft;
+  fft.fwd(out, in);
+  return out;
+}
+
+/// Responses of the whitened residual to a unit pulse of one tick, by output.
+std::vector<std::vector<double>> pulse_responses(const Case& data, const Weighing& weighing,
+                                                 const physics::Model& model, const char* site, double size) {
+  const auto& recording = data.recordings.front();
+  const std::size_t rows = recording.inputs.rows(), at = std::min<std::size_t>(40, rows / 4);
+  const double t = recording.inputs.time[at], period = recording.inputs.time[at + 1] - t;
+  // Friction would hold the carriage against a small pulse; the loop's linear part is wanted.
+  physics::Model smooth = model;
+  std::erase_if(smooth.terms, [](const physics::Term& term) {
+    return term.info->name.find("friction") != std::string_view::npos || term.info->name == "backlash" ||
+           term.info->name == "dead_zone";
+  });
+  physics::Model pulsed = smooth;
+  physics::Term pulse;
+  pulse.info = physics::unmodelled(physics::Plant::axis, site);
+  pulse.curve = {"time", {t - period, t, t + period}, {0.0, size, 0.0}};
+  pulsed.terms.push_back(pulse);
+  physics::Outputs quiet, struck;
+  recording.simulation->run(smooth, quiet);
+  recording.simulation->run(pulsed, struck);
+  std::vector<std::vector<double>> responses;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<double> difference(rows), white(rows);
+    for (std::size_t i = 0; i < rows; ++i) difference[i] = (struck[o][i] - quiet[o][i]) / size;
+    whiten(weighing.filters[o], difference, std::vector<bool>(rows, true), white.data());
+    white.erase(white.begin(), white.begin() + static_cast<std::ptrdiff_t>(at));
+    responses.push_back(std::move(white));
+  }
+  return responses;
+}
+
+/// The adjoint: for each row, how much a push there would take from the residual.
+std::vector<double> carried_back(const Case& data, const Fit& fitted,
+                                 const std::vector<std::vector<double>>& responses, std::size_t recording) {
+  Eigen::Index at = 0;
+  for (std::size_t r = 0; r < recording; ++r)
+    at += static_cast<Eigen::Index>(data.recordings[r].inputs.rows() * data.outputs.size());
+  const std::size_t rows = data.recordings[recording].inputs.rows();
+  const std::size_t size = power_of_two(2 * std::max(rows, responses.front().size()));
+  Spectrum sum(size, Complex{});
+  for (std::size_t o = 0; o < data.outputs.size(); ++o, at += static_cast<Eigen::Index>(rows)) {
+    std::vector<double> w(fitted.residual.data() + at,
+                          fitted.residual.data() + at + static_cast<Eigen::Index>(rows));
+    const auto residual = transform(std::move(w), size), response = transform(responses[o], size);
+    for (std::size_t k = 0; k < size; ++k) sum[k] += std::conj(response[k]) * residual[k];
+  }
+  Eigen::FFT<double> fft;
+  std::vector<Complex> back;
+  fft.inv(back, sum);
+  std::vector<double> out(rows);
+  for (std::size_t i = 0; i < rows; ++i) out[i] = back[i].real();
+  return out;
+}
+
+/// Peaks of a power spectrum that stand out of their neighbourhood, best first; bins below `from` are left out.
+std::vector<double> peaks(const std::vector<double>& power, std::size_t from, std::size_t to,
+                          std::size_t most) {
+  std::vector<std::pair<double, double>> found;
+  to = std::min(to, power.size() - 1);
+  std::vector<double> level(power.size(), 0.0);
+  for (std::size_t block = from; block < to;) {
+    const std::size_t half = std::max<std::size_t>(12, block / 4);
+    const std::size_t a = block > half + from ? block - half : from, b = std::min(to, block + half);
+    const double local = median(
+        {power.begin() + static_cast<std::ptrdiff_t>(a), power.begin() + static_cast<std::ptrdiff_t>(b)});
+    const std::size_t until = std::min(to, block + std::max<std::size_t>(1, half / 4));
+    for (; block < until; ++block) level[block] = local;
+  }
+  for (std::size_t k = std::max<std::size_t>(1, from); k + 1 < to; ++k)
+    if (power[k] > power[k - 1] && power[k] >= power[k + 1] && level[k] > 0.0) {
+      // The top of the parabola through three bins.
+      const double bend = power[k - 1] - 2.0 * power[k] + power[k + 1];
+      const double shift = bend < 0.0 ? 0.5 * (power[k - 1] - power[k + 1]) / bend : 0.0;
+      found.emplace_back(power[k] / level[k], static_cast<double>(k) + shift);
+    }
+  std::sort(found.rbegin(), found.rend());
+  std::vector<double> places;
+  for (const auto& [height, place] : found) {
+    if (places.size() >= most || height < 6.0) break;
+    places.push_back(place);
+  }
+  return places;
+}
+
+}  // namespace
+
+Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted) {
+  Periods periods;
+  const auto force = pulse_responses(data, weighing, fitted.model, "force", 1e-2);
+  const auto reading = pulse_responses(data, weighing, fitted.model, "measurement", 1e-7);
+  double low = 1e300, high = -1e300;
+  std::vector<std::vector<double>> positions, forces, readings, currents;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    positions.push_back(variable_values(data, r, "position"));
+    currents.push_back(variable_values(data, r, "current"));
+    forces.push_back(carried_back(data, fitted, force, r));
+    readings.push_back(carried_back(data, fitted, reading, r));
+    for (double x : positions.back()) low = std::min(low, x), high = std::max(high, x);
+  }
+  const double span = high - low;
+  constexpr std::size_t bins = 1U << 15U, padded = 4 * bins;
+  const auto along_position = [&](const auto& weight) {
+    std::vector<double> grid(bins, 0.0);
+    for (std::size_t r = 0; r < positions.size(); ++r)
+      for (std::size_t i = 0; i < positions[r].size(); ++i) {
+        const auto bin = static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1));
+        grid[std::min(bin, bins - 1)] += weight(r, i);
+      }
+    const auto spectrum = transform(std::move(grid), padded);
+    std::vector<double> power(bins);
+    for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+    std::vector<double> pitches;
+    // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
+    const double finest = std::max(2e-5, span / 6000.0);
+    for (double k : peaks(power, 4, static_cast<std::size_t>(4.0 * span / finest), 4))
+      pitches.push_back(4.0 * span / k);
+    return pitches;
+  };
+  if (span > 1e-5) {
+    periods.force_pitch = along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; });
+    periods.motor_pitch =
+        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; });
+    periods.reading_pitch = along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; });
+    // The two ripples look alike in this light; each is also tried at the other's pitch.
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.motor_pitch.size()); ++i)
+      periods.force_pitch.push_back(periods.motor_pitch[i]);
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.force_pitch.size()); ++i)
+      periods.motor_pitch.push_back(periods.force_pitch[i]);
+  }
+  for (std::size_t r = 0; r < forces.size(); ++r) {
+    const std::size_t rows = forces[r].size(), size = power_of_two(4 * rows);
+    const double period = (data.recordings[r].inputs.time.back() - data.recordings[r].inputs.time.front()) /
+                          static_cast<double>(rows - 1);
+    const auto spectrum = transform(forces[r], size);
+    std::vector<double> power(size / 2);
+    for (std::size_t k = 0; k < power.size(); ++k) power[k] = std::norm(spectrum[k]);
+    for (double k : peaks(power, 8, power.size(), 3))
+      periods.force_frequency.push_back(k / (static_cast<double>(size) * period));
+  }
+  return periods;
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,409 @@
+#include "tools/diagnose/candidates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "core/physics/library.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Plant;
+using physics::Role;
+using physics::Term;
+using physics::TermInfo;
+
+constexpr auto none = physics::most_parameters;
+
+bool has(const Case& data, const char* name) { return data.recordings.front().inputs.find(name) != nullptr; }
+
+/// Does anything in the recordings let this term show?
+bool may_show(const Case& data, const physics::Model& model, const TermInfo& info) {
+  const auto name = info.name;
+  switch (info.plant) {
+    case Plant::thermal:
+      if (name == "speed_dependent_convection") return has(data, "speed");
+      if (name == "motor_heating") return has(data, "motor_current");
+      if (name == "node_coupling") return data.model.thermal.nodes.size() > 1;
+      if (name == "heater_saturation") return !data.model.thermal.heaters.empty();
+      return true;
+    case Plant::error_map: {
+      bool expands = model.value("expansion") != 0.0;
+      for (const auto& term : model.terms) expands = expands || term.info->name == "thermal_expansion";
+      if (name == "backlash") return has(data, "direction");
+      if (name == "thermal_expansion")
+        return has(data, "temperature") && data.model.find("expansion") == nullptr;
+      if (name == "heating_rate_lag") return has(data, "temperature") && expands;
+      if (name == "refractive_index") return has(data, "pressure");
+      if (name == "abbe_offset") return has(data, "offset");
+      return true;
+    }
+    case Plant::droplet:
+      if (name == "stage_velocity_carry" || name == "valve_delay") return has(data, "velocity_x");
+      if (name == "pressure_dependence") return has(data, "pressure");
+      if (name == "lens_distortion" || name == "camera_rotation") return has(data, "image_x");
+      return true;
+    default:
+      return true;
+  }
+}
+
+std::vector<std::string> places(const Case& data, const TermInfo& info) {
+  switch (info.plant) {
+    case Plant::thermal:
+      return data.model.thermal.nodes;
+    case Plant::sensor: {
+      std::vector<std::string> on;
+      for (const auto& output : data.outputs) {
+        const bool encoder = output == "encoder";
+        if (info.name == "gain_droop" && encoder) continue;
+        if ((info.name == "periodic_error" || info.name == "hysteresis") && !encoder) continue;
+        on.push_back(output);
+      }
+      return on;
+    }
+    default:
+      return {""};
+  }
+}
+
+/// The starts of one term: every value of its first shape, the first value of further ones.
+void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes = {}) {
+  const auto& info = *term.info;
+  Start start;
+  bool periodic = false, any_amplitude = false;
+  std::size_t shape = none;
+  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
+    const auto& p = info.parameters[i];
+    if (p.role == Role::phase) periodic = true;
+    if (p.role == Role::amplitude) any_amplitude = true;
+    if (p.role == Role::shape && shape == none) shape = i;
+    if (p.role != Role::reference || !term.given[i])
+      term.values[i] = term.given[i] ? term.values[i] : p.starts[0];
+    term.given[i] = true;
+  }
+  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
+    if (info.parameters[i].role != Role::amplitude) continue;
+    start.directions.push_back({i, 0, false});
+    if (periodic) start.directions.push_back({i, 0, true});
+  }
+  if (!any_amplitude) start.directions.push_back({none, 0, false});
+  std::vector<double> values = first_shapes;
+  if (values.empty() && shape != none)
+    for (double v : info.parameters[shape].starts)
+      if (std::isfinite(v)) values.push_back(v);
+  if (shape == none) values = {0.0};
+  for (double v : values) {
+    start.term = term;
+    if (shape != none) start.term.values[shape] = info.parameters[shape].bounds.clamp(v);
+    starts.push_back(start);
+  }
+}
+
+/// Pitches worth trying where the rows are few: a fine grid of wave numbers between one and the sampling's limit.
+std::vector<double> pitch_grid(const std::vector<double>& positions, std::size_t most) {
+  auto sorted = positions;
+  std::sort(sorted.begin(), sorted.end());
+  const double span = sorted.back() - sorted.front();
+  if (!(span > 0.0)) return {};
+  double coarse = span;
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < sorted.size(); ++i)
+    if (sorted[i] - sorted[i - 1] > 1e-6 * span) steps.push_back(sorted[i] - sorted[i - 1]);
+  if (!steps.empty()) coarse = median(steps);
+  const double top = std::min(0.5 / coarse, static_cast<double>(most) * 0.2 / span);
+  std::vector<double> pitches;
+  for (double k = 0.75 / span; k <= top && pitches.size() < most; k += 0.2 / span) pitches.push_back(1.0 / k);
+  return pitches;
+}
+
+std::vector<double> own_shapes(const Case& data, const TermInfo& info, const std::string& on) {
+  if (info.name == "heater_saturation") {
+    double top = 0.0;
+    for (const auto& heater : data.model.thermal.heaters)
+      if (heater.node == on)
+        for (const auto& r : data.recordings)
+          for (double p : *r.inputs.find(heater.name))
+            if (std::isfinite(p)) top = std::max(top, p);
+    return {0.92 * top, 0.8 * top, 0.65 * top};
+  }
+  if (info.plant == Plant::thermal && info.name == "hidden_node") {
+    const double c = data.model.value(on + ".capacity", 100.0);
+    return {0.3 * c, 1.0 * c, 3.0 * c, 0.08 * c};
+  }
+  if ((info.plant == Plant::error_map || info.plant == Plant::sensor) && info.name == "periodic_error") {
+    std::vector<double> all;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& x =
+          *data.recordings[r].inputs.find(info.plant == Plant::sensor ? "true_position" : "position");
+      for (double v : x)
+        if (std::isfinite(v)) all.push_back(v);
+    }
+    return pitch_grid(all, 400);
+  }
+  return {};
+}
+
+void add_equations(const Case& data, const physics::Model& model, std::vector<Start>& starts) {
+  const auto& equations = data.model.equations;
+  // The usual size of each variable and of each state's rate: the unit in which strengths are tried.
+  Case copy = data;
+  const auto size_of = [&](const std::string& symbol) {
+    for (const auto& output : equations.outputs)
+      if (output.expression == symbol) {
+        std::vector<double> values;
+        for (const auto& r : data.recordings)
+          for (std::size_t o = 0; o < data.outputs.size(); ++o)
+            if (data.outputs[o] == output.name)
+              for (double v : r.measured[o])
+                if (std::isfinite(v)) values.push_back(std::abs(v));
+        if (!values.empty()) return std::max(1e-12, *std::max_element(values.begin(), values.end()));
+      }
+    return std::max(1e-3, std::abs(model.value(symbol + ".initial", 1.0)));
+  };
+  const auto make = [&](const char* name, const std::string& on, const std::string& with) {
+    Term term;
+    term.info = physics::find_term(Plant::equations, name);
+    term.on = on;
+    term.with = with;
+    for (const auto& used : model.terms)
+      if (used.info == term.info && used.on == on && used.with == with) term.info = nullptr;
+    return term;
+  };
+  const double duration =
+      data.recordings.front().inputs.time.back() - data.recordings.front().inputs.time.front();
+  for (const auto& state : equations.states) {
+    // A state whose rate is only another state (x' = v) is kinematics; nothing can be missing there.
+    bool kinematic = false;
+    for (const auto& other : equations.states) kinematic = kinematic || state.derivative == other.name;
+    if (kinematic) continue;
+    for (const char* name : {"linear", "quadratic", "cubic"})
+      for (const auto& other : equations.states) {
+        const bool own = other.name == state.name;
+        auto term = make(std::string{name} == "linear" && !own ? "coupling" : name, state.name,
+                         own ? "" : other.name);
+        if (term.info == nullptr) continue;
+        const double s = size_of(other.name);
+        term.values[0] = 1e-3 * size_of(state.name) /
+                         std::pow(s, name[0] == 'l' ? 1 : (name[0] == 'q' ? 2 : 3)) / duration;
+        term.given[0] = true;
+        add_starts(starts, term);
+      }
+    for (const auto& input : equations.inputs) {
+      auto term = make("coupling", state.name, input.symbol);
+      if (term.info == nullptr) continue;
+      term.values[0] = 1e-3 * size_of(state.name) / duration;
+      term.given[0] = true;
+      add_starts(starts, term);
+    }
+    for (const char* name : {"constant", "dry_friction"}) {
+      auto term = make(name, state.name, "");
+      if (term.info == nullptr) continue;
+      term.values[0] = 1e-3 * size_of(state.name) / duration;
+      term.given[0] = true;
+      add_starts(starts, term);
+    }
+    if (auto term = make("hidden_state", state.name, ""); term.info != nullptr) {
+      term.values[0] = 0.05 / duration;
+      term.given[0] = true;
+      add_starts(starts, term, {0.003 * duration, 0.03 * duration, 0.2 * duration});
+    }
+    const double top = size_of(state.name);
+    for (const char* name : {"upper_limit", "overflow"})
+      for (double share : {0.98, 0.9, 1.1}) {
+        if (std::string{name} == "overflow") {
+          for (const auto& other : equations.states)
+            if (other.name != state.name)
+              if (auto term = make(name, state.name, other.name); term.info != nullptr)
+                add_starts(starts, term, {share * top});
+        } else if (auto term = make(name, state.name, ""); term.info != nullptr) {
+          add_starts(starts, term, {share * top});
+        }
+      }
+  }
+  const double step = duration / static_cast<double>(data.recordings.front().inputs.rows());
+  for (const auto& input : equations.inputs)
+    for (const char* name : {"delay", "lag", "dead_zone"})
+      if (auto term = make(name, input.symbol, ""); term.info != nullptr) {
+        term.values[0] = std::string{name} == "dead_zone" ? 1e-3 : 0.5 * step;
+        term.given[0] = true;
+        add_starts(starts, term);
+      }
+  for (const auto& output : equations.outputs)
+    for (const char* name : {"delay", "lag"})
+      if (auto term = make(name, output.name, ""); term.info != nullptr) {
+        term.values[0] = 0.5 * step;
+        term.given[0] = true;
+        add_starts(starts, term);
+      }
+}
+
+}  // namespace
+
+std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name) {
+  const auto& r = data.recordings[recording];
+  if (name == "time") return r.inputs.time;
+  if (const auto* values = r.inputs.find(name);
+      values != nullptr && std::find(data.outputs.begin(), data.outputs.end(), name) == data.outputs.end())
+    return physics::bridged(r.inputs.time, *values);
+  const auto measured = [&](const std::string& signal) {
+    for (std::size_t o = 0; o < data.outputs.size(); ++o)
+      if (data.outputs[o] == signal) return physics::bridged(r.inputs.time, r.measured[o]);
+    return std::vector<double>{};
+  };
+  if (data.model.plant == Plant::thermal && name == "temperature") return measured(data.outputs.front());
+  if (name == "velocity") {
+    auto position =
+        data.model.plant == Plant::sensor ? physics::bridged(r.inputs.time, *r.inputs.find("true_position"))
+        : r.inputs.find("reference") != nullptr ? physics::bridged(r.inputs.time, *r.inputs.find("reference"))
+                                                : measured("position");
+    std::vector<double> velocity(position.size(), 0.0);
+    for (std::size_t i = 1; i + 1 < position.size(); ++i)
+      velocity[i] = (position[i + 1] - position[i - 1]) / (r.inputs.time[i + 1] - r.inputs.time[i - 1]);
+    return velocity;
+  }
+  return measured(name);
+}
+
+std::vector<Start> named_starts(const Case& data, const Weighing& weighing, const Fit& fitted) {
+  std::vector<Start> starts;
+  const auto& model = fitted.model;
+  if (data.model.plant == Plant::equations) {
+    add_equations(data, model, starts);
+    return starts;
+  }
+  Periods periods;
+  if (data.model.plant == Plant::axis) periods = axis_periods(data, weighing, fitted);
+  for (const auto* info : physics::terms_of(data.model.plant)) {
+    if (!may_show(data, model, *info)) continue;
+    const bool may_repeat = info->index_of("pitch") != none || info->index_of("frequency") != none;
+    for (const auto& on : places(data, *info)) {
+      const bool used = std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+        return term.info == info && (term.on.empty() || term.on == on);
+      });
+      if (used && !(may_repeat && info->name != "flexible_mode")) continue;
+      Term term;
+      term.info = info;
+      term.on = on;
+      for (std::size_t i = 0; i < info->parameter_count(); ++i)
+        if (const auto* shared = data.model.find(info->parameters[i].name);
+            shared != nullptr && info->parameters[i].role == Role::shape) {
+          term.values[i] = shared->value;
+          term.given[i] = true;
+        }
+      if (const auto at = info->index_of("reference_pressure"); at != none && has(data, "pressure")) {
+        std::vector<double> all;
+        for (const auto& r : data.recordings)
+          for (double v : *r.inputs.find("pressure"))
+            if (std::isfinite(v)) all.push_back(v);
+        term.values[at] = median(all);
+        term.given[at] = true;
+        if (info->plant == Plant::error_map) {
+          add_starts(starts, term, {median(all)});
+          continue;
+        }
+      }
+      if (info->name == "node_coupling") {
+        for (const auto& other : data.model.thermal.nodes) {
+          const auto joined = [&](const auto& c) {
+            return (c.first == on && c.second == other) || (c.first == other && c.second == on);
+          };
+          if (other <= on ||
+              std::any_of(data.model.thermal.couplings.begin(), data.model.thermal.couplings.end(), joined))
+            continue;
+          term.with = other;
+          add_starts(starts, term);
+        }
+        continue;
+      }
+      std::vector<double> shapes = own_shapes(data, *info, on);
+      if (info->plant == Plant::axis) {
+        const auto name = info->name;
+        if (name == "force_ripple") shapes = periods.force_pitch;
+        if (name == "motor_constant_ripple") shapes = periods.motor_pitch;
+        if (name == "encoder_periodic_error") shapes = periods.reading_pitch;
+        if (name == "periodic_disturbance" || name == "additive_disturbance")
+          shapes = periods.force_frequency;
+        if (name == "position_stiffness") shapes = {0.0};
+        if (may_repeat && name != "flexible_mode" && shapes.empty()) continue;
+      }
+      if (info->name == "stage_velocity_carry") {
+        const double v = data.model.value("speed", 3.0);
+        shapes = {v, 0.6 * v, 1.7 * v};
+      }
+      if (info->name == "periodic_error" && shapes.empty()) continue;
+      add_starts(starts, term, shapes);
+    }
+  }
+  return starts;
+}
+
+std::vector<Start> unmodelled_starts(const Case& data, const Fit& /*fitted*/) {
+  struct Choice {
+    const char* site;
+    const char* over;
+    std::size_t knots;
+  };
+  std::vector<Choice> choices;
+  switch (data.model.plant) {
+    case Plant::axis:
+      choices = {{"force", "position", 10},     {"force", "position", 28},   {"force", "velocity", 12},
+                 {"force", "time", 12},         {"force", "temperature", 6}, {"actuator", "current", 9},
+                 {"actuator", "temperature", 5}};
+      break;
+    case Plant::thermal:
+      choices = {{"loss", "temperature", 6}, {"loss", "time", 12},   {"source", "time", 12},
+                 {"loss", "speed", 5},       {"source", "power", 6}, {"source", "motor_current", 5}};
+      break;
+    case Plant::error_map:
+      choices = {{"kinematic", "position", 12},  {"kinematic", "time", 14},  {"thermal", "temperature", 6},
+                 {"measurement", "pressure", 5}, {"kinematic", "offset", 5}, {"thermal", "time", 10}};
+      break;
+    case Plant::droplet:
+      choices = {{"flight", "time", 6},      {"flight", "height", 6},   {"camera", "image_x", 6},
+                 {"camera", "image_y", 6},   {"valve", "pressure", 6},  {"valve", "velocity_x", 6},
+                 {"valve", "velocity_y", 6}, {"flight", "target_x", 6}, {"flight", "target_y", 6},
+                 {"valve", "on_time", 5}};
+      break;
+    case Plant::sensor:
+      choices = {
+          {"measurement", "velocity", 10}, {"measurement", "time", 10}, {"measurement", "true_position", 14}};
+      break;
+    default:
+      break;
+  }
+  std::vector<Start> starts;
+  for (const auto& choice : choices) {
+    std::vector<double> all;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto values = variable_values(data, r, choice.over);
+      all.insert(all.end(), values.begin(), values.end());
+    }
+    if (all.empty()) continue;
+    std::sort(all.begin(), all.end());
+    const double low = all[all.size() / 500], high = all[all.size() - 1 - all.size() / 500];
+    if (!(high - low > 1e-9 * (std::abs(high) + std::abs(low)))) continue;
+    std::vector<std::string> on{""};
+    if (data.model.plant == Plant::thermal) on = data.model.thermal.nodes;
+    if (data.model.plant == Plant::droplet || data.model.plant == Plant::sensor) on = data.outputs;
+    for (const auto& place : on) {
+      Start start;
+      start.term.info = physics::unmodelled(data.model.plant, choice.site);
+      start.term.on = place;
+      start.term.curve.over = choice.over;
+      for (std::size_t k = 0; k < choice.knots; ++k) {
+        const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
+        start.term.curve.knots.push_back(low + share * (high - low));
+        start.term.curve.values.push_back(0.0);
+        start.directions.push_back({none, k, false});
+      }
+      starts.push_back(std::move(start));
+    }
+  }
+  return starts;
+}
+
+}  // namespace invar::diagnose

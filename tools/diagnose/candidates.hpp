@@ -1,0 +1,36 @@
+// Candidates: which terms could act in this machine, where, and from which shapes a fit of them begins.
+#pragma once
+
+#include <vector>
+
+#include "tools/diagnose/fit.hpp"
+
+namespace invar::diagnose {
+
+/// A term to be tried from one shape. `columns` are the directions in which its strength may grow.
+struct Start {
+  physics::Term term;
+  struct Direction {
+    std::size_t amplitude =
+        physics::most_parameters;  // most_parameters: the term as a whole, or a curve's value
+    std::size_t knot = 0;
+    bool quadrature = false;  // of a periodic term: the cosine
+  };
+  std::vector<Direction> directions;
+};
+
+/// All named terms that the signals of the case allow, on top of `fitted`.
+std::vector<Start> named_starts(const Case& data, const Weighing& weighing, const Fit& fitted);
+/// Curves over each variable, for what no name describes.
+std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
+
+/// Pitches or frequencies at which a periodic term would explain most, best first (axis: by the adjoint of the loop).
+struct Periods {
+  std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency;
+};
+Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted);
+
+/// Rows of one signal over all recordings, as the model sees them (positions measured, velocities differentiated).
+std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name);
+
+}  // namespace invar::diagnose

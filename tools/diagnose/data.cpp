@@ -1,0 +1,159 @@
+#include "tools/diagnose/data.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "tools/diagnose/statistics.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+/// Rows in order of time, one a time stamp.
+physics::Record in_order(const physics::Record& raw, DataCount& count) {
+  const std::size_t n = raw.rows();
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (std::isfinite(raw.time[i]))
+      order.push_back(i);
+    else
+      ++count.missing;
+  }
+  for (std::size_t i = 1; i < order.size(); ++i)
+    if (raw.time[order[i]] < raw.time[order[i - 1]]) ++count.out_of_order;
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return raw.time[a] < raw.time[b]; });
+  std::vector<std::size_t> kept;
+  for (const auto i : order) {
+    if (!kept.empty() && raw.time[i] <= raw.time[kept.back()])
+      ++count.duplicates;
+    else
+      kept.push_back(i);
+  }
+  physics::Record record;
+  for (const auto i : kept) record.time.push_back(raw.time[i]);
+  for (const auto& [name, values] : raw.signals)
+    for (const auto i : kept) record.signals[name].push_back(values[i]);
+  return record;
+}
+
+double median_step(const std::vector<double>& time) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
+  return steps.empty() ? 1.0 : median(steps);
+}
+
+/// The initial state, where the first rows contradict the one that the model starts from.
+void give_start(Case& data, Recording& recording) {
+  using physics::Plant;
+  auto& inputs = recording.inputs;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    const auto& name = data.outputs[o];
+    std::vector<double> first;
+    for (std::size_t i = 0; i < std::min<std::size_t>(7, inputs.rows()); ++i)
+      if (std::isfinite(recording.measured[o][i])) first.push_back(recording.measured[o][i]);
+    if (first.size() < 3) continue;
+    const double begin = median(first), spread = 1.5 * spread_of_differences(recording.measured[o]);
+    double expected = nothing, doubt = 0.0;
+    if (data.model.plant == Plant::thermal) {
+      const auto* ambient = inputs.find("ambient");
+      expected = ambient != nullptr ? ambient->front() : data.model.value("ambient", 20.0);
+      if (ambient == nullptr && data.model.find("ambient")->sigma) doubt = *data.model.find("ambient")->sigma;
+      doubt += 0.1;
+    } else if (data.model.plant == Plant::axis && name == "position") {
+      const auto* reference = inputs.find("reference");
+      expected = data.model.controller && reference != nullptr ? reference->front() : 0.0;
+      doubt = 1e-6;
+      if (reference != nullptr && reference->size() > 5) doubt += std::abs((*reference)[5] - (*reference)[0]);
+    }
+    if (!std::isfinite(expected) || !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt))) continue;
+    auto& column = inputs.signals[name];
+    column.assign(inputs.rows(), nothing);
+    column.front() = begin;
+  }
+}
+
+}  // namespace
+
+Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
+  Case data;
+  data.model = model;
+  data.outputs = model.outputs();
+  data.given_noise.assign(data.outputs.size(), nothing);
+  data.is_time_series = model.plant != physics::Plant::droplet;
+  // Rounding to the resolution is noise to a fit, not a step.
+  for (auto& parameter : data.model.parameters)
+    if (model.plant == physics::Plant::sensor && parameter.name == "resolution") parameter.sigma = 0.0;
+  for (const auto& file : files) {
+    const auto table = recording::Table::read(file);
+    const auto content = model::to_record(table, model, true);
+    Recording recording;
+    recording.name = file.filename().string();
+    data.count.rows += content.record.rows();
+    recording.inputs = in_order(content.record, data.count);
+    if (recording.inputs.rows() < 8)
+      throw InputError{file.string(), "has fewer than 8 usable rows", "record for longer"};
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      const auto& name = data.outputs[o];
+      recording.measured.push_back(recording.inputs.signals.at(name));
+      recording.inputs.signals.erase(name);
+      if (const auto noise = model.noise.find(name); noise != model.noise.end())
+        data.given_noise[o] = noise->second * content.units.at(name).factor;
+      for (const double v : recording.measured.back())
+        if (!std::isfinite(v)) ++data.count.missing;
+    }
+    const double step = median_step(recording.inputs.time);
+    for (std::size_t i = 1; i < recording.inputs.rows(); ++i) {
+      const double gap = recording.inputs.time[i] - recording.inputs.time[i - 1];
+      if (!data.is_time_series || gap < 2.5 * step) continue;
+      ++data.count.gaps;
+      // Behind a long gap in a loop nobody knows what the reference did; the loop needs a while to forget.
+      if (model.plant == physics::Plant::axis && gap > 20.0 * step)
+        for (std::size_t j = i; j < recording.inputs.rows() &&
+                                recording.inputs.time[j] < recording.inputs.time[i] + 150.0 * step;
+             ++j)
+          for (auto& column : recording.measured) column[j] = nothing;
+    }
+    give_start(data, recording);
+    recording.simulation = physics::prepare(model, recording.inputs);
+    data.recordings.push_back(std::move(recording));
+  }
+  return data;
+}
+
+void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    auto& recording = data.recordings[r];
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      auto& measured = recording.measured[o];
+      std::vector<std::size_t> rows;
+      std::vector<double> residual;
+      for (std::size_t i = 0; i < measured.size(); ++i)
+        if (std::isfinite(measured[i])) {
+          rows.push_back(i);
+          residual.push_back(measured[i] - simulated[r][o][i]);
+        }
+      if (residual.size() < 20) continue;
+      // Against the median of its neighbourhood, on the scale of all such differences.
+      std::vector<double> off(residual.size());
+      const std::size_t reach = data.is_time_series ? 3 : 40;
+      for (std::size_t i = 0; i < residual.size(); ++i) {
+        const std::size_t a = i < reach ? 0 : i - reach, b = std::min(residual.size(), i + reach + 1);
+        off[i] = residual[i] - median({residual.begin() + static_cast<std::ptrdiff_t>(a),
+                                       residual.begin() + static_cast<std::ptrdiff_t>(b)});
+      }
+      const double scale = robust_sigma(off);
+      const double limit = (data.is_time_series ? 6.0 : 5.0) * scale;
+      for (std::size_t i = 0; i < off.size(); ++i)
+        if (scale > 0.0 && std::abs(off[i]) > limit) {
+          measured[rows[i]] = nothing;
+          ++data.count.outliers;
+        }
+    }
+  }
+}
+
+}  // namespace invar::diagnose

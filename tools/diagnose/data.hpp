@@ -1,0 +1,42 @@
+// The recordings of a diagnosis: put in order, with what cannot be used marked and counted.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/model/record_file.hpp"
+#include "core/physics/simulation.hpp"
+
+namespace invar::diagnose {
+
+struct DataCount {
+  std::size_t rows = 0, used = 0, missing = 0, outliers = 0, duplicates = 0, out_of_order = 0, gaps = 0;
+};
+
+/// One recording, ready to be simulated and compared.
+struct Recording {
+  std::string name;
+  physics::Record inputs;                     // and, where the first rows say so, the initial state
+  std::vector<std::vector<double>> measured;  // by output, SI; NaN where nothing is to be compared
+  std::shared_ptr<const physics::Simulation> simulation;
+};
+
+/// What the diagnosis knows of the machine.
+struct Case {
+  physics::Model model;  // as the user believes
+  std::vector<Recording> recordings;
+  std::vector<std::string> outputs;  // signals
+  std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
+  DataCount count;
+  bool is_time_series = true;  // rows follow one another; false for droplets
+};
+
+/// Reads and cleans. Throws InputError for what is unusable.
+Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files);
+
+/// Marks lone values far from their neighbours in the residual (measured - simulated) as unusable and counts them.
+void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated);
+
+}  // namespace invar::diagnose

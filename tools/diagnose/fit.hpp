@@ -1,0 +1,72 @@
+// Fitting a model's free numbers to the recordings: whitened residuals, priors, Levenberg-Marquardt.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "tools/diagnose/data.hpp"
+#include "tools/diagnose/statistics.hpp"
+
+namespace invar::diagnose {
+
+/// One number that a fit may move.
+struct Freedom {
+  enum class Where { parameter, term, curve };
+  Where where = Where::parameter;
+  std::size_t term = 0;   // of terms and curves
+  std::size_t index = 0;  // of the parameter, the term's parameter or the curve's value
+  double scale = 1.0;     // a typical change; finite differences take a thousandth of it
+  double center = 0.0;    // prior
+  double sigma = 0.0;     // of the prior; not positive: none
+  Range bounds;
+};
+
+double get(const physics::Model& model, const Freedom& freedom);
+/// Sets it, and terms that share a nominal parameter with it.
+void set(physics::Model& model, const Freedom& freedom, double value);
+
+/// All that may move: parameters whose sigma is not 0, and the terms' amplitudes and shapes. `believed` holds the
+/// priors of the nominal numbers.
+std::vector<Freedom> freedoms(const physics::Model& model, const physics::Model& believed);
+
+/// How residuals count: a filter for each output, and which rows belong to the fit.
+struct Weighing {
+  std::vector<Whitening> filters;                       // by output
+  std::vector<std::vector<std::vector<bool>>> present;  // by recording, output, row
+  Eigen::Index rows = 0;
+  double temper =
+      1.0;  // what one nat of log likelihood counts: outputs of one loop tell the same thing twice
+};
+
+/// Rows that are measured; filters as fitted to the residuals of these simulations.
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated);
+
+std::vector<physics::Outputs> simulate(const Case& data, const physics::Model& model);
+Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);
+Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
+                         const std::vector<physics::Outputs>& simulated);
+/// Columns: change of the residual by each freedom. Runs on all processors.
+Eigen::MatrixXd sensitivities(const Case& data, const Weighing& weighing, const physics::Model& model,
+                              const std::vector<Freedom>& free, const Eigen::VectorXd& at);
+
+struct Fit {
+  physics::Model model;
+  std::vector<Freedom> free;
+  Eigen::VectorXd sigma;     // of each freedom, from the curvature
+  double cost = 0.0;         // half the sum of squares, priors included, tempered
+  double data_cost = 0.0;    // without the priors
+  double evidence = 0.0;     // log, up to a constant common to all models of one weighing: BIC
+  Eigen::VectorXd residual;  // whitened
+};
+
+/// From the numbers in `start`. `iterations` 0 only evaluates.
+Fit fit(const Case& data, const Weighing& weighing, const physics::Model& start,
+        const physics::Model& believed, int iterations);
+
+/// Runs `work(i)` for i < n on all processors.
+template <class Work>
+void in_parallel(std::size_t n, Work work);
+
+}  // namespace invar::diagnose
+
+#include "tools/diagnose/in_parallel.hpp"

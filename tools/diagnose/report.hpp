@@ -1,0 +1,33 @@
+// What the diagnosis says: report.json, report.html, patched.yaml and the summary on the terminal.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/config/yaml.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+
+/// report.json, version 1, as text.
+std::string report_json(const Case& data, const Diagnosis& diagnosis);
+
+/// The self-contained page.
+void write_page(const Case& data, const Diagnosis& diagnosis, const std::string& subject,
+                const std::filesystem::path& file);
+
+/// A few lines for the terminal.
+std::string summary(const Case& data, const Diagnosis& diagnosis);
+
+/// "axis.force"; of a term in equations "equations.x1".
+std::string site_of(const Case& data, const physics::Term& term);
+/// The signals on which a term depends.
+std::vector<std::string> dependence(const Case& data, const physics::Term& term);
+/// The verdict in one sentence.
+std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
+/// The motion or recording that would tell two terms apart.
+std::string separating_experiment(const std::string& one, const std::string& other);
+/// The unit of a term's parameter, by the place it acts on where the library leaves it open.
+std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,252 @@
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tools/diagnose/report.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using nlohmann::json;
+
+json fit_json(const std::vector<FitRow>& rows) {
+  json out = json::object();
+  for (const auto& row : rows)
+    out[row.signal] = {{"unit", row.unit},
+                       {"before", row.before},
+                       {"retuned", row.retuned},
+                       {"after", row.after},
+                       {"noise_floor", row.noise_floor}};
+  return out;
+}
+
+std::string text(double value) {
+  std::ostringstream out;
+  out.precision(3);
+  out << value;
+  return out.str();
+}
+
+}  // namespace
+
+std::string site_of(const Case& data, const physics::Term& term) {
+  const std::string plant{physics::name_of(data.model.plant)};
+  if (data.model.plant == physics::Plant::equations) {
+    for (const auto& input : data.model.equations.inputs)
+      if (input.symbol == term.on) return plant + ".input";
+    for (const auto& output : data.model.equations.outputs)
+      if (output.name == term.on) return plant + ".output";
+    return plant + "." + term.on;
+  }
+  return plant + "." + std::string{term.info->site};
+}
+
+std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
+  std::vector<std::string> names;
+  for (const auto name : term.info->depends_on)
+    if (!name.empty()) names.emplace_back(name);
+  if (!term.curve.over.empty()) {
+    names.push_back(term.curve.over);
+    if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
+    if (term.curve.over.rfind("velocity", 0) == 0) names.emplace_back("velocity");
+  }
+  if (data.model.plant == physics::Plant::equations) names.push_back(term.with.empty() ? term.on : term.with);
+  return names;
+}
+
+std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
+  const std::string unit{term.info->parameters[parameter].unit};
+  if (unit != "*") return unit;
+  const auto* signal = data.model.signal(term.on);
+  return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
+}
+
+std::string separating_experiment(const std::string& one, const std::string& other) {
+  const auto is = [&](const char* a, const char* b) {
+    return (one == a && other == b) || (one == b && other == a);
+  };
+  if (is("coulomb_friction", "constant_force") || is("stribeck_friction", "constant_force") ||
+      is("presliding_friction", "constant_force"))
+    return "move in both directions: friction turns its sign with the motion, a constant force does not";
+  if (is("transport_delay", "measurement_delay"))
+    return "record the position with a second, direct instrument: a late encoder trails it, a late motor "
+           "does not";
+  if (is("transport_delay", "amplifier_lag") || is("measurement_delay", "amplifier_lag"))
+    return "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
+  if (is("stage_velocity_carry", "valve_delay"))
+    return "print at two clearly different heights: carry grows with the height, a valve delay does not";
+  if (is("force_ripple", "motor_constant_ripple"))
+    return "cross the same places at high and at low current: the ripple of the motor constant goes with the "
+           "current";
+  if (is("periodic_disturbance", "additive_disturbance"))
+    return "record with the motor switched off and the carriage free: a force shakes it still";
+  return "a recording in which " + one + " and " + other + " act at different times, places or speeds";
+}
+
+std::string verdict_sentence(const Case& data, const Diagnosis& d) {
+  std::string names;
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    const auto& finding = d.findings[i];
+    names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) +
+             std::string{finding.term.info->name} + " at " + site_of(data, finding.term);
+  }
+  switch (d.verdict) {
+    case Verdict::no_mismatch:
+      return "No mismatch: the model explains the recording to the noise.";
+    case Verdict::parameters_only:
+      return "Only parameters are off: no physics is missing, but a parameter stands " +
+             text(d.parameter_excursion) + " sigma from what was believed.";
+    case Verdict::explained:
+      return "Explained: the model leaves out " + names + ".";
+    case Verdict::partly_explained:
+      return "Partly explained: the model leaves out " + names + ", and something more.";
+    case Verdict::ambiguous: {
+      std::string also;
+      for (const auto& f : d.findings)
+        for (const auto& a : f.alternatives)
+          if (a.log_odds > -ambiguous_margin)
+            also += (also.empty() ? "" : ", ") + std::string{a.term.info->name};
+      return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
+    }
+    case Verdict::unknown_physics:
+      return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
+             " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
+  }
+  return "";
+}
+
+std::string report_json(const Case& data, const Diagnosis& d) {
+  json report;
+  report["invar_report"] = 1;
+  report["verdict"] = name_of(d.verdict);
+  double over = 0.0;
+  for (const auto& row : d.train)
+    over = std::max(over, row.noise_floor > 0.0 ? row.before / row.noise_floor : 1.0);
+  report["mismatch"] = {{"significant", d.mismatch_gain > claim_margin},
+                        {"residual_over_noise", over},
+                        {"p_value", std::exp(-std::max(0.0, std::min(600.0, d.mismatch_gain)))}};
+  report["location"] = json::array();
+  report["findings"] = json::array();
+  report["ambiguity"] = json::array();
+  for (const auto& finding : d.findings) {
+    const auto& term = finding.term;
+    const auto depends = dependence(data, term);
+    json where = json::object();
+    if (!term.curve.knots.empty()) {
+      // Where the curve is more than a third of its peak.
+      double top = 0.0, low = 0.0, high = 0.0;
+      for (double v : term.curve.values) top = std::max(top, std::abs(v));
+      bool first = true;
+      for (std::size_t k = 0; k < term.curve.knots.size(); ++k)
+        if (std::abs(term.curve.values[k]) > top / 3.0) {
+          if (first) low = term.curve.knots[k];
+          high = term.curve.knots[k];
+          first = false;
+        }
+      where[term.curve.over] = {low, high};
+    }
+    report["location"].push_back(
+        {{"site", site_of(data, term)},
+         {"depends_on", depends},
+         {"where", where},
+         {"share", finding.share},
+         {"why", "without " + std::string{term.info->name} + " there, " + text(100.0 * finding.share) +
+                     " % of the excess residual comes back"}});
+    json parameters = json::object();
+    for (std::size_t i = 0; i < term.info->parameter_count(); ++i)
+      parameters[std::string{term.info->parameters[i].name}] = {
+          {"value", term.values[i]}, {"unit", unit_of(data, term, i)}, {"sigma", finding.sigmas[i]}};
+    json alternatives = json::array();
+    for (const auto& a : finding.alternatives) {
+      const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
+      if (p > 1e-4) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
+      if (a.log_odds > -ambiguous_margin && a.term.info != term.info)
+        report["ambiguity"].push_back(
+            {{"between", {term.info->name, a.term.info->name}},
+             {"experiment",
+              separating_experiment(std::string{term.info->name}, std::string{a.term.info->name})}});
+    }
+    json entry = {{"term", term.info->name},
+                  {"site", site_of(data, term)},
+                  {"probability", finding.probability},
+                  {"share", finding.share},
+                  {"parameters", parameters},
+                  {"alternatives", alternatives},
+                  {"description", term.info->description}};
+    if (!term.on.empty()) entry["on"] = term.on;
+    if (!term.with.empty()) entry["with"] = term.with;
+    if (!term.curve.knots.empty())
+      entry["curve"] = {
+          {"over", term.curve.over}, {"knots", term.curve.knots}, {"values", term.curve.values}};
+    report["findings"].push_back(entry);
+  }
+  report["parameter_corrections"] = json::array();
+  for (std::size_t k = 0; k < d.best.free.size(); ++k) {
+    const auto& f = d.best.free[k];
+    const double to = get(d.best.model, f), sigma = d.best.sigma(static_cast<Eigen::Index>(k));
+    if (f.where == Freedom::Where::parameter) {
+      const auto& p = data.model.parameters[f.index];
+      if (std::abs(to - p.value) > 2.0 * sigma)
+        report["parameter_corrections"].push_back(
+            {{"name", p.name}, {"from", p.value}, {"to", to}, {"sigma", sigma}, {"unit", p.unit}});
+    } else if (f.where == Freedom::Where::term && f.term < data.model.terms.size()) {
+      const auto& term = data.model.terms[f.term];
+      const double from = term.values[f.index];
+      if (std::abs(to - from) > 2.0 * sigma)
+        report["parameter_corrections"].push_back(
+            {{"name", std::string{term.info->name} + "." + std::string{term.info->parameters[f.index].name}},
+             {"from", from},
+             {"to", to},
+             {"sigma", sigma},
+             {"unit", unit_of(data, term, f.index)}});
+    }
+  }
+  report["fit"] = {{"heldout", fit_json(d.heldout)},
+                   {"train", fit_json(d.train)},
+                   {"split",
+                    "every third of 18 stretches of each recording was kept from the fit; simulated without "
+                    "restart over the whole recording"}};
+  report["unexplained"] = {{"residual_over_noise", d.unexplained}, {"depends_on", d.unexplained_over}};
+  report["detectable"] = json::array();
+  for (const auto& entry : d.detectable)
+    report["detectable"].push_back({{"term", entry.term},
+                                    {"parameter", entry.parameter},
+                                    {"smallest", {{"value", entry.value}, {"unit", entry.unit}}}});
+  report["rejected"] = json::array();
+  for (const auto& r : d.rejected) report["rejected"].push_back({{"term", r.term}, {"why", r.why}});
+  std::size_t used = 0;
+  for (const auto& recording : data.recordings)
+    for (std::size_t i = 0; i < recording.inputs.rows(); ++i)
+      used += std::isfinite(recording.measured.front()[i]) ? 1U : 0U;
+  report["data"] = {
+      {"rows", data.count.rows},
+      {"used", used},
+      {"dropped",
+       {{"nan", data.count.missing}, {"outlier", data.count.outliers}, {"duplicate", data.count.duplicates}}},
+      {"reordered", data.count.out_of_order},
+      {"gaps", data.count.gaps}};
+  report["patched_model"] = "patched.yaml";
+  return report.dump(2, ' ', false, json::error_handler_t::replace);
+}
+
+std::string summary(const Case& data, const Diagnosis& d) {
+  std::ostringstream out;
+  out.precision(4);
+  out << verdict_sentence(data, d) << '\n';
+  for (const auto& finding : d.findings) {
+    out << "  " << finding.term.info->name << " (" << 100.0 * finding.probability << " %)";
+    for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)
+      out << "  " << finding.term.info->parameters[i].name << " = " << finding.term.values[i] << ' '
+          << unit_of(data, finding.term, i) << " +- " << finding.sigmas[i];
+    for (const auto& a : finding.alternatives) out << "  [" << a.term.info->name << ' ' << a.log_odds << ']';
+    out << '\n';
+  }
+  for (const auto& row : d.heldout)
+    out << "  " << row.signal << " [" << row.unit << "] held out: before " << row.before << ", retuned "
+        << row.retuned << ", after " << row.after << ", noise " << row.noise_floor << '\n';
+  return out.str();
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,161 @@
+#include "tools/diagnose/screen.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Role;
+using physics::Term;
+
+constexpr auto none = physics::most_parameters;
+
+/// The base's own directions, to be taken out of every other.
+struct Nuisance {
+  Eigen::MatrixXd columns;
+  Eigen::LDLT<Eigen::MatrixXd> hessian;
+};
+
+Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
+  Nuisance n;
+  n.columns = sensitivities(data, weighing, base.model, base.free, base.residual);
+  Eigen::MatrixXd h = weighing.temper * (n.columns.transpose() * n.columns);
+  for (Eigen::Index k = 0; k < h.rows(); ++k) {
+    const double sigma = base.free[static_cast<std::size_t>(k)].sigma;
+    if (sigma > 0.0) h(k, k) += 1.0 / (sigma * sigma);
+    h(k, k) += 1e-9 * h(k, k) + 1e-300;
+  }
+  n.hessian.compute(h);
+  return n;
+}
+
+Eigen::MatrixXd columns_of(const Case& data, const Weighing& weighing, const Fit& base, const Start& start) {
+  Eigen::MatrixXd columns(base.residual.size(), static_cast<Eigen::Index>(start.directions.size()));
+  for (std::size_t d = 0; d < start.directions.size(); ++d) {
+    const auto& direction = start.directions[d];
+    physics::Model model = base.model;
+    Term term = start.term;
+    double by = 1.0;
+    if (!term.curve.knots.empty()) {
+      by = data.model.plant == physics::Plant::axis ? 0.05 : 1e-6;
+      if (data.model.plant == physics::Plant::thermal) by = 0.1;
+      if (term.info->site == "actuator" || term.info->site == "thermal" || term.info->site == "measurement")
+        by = 1e-3;
+      if (data.model.plant == physics::Plant::sensor) by = 1e-7;
+      term.curve.values[direction.knot] = by;
+    } else if (direction.amplitude < none) {
+      for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
+        if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
+          term.values[i] = 0.0;
+        if (term.info->parameters[i].role == Role::phase)
+          term.values[i] = direction.quadrature ? 0.5 * std::numbers::pi : 0.0;
+      }
+      by = term.values[direction.amplitude];
+    }
+    model.terms.push_back(term);
+    columns.col(static_cast<Eigen::Index>(d)) = (residual(data, weighing, model) - base.residual) / by;
+  }
+  return columns;
+}
+
+/// Fills strength and gain of a set of columns with the nuisance taken out.
+double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const Eigen::MatrixXd& columns,
+             Eigen::VectorXd& strength) {
+  const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
+  Eigen::MatrixXd m = weighing.temper * (columns.transpose() * columns);
+  for (Eigen::Index k = 0; k < m.rows(); ++k) m(k, k) += 1e-8 * m(k, k) + 1e-300;
+  const Eigen::MatrixXd reduced = m - b.transpose() * n.hessian.solve(b);
+  const Eigen::VectorXd g = weighing.temper * (columns.transpose() * base.residual);
+  Eigen::MatrixXd regular = reduced;
+  for (Eigen::Index k = 0; k < m.rows(); ++k) regular(k, k) += 1e-6 * m(k, k);
+  strength = -regular.ldlt().solve(g);
+  if (!strength.allFinite()) {
+    strength.setZero();
+    return 0.0;
+  }
+  return std::max(0.0, -0.5 * strength.dot(g));
+}
+
+}  // namespace
+
+std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
+                             const std::vector<Start>& starts, std::size_t keep) {
+  const auto n = nuisance(data, weighing, base);
+  std::vector<Screened> all(starts.size());
+  const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
+  in_parallel(starts.size(), [&](std::size_t i) {
+    auto& s = all[i];
+    s.start = starts[i];
+    s.columns = columns_of(data, weighing, base, s.start);
+    s.gain = solve(weighing, base, n, s.columns, s.strength);
+    const auto& info = *s.start.term.info;
+    // An amplitude without a phase has one possible sign where its bounds say so.
+    bool periodic = false;
+    std::size_t shapes = 0;
+    for (std::size_t k = 0; k < info.parameter_count(); ++k) {
+      periodic = periodic || info.parameters[k].role == Role::phase;
+      shapes += info.parameters[k].role == Role::shape ? 1U : 0U;
+    }
+    if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
+      const auto& d = s.start.directions.front();
+      const double lower = d.amplitude < none ? info.parameters[d.amplitude].bounds.lower : 0.0;
+      s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
+      if (d.amplitude == none && s.strength(0) > 0.0) {  // all or nothing: what it brings at full strength
+        const Eigen::VectorXd g = base.residual + s.columns.col(0);
+        (void)g;
+      }
+    }
+    const double numbers = static_cast<double>(s.start.directions.size() + shapes);
+    s.merit = s.gain - 0.5 * numbers * std::log(observations);
+    if (keep == 0 || s.merit < -20.0) s.columns.resize(0, 0);
+  });
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
+  for (std::size_t i = keep; i < all.size(); ++i) all[i].columns.resize(0, 0);
+  return all;
+}
+
+double pair_gain(const Weighing& weighing, const Fit& base, const Screened& a, const Screened& b) {
+  (void)weighing;
+  (void)base;
+  return a.gain + b.gain;
+}
+
+physics::Model with(const Fit& base, const std::vector<const Screened*>& added) {
+  physics::Model model = base.model;
+  for (const auto* s : added) {
+    Term term = s->start.term;
+    const auto& info = *term.info;
+    for (std::size_t d = 0; d < s->start.directions.size(); ++d) {
+      const auto& direction = s->start.directions[d];
+      const double value = s->strength(static_cast<Eigen::Index>(d));
+      if (!term.curve.knots.empty()) {
+        term.curve.values[direction.knot] = value;
+        continue;
+      }
+      if (direction.amplitude >= none) continue;
+      const auto& p = info.parameters[direction.amplitude];
+      const auto phase = info.index_of("phase");
+      if (phase < none && d + 1 < s->start.directions.size() && s->start.directions[d + 1].quadrature) {
+        const double cosine = s->strength(static_cast<Eigen::Index>(d + 1));
+        term.values[direction.amplitude] = p.bounds.clamp(std::hypot(value, cosine));
+        term.values[phase] = std::atan2(cosine, value);
+        ++d;
+        continue;
+      }
+      // Never at zero itself: there the shapes would have no slope.
+      const double floor = 0.02 * std::abs(p.starts[0]);
+      term.values[direction.amplitude] =
+          p.bounds.lower >= 0.0
+              ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
+              : p.bounds.clamp(value);
+    }
+    model.terms.push_back(term);
+  }
+  return model;
+}
+
+}  // namespace invar::diagnose

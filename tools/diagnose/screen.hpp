@@ -1,0 +1,27 @@
+// Screening: what each start would gain to first order, alone and in pairs, the nominal parameters free beside it.
+#pragma once
+
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+struct Screened {
+  Start start;
+  Eigen::MatrixXd columns;   // change of the residual by each direction
+  Eigen::VectorXd strength;  // by direction, at the optimum
+  double gain = 0.0;         // of log likelihood
+  double merit = 0.0;        // gain less the price of its numbers
+  bool impossible = false;   // needs a sign that its bounds forbid
+};
+
+/// Best first by merit. `keep` bounds how many carry their columns.
+std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
+                             const std::vector<Start>& starts, std::size_t keep);
+
+/// First-order gain of two together.
+double pair_gain(const Weighing& weighing, const Fit& base, const Screened& a, const Screened& b);
+
+/// The base model with the screened term(s) at their first-order strength.
+physics::Model with(const Fit& base, const std::vector<const Screened*>& added);
+
+}  // namespace invar::diagnose

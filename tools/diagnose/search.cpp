@@ -1,0 +1,384 @@
+#include "tools/diagnose/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "tools/diagnose/screen.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Model;
+using physics::Role;
+using physics::Term;
+
+constexpr auto none = physics::most_parameters;
+
+std::string label(const Term& term) {
+  std::string text{term.info->name};
+  if (!term.on.empty()) text += "@" + term.on;
+  if (!term.with.empty()) text += "+" + term.with;
+  return text;
+}
+
+/// A claim must have a strength that is possible and clearly not zero.
+bool stands(const Fit& fit, std::size_t term) {
+  const auto& info = *fit.model.terms[term].info;
+  for (std::size_t k = 0; k < fit.free.size(); ++k) {
+    const auto& f = fit.free[k];
+    if (f.where != Freedom::Where::term || f.term != term) continue;
+    if (info.parameters[f.index].role != Role::amplitude) continue;
+    if (std::abs(get(fit.model, f)) > 3.0 * fit.sigma(static_cast<Eigen::Index>(k))) return true;
+  }
+  for (std::size_t i = 0; i < info.parameter_count(); ++i)
+    if (info.parameters[i].role == Role::amplitude) return false;
+  return true;  // a term of shapes alone, or a curve
+}
+
+class Search {
+ public:
+  Search(Case& data, const std::function<void(double, const std::string&)>& progress)
+      : data_{data}, progress_{progress} {}
+
+  Diagnosis run();
+
+ private:
+  struct Trial {
+    std::vector<Term> added;  // in order
+    Fit fit;
+  };
+
+  void prepare();
+  /// Refits everything that is still in question under filters of `by`'s residual.
+  void reweigh(const Fit& by);
+  bool add_named(double round);
+  void weigh_alternatives();
+  void try_unmodelled();
+  void hold_out();
+  void conclude();
+  void smallest_effects();
+  void reject(const std::string& term, const std::string& why, double gain);
+  [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
+
+  Case& data_;
+  const std::function<void(double, const std::string&)>& progress_;
+  Diagnosis d_;
+  std::vector<std::vector<Term>> rivals_;  // by finding: other terms that were nearly as good in its place
+  std::vector<Screened> last_screen_;
+  bool unnamed_ = false, rest_ = false;
+};
+
+void Search::prepare() {
+  progress_(0.02, "simulating the nominal model");
+  auto simulated = simulate(data_, data_.model);
+  drop_outliers(data_, simulated);
+  d_.weighing = weigh(data_, simulated);
+  d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 6);
+  simulated = simulate(data_, d_.retuned.model);
+  d_.weighing = weigh(data_, simulated);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5);
+  d_.best = d_.retuned;
+}
+
+void Search::reweigh(const Fit& by) {
+  d_.weighing = weigh(data_, simulate(data_, by.model));
+  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4);
+}
+
+void Search::reject(const std::string& term, const std::string& why, double gain) {
+  for (auto& r : d_.rejected)
+    if (r.term == term) {
+      if (gain > r.gain) r = {term, why, gain};
+      return;
+    }
+  d_.rejected.push_back({term, why, gain});
+}
+
+bool Search::add_named(double round) {
+  progress_(0.1 + 0.2 * round, "screening candidates");
+  auto screened = screen(data_, d_.weighing, d_.best, named_starts(data_, d_.weighing, d_.best), 30);
+  std::vector<const Screened*> shortlist;
+  std::map<std::string, int> seen;
+  for (const auto& s : screened) {
+    if (s.impossible) {
+      if (s.merit > 3.0)
+        reject(std::string{s.start.term.info->name}, "would need an impossible sign", s.merit);
+      continue;
+    }
+    if (s.merit < -3.0 || shortlist.size() >= 9) break;
+    if (seen[label(s.start.term)]++ < 2) shortlist.push_back(&s);
+  }
+  // Two together may do what neither does alone.
+  std::vector<std::vector<const Screened*>> sets;
+  for (const auto* s : shortlist) sets.push_back({s});
+  progress_(0.15 + 0.2 * round, "fitting the short list");
+  std::vector<Fit> fits(sets.size());
+  for (std::size_t i = 0; i < sets.size(); ++i)
+    fits[i] = fit(data_, d_.weighing, with(d_.best, sets[i]), data_.model, i < 4 ? 7 : 5);
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < fits.size(); ++i)
+    if (stands(fits[i], fits[i].model.terms.size() - 1)) order.push_back(i);
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return fits[a].evidence > fits[b].evidence; });
+  last_screen_ = std::move(screened);
+  for (auto& s : last_screen_) s.columns.resize(0, 0);
+  if (order.empty() || fits[order[0]].evidence < d_.best.evidence + claim_margin) {
+    for (const auto i : order)
+      reject(std::string{fits[i].model.terms.back().info->name}, "its gain does not pay for its numbers",
+             fits[i].evidence - d_.best.evidence);
+    return false;
+  }
+  const double before = d_.best.evidence;
+  const auto winner = order[0];
+  std::vector<Term> rivals;
+  std::set<std::string> named{label(fits[winner].model.terms.back())};
+  for (std::size_t k = 1; k < order.size(); ++k) {
+    const auto& f = fits[order[k]];
+    if (!named.insert(label(f.model.terms.back())).second) continue;
+    if (f.evidence > before + 0.3 * (fits[winner].evidence - before) && rivals.size() < 4)
+      rivals.push_back(f.model.terms.back());
+    else
+      reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
+             f.evidence - before);
+  }
+  d_.best = std::move(fits[winner]);
+  rivals_.push_back(std::move(rivals));
+  reweigh(d_.best);
+  return true;
+}
+
+void Search::weigh_alternatives() {
+  progress_(0.7, "comparing with near twins");
+  for (int pass = 0; pass < 2; ++pass)
+    for (std::size_t i = 0; i < rivals_.size(); ++i) {
+      const std::size_t place = given() + i;
+      if (place >= d_.best.model.terms.size()) break;
+      Finding finding;
+      std::vector<Term> kept;
+      for (const auto& rival : rivals_[i]) {
+        Model model = d_.best.model;
+        model.terms[place] = rival;
+        auto f = fit(data_, d_.weighing, model, data_.model, 6);
+        const double odds = f.evidence - d_.best.evidence;
+        if (odds > 0.5 && stands(f, place)) {  // better after all, beside the other terms
+          kept.push_back(d_.best.model.terms[place]);
+          finding.alternatives.push_back({d_.best.model.terms[place], -odds});
+          for (auto& a : finding.alternatives) a.log_odds -= odds;
+          d_.best = std::move(f);
+          continue;
+        }
+        kept.push_back(f.model.terms[place]);
+        finding.alternatives.push_back({f.model.terms[place], odds});
+      }
+      rivals_[i] = kept;
+      finding.term = d_.best.model.terms[place];
+      if (pass == 1 || rivals_.size() == 1) {
+        if (d_.findings.size() <= i) d_.findings.resize(i + 1);
+        d_.findings[i] = finding;
+      }
+      if (rivals_.size() == 1 && pass == 0) pass = 1;
+    }
+}
+
+void Search::try_unmodelled() {
+  progress_(0.78, "looking for physics without a name");
+  const auto starts = unmodelled_starts(data_, d_.best);
+  if (starts.empty()) return;
+  const auto best_curve = [&](const Fit& base) {
+    const auto screened = screen(data_, d_.weighing, base, starts, 6);
+    Fit best;
+    best.evidence = -1e300;
+    int tried = 0;
+    for (const auto& s : screened) {
+      if (tried++ >= 2 || s.merit < claim_margin) break;
+      auto f = fit(data_, d_.weighing, with(base, {&s}), data_.model, 3);
+      if (f.evidence > best.evidence) best = std::move(f);
+    }
+    return best;
+  };
+  const bool named = d_.best.model.terms.size() > given();
+  auto beside = best_curve(d_.best);
+  if (named) {
+    auto instead = best_curve(d_.retuned);
+    if (instead.evidence > d_.best.evidence + claim_margin && instead.evidence > beside.evidence - 5.0) {
+      for (std::size_t t = given(); t < d_.best.model.terms.size(); ++t)
+        reject(std::string{d_.best.model.terms[t].info->name}, "a curve without a name explains far more",
+               d_.best.evidence - d_.retuned.evidence);
+      d_.best = std::move(instead);
+      d_.findings.clear();
+      rivals_.clear();
+      unnamed_ = true;
+    }
+  }
+  if (!unnamed_ && beside.evidence > d_.best.evidence + 2.0 * claim_margin) {
+    d_.best = std::move(beside);
+    (named ? rest_ : unnamed_) = true;
+  }
+  if (unnamed_ || rest_) {
+    Finding finding;
+    finding.term = d_.best.model.terms.back();
+    d_.findings.push_back(finding);
+    reweigh(d_.best);
+  }
+}
+
+void Search::hold_out() {
+  progress_(0.88, "checking on held-out stretches");
+  // Every third stretch is kept from the fit; the simulation runs through, so its horizon is the whole recording.
+  Weighing train = d_.weighing, test = d_.weighing;
+  for (std::size_t r = 0; r < data_.recordings.size(); ++r) {
+    const std::size_t rows = data_.recordings[r].inputs.rows();
+    const std::size_t stretch = std::max<std::size_t>(1, rows / 18);
+    for (std::size_t o = 0; o < data_.outputs.size(); ++o)
+      for (std::size_t i = 0; i < rows; ++i) {
+        const bool out = (i / stretch) % 3 == 1;
+        (out ? train : test).present[r][o][i] = false;
+      }
+  }
+  const auto retuned = fit(data_, train, d_.retuned.model, data_.model, 2);
+  const auto after =
+      d_.best.model.terms.size() > given() ? fit(data_, train, d_.best.model, data_.model, 2) : retuned;
+  const auto nominal_out = simulate(data_, data_.model), retuned_out = simulate(data_, retuned.model),
+             after_out = simulate(data_, after.model);
+  const auto rms = [&](const std::vector<physics::Outputs>& simulated, std::size_t o, const Weighing& on) {
+    double sum = 0.0;
+    std::size_t n = 0;
+    for (std::size_t r = 0; r < data_.recordings.size(); ++r)
+      for (std::size_t i = 0; i < data_.recordings[r].inputs.rows(); ++i)
+        if (on.present[r][o][i])
+          sum += std::pow(data_.recordings[r].measured[o][i] - simulated[r][o][i], 2), ++n;
+    return n > 0 ? std::sqrt(sum / static_cast<double>(n)) : 0.0;
+  };
+  for (std::size_t o = 0; o < data_.outputs.size(); ++o) {
+    const auto& signal = *data_.model.signal(data_.outputs[o]);
+    FitRow row{signal.name,
+               signal.unit == "degC" ? "K" : signal.unit,
+               rms(nominal_out, o, test),
+               rms(retuned_out, o, test),
+               rms(after_out, o, test),
+               0.0};
+    FitRow trained{signal.name,
+                   row.unit,
+                   rms(nominal_out, o, train),
+                   rms(retuned_out, o, train),
+                   rms(after_out, o, train),
+                   0.0};
+    row.noise_floor = trained.noise_floor = std::isfinite(data_.given_noise[o])
+                                                ? data_.given_noise[o]
+                                                : std::min(row.after, d_.weighing.filters[o].sigma);
+    d_.heldout.push_back(row);
+    d_.train.push_back(trained);
+  }
+  if (d_.best.model.terms.size() == given()) return;
+  // A claim must help on what it has not seen, counted in whitened residuals.
+  const double gain =
+      0.5 * d_.weighing.temper *
+      (residual(data_, test, retuned_out).squaredNorm() - residual(data_, test, after_out).squaredNorm());
+  if (gain < 3.0) {
+    for (const auto& finding : d_.findings)
+      reject(std::string{finding.term.info->name}, "no gain on held-out data",
+             d_.best.evidence - d_.retuned.evidence);
+    d_.findings.clear();
+    d_.best = d_.retuned;
+    unnamed_ = rest_ = false;
+    for (auto* rows : {&d_.heldout, &d_.train})
+      for (auto& row : *rows) row.after = row.retuned;
+  }
+}
+
+void Search::smallest_effects() {
+  std::map<std::string, Detectable> smallest;
+  for (const auto& s : last_screen_) {
+    const auto& info = *s.start.term.info;
+    if (s.start.directions.empty() || s.start.directions[0].amplitude >= none || !(s.gain > 0.0)) continue;
+    const auto& p = info.parameters[s.start.directions[0].amplitude];
+    double size = s.strength.norm();
+    // The gain goes with the square of the strength: where it would just reach the margin.
+    const double value = size * std::sqrt((claim_margin + 12.0) / s.gain);
+    auto& entry = smallest[std::string{info.name}];
+    if (entry.term.empty() || value < entry.value)
+      entry = {std::string{info.name}, std::string{p.name}, std::string{p.unit}, value};
+  }
+  for (const auto& [name, entry] : smallest) d_.detectable.push_back(entry);
+}
+
+void Search::conclude() {
+  for (std::size_t i = 0; i < d_.findings.size(); ++i) {
+    auto& finding = d_.findings[i];
+    const std::size_t place = given() + i;
+    finding.term = d_.best.model.terms[place];
+    finding.sigmas.assign(finding.term.info->parameter_count(), 0.0);
+    for (std::size_t k = 0; k < d_.best.free.size(); ++k) {
+      const auto& f = d_.best.free[k];
+      if (f.where == Freedom::Where::term && f.term == place)
+        finding.sigmas[f.index] = d_.best.sigma(static_cast<Eigen::Index>(k));
+    }
+    // What is lost without it.
+    Model without = d_.best.model;
+    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    const auto lost = residual(data_, d_.weighing, without).squaredNorm() - d_.best.residual.squaredNorm();
+    const auto all = residual(data_, d_.weighing, data_.model).squaredNorm() - d_.best.residual.squaredNorm();
+    finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
+    double sum = 1.0;
+    for (const auto& a : finding.alternatives) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    finding.probability = std::min(0.995, 1.0 / sum);
+  }
+  for (std::size_t k = 0; k < d_.best.free.size(); ++k) {
+    const auto& f = d_.best.free[k];
+    if (f.where == Freedom::Where::curve || f.sigma <= 0.0) continue;
+    d_.parameter_excursion =
+        std::max(d_.parameter_excursion, std::abs(get(d_.best.model, f) - f.center) / f.sigma);
+  }
+  d_.nominal = fit(data_, d_.weighing, data_.model, data_.model, 0);
+  d_.mismatch_gain = d_.best.evidence - d_.nominal.evidence;
+  bool ambiguous = false;
+  for (const auto& finding : d_.findings)
+    for (const auto& a : finding.alternatives) ambiguous = ambiguous || a.log_odds > -ambiguous_margin;
+  if (d_.findings.empty())
+    d_.verdict = d_.parameter_excursion > 3.0 ? Verdict::parameters_only : Verdict::no_mismatch;
+  else if (unnamed_)
+    d_.verdict = Verdict::unknown_physics;
+  else if (ambiguous)
+    d_.verdict = Verdict::ambiguous;
+  else
+    d_.verdict = rest_ ? Verdict::partly_explained : Verdict::explained;
+  double sum = 0.0;
+  for (const auto& row : d_.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
+  d_.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d_.heldout.size()));
+  std::sort(d_.rejected.begin(), d_.rejected.end(),
+            [](const auto& a, const auto& b) { return a.gain > b.gain; });
+  std::erase_if(d_.rejected, [&](const Rejection& r) {
+    return std::any_of(d_.findings.begin(), d_.findings.end(),
+                       [&](const Finding& f) { return f.term.info->name == r.term; });
+  });
+}
+
+Diagnosis Search::run() {
+  prepare();
+  for (int round = 0; round < 3; ++round)
+    if (!add_named(round)) break;
+  weigh_alternatives();
+  try_unmodelled();
+  hold_out();
+  smallest_effects();
+  conclude();
+  progress_(1.0, "done");
+  return d_;
+}
+
+}  // namespace
+
+Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress) {
+  return Search{data, progress}.run();
+}
+
+std::string name_of(Verdict verdict) {
+  static const std::array<const char*, 6> names{"no_mismatch",      "parameters_only", "explained",
+                                                "partly_explained", "ambiguous",       "unknown_physics"};
+  return names[static_cast<std::size_t>(verdict)];
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,97 @@
+#include "tools/diagnose/statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace invar::diagnose {
+
+double median(std::vector<double> values) {
+  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double robust_sigma(const std::vector<double>& values) {
+  std::vector<double> finite;
+  for (double v : values)
+    if (std::isfinite(v)) finite.push_back(v);
+  if (finite.empty()) return 0.0;
+  const double center = median(finite);
+  for (double& v : finite) v = std::abs(v - center);
+  return 1.4826 * median(finite);
+}
+
+double spread_of_differences(const std::vector<double>& values) {
+  std::vector<double> second;
+  for (std::size_t i = 2; i < values.size(); ++i)
+    second.push_back((values[i] - 2.0 * values[i - 1] + values[i - 2]) / std::sqrt(6.0));
+  return robust_sigma(second);
+}
+
+Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::size_t most) {
+  Whitening result;
+  std::vector<double> all;
+  for (const auto& one : series)
+    for (double v : one)
+      if (std::isfinite(v)) all.push_back(v);
+  if (all.size() < 2) return result;
+  double square = 0.0;
+  for (double v : all) square += v * v;
+  const double rms = std::sqrt(square / static_cast<double>(all.size()));
+  const double clip = 5.0 * std::max(robust_sigma(all), 0.2 * rms);
+  if (!(clip > 0.0)) return result;
+  const auto kept = [clip](double v) { return std::clamp(v, -clip, clip); };
+
+  std::vector<double> covariance(most + 1, 0.0);
+  for (std::size_t lag = 0; lag <= most; ++lag) {
+    double sum = 0.0;
+    std::size_t n = 0;
+    for (const auto& one : series)
+      for (std::size_t i = lag; i < one.size(); ++i)
+        if (std::isfinite(one[i]) && std::isfinite(one[i - lag]))
+          sum += kept(one[i]) * kept(one[i - lag]), ++n;
+    covariance[lag] = n > 0 ? sum / static_cast<double>(n) : 0.0;
+  }
+  // Levinson's recursion; the order with the least Akaike number.
+  std::vector<double> a;
+  double error = covariance[0];
+  const auto count = static_cast<double>(all.size());
+  double best = count * std::log(error);
+  result.sigma = std::sqrt(error);
+  for (std::size_t k = 1; k <= most; ++k) {
+    double reflection = covariance[k];
+    for (std::size_t j = 0; j + 1 < k; ++j) reflection -= a[j] * covariance[k - 1 - j];
+    reflection /= error;
+    if (!(std::abs(reflection) < 0.9999)) break;
+    std::vector<double> next(k);
+    for (std::size_t j = 0; j + 1 < k; ++j) next[j] = a[j] - reflection * a[k - 2 - j];
+    next[k - 1] = reflection;
+    a = std::move(next);
+    error *= 1.0 - reflection * reflection;
+    const double akaike = count * std::log(error) + 2.0 * static_cast<double>(k);
+    if (akaike < best - 2.0) {
+      best = akaike;
+      result.a = a;
+      result.sigma = std::sqrt(error);
+    }
+  }
+  return result;
+}
+
+void whiten(const Whitening& filter, const std::vector<double>& r, const std::vector<bool>& present,
+            double* out) {
+  const std::size_t order = filter.a.size();
+  std::vector<double> filled(r.size());
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    double predicted = 0.0;
+    for (std::size_t j = 0; j < order && j < i; ++j) predicted += filter.a[j] * filled[i - 1 - j];
+    filled[i] = present[i] ? r[i] : predicted;
+    out[i] = present[i] ? (r[i] - predicted) / filter.sigma : 0.0;
+  }
+}
+
+double normal_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
+
+}  // namespace invar::diagnose
