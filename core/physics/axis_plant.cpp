@@ -70,6 +70,11 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
         break;
       }
     }
+    // What repeats must be sampled: at 1 m/s along the way, at its frequency in time.
+    if (const auto pitch = term.kind->info->index_of("pitch");
+        pitch < most_parameters && term.kind->reading == nullptr)
+      fastest = std::max(fastest, 2.0 / p[pitch]);
+    if (term.kind->info->name == "periodic_disturbance") fastest = std::max(fastest, 4.0 * p[1]);
     if (term.kind->info->name == "position_stiffness")
       fastest = std::max(fastest, std::sqrt(std::abs(p[0]) / parameters.mass));
   }
@@ -78,7 +83,7 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
   delay_ = std::min(delay_, oldest);
   age_ = std::min(age_, oldest);
   // Runge-Kutta of fourth order errs by (omega h)^5/120 a step.
-  if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 2e-5, 5e-4);
+  if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 2e-5, 1e-3);
   rest_at(0.0);
 }
 

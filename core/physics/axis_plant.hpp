@@ -100,7 +100,7 @@ class AxisPlant {
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;
   Mode mode_{};
-  double longest_substep_ = 5e-4;
+  double longest_substep_ = 1e-3;
 
   double time_ = 0.0, position_ = 0.0, velocity_ = 0.0, temperature_ = 20.0, outside_force_ = 0.0;
   double swing_ = 0.0, swing_speed_ = 0.0;

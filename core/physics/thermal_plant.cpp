@@ -121,7 +121,7 @@ ThermalPlant::State ThermalPlant::slope(const State& state, double time,
 
 void ThermalPlant::step(const ThermalInputs& inputs, double dt) noexcept {
   if (!(dt > 0.0)) return;
-  const auto parts = static_cast<int>(std::min(1e4, std::max(1.0, std::ceil(dt / longest_substep_))));
+  const auto parts = static_cast<int>(std::min(200.0, std::max(1.0, std::ceil(dt / longest_substep_))));
   const double h = dt / parts;
   const std::size_t n = nodes_.size() + hidden_.size();
   for (int part = 0; part < parts; ++part) {

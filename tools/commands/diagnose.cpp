@@ -49,7 +49,10 @@ void run(const Options& options) {
   if (error)
     throw InputError{options.out.string(), "cannot be made: " + error.message(), "choose another --out"};
   const auto json = diagnose::report_json(data, diagnosis);
-  write_text(options.out / "patched.yaml", model::patched(yaml, diagnosis.best.model));
+  auto patched = diagnosis.best.model;
+  for (std::size_t i = 0; i < patched.parameters.size(); ++i)  // the fit looks through the encoder's steps
+    if (patched.parameters[i].name == "resolution") patched.parameters[i] = model.parameters[i];
+  write_text(options.out / "patched.yaml", model::patched(yaml, patched));
   diagnose::write_page(data, diagnosis, options.model.string(), options.out / "report.html");
   write_text(options.out / "report.json", json + "\n");
   if (options.json)

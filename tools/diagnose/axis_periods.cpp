@@ -116,6 +116,33 @@ std::vector<double> peaks(const std::vector<double>& power, std::size_t from, st
 
 }  // namespace
 
+std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
+  std::vector<std::vector<double>> positions;
+  double low = 1e300, high = -1e300;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    positions.push_back(variable_values(data, r, "true_position"));
+    for (double x : positions.back()) low = std::min(low, x), high = std::max(high, x);
+  }
+  const double span = high - low;
+  if (!(span > 1e-6)) return {};
+  constexpr std::size_t bins = 1U << 16U, padded = 4 * bins;
+  std::vector<double> grid(bins, 0.0);
+  Eigen::Index at = 0;
+  for (std::size_t r = 0; r < positions.size(); ++r)
+    for (const auto& output : data.outputs) {
+      for (std::size_t i = 0; i < positions[r].size(); ++i, ++at)
+        if (output == "encoder")
+          grid[static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1))] += fitted.residual(at);
+    }
+  const auto spectrum = transform(std::move(grid), padded);
+  std::vector<double> power(bins), pitches;
+  for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+  for (double k :
+       peaks(power, 4, std::min<std::size_t>(bins - 2, static_cast<std::size_t>(4.0 * span / 1e-5)), 6))
+    pitches.push_back(4.0 * span / k);
+  return pitches;
+}
+
 Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted) {
   Periods periods;
   const auto force = pulse_responses(data, weighing, fitted.model, "force", 1e-2);

@@ -120,7 +120,8 @@ std::vector<double> pitch_grid(const std::vector<double>& positions, std::size_t
   return pitches;
 }
 
-std::vector<double> own_shapes(const Case& data, const TermInfo& info, const std::string& on) {
+std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermInfo& info,
+                               const std::string& on) {
   if (info.name == "heater_saturation") {
     double top = 0.0;
     for (const auto& heater : data.model.thermal.heaters)
@@ -134,6 +135,7 @@ std::vector<double> own_shapes(const Case& data, const TermInfo& info, const std
     const double c = data.model.value(on + ".capacity", 100.0);
     return {0.3 * c, 1.0 * c, 3.0 * c, 0.08 * c};
   }
+  if (info.plant == Plant::sensor && info.name == "periodic_error") return sensor_pitches(data, fitted);
   if ((info.plant == Plant::error_map || info.plant == Plant::sensor) && info.name == "periodic_error") {
     std::vector<double> all;
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
@@ -319,7 +321,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         }
         continue;
       }
-      std::vector<double> shapes = own_shapes(data, *info, on);
+      std::vector<double> shapes = own_shapes(data, fitted, *info, on);
       if (info->plant == Plant::axis) {
         const auto name = info->name;
         if (name == "force_ripple") shapes = periods.force_pitch;

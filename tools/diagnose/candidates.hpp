@@ -28,6 +28,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
 struct Periods {
   std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency;
 };
+/// Pitches of a sensor's residual along its position, best first.
+std::vector<double> sensor_pitches(const Case& data, const Fit& fitted);
 Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted);
 
 /// Rows of one signal over all recordings, as the model sees them (positions measured, velocities differentiated).

@@ -86,7 +86,8 @@ Case load_case(const physics::Model& model, const std::vector<std::filesystem::p
   data.is_time_series = model.plant != physics::Plant::droplet;
   // Rounding to the resolution is noise to a fit, not a step.
   for (auto& parameter : data.model.parameters)
-    if (model.plant == physics::Plant::sensor && parameter.name == "resolution") parameter.sigma = 0.0;
+    if (model.plant == physics::Plant::sensor && parameter.name == "resolution")
+      parameter.value = 0.0, parameter.sigma = 0.0;
   for (const auto& file : files) {
     const auto table = recording::Table::read(file);
     const auto content = model::to_record(table, model, true);

@@ -94,13 +94,30 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
   return free;
 }
 
+namespace {
+
+// What users believe has a heavy tail (Student's t, 3 degrees of freedom): one parameter that is far off is likelier
+// than several that are each a little off.
+constexpr double tail = 3.0;
+double prior_cost(const Freedom& f, double value) {
+  const double z = (value - f.center) / f.sigma;
+  return f.where == Freedom::Where::curve ? 0.5 * z * z : 0.5 * (tail + 1.0) * std::log1p(z * z / tail);
+}
+/// The weight of a Gaussian prior that has the same slope here.
+double prior_weight(const Freedom& f, double value) {
+  const double z = (value - f.center) / f.sigma;
+  return (f.where == Freedom::Where::curve ? 1.0 : (tail + 1.0) / (tail + z * z)) / (f.sigma * f.sigma);
+}
+
+}  // namespace
+
 std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
   std::vector<physics::Outputs> all(data.recordings.size());
   for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
   return all;
 }
 
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated) {
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
   Weighing weighing;
   weighing.present.resize(data.recordings.size());
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
@@ -119,7 +136,7 @@ Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated)
       weighing.present[r].push_back(std::move(present));
       weighing.rows += static_cast<Eigen::Index>(measured.size());
     }
-    const std::size_t most = data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
+    const std::size_t most = coloured && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
     auto filter = fit_whitening(series, most);
     // Hardly any values: nothing but the user's word says how good they are.
     if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o]};
@@ -130,23 +147,43 @@ Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated)
   return weighing;
 }
 
-Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
-                         const std::vector<physics::Outputs>& simulated) {
-  Eigen::VectorXd out(weighing.rows);
+Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated) {
+  Eigen::Index rows = 0;
+  for (const auto& recording : data.recordings)
+    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
+  Eigen::VectorXd out(rows);
   Eigen::Index at = 0;
+  for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
+    for (std::size_t o = 0; o < data.outputs.size(); ++o)
+      for (std::size_t i = 0; i < data.recordings[rec].inputs.rows(); ++i)
+        out(at++) = data.recordings[rec].measured[o][i] - simulated[rec][o][i];
+  return out;
+}
+
+namespace {
+
+void whiten_all(const Case& data, const Weighing& weighing, const double* in, double* out) {
   std::vector<double> r;
   for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
     for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-      const auto& measured = data.recordings[rec].measured[o];
-      r.resize(measured.size());
-      for (std::size_t i = 0; i < r.size(); ++i) {
-        r[i] = measured[i] - simulated[rec][o][i];
-        if (std::isnan(r[i]) && weighing.present[rec][o][i])
-          r[i] = 1e3 * weighing.filters[o].sigma;  // ran away
-      }
-      whiten(weighing.filters[o], r, weighing.present[rec][o], out.data() + at);
-      at += static_cast<Eigen::Index>(r.size());
+      const std::size_t rows = data.recordings[rec].inputs.rows();
+      r.assign(in, in + rows);
+      // What is present but not finite ran away.
+      for (std::size_t i = 0; i < rows; ++i)
+        if (!std::isfinite(r[i])) r[i] = 1e3 * weighing.filters[o].sigma;
+      whiten(weighing.filters[o], r, weighing.present[rec][o], out);
+      in += rows;
+      out += rows;
     }
+}
+
+}  // namespace
+
+Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
+                         const std::vector<physics::Outputs>& simulated) {
+  const Eigen::VectorXd raw = differences(data, simulated);
+  Eigen::VectorXd out(raw.size());
+  whiten_all(data, weighing, raw.data(), out.data());
   return out.cwiseMax(-1e6).cwiseMin(1e6);
 }
 
@@ -154,8 +191,8 @@ Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const Model
   return residual(data, weighing, simulate(data, model));
 }
 
-Eigen::MatrixXd sensitivities(const Case& data, const Weighing& weighing, const Model& model,
-                              const std::vector<Freedom>& free, const Eigen::VectorXd& at) {
+Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
+  const Eigen::VectorXd at = differences(data, simulate(data, model));
   Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(free.size()));
   in_parallel(free.size(), [&](std::size_t j) {
     Model changed = model;
@@ -163,79 +200,162 @@ Eigen::MatrixXd sensitivities(const Case& data, const Weighing& weighing, const 
     double step = 1e-2 * free[j].scale;
     if (value + step > free[j].bounds.upper) step = -step;
     set(changed, free[j], value + step);
-    columns.col(static_cast<Eigen::Index>(j)) = (residual(data, weighing, changed) - at) / step;
+    auto column = columns.col(static_cast<Eigen::Index>(j));
+    column = (differences(data, simulate(data, changed)) - at) / step;
+    column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   });
   return columns;
 }
 
-Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed,
-        int iterations) {
+Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd out(columns.rows(), columns.cols());
+  in_parallel(static_cast<std::size_t>(columns.cols()), [&](std::size_t j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    whiten_all(data, weighing, columns.col(k).data(), out.col(k).data());
+  });
+  return out;
+}
+
+namespace {
+
+bool same_term(const Model& a, const Model& b, std::size_t term) {
+  if (term >= a.terms.size() || term >= b.terms.size()) return false;
+  const auto &one = a.terms[term], &other = b.terms[term];
+  return one.info == other.info && one.on == other.on && one.curve.knots == other.curve.knots;
+}
+
+/// The sensitivities of `free`, as far as possible those of `near`.
+Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<Freedom>& free,
+                       const Fit* near) {
+  std::vector<Freedom> missing;
+  std::vector<Eigen::Index> from(free.size(), -1);
+  for (std::size_t k = 0; k < free.size(); ++k) {
+    const auto& f = free[k];
+    if (near != nullptr && near->columns.cols() == static_cast<Eigen::Index>(near->free.size()))
+      for (std::size_t q = 0; q < near->free.size(); ++q) {
+        const auto& g = near->free[q];
+        if (g.where != f.where || g.index != f.index) continue;
+        if (f.where == Freedom::Where::parameter ||
+            (g.term == f.term && same_term(near->model, model, f.term)))
+          from[k] = static_cast<Eigen::Index>(q);
+      }
+    if (from[k] < 0) missing.push_back(f);
+  }
+  if (missing.size() == free.size()) return sensitivities(data, model, free);
+  const Eigen::MatrixXd found = missing.empty() ? Eigen::MatrixXd{} : sensitivities(data, model, missing);
+  Eigen::MatrixXd all(near->columns.rows(), static_cast<Eigen::Index>(free.size()));
+  Eigen::Index next = 0;
+  for (std::size_t k = 0; k < free.size(); ++k)
+    all.col(static_cast<Eigen::Index>(k)) = from[k] >= 0 ? near->columns.col(from[k]) : found.col(next++);
+  return all;
+}
+
+}  // namespace
+
+Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
+        const Fit* near) {
   Fit best;
   best.model = start;
   best.free = freedoms(start, believed);
   const auto n = static_cast<Eigen::Index>(best.free.size());
-  const auto prior_cost = [&](const Model& model) {
+  const auto priors = [&](const Model& model) {
     double sum = 0.0;
     for (const auto& f : best.free)
-      if (f.sigma > 0.0) sum += std::pow((get(model, f) - f.center) / f.sigma, 2);
-    return 0.5 * sum;
+      if (f.sigma > 0.0) sum += prior_cost(f, get(model, f));
+    return sum;
   };
-  best.residual = residual(data, weighing, best.model);
+  const auto filtered = [&](const Eigen::VectorXd& r) {
+    Eigen::VectorXd out(r.size());
+    whiten_all(data, weighing, r.data(), out.data());
+    return Eigen::VectorXd{out.cwiseMax(-1e6).cwiseMin(1e6)};
+  };
+  Eigen::VectorXd raw = differences(data, simulate(data, best.model));
+  best.residual = filtered(raw);
   best.data_cost = 0.5 * weighing.temper * best.residual.squaredNorm();
-  best.cost = best.data_cost + prior_cost(best.model);
-  double damping = 1e-3;
+  best.cost = best.data_cost + priors(best.model);
+  best.columns = nearly(data, best.model, best.free, near);
+  bool fresh = near == nullptr;
+  Eigen::MatrixXd j = whitened(data, weighing, best.columns);
   Eigen::MatrixXd hessian;
-  bool converged = iterations == 0;
-  for (int i = 0; i <= iterations; ++i) {
-    const Eigen::MatrixXd j = sensitivities(data, weighing, best.model, best.free, best.residual);
+  Eigen::VectorXd gradient;
+  const auto derive = [&] {
     hessian = weighing.temper * (j.transpose() * j);
-    Eigen::VectorXd gradient = weighing.temper * (j.transpose() * best.residual);
+    gradient = weighing.temper * (j.transpose() * best.residual);
     for (Eigen::Index k = 0; k < n; ++k) {
       const auto& f = best.free[static_cast<std::size_t>(k)];
       if (!(f.sigma > 0.0)) continue;
-      hessian(k, k) += 1.0 / (f.sigma * f.sigma);
-      gradient(k) += (get(best.model, f) - f.center) / (f.sigma * f.sigma);
+      const double weight = prior_weight(f, get(best.model, f));
+      hessian(k, k) += weight;
+      gradient(k) += (get(best.model, f) - f.center) * weight;
     }
-    if (converged || i == iterations) break;
-    const double before = best.cost;
-    bool better = false;
-    for (int attempt = 0; attempt < 5 && !better; ++attempt) {
-      Eigen::MatrixXd damped = hessian;
-      for (Eigen::Index k = 0; k < n; ++k) damped(k, k) += damping * hessian(k, k) + 1e-300;
-      const Eigen::VectorXd step = damped.ldlt().solve(-gradient);
-      if (!step.allFinite()) break;
-      Model tried = best.model;
-      for (Eigen::Index k = 0; k < n; ++k) {
-        const auto& f = best.free[static_cast<std::size_t>(k)];
-        double by = step(k);
-        // A shape is trusted to be linear only so far.
-        if (f.where == Freedom::Where::term && f.sigma <= 0.0)
-          by = std::clamp(by, -20.0 * f.scale, 20.0 * f.scale);
-        set(tried, f, f.bounds.clamp(get(best.model, f) + by));
-      }
-      Eigen::VectorXd r = residual(data, weighing, tried);
-      const double data_cost = 0.5 * weighing.temper * r.squaredNorm();
-      const double cost = data_cost + prior_cost(tried);
-      if (cost < best.cost) {
-        best.model = std::move(tried);
-        best.residual = std::move(r);
-        best.cost = cost;
-        best.data_cost = data_cost;
-        damping = std::max(1e-9, 0.1 * damping);
-        better = true;
-      } else {
-        damping *= 10.0;
-      }
+  };
+  derive();
+  double damping = 1e-3;
+  int failures = 0;
+  for (int i = 0; i < iterations && n > 0; ++i) {
+    Eigen::MatrixXd damped = hessian;
+    for (Eigen::Index k = 0; k < n; ++k) damped(k, k) += damping * hessian(k, k) + 1e-300;
+    const Eigen::VectorXd step = damped.ldlt().solve(-gradient);
+    if (!step.allFinite()) break;
+    Model tried = best.model;
+    Eigen::VectorXd taken(n), scale(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const auto& f = best.free[static_cast<std::size_t>(k)];
+      double by = step(k);
+      // A shape is trusted to be linear only so far.
+      if (f.where == Freedom::Where::term && f.sigma <= 0.0)
+        by = std::clamp(by, -20.0 * f.scale, 20.0 * f.scale);
+      const double before = get(best.model, f);
+      set(tried, f, f.bounds.clamp(before + by));
+      taken(k) = get(tried, f) - before;
+      scale(k) = f.scale;
     }
-    converged = !better || before - best.cost < 0.02 + 1e-5 * best.cost;
-    if (!better) break;
-    if (converged) i = std::max(i, iterations - 1);
+    const Eigen::VectorXd raw_tried = differences(data, simulate(data, tried));
+    Eigen::VectorXd r = filtered(raw_tried);
+    const double data_cost = 0.5 * weighing.temper * r.squaredNorm();
+    const double cost = data_cost + priors(tried);
+    if (cost < best.cost) {
+      const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
+      if (const double length = taken.dot(by_scale); length > 0.0) {
+        // Broyden: the sensitivities now give the change that was seen.
+        j += (r - best.residual - j * taken) * by_scale.transpose() / length;
+        Eigen::VectorXd change = raw_tried - raw - best.columns * taken;
+        change = change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
+        best.columns += change * by_scale.transpose() / length;
+      }
+      const double gained = best.cost - cost;
+      best.model = std::move(tried);
+      best.residual = std::move(r);
+      raw = raw_tried;
+      best.cost = cost;
+      best.data_cost = data_cost;
+      damping = std::max(1e-9, 0.1 * damping);
+      fresh = false;
+      derive();
+      if (gained < 0.2) break;
+    } else if (cost < best.cost + 0.05) {
+      break;  // as good as it gets
+    } else if (!fresh) {
+      best.columns = sensitivities(data, best.model, best.free);
+      j = whitened(data, weighing, best.columns);
+      fresh = true;
+      derive();
+    } else {
+      damping *= 30.0;
+      if (++failures > 4) break;
+    }
   }
   // Numbers that the data do not move keep their prior and cost nothing.
   double complexity = 0.0;
   const double observations = std::max(10.0, weighing.temper * static_cast<double>(best.residual.size()));
   for (const auto& f : best.free)
     if (!(f.sigma > 0.0) || f.where == Freedom::Where::curve) complexity += 0.5 * std::log(observations);
+  // A pitch or a frequency was looked for in as many places as the recording resolves.
+  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
+    for (const char* scanned : {"pitch", "frequency", "period"})
+      if (best.model.terms[t].info->index_of(scanned) < physics::most_parameters &&
+          best.model.terms[t].info->index_of("phase") < physics::most_parameters)
+        complexity += 0.7 * std::log(observations);
   best.evidence = -best.cost - complexity;
   Eigen::MatrixXd regular = hessian;
   for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tools/diagnose/data.hpp"
+#include "tools/diagnose/in_parallel.hpp"
 #include "tools/diagnose/statistics.hpp"
 
 namespace invar::diagnose {
@@ -38,16 +39,21 @@ struct Weighing {
       1.0;  // what one nat of log likelihood counts: outputs of one loop tell the same thing twice
 };
 
-/// Rows that are measured; filters as fitted to the residuals of these simulations.
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated);
+/// Rows that are measured; filters as fitted to the residuals of these simulations. Without `coloured` every row counts
+/// alike: right for looking for physics in a residual that is not noise yet.
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured = true);
 
 std::vector<physics::Outputs> simulate(const Case& data, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
                          const std::vector<physics::Outputs>& simulated);
-/// Columns: change of the residual by each freedom. Runs on all processors.
-Eigen::MatrixXd sensitivities(const Case& data, const Weighing& weighing, const physics::Model& model,
-                              const std::vector<Freedom>& free, const Eigen::VectorXd& at);
+/// Columns: change of measured - simulated by each freedom, row by row as they stand. Runs on all processors.
+Eigen::MatrixXd sensitivities(const Case& data, const physics::Model& model,
+                              const std::vector<Freedom>& free);
+/// Each column through the filters of the weighing.
+Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns);
+/// measured - simulated of all recordings and outputs below one another; NaN where nothing was measured.
+Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated);
 
 struct Fit {
   physics::Model model;
@@ -57,16 +63,12 @@ struct Fit {
   double data_cost = 0.0;    // without the priors
   double evidence = 0.0;     // log, up to a constant common to all models of one weighing: BIC
   Eigen::VectorXd residual;  // whitened
+  Eigen::MatrixXd columns;   // sensitivities at or near the solution, not whitened
 };
 
-/// From the numbers in `start`. `iterations` 0 only evaluates.
+/// From the numbers in `start`. `iterations` 0 only evaluates. The sensitivities of freedoms that `near` has too are
+/// taken from there and then kept up to date by Broyden's rule; they are found anew where a step fails.
 Fit fit(const Case& data, const Weighing& weighing, const physics::Model& start,
-        const physics::Model& believed, int iterations);
-
-/// Runs `work(i)` for i < n on all processors.
-template <class Work>
-void in_parallel(std::size_t n, Work work);
+        const physics::Model& believed, int iterations, const Fit* near = nullptr);
 
 }  // namespace invar::diagnose
-
-#include "tools/diagnose/in_parallel.hpp"

@@ -22,7 +22,10 @@ struct Nuisance {
 
 Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   Nuisance n;
-  n.columns = sensitivities(data, weighing, base.model, base.free, base.residual);
+  n.columns = whitened(data, weighing,
+                       base.columns.cols() == static_cast<Eigen::Index>(base.free.size())
+                           ? base.columns
+                           : sensitivities(data, base.model, base.free));
   Eigen::MatrixXd h = weighing.temper * (n.columns.transpose() * n.columns);
   for (Eigen::Index k = 0; k < h.rows(); ++k) {
     const double sigma = base.free[static_cast<std::size_t>(k)].sigma;
@@ -33,8 +36,8 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   return n;
 }
 
-Eigen::MatrixXd columns_of(const Case& data, const Weighing& weighing, const Fit& base, const Start& start) {
-  Eigen::MatrixXd columns(base.residual.size(), static_cast<Eigen::Index>(start.directions.size()));
+Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at, const Start& start) {
+  Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(start.directions.size()));
   for (std::size_t d = 0; d < start.directions.size(); ++d) {
     const auto& direction = start.directions[d];
     physics::Model model = base.model;
@@ -57,7 +60,9 @@ Eigen::MatrixXd columns_of(const Case& data, const Weighing& weighing, const Fit
       by = term.values[direction.amplitude];
     }
     model.terms.push_back(term);
-    columns.col(static_cast<Eigen::Index>(d)) = (residual(data, weighing, model) - base.residual) / by;
+    auto column = columns.col(static_cast<Eigen::Index>(d));
+    column = (differences(data, simulate(data, model)) - at) / by;
+    column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   }
   return columns;
 }
@@ -85,13 +90,14 @@ double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const
 std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
                              const std::vector<Start>& starts, std::size_t keep) {
   const auto n = nuisance(data, weighing, base);
+  const Eigen::VectorXd at = differences(data, simulate(data, base.model));
   std::vector<Screened> all(starts.size());
   const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
   in_parallel(starts.size(), [&](std::size_t i) {
     auto& s = all[i];
     s.start = starts[i];
-    s.columns = columns_of(data, weighing, base, s.start);
-    s.gain = solve(weighing, base, n, s.columns, s.strength);
+    s.columns = columns_of(data, base, at, s.start);
+    s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
     const auto& info = *s.start.term.info;
     // An amplitude without a phase has one possible sign where its bounds say so.
     bool periodic = false;
@@ -104,24 +110,14 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
       const auto& d = s.start.directions.front();
       const double lower = d.amplitude < none ? info.parameters[d.amplitude].bounds.lower : 0.0;
       s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
-      if (d.amplitude == none && s.strength(0) > 0.0) {  // all or nothing: what it brings at full strength
-        const Eigen::VectorXd g = base.residual + s.columns.col(0);
-        (void)g;
-      }
     }
     const double numbers = static_cast<double>(s.start.directions.size() + shapes);
     s.merit = s.gain - 0.5 * numbers * std::log(observations);
-    if (keep == 0 || s.merit < -20.0) s.columns.resize(0, 0);
+    if (keep == 0 || s.merit < 0.0) s.columns.resize(0, 0);
   });
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
-  for (std::size_t i = keep; i < all.size(); ++i) all[i].columns.resize(0, 0);
+  for (std::size_t i = std::min(keep, all.size()); i < all.size(); ++i) all[i].columns.resize(0, 0);
   return all;
-}
-
-double pair_gain(const Weighing& weighing, const Fit& base, const Screened& a, const Screened& b) {
-  (void)weighing;
-  (void)base;
-  return a.gain + b.gain;
 }
 
 physics::Model with(const Fit& base, const std::vector<const Screened*>& added) {
@@ -156,6 +152,15 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added) 
     model.terms.push_back(term);
   }
   return model;
+}
+
+Fit with_columns(const Case& data, const Fit& base, const Screened& added) {
+  Fit near;
+  near.model = with(base, {&added});
+  near.free = freedoms(near.model, data.model);
+  near.columns.resize(base.columns.rows(), base.columns.cols() + added.columns.cols());
+  near.columns << base.columns, added.columns;
+  return near;
 }
 
 }  // namespace invar::diagnose

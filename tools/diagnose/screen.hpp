@@ -7,7 +7,7 @@ namespace invar::diagnose {
 
 struct Screened {
   Start start;
-  Eigen::MatrixXd columns;   // change of the residual by each direction
+  Eigen::MatrixXd columns;   // change of measured - simulated by each direction, not whitened
   Eigen::VectorXd strength;  // by direction, at the optimum
   double gain = 0.0;         // of log likelihood
   double merit = 0.0;        // gain less the price of its numbers
@@ -18,10 +18,10 @@ struct Screened {
 std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
                              const std::vector<Start>& starts, std::size_t keep);
 
-/// First-order gain of two together.
-double pair_gain(const Weighing& weighing, const Fit& base, const Screened& a, const Screened& b);
-
 /// The base model with the screened term(s) at their first-order strength.
 physics::Model with(const Fit& base, const std::vector<const Screened*>& added);
+
+/// For a curve: model, freedoms and sensitivities from which a fit may begin without finding them again.
+Fit with_columns(const Case& data, const Fit& base, const Screened& added);
 
 }  // namespace invar::diagnose

@@ -52,8 +52,8 @@ class Search {
   };
 
   void prepare();
-  /// Refits everything that is still in question under filters of `by`'s residual.
-  void reweigh(const Fit& by);
+  /// Candidates fitted on top of `base`, best first.
+  std::vector<Fit> shortlisted(const Weighing& weighing, const Fit& base, double share);
   bool add_named(double round);
   void weigh_alternatives();
   void try_unmodelled();
@@ -79,14 +79,8 @@ void Search::prepare() {
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 6);
   simulated = simulate(data_, d_.retuned.model);
   d_.weighing = weigh(data_, simulated);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
   d_.best = d_.retuned;
-}
-
-void Search::reweigh(const Fit& by) {
-  d_.weighing = weigh(data_, simulate(data_, by.model));
-  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4);
 }
 
 void Search::reject(const std::string& term, const std::string& why, double gain) {
@@ -98,9 +92,9 @@ void Search::reject(const std::string& term, const std::string& why, double gain
   d_.rejected.push_back({term, why, gain});
 }
 
-bool Search::add_named(double round) {
-  progress_(0.1 + 0.2 * round, "screening candidates");
-  auto screened = screen(data_, d_.weighing, d_.best, named_starts(data_, d_.weighing, d_.best), 30);
+std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, double share) {
+  progress_(share, "screening candidates");
+  auto screened = screen(data_, weighing, base, named_starts(data_, weighing, base), 0);
   std::vector<const Screened*> shortlist;
   std::map<std::string, int> seen;
   for (const auto& s : screened) {
@@ -112,42 +106,75 @@ bool Search::add_named(double round) {
     if (s.merit < -3.0 || shortlist.size() >= 9) break;
     if (seen[label(s.start.term)]++ < 2) shortlist.push_back(&s);
   }
-  // Two together may do what neither does alone.
-  std::vector<std::vector<const Screened*>> sets;
-  for (const auto* s : shortlist) sets.push_back({s});
-  progress_(0.15 + 0.2 * round, "fitting the short list");
-  std::vector<Fit> fits(sets.size());
-  for (std::size_t i = 0; i < sets.size(); ++i)
-    fits[i] = fit(data_, d_.weighing, with(d_.best, sets[i]), data_.model, i < 4 ? 7 : 5);
-  std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < fits.size(); ++i)
-    if (stands(fits[i], fits[i].model.terms.size() - 1)) order.push_back(i);
-  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return fits[a].evidence > fits[b].evidence; });
+  progress_(share + 0.04, "fitting the short list");
+  // A few steps each; those that lag far behind the leader are not driven further.
+  std::vector<Fit> fits;
+  double leader = -1e300;
+  for (const auto* s : shortlist) {
+    fits.push_back(fit(data_, weighing, with(base, {s}), data_.model, 3, &base));
+    leader = std::max(leader, fits.back().evidence);
+  }
+  for (auto& f : fits) {
+    const double gained = std::max(1.0, leader - base.evidence);
+    if (f.evidence > leader - std::max(15.0, 0.5 * gained))
+      f = fit(data_, weighing, f.model, data_.model, 8, &f);
+    leader = std::max(leader, f.evidence);
+  }
+  std::erase_if(fits, [](const Fit& f) { return !stands(f, f.model.terms.size() - 1); });
+  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
   last_screen_ = std::move(screened);
-  for (auto& s : last_screen_) s.columns.resize(0, 0);
-  if (order.empty() || fits[order[0]].evidence < d_.best.evidence + claim_margin) {
-    for (const auto i : order)
-      reject(std::string{fits[i].model.terms.back().info->name}, "its gain does not pay for its numbers",
-             fits[i].evidence - d_.best.evidence);
-    return false;
+  return fits;
+}
+
+/// Adds the term that explains most, if one stands under the filters that its own residual asks for.
+bool Search::add_named(double round) {
+  for (const bool coloured : {true, false}) {
+    // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
+    // every row counts alike. Either way a claim is judged under the filters of its own residual.
+    const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
+    const Fit base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
+    auto fits = shortlisted(weighing, base, 0.1 + 0.2 * round + (coloured ? 0.0 : 0.1));
+    double best_gain = -1e300;
+    std::size_t winner = 0;
+    Weighing own_weighing;
+    Fit own_fit, own_base;
+    std::set<std::string> tried;
+    for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {
+      if (fits[i].evidence < base.evidence + 2.0) break;
+      if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
+      if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
+      const Weighing own = weigh(data_, simulate(data_, fits[i].model));
+      auto with_term = fit(data_, own, fits[i].model, data_.model, 6, &fits[i]);
+      auto without = fit(data_, own, base.model, data_.model, 4, &base);
+      const double gain = with_term.evidence - without.evidence;
+      if (gain > best_gain && stands(with_term, with_term.model.terms.size() - 1)) {
+        best_gain = gain, winner = i;
+        own_weighing = own, own_fit = std::move(with_term), own_base = std::move(without);
+      }
+    }
+    if (best_gain < claim_margin_of(d_.weighing)) {
+      for (const auto& f : fits)
+        reject(std::string{f.model.terms.back().info->name}, "its gain does not pay for its numbers",
+               f.evidence - base.evidence);
+      continue;
+    }
+    std::vector<Term> rivals;
+    std::set<std::string> named{label(fits[winner].model.terms.back())};
+    for (const auto& f : fits) {
+      if (!named.insert(label(f.model.terms.back())).second) continue;
+      if (f.evidence > base.evidence + 0.3 * (fits[winner].evidence - base.evidence) && rivals.size() < 4)
+        rivals.push_back(f.model.terms.back());
+      else
+        reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
+               f.evidence - base.evidence);
+    }
+    d_.weighing = std::move(own_weighing);
+    d_.best = std::move(own_fit);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+    rivals_.push_back(std::move(rivals));
+    return true;
   }
-  const double before = d_.best.evidence;
-  const auto winner = order[0];
-  std::vector<Term> rivals;
-  std::set<std::string> named{label(fits[winner].model.terms.back())};
-  for (std::size_t k = 1; k < order.size(); ++k) {
-    const auto& f = fits[order[k]];
-    if (!named.insert(label(f.model.terms.back())).second) continue;
-    if (f.evidence > before + 0.3 * (fits[winner].evidence - before) && rivals.size() < 4)
-      rivals.push_back(f.model.terms.back());
-    else
-      reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
-             f.evidence - before);
-  }
-  d_.best = std::move(fits[winner]);
-  rivals_.push_back(std::move(rivals));
-  reweigh(d_.best);
-  return true;
+  return false;
 }
 
 void Search::weigh_alternatives() {
@@ -161,7 +188,7 @@ void Search::weigh_alternatives() {
       for (const auto& rival : rivals_[i]) {
         Model model = d_.best.model;
         model.terms[place] = rival;
-        auto f = fit(data_, d_.weighing, model, data_.model, 6);
+        auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
         const double odds = f.evidence - d_.best.evidence;
         if (odds > 0.5 && stands(f, place)) {  // better after all, beside the other terms
           kept.push_back(d_.best.model.terms[place]);
@@ -187,42 +214,59 @@ void Search::try_unmodelled() {
   progress_(0.78, "looking for physics without a name");
   const auto starts = unmodelled_starts(data_, d_.best);
   if (starts.empty()) return;
+  struct Curved {
+    Fit fit;
+    Weighing weighing;
+    double gain = -1e300;  // over `base`, under its own filters
+  };
   const auto best_curve = [&](const Fit& base) {
-    const auto screened = screen(data_, d_.weighing, base, starts, 6);
-    Fit best;
-    best.evidence = -1e300;
+    Curved best;
+    const Weighing plain = weigh(data_, simulate(data_, base.model), false);
+    const Fit under_plain = fit(data_, plain, base.model, data_.model, 4, &base);
+    const auto screened = screen(data_, plain, under_plain, starts, 3);
     int tried = 0;
     for (const auto& s : screened) {
-      if (tried++ >= 2 || s.merit < claim_margin) break;
-      auto f = fit(data_, d_.weighing, with(base, {&s}), data_.model, 3);
-      if (f.evidence > best.evidence) best = std::move(f);
+      if (tried++ >= 3 || s.merit < claim_margin) break;
+      const Fit near = with_columns(data_, under_plain, s);
+      auto rough = fit(data_, plain, near.model, data_.model, 2, &near);
+      const Weighing own = weigh(data_, simulate(data_, rough.model));
+      auto curved = fit(data_, own, rough.model, data_.model, 3, &rough);
+      const auto without = fit(data_, own, base.model, data_.model, 4, &base);
+      const double gain = curved.evidence - without.evidence;
+      if (gain > best.gain) best = {std::move(curved), own, gain};
     }
     return best;
   };
   const bool named = d_.best.model.terms.size() > given();
+  const double margin = 2.0 * claim_margin_of(d_.weighing);
   auto beside = best_curve(d_.best);
   if (named) {
     auto instead = best_curve(d_.retuned);
-    if (instead.evidence > d_.best.evidence + claim_margin && instead.evidence > beside.evidence - 5.0) {
-      for (std::size_t t = given(); t < d_.best.model.terms.size(); ++t)
-        reject(std::string{d_.best.model.terms[t].info->name}, "a curve without a name explains far more",
-               d_.best.evidence - d_.retuned.evidence);
-      d_.best = std::move(instead);
-      d_.findings.clear();
-      rivals_.clear();
-      unnamed_ = true;
+    if (instead.gain > margin) {
+      const auto named_there = fit(data_, instead.weighing, d_.best.model, data_.model, 4, &d_.best);
+      if (instead.fit.evidence > named_there.evidence + margin &&
+          (beside.gain < margin || instead.fit.evidence > named_there.evidence + 0.9 * beside.gain)) {
+        for (std::size_t t = given(); t < d_.best.model.terms.size(); ++t)
+          reject(std::string{d_.best.model.terms[t].info->name}, "a curve without a name explains far more",
+                 1.0);
+        d_.best = std::move(instead.fit);
+        d_.weighing = std::move(instead.weighing);
+        d_.findings.clear();
+        rivals_.clear();
+        unnamed_ = true;
+      }
     }
   }
-  if (!unnamed_ && beside.evidence > d_.best.evidence + 2.0 * claim_margin) {
-    d_.best = std::move(beside);
+  if (!unnamed_ && beside.gain > margin) {
+    d_.best = std::move(beside.fit);
+    d_.weighing = std::move(beside.weighing);
     (named ? rest_ : unnamed_) = true;
   }
-  if (unnamed_ || rest_) {
-    Finding finding;
-    finding.term = d_.best.model.terms.back();
-    d_.findings.push_back(finding);
-    reweigh(d_.best);
-  }
+  if (!unnamed_ && !rest_) return;
+  Finding finding;
+  finding.term = d_.best.model.terms.back();
+  d_.findings.push_back(finding);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
 }
 
 void Search::hold_out() {
@@ -238,9 +282,10 @@ void Search::hold_out() {
         (out ? train : test).present[r][o][i] = false;
       }
   }
-  const auto retuned = fit(data_, train, d_.retuned.model, data_.model, 2);
-  const auto after =
-      d_.best.model.terms.size() > given() ? fit(data_, train, d_.best.model, data_.model, 2) : retuned;
+  const auto retuned = fit(data_, train, d_.retuned.model, data_.model, 3, &d_.retuned);
+  const auto after = d_.best.model.terms.size() > given()
+                         ? fit(data_, train, d_.best.model, data_.model, 3, &d_.best)
+                         : retuned;
   const auto nominal_out = simulate(data_, data_.model), retuned_out = simulate(data_, retuned.model),
              after_out = simulate(data_, after.model);
   const auto rms = [&](const std::vector<physics::Outputs>& simulated, std::size_t o, const Weighing& on) {
@@ -332,7 +377,7 @@ void Search::conclude() {
     d_.parameter_excursion =
         std::max(d_.parameter_excursion, std::abs(get(d_.best.model, f) - f.center) / f.sigma);
   }
-  d_.nominal = fit(data_, d_.weighing, data_.model, data_.model, 0);
+  d_.nominal = fit(data_, d_.weighing, data_.model, data_.model, 0, &d_.retuned);
   d_.mismatch_gain = d_.best.evidence - d_.nominal.evidence;
   bool ambiguous = false;
   for (const auto& finding : d_.findings)

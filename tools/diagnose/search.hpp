@@ -59,8 +59,11 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
 
 std::string name_of(Verdict verdict);
 
-/// log evidence by which a term must win before it is claimed.
+/// log evidence by which a term must win before it is claimed; more where many rows would make a trifle significant.
 inline constexpr double claim_margin = 10.0;
+inline double claim_margin_of(const Weighing& weighing) {
+  return claim_margin + 0.001 * weighing.temper * static_cast<double>(weighing.rows);
+}
 /// Alternatives nearer than this cannot be told apart.
 inline constexpr double ambiguous_margin = 3.0;
 

@@ -16,7 +16,7 @@ struct HiddenNode {
       .parameters = {{{"conductance", "W/K", {0.0, 1e4}, Role::amplitude, {0.3}, "of the contact"},
                       {"capacity",
                        "J/K",
-                       {1e-3, 1e8},
+                       {0.05, 1e8},
                        Role::shape,
                        {1000.0, 200.0, 5000.0, 30.0},
                        "of the hidden store"}}},
