@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   invar::tools::add_predict(program);
   invar::tools::add_run(program);
   invar::tools::add_recording(program);
+  invar::tools::add_diagnose(program);
   invar::tools::add_simulate(program);
   try {
     program.parse(argc, argv);
