@@ -186,10 +186,10 @@ VelocitySensorModel identify_velocity(const std::vector<FusionRun>& runs, const 
       }
     }
     gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
-    // Priors: nonlinearity of the size of a tenth, offset of a hundredth of the speed, lag of 5 ms.
+    // Priors: nonlinearity of the size of a tenth, offset of a hundredth of the speed, lag of 20 ms.
     for (int k = 1; k < powers; ++k) gram(k, k) += 1.0 / std::pow(0.2 * fastest, 2);
     gram(powers, powers) += 1.0 / std::pow(0.02 * fastest, 2);
-    gram(powers + 1, powers + 1) += 1.0 / std::pow(5e-3, 2);
+    gram(powers + 1, powers + 1) += 1.0 / std::pow(20e-3, 2);
     p = gram.colPivHouseholderQr().solve(moment);
   }
   for (int k = 0; k < powers; ++k) model.gains[static_cast<std::size_t>(k)] = p(k) / std::pow(fastest, k + 1);
@@ -248,10 +248,9 @@ Eigen::MatrixXd integrated(const FusionRun& run) {
   return all;
 }
 
-double run_speed(const FusionRun& run, const Motion& motion) {
-  (void)run;
-  std::vector<double> speeds(motion.velocity.cwiseAbs().begin(), motion.velocity.cwiseAbs().end());
-  return numerics::median(speeds);
+double typical_speed(const Motion& motion) {
+  const Eigen::VectorXd speed = motion.velocity.cwiseAbs();
+  return numerics::median({speed.begin(), speed.end()});
 }
 
 double run_noise(const FusionRun& run) {
@@ -328,7 +327,7 @@ WeightModel identify_weights(const std::vector<FusionRun>& runs, int degree) {
     const FusionRun& run = runs[static_cast<std::size_t>(r)];
     const Eigen::MatrixXd all = integrated(run);
     const auto rows = complete_rows(all);
-    selectors.col(r) << run_speed(run, motion_of(run)), run_noise(run);
+    selectors.col(r) << typical_speed(motion_of(run)), run_noise(run);
     weights.col(r).setConstant(1.0 / static_cast<double>(sensors));
     if (static_cast<Eigen::Index>(rows.size()) <= sensors + 1) continue;
     const WeightFit fit = fit_weights(all(rows, Eigen::all), run.reference(rows));
@@ -431,7 +430,7 @@ FusionFit identify_fusion(const std::vector<FusionRun>& given, const std::vector
   }
   for (std::size_t r = 0; r < runs.size(); ++r) {
     HeldOut& held = fit.held_out[r];
-    held.speed = run_speed(runs[r], motion_of(runs[r]));
+    held.speed = typical_speed(motion_of(runs[r]));
     held.noise_level = run_noise(runs[r]);
     const Eigen::MatrixXd all = integrated(runs[r]);
     const auto rows = complete_rows(all);

@@ -35,6 +35,10 @@ struct Cut {
   double mean;
   double variance;
 };
+
+/// The most that a cell of this width could ever hold: what its probability is to be compared with.
+double most_probable(double low, double high) noexcept { return 1.0 - 2.0 * beyond(0.5 * (high - low)); }
+
 Cut cut(double low, double high) noexcept {
   if (low > 0.0) {  // mirror, so that differences are taken in the tail that has digits
     const Cut mirrored = cut(-high, -low);
@@ -202,6 +206,54 @@ void FusionObserver::renormalise(const std::array<double, models>& likelihood) n
   for (Mode& mode : modes_) mode.probability /= floored;
 }
 
+/// What the velocity sensors say was travelled while each position reading stood still.
+void FusionObserver::add_travel(const FusionSample& sample) noexcept {
+  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
+    const VelocityMemory& velocity = velocity_memory_[i];
+    if (velocity.faulty || velocity.dead || !std::isfinite(sample.velocities[i])) continue;
+    const VelocitySensorModel& sensor = model_.velocities[i];
+    const double gain = std::max(std::abs(sensor.sensitivity(0.0)), 1e-6);
+    const double noise = sensor.correlation * sample.period / gain;
+    for (std::size_t k = 0; k < model_.positions.size(); ++k) {
+      PositionMemory& memory = position_memory_[k];
+      const double moved = (sample.velocities[i] - sensor.offset) / gain * sample.period;
+      const double variance = velocity.variance * noise * noise;
+      memory.travel += moved;
+      memory.travel_variance += variance;
+      memory.since += moved;
+      memory.since_variance += variance;
+    }
+    return;  // one live sensor is witness enough
+  }
+}
+
+/// True where a witness says that a position which reads the same cannot stand still: a velocity sensor beyond
+/// its noise, or another position sensor. A filter that merely expected motion is no witness.
+bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
+  const PositionMemory& memory = position_memory_[position];
+  const double cell =
+      std::max(0.75 * model_.positions[position].step, 10.0 * model_.positions[position].noise);
+  if (std::abs(memory.travel) > cell + 5.0 * std::sqrt(memory.travel_variance) &&
+      memory.travel_variance > 0.0)
+    return true;
+  for (std::size_t i = 0; i < model_.positions.size(); ++i)
+    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
+  return false;
+}
+
+/// True where a witness says that the position cannot have gone from what was last believed to this reading.
+bool FusionObserver::refuted_jump(std::size_t position, double reading) const noexcept {
+  const PositionMemory& memory = position_memory_[position];
+  const double cell =
+      std::max(2.0 * model_.positions[position].step, 20.0 * model_.positions[position].noise);
+  if (memory.since_variance > 0.0 &&
+      std::abs(reading - memory.believed - memory.since) > cell + 5.0 * std::sqrt(memory.since_variance))
+    return true;
+  for (std::size_t i = 0; i < model_.positions.size(); ++i)
+    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
+  return false;
+}
+
 /// Back by some samples, whose velocities turn out to have been those of a dead sensor; the positions since then
 /// are used again. Bounded by the history.
 void FusionObserver::undo(std::size_t steps) noexcept {
@@ -322,11 +374,14 @@ void FusionObserver::use_position(std::size_t i, double reading) noexcept {
       const double z = (reading - expected) / deviation[j];
       cuts[j] = {std::exp(-0.5 * z * z), z, 0.0};  // state and noise together are known exactly
     }
-    probability += mode.probability * cuts[j].probability;
+    const double width = sensor.step / deviation[j];
+    probability += mode.probability * cuts[j].probability /
+                   (sensor.step > 0.0 ? std::max(most_probable(0.0, width), 1e-12) : 1.0);
   }
   // A reading that stands still while the rest moves on is refuted little by little; an edge clears it.
   const bool odd = probability < surprise;
   if (moved && !odd) memory.conflict = memory.pulled = 0.0;
+  if (moved) memory.travel = memory.travel_variance = 0.0;
   memory.conflict = std::max(
       0.0, memory.conflict - std::log(std::max(probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0));
   if (memory.conflict <= 0.0) memory.pulled = 0.0;
@@ -339,7 +394,14 @@ void FusionObserver::use_position(std::size_t i, double reading) noexcept {
     memory.conflict = memory.pulled = 0.0;
     return;
   }
-  if (!memory.faulty && (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict))) {
+  if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i, reading)) {
+    restart_at(sensor, reading);  // nobody contradicts the sensor: it is the estimate that was lost
+    memory.odd = 0;
+    memory.conflict = memory.pulled = 0.0;
+    return;
+  }
+  if (!memory.faulty &&
+      (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict && refuted_standing(i)))) {
     memory.faulty = true;
     for (Mode& mode : modes_) {
       mode.mean(0) -= memory.pulled;  // what the stuck reading held back
@@ -348,6 +410,8 @@ void FusionObserver::use_position(std::size_t i, double reading) noexcept {
   }
   if (memory.faulty && memory.good >= good_limit && memory.conflict <= 0.0) memory.faulty = false;
   if (memory.faulty || odd) return;
+  memory.believed = reading;
+  memory.since = memory.since_variance = 0.0;
   double information = 0.0;
   double moved_by = 0.0;
   std::array<double, models> likelihood{};
@@ -372,6 +436,7 @@ FusedPosition FusionObserver::step(const FusionSample& sample) noexcept {
   const std::size_t velocities = model_.velocities.size();
   if (!started_) start(sample);
   learn_noise(sample);
+  add_travel(sample);
   for (std::size_t i = 0; i < velocities; ++i)
     if (velocity_memory_[i].dead && !velocity_memory_[i].faulty) {
       velocity_memory_[i].faulty = true;

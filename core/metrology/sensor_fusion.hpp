@@ -100,8 +100,13 @@ class FusionObserver final : public FusionEstimator {
     double last = std::numeric_limits<double>::quiet_NaN();
     double conflict = 0.0;  // cumulated surprise while the reading stands still
     double pulled = 0.0;    // what its cell moved the estimate by since then [m]
-    int odd = 0;            // surprising readings in a row
-    int good = 0;           // unsurprising ones in a row
+    double travel = 0.0;    // that the velocity sensors report since the reading last changed [m]
+    double travel_variance = 0.0;
+    double believed = 0.0;  // the last reading that was no surprise [m]
+    double since = 0.0;     // travel by the velocity sensors since then [m]
+    double since_variance = 0.0;
+    int odd = 0;   // surprising readings in a row
+    int good = 0;  // unsurprising ones in a row
     bool faulty = false;
   };
   struct VelocityMemory {
@@ -123,6 +128,9 @@ class FusionObserver final : public FusionEstimator {
   void learn_noise(const FusionSample& sample) noexcept;
   void use_velocity(std::size_t i, double reading) noexcept;
   void use_position(std::size_t i, double reading) noexcept;
+  void add_travel(const FusionSample& sample) noexcept;
+  [[nodiscard]] bool refuted_standing(std::size_t position) const noexcept;
+  [[nodiscard]] bool refuted_jump(std::size_t position, double reading) const noexcept;
   void undo(std::size_t steps) noexcept;
   void advance(double period) noexcept;
   void restart_at(const PositionSensorModel& sensor, double reading) noexcept;

@@ -138,6 +138,16 @@ TEST(FusionObserver, IsFarBetterThanTheEncoderOnTheSeedsSinusoids) {
     }
 }
 
+TEST(FusionObserver, SurvivesNoiseTenTimesTheReading) {
+  const Rig rig;
+  FusionObserver observer{model_of(rig)};
+  for (unsigned seed = 1; seed <= 6; ++seed)
+    for (const double noise : {3.0, 10.0}) {
+      const FusionRun run = record(rig, sinusoid(5.0), 10.0, noise, seed);
+      EXPECT_LT(rms(observer, run), 0.7 * encoder_rms(run)) << noise << ", seed " << seed;
+    }
+}
+
 TEST(FusionObserver, KnowsItsError) {
   const Rig rig;
   FusionObserver observer{model_of(rig)};
