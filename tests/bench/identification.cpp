@@ -26,7 +26,8 @@ Eigen::VectorXd errors(unsigned seed) {
 
 void eighteen_networks_of_41_samples(benchmark::State& state) {
   for (auto _ : state)
-    for (unsigned k = 0; k < 18; ++k) benchmark::DoNotOptimize(fit_ridge(positions(), errors(k)).ridge);
+    for (unsigned k = 0; k < 18; ++k)
+      benchmark::DoNotOptimize(invar::numerics::fit_ridge(positions(), errors(k)).ridge);
 }
 BENCHMARK(eighteen_networks_of_41_samples)->Unit(benchmark::kMillisecond);
 
