@@ -128,13 +128,32 @@ bool weaken_outlying_points(Identification& work, const Eigen::VectorXd& unknown
   return moved;
 }
 
+/// The covariance that standard deviations are told from. Of H^-1 = H^-1 M H^-1 + H^-1 Q H^-1 the first part is what the
+/// noise moves, the second what only the prior holds; the prior's strength comes from a handful of curves, so what it alone
+/// holds is known less well than it says (metrology.md section 4: up to 1.4 times on rank-deficient sets).
+Eigen::MatrixXd cautious_covariance(const Identification& work, bool has_prior) {
+  constexpr double caution = 1.7;  // of the variance that the prior alone holds
+  const Eigen::MatrixXd& h = work.posterior.covariance;
+  if (!has_prior) return h;
+  Eigen::MatrixXd product = h;  // H^-1 Q, Q block diagonal
+  for (const auto& block : work.basis.blocks) {
+    const Eigen::MatrixXd own =
+        work.posterior.prior_covariance.block(block.first, block.first, block.size(), block.size());
+    const Eigen::MatrixXd columns = h.middleCols(block.first, block.size());
+    product.middleCols(block.first, block.size()) = own.llt().solve(columns.transpose()).transpose();
+  }
+  for (int i = work.basis.first_squareness(); i < work.basis.size; ++i)
+    product.col(i) /= work.posterior.prior_covariance(i, i);
+  return h + (caution - 1.0) * product * h;
+}
+
 /// Component and field standard deviations from the posterior.
-void fill_sigma(Identification& work) {
+void fill_sigma(Identification& work, bool has_prior) {
   GeometricModel& model = work.model;
+  const Eigen::MatrixXd all = cautious_covariance(work, has_prior);
   for (const auto& block : work.basis.blocks) {
     const auto& spline = work.basis.splines[index(axis_of(block.component))];
-    const Eigen::MatrixXd covariance =
-        work.posterior.covariance.block(block.first, block.first, block.size(), block.size());
+    const Eigen::MatrixXd covariance = all.block(block.first, block.first, block.size(), block.size());
     Eigen::VectorXd& sigma = model.sigma[index(block.component)];
     sigma.resize(spline.intervals() + 1);
     for (int i = 0; i <= spline.intervals(); ++i) {
@@ -146,7 +165,7 @@ void fill_sigma(Identification& work) {
   }
   for (std::size_t i = 0; i < work.basis.pairs.size(); ++i) {
     const Eigen::Index k = work.basis.first_squareness() + static_cast<Eigen::Index>(i);
-    model.squareness_sigma[index(work.basis.pairs[i])] = std::sqrt(work.posterior.covariance(k, k));
+    model.squareness_sigma[index(work.basis.pairs[i])] = std::sqrt(all(k, k));
   }
   constexpr int nodes = 9;
   SigmaGrid& grid = model.field_sigma;
@@ -160,7 +179,7 @@ void fill_sigma(Identification& work) {
   for (const Eigen::Vector3d& position : volume_grid(model.chain, model.travel, nodes)) {
     const Eigen::MatrixXd map = shape_map(work.basis, model.squareness, rigid, position, model.tool);
     Eigen::Vector3d sigma;
-    const Eigen::MatrixXd moved = map * work.posterior.covariance;
+    const Eigen::MatrixXd moved = map * all;
     for (int k = 0; k < 3; ++k)
       // What repeats but no smooth model explains is error of the machine too, at every point.
       sigma[k] = model.chain.has(k)
@@ -188,7 +207,8 @@ void fill_reversal(Identification& work) {
   }
 }
 
-void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges) {
+void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges,
+                bool has_prior) {
   GeometricModel& model = work.model;
   model.chain = machine.chain;
   model.travel = ranges;
@@ -199,7 +219,7 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
         work.basis.spline_coefficients(block.component, work.posterior.mean);
   model.squareness = work.basis.squareness(work.posterior.mean);
   fill_reversal(work);
-  fill_sigma(work);
+  fill_sigma(work, has_prior);
 }
 
 void make_rows(Identification& work, const Squareness& squareness) {
@@ -313,7 +333,7 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
     work.posterior = solve(work.equations, work.basis, work.prior);
   }
   say(0.9, "field and its deviation");
-  fill_model(work, machine, ranges);
+  fill_model(work, machine, ranges, options.method == IdentificationMethod::full);
   return work;
 }
 

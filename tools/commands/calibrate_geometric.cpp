@@ -1,6 +1,10 @@
 // `invar calibrate geometric`: displacement lines in, the machine's geometric error out.
+#include <unistd.h>
+
+#include <array>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -35,7 +39,13 @@ void calibrate(const Options& options) {
   metrology::IdentificationOptions how;
   how.method = options.method == "full" ? metrology::IdentificationMethod::full
                                         : metrology::IdentificationMethod::displacement;
+  const bool watched = isatty(STDERR_FILENO) != 0;
+  if (watched)
+    how.progress = [](double part, const std::string& what) {
+      std::cerr << "\r\033[K" << static_cast<int>(100.0 * part) << " % " << what << std::flush;
+    };
   result.found = metrology::identify(result.machine, result.input.lines, how);
+  if (watched) std::cerr << "\r\033[K" << std::flush;
   evaluate(result);
   if (options.study) study_intervals(result);
 

@@ -79,6 +79,8 @@ void evaluate(GeometricResult& result) {
   result.unseen_rms = std::sqrt(unseen / points);
   result.knowledge = metrology::identifiability(found.basis, found.posterior, found.model.squareness,
                                                 found.model.travel, found.model.tool);
+  result.knowledge.volumetric_rms = std::hypot(
+      result.knowledge.volumetric_rms, std::sqrt(static_cast<double>(found.basis.chain.axes)) * found.misfit);
   if (result.method == "full") result.next = metrology::next_lines(result.machine, found, 3);
 }
 
