@@ -5,7 +5,11 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <random>
+#include <string>
 
 namespace invar::metrology {
 namespace {
@@ -84,6 +88,51 @@ TEST(PlanarCamera, HeldOutViewsTellTheLensFromAPinholeAndFromMoreThanItIs) {
   };
   EXPECT_GT(score(Lens::pinhole), 3.0 * score(Lens::radial_2));
   EXPECT_LT(score(Lens::radial_2), 0.16);  // 0.141 is the noise itself
+}
+
+// Zhang's own five views of 256 corners, where they are at hand: environment INVAR_SHARED or ../shared.
+Matrix2Xd read_csv(const std::filesystem::path& file) {
+  std::ifstream in{file};
+  std::string line;
+  std::getline(in, line);  // names
+  std::vector<double> numbers;
+  while (std::getline(in, line)) {
+    const auto comma = line.find(',');
+    if (comma == std::string::npos) continue;
+    numbers.push_back(std::stod(line.substr(0, comma)));
+    numbers.push_back(std::stod(line.substr(comma + 1)));
+  }
+  return Eigen::Map<Matrix2Xd>(numbers.data(), 2, static_cast<Index>(numbers.size() / 2));
+}
+
+TEST(PlanarCamera, PublishedCalibrationOfRealViewsIsReproduced) {
+  const char* shared = std::getenv("INVAR_SHARED");
+  const std::filesystem::path folder =
+      (shared != nullptr ? std::filesystem::path{shared}
+                         : std::filesystem::path{INVAR_SOURCE_DIR} / "../shared") /
+      "data/camera-planar-target";
+  if (!std::filesystem::exists(folder / "target.csv")) {
+    std::printf("no recordings at %s: nothing was compared\n", folder.c_str());
+    return;
+  }
+  std::vector<Matrix2Xd> seen;
+  for (int view = 1; view <= 5; ++view)
+    seen.push_back(read_csv(folder / ("view" + std::to_string(view) + ".csv")));
+  const Matrix2Xd target = read_csv(folder / "target.csv");
+  const auto fit = calibrate_planar(target, seen, Lens::radial_2);
+  ASSERT_TRUE(fit);
+  // Zhang (2000), table 1, five images.
+  EXPECT_NEAR(fit->camera.fx, 832.5, 0.05);
+  EXPECT_NEAR(fit->camera.fy, 832.53, 0.05);
+  EXPECT_NEAR(fit->camera.u0, 303.96, 0.05);
+  EXPECT_NEAR(fit->camera.v0, 206.59, 0.05);
+  EXPECT_NEAR(fit->camera.skew, 0.2045, 0.001);
+  EXPECT_NEAR(fit->camera.radial[0], -0.2286, 2e-4);
+  EXPECT_NEAR(fit->camera.radial[1], 0.1903, 5e-4);
+  EXPECT_NEAR(fit->rms, 0.335, 0.002);
+  const auto left_out = leave_one_view_out(target, seen, Lens::radial_2);
+  ASSERT_TRUE(left_out);
+  for (const double rms : *left_out) EXPECT_LT(rms, 0.6);
 }
 
 TEST(PlanarCamera, WhatDoesNotDetermineACameraIsRefused) {
