@@ -142,18 +142,22 @@ void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double pos
   axes_[axis]->command.write(command);
 }
 
+/// Processes come up in any order: asks again until every axis is enabled.
 Task Calibration::enable_axes() {
-  for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_ENABLE, 0.0);
-  const Instant give_up = now() + Duration::seconds(parameters_.settle_timeout);
+  const Instant give_up = now() + Duration::seconds(10.0) + Duration::seconds(parameters_.settle_timeout);
+  Instant ask_at = now();
   for (;;) {
+    if (now() >= ask_at) {
+      for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_ENABLE, 0.0);
+      ask_at = now() + Duration::seconds(0.5);
+    }
     co_await NextStep{};
     const bool all = std::all_of(axes_.begin(), axes_.end(), [](const auto& axis) {
       const auto* state = axis->state.latest();
       return state != nullptr && state->command_id() == axis->last_command && state->enabled();
     });
     if (all) co_return;
-    if (now() > give_up)
-      throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
+    if (now() > give_up) throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
   }
 }
 

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <deque>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -18,6 +19,8 @@
 #include "core/executor/process_control.hpp"
 #include "core/recording/type_book.hpp"
 #include "idl/job.h"
+#include "idl/stage.h"
+#include "tools/cell/black_box_file.hpp"
 #include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
@@ -56,6 +59,7 @@ class RunningProcess {
                                                   .every = static_cast<std::uint32_t>(member.file->every)});
     }
     join_directly();
+    fill_black_box();
     watch_job();
     service_ = std::make_unique<dds::ProcessService>(
         node_, control_,
@@ -97,6 +101,36 @@ class RunningProcess {
       found = found || (port.direction() == Port::Direction::output && port.topic == topic);
     });
     return found;
+  }
+
+  /// What every axis did goes into the black box; an axis in fault freezes it, as a component in error does.
+  void fill_black_box() {
+    each_port([&](std::size_t index, Port& port) {
+      auto* state = dynamic_cast<Output<stage::AxisState>*>(&port);
+      if (state == nullptr) return;
+      stage::AxisState& last = axes_.emplace_back();
+      state->add_sink([this, &last](const stage::AxisState& sample, Instant) {
+        if (sample.mode() == stage::AXIS_MODE_FAULT && last.mode() != stage::AXIS_MODE_FAULT)
+          executor_.freeze_black_box();
+        last = sample;
+      });
+      const std::string prefix = executor_.component(index).name + ".";
+      BlackBox& box = executor_.black_box();
+      box.watch(prefix + "setpoint_position", "m", [&last] { return last.setpoint_position(); });
+      box.watch(prefix + "position", "m", [&last] { return last.position(); });
+      box.watch(prefix + "following_error", "m", [&last] { return last.following_error(); });
+      box.watch(prefix + "current", "A", [&last] { return last.current(); });
+      box.watch(prefix + "correction", "m", [&last] { return last.correction(); });
+      box.watch(prefix + "mode", "1", [&last] { return static_cast<double>(last.mode()); });
+    });
+    executor_.black_box().on_trip([this](const BlackBoxRecord& record) {
+      try {
+        spdlog::warn("{}: {}; the last cycles are in {}", file_.name, record.reason,
+                     write_black_box(record, "out").string());
+      } catch (const std::exception& error) {
+        spdlog::error("{}: the black box cannot be written: {}", file_.name, error.what());
+      }
+    });
   }
 
   /// Puts the command that starts the job into the inbox of the component that runs it, and follows its status.
@@ -162,6 +196,7 @@ class RunningProcess {
         service_->publish(event::SEVERITY_FAULT, file_.name, alarm.topic + ": " + alarm.text);
       }
     }
+    say_how_the_job_ended();
     status_ = control_.status();
     control_.stop();
     service_.reset();
@@ -194,6 +229,7 @@ class RunningProcess {
         },
         [&] { return !options_.job.empty() && (!runs_job_ || job_ended_.load()); }, stop);
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
+    say_how_the_job_ended();
     status_ = control_.status();
     control_.stop();
     service_.reset();
@@ -253,6 +289,12 @@ class RunningProcess {
       service_->publish(is_fault ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, from, text);
     };
     return view;
+  }
+
+  void say_how_the_job_ended() {
+    const std::scoped_lock lock{job_mutex_};
+    if (runs_job_ && job_ended_ && job_.phase() != job::JOB_DONE)
+      spdlog::error("job `{}` failed: {}", job_.name().c_str(), job_.text().c_str());
   }
 
   bool job_succeeded() {
@@ -320,6 +362,7 @@ class RunningProcess {
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
+  std::deque<stage::AxisState> axes_;  // newest state of each, the loop's; addresses stay
   std::unique_ptr<dds::ProcessService> service_;
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
   std::map<std::string, std::int64_t> last_status_;

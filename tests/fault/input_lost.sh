@@ -1,0 +1,79 @@
+#!/usr/bin/env bash
+# The process that gives a moving axis its feedback is killed: the stage brakes under control, lets go, stays stopped, and
+# leaves its black box. Four processes over DDS, by the wall clock.
+# input_lost.sh INVAR SOURCE_DIR
+set -euo pipefail
+invar=$1 source=$2
+folder=$(mktemp -d)
+domain=$((100 + RANDOM % 100)); echo "domain $domain"
+cp "$source/deployment/profiles.yaml" "$folder"
+cp "$source/deployment/machines/xy-table-nominal.yaml" "$folder/machine.yaml"
+cat > "$folder/cell.yaml" <<C
+invar_cell: 1
+name: lost
+domain: $domain
+profiles: profiles.yaml
+hosts: {pc: {address: 127.0.0.1}}
+processes:
+  plant:
+    host: pc
+    rate: 1000
+    components:
+      world: {type: simulated_stage, machine: machine.yaml, connect: {motor_x: stage_x.motor}}
+      laser: {type: interferometer, connect: {tool: world.tool}}
+  servo:
+    host: pc
+    rate: 1000
+    components:
+      stage_x:
+        type: stage
+        travel: [0, 0.2]
+        feedback_timeout: 0.1
+        following_error: 0.05
+        limits: {velocity: 0.02}
+        control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
+        connect: {feedback: world.feedback_x}
+  calibration:
+    host: pc
+    rate: 50
+    components:
+      calibration:
+        type: calibration
+        axes: 1
+        connect: {state_x: stage_x.state, command_x: stage_x.command, reading: laser.reading, beam: laser.beam, model: stage_x.command_of_nobody}
+        jobs: [{name: move, machine: machine.yaml, interval: 0.2, lines: [{name: X, from: [0.19], to: [0.0]}]}]
+  recorder: {host: pc, rate: 50, components: {recorder: {type: recorder, topics: [stage_x]}}}
+jobs: {move: calibration}
+C
+sed -i 's/, model: stage_x.command_of_nobody//' "$folder/cell.yaml"
+cd "$folder"
+pids=()
+trap 'kill -9 "${pids[@]}" 2>/dev/null || true; rm -rf "$folder"' EXIT
+start() { "$invar" run cell.yaml --process "$@" >"$1.log" 2>&1 & pids+=($!); }
+start recorder; start plant; plant=${pids[1]}; start servo; sleep 3
+start calibration --job move
+sleep 4  # the first move, 190 mm at 20 mm/s, is under way
+kill -9 "$plant"
+sleep 3
+kill -TERM "${pids[2]}" "${pids[3]}" 2>/dev/null || true; sleep 1; kill -TERM "${pids[0]}"; wait "${pids[0]}" || true
+cat ./*.log
+"$invar" export out/recording.mcap --out tables >/dev/null
+ls out tables
+/usr/bin/python3 - tables/*stage_x*state*.csv tables/*stage_x*motor*.csv <<'P'
+import csv, sys
+rows = list(csv.DictReader(open(sys.argv[1])))
+modes = []
+for row in rows:
+    if not modes or modes[-1] != row["mode"]:
+        modes.append(row["mode"])
+print("modes:", " -> ".join(modes))
+motor = list(csv.DictReader(open(sys.argv[2])))
+enabled = next(k for k in motor[0] if k.startswith("enabled"))
+assert "AXIS_MODE_MOVING" in modes, "the axis never moved"
+after = modes[modes.index("AXIS_MODE_MOVING"):]
+assert after[:3] == ["AXIS_MODE_MOVING", "AXIS_MODE_STOPPING", "AXIS_MODE_FAULT"], after
+assert motor[-1][enabled] in ("0", "false"), "the motor is still enabled"
+P
+ls out/black-box-servo-*.mcap
+"$invar" recording info out/black-box-servo-*.mcap
+echo "passed"
