@@ -83,7 +83,7 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
   delay_ = std::min(delay_, oldest);
   age_ = std::min(age_, oldest);
   // Runge-Kutta of fourth order errs by (omega h)^5/120 a step.
-  if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 2e-5, 1e-3);
+  if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 1e-4, 1e-3);
   rest_at(0.0);
 }
 

@@ -158,7 +158,7 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
   }
   const double span = high - low;
   constexpr std::size_t bins = 1U << 15U, padded = 4 * bins;
-  const auto along_position = [&](const auto& weight) {
+  const auto along_position = [&](const auto& weight, double least) {
     std::vector<double> grid(bins, 0.0);
     for (std::size_t r = 0; r < positions.size(); ++r)
       for (std::size_t i = 0; i < positions[r].size(); ++i) {
@@ -170,16 +170,17 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
     std::vector<double> pitches;
     // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
-    const double finest = std::max(2e-5, span / 6000.0);
+    const double finest = std::max(least, span / 6000.0);
     for (double k : peaks(power, 4, static_cast<std::size_t>(4.0 * span / finest), 4))
       pitches.push_back(4.0 * span / k);
     return pitches;
   };
   if (span > 1e-5) {
-    periods.force_pitch = along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; });
+    periods.force_pitch = along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; }, 1e-3);
     periods.motor_pitch =
-        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; });
-    periods.reading_pitch = along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; });
+        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; }, 1e-3);
+    periods.reading_pitch =
+        along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; }, 2e-5);
     // The two ripples look alike in this light; each is also tried at the other's pitch.
     for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.motor_pitch.size()); ++i)
       periods.force_pitch.push_back(periods.motor_pitch[i]);

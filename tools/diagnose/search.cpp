@@ -27,6 +27,17 @@ std::string label(const Term& term) {
 /// A claim must have a strength that is possible and clearly not zero.
 bool stands(const Fit& fit, std::size_t term) {
   const auto& info = *fit.model.terms[term].info;
+  const auto& values = fit.model.terms[term].values;
+  // A shape at the end of its range is another term in disguise.
+  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
+    const auto& p = info.parameters[i];
+    if (p.role != Role::shape || p.name == "center" || p.name == "limit") continue;
+    if (p.bounds.lower > 0.0 && values[i] < 1.3 * p.bounds.lower) return false;
+    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > p.bounds.upper / 1.3) return false;
+  }
+  // Friction that is smaller at rest than at speed is none.
+  if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
+
   for (std::size_t k = 0; k < fit.free.size(); ++k) {
     const auto& f = fit.free[k];
     if (f.where != Freedom::Where::term || f.term != term) continue;
@@ -55,6 +66,10 @@ class Search {
   /// Candidates fitted on top of `base`, best first.
   std::vector<Fit> shortlisted(const Weighing& weighing, const Fit& base, double share);
   bool add_named(double round);
+  /// Drops terms that the others make needless.
+  void prune();
+  /// The smallest ratio of residual RMS of any output, a over b.
+  [[nodiscard]] double least_ratio(const Fit& a, const Fit& b) const;
   void weigh_alternatives();
   void try_unmodelled();
   void hold_out();
@@ -147,7 +162,10 @@ bool Search::add_named(double round) {
       auto with_term = fit(data_, own, fits[i].model, data_.model, 6, &fits[i]);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double gain = with_term.evidence - without.evidence;
-      if (gain > best_gain && stands(with_term, with_term.model.terms.size() - 1)) {
+      // A further claim must be one that an engineer would see in the residual.
+      const double ratio = rivals_.empty() ? 0.995 : 0.95;
+      if (gain > best_gain && stands(with_term, with_term.model.terms.size() - 1) &&
+          least_ratio(with_term, without) < ratio) {
         best_gain = gain, winner = i;
         own_weighing = own, own_fit = std::move(with_term), own_base = std::move(without);
       }
@@ -175,6 +193,56 @@ bool Search::add_named(double round) {
     return true;
   }
   return false;
+}
+
+double Search::least_ratio(const Fit& a, const Fit& b) const {
+  double least = 1.0;
+  const auto with_a = simulate(data_, a.model), with_b = simulate(data_, b.model);
+  for (std::size_t o = 0; o < data_.outputs.size(); ++o) {
+    double sum_a = 0.0, sum_b = 0.0;
+    for (std::size_t r = 0; r < data_.recordings.size(); ++r)
+      for (std::size_t i = 0; i < with_a[r][o].size(); ++i)
+        if (const double y = data_.recordings[r].measured[o][i]; std::isfinite(y)) {
+          sum_a += std::pow(y - with_a[r][o][i], 2);
+          sum_b += std::pow(y - with_b[r][o][i], 2);
+        }
+    if (sum_b > 0.0) least = std::min(least, std::sqrt(sum_a / sum_b));
+  }
+  return least;
+}
+
+void Search::prune() {
+  const auto is_friction = [](const Term& term) {
+    return term.info->name.find("friction") != std::string_view::npos;
+  };
+  for (std::size_t i = 0; i < rivals_.size() && rivals_.size() > 1; ++i) {
+    const std::size_t place = given() + i;
+    Model model = d_.best.model;
+    const Term removed = model.terms[place];
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    // What one friction law gives up another may take over.
+    for (std::size_t t = given(); t < model.terms.size(); ++t)
+      if (is_friction(removed) && is_friction(model.terms[t])) {
+        model.terms[t].values[0] += 0.7 * removed.values[0];
+        if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
+      }
+    auto without = fit(data_, d_.weighing, model, data_.model, 10);
+    bool possible = true;
+    for (std::size_t t = given(); t < without.model.terms.size(); ++t)
+      possible = possible && stands(without, t);
+    if (!possible) continue;
+    if (without.evidence < d_.best.evidence - claim_margin_of(d_.weighing) &&
+        least_ratio(d_.best, without) < 0.95)
+      continue;
+    reject(std::string{removed.info->name}, "the others explain it without",
+           d_.best.evidence - without.evidence);
+    d_.best = std::move(without);
+    rivals_.erase(rivals_.begin() + static_cast<std::ptrdiff_t>(i));
+    d_.weighing = weigh(data_, simulate(data_, d_.best.model));
+    d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+    i = static_cast<std::size_t>(-1);
+  }
 }
 
 void Search::weigh_alternatives() {
@@ -245,7 +313,7 @@ void Search::try_unmodelled() {
     if (instead.gain > margin) {
       const auto named_there = fit(data_, instead.weighing, d_.best.model, data_.model, 4, &d_.best);
       if (instead.fit.evidence > named_there.evidence + margin &&
-          (beside.gain < margin || instead.fit.evidence > named_there.evidence + 0.9 * beside.gain)) {
+          instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) {
         for (std::size_t t = given(); t < d_.best.model.terms.size(); ++t)
           reject(std::string{d_.best.model.terms[t].info->name}, "a curve without a name explains far more",
                  1.0);
@@ -257,7 +325,8 @@ void Search::try_unmodelled() {
       }
     }
   }
-  if (!unnamed_ && beside.gain > margin) {
+  // A rest counts where an engineer would see it.
+  if (!unnamed_ && beside.gain > margin && least_ratio(beside.fit, d_.best) < (named ? 0.9 : 0.985)) {
     d_.best = std::move(beside.fit);
     d_.weighing = std::move(beside.weighing);
     (named ? rest_ : unnamed_) = true;
@@ -405,6 +474,7 @@ Diagnosis Search::run() {
   prepare();
   for (int round = 0; round < 3; ++round)
     if (!add_named(round)) break;
+  prune();
   weigh_alternatives();
   try_unmodelled();
   hold_out();

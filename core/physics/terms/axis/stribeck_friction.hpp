@@ -18,7 +18,7 @@ struct StribeckFriction {
                       {"static", "N", {0.0, 1000.0}, Role::amplitude, {1.0}, "friction force at rest"},
                       {"velocity",
                        "m/s",
-                       {1e-4, 0.3},
+                       {3e-4, 0.3},
                        Role::shape,
                        {0.008, 0.03, 0.002},
                        "speed at which the excess has fallen to 1/e"}}},
