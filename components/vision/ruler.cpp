@@ -54,7 +54,7 @@ std::vector<Circle> find_circles(const cv::Mat& image) {
   for (const Candidate& candidate : found.candidates) {
     Shape shape{candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
     Rays rays;
-    rays.choose(shape.radius);
+    rays.choose(2.0 * shape.radius);  // there is time, and few circles
     OutlineFit fit =
         seek_outline(image, shape, found.polarity, std::clamp(0.25 * shape.radius, 3.0, 14.0), rays);
     if (!fit.valid || fit.coverage < 0.6 || shape.radius < 5.0) continue;

@@ -68,7 +68,7 @@ nlohmann::json report_json(const Results& r) {
   return out;
 }
 
-void write_report(const Results& r, const std::filesystem::path& file) {
+report::Page make_page(const Results& r) {
   using report::number;
   const vision::CameraModel& camera = r.fit.camera;
   report::Page page{"Camera", "Scale from circles of known radius"};
@@ -116,7 +116,7 @@ void write_report(const Results& r, const std::filesystem::path& file) {
              .series = {residual},
              .x_range = {},
              .y_range = {}});
-  page.write(file);
+  return page;
 }
 
 void calibrate_by_ruler(const CameraOptions& options) {
@@ -126,11 +126,9 @@ void calibrate_by_ruler(const CameraOptions& options) {
   const auto fit = vision::calibrate_ruler(image, radii, failure);
   if (!fit) throw InputError{options.image->string(), failure.what, "see " + options.ruler->string()};
 
-  std::filesystem::create_directories(options.out);
   const Results results{*fit, image};
-  write_report(results, options.out / "report.html");
-  std::ofstream{options.out / "report.json"} << report_json(results).dump(2) << '\n';
-  std::ofstream{options.out / "camera.yaml"} << camera_yaml(fit->camera, image.cols, image.rows);
+  write_camera_result(options.out, camera_yaml(fit->camera, image.cols, image.rows),
+                      report_json(results).dump(2), make_page(results));
   const vision::CameraModel& camera = fit->camera;
   std::cout << "scale " << report::number(camera.scale * 1e6, 7) << " um/px, sigma "
             << report::number(camera.scale_sigma * 1e9, 2) << " nm/px (" << fit->circles.size()
@@ -147,6 +145,23 @@ void calibrate_by_ruler(const CameraOptions& options) {
 }
 
 }  // namespace
+
+void write_camera_result(const std::filesystem::path& folder, const std::string& camera,
+                         const std::string& json, const report::Page& page) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed || !std::filesystem::is_directory(folder))
+    throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
+  page.write(folder / "report.html");
+  const auto write = [&](const char* name, const std::string& text) {
+    std::ofstream out{folder / name};
+    out << text << '\n';
+    out.close();
+    if (!out) throw InputError{(folder / name).string(), "cannot be written", "check the space left"};
+  };
+  write("report.json", json);
+  write("camera.yaml", camera);  // last: where it is, all is there
+}
 
 void add_calibrate_camera(CLI::App& group) {
   auto* command = group.add_subcommand(

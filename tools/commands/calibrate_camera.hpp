@@ -3,7 +3,10 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
+
+#include "tools/report/page.hpp"
 
 namespace invar::tools {
 
@@ -15,5 +18,9 @@ struct CameraOptions {
 };
 
 void calibrate_by_target(const CameraOptions& options);
+
+/// Makes the folder and writes report.html, report.json and camera.yaml. Throws InputError where that fails.
+void write_camera_result(const std::filesystem::path& folder, const std::string& camera,
+                         const std::string& json, const report::Page& page);
 
 }  // namespace invar::tools

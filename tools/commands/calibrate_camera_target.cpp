@@ -4,7 +4,6 @@
 #include <cctype>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -83,8 +82,8 @@ std::string camera_yaml(const Rival& best) {
          entry("p2", c.tangential[1], s.tangential[1], "\"1\"");
 }
 
-void write_report(const std::vector<Rival>& rivals, const Rival& best, const std::vector<Matrix2Xd>& views,
-                  const CameraOptions& options) {
+report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
+                       const std::vector<Matrix2Xd>& views, const CameraOptions& options) {
   using report::number;
   report::Page page{"Camera",
                     "Pinhole and lens from " + std::to_string(views.size()) + " views of a flat target"};
@@ -134,7 +133,7 @@ void write_report(const std::vector<Rival>& rivals, const Rival& best, const std
   };
   page.plots({arrows(nominal, "Ideal pinhole"), arrows(best, metrology::name(best.fit.lens))},
              "Seen minus projected, all views, 30 times enlarged");
-  page.write(options.out / "report.html");
+  return page;
 }
 
 }  // namespace
@@ -173,8 +172,6 @@ void calibrate_by_target(const CameraOptions& options) {
   const Rival& best = *std::min_element(
       rivals.begin(), rivals.end(), [](const Rival& a, const Rival& b) { return a.held_out < b.held_out; });
 
-  std::filesystem::create_directories(options.out);
-  write_report(rivals, best, views, options);
   nlohmann::json json;
   json["model"] = metrology::name(best.fit.lens);
   json["camera"] = numbers(best.fit.camera);
@@ -187,8 +184,7 @@ void calibrate_by_target(const CameraOptions& options) {
                               {"rms_px", r.fit.rms},
                               {"held_out_rms_px", r.held_out},
                               {"left_out_px", r.left_out}});
-  std::ofstream{options.out / "report.json"} << json.dump(2) << '\n';
-  std::ofstream{options.out / "camera.yaml"} << camera_yaml(best);
+  write_camera_result(options.out, camera_yaml(best), json.dump(2), make_page(rivals, best, views, options));
   for (const Rival& r : rivals)
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"

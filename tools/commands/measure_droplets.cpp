@@ -8,6 +8,7 @@
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
 #include "tools/image/camera_file.hpp"
+#include "tools/image/droplets_page.hpp"
 #include "tools/image/image_file.hpp"
 
 namespace invar::tools {
@@ -18,6 +19,7 @@ struct Options {
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> camera;
   std::filesystem::path output;
+  std::optional<std::filesystem::path> report;
 };
 
 struct Rows {
@@ -33,6 +35,7 @@ void measure(const Options& options) {
   for (const auto& file : options.images) images.push_back(read_gray_image(file));
 
   Rows rows;
+  std::vector<MeasuredImage> shown;
   for (std::size_t i = 0; i < images.size(); ++i) {
     const vision::Droplets found = vision::measure_droplets(images[i]);
     for (const vision::Droplet& drop : found.droplets) {
@@ -50,6 +53,7 @@ void measure(const Options& options) {
       rows.y_metres.push_back(at.y());
       rows.diameter.push_back(2.0 * drop.radius * camera->local_scale({drop.x, drop.y}));
     }
+    if (options.report) shown.push_back({options.images[i].filename().string(), images[i], found});
     std::cout << options.images[i].string() << ": " << found.sound() << " droplets, "
               << found.droplets.size() - found.sound() << " others marked\n";
   }
@@ -68,6 +72,12 @@ void measure(const Options& options) {
     table.add("diameter", "m", rows.diameter);
   }
   table.write(options.output);
+  if (options.report) {
+    report::Page page{"Droplets",
+                      std::to_string(images.size()) + (images.size() == 1 ? " image" : " images")};
+    add_droplets(page, shown, camera);
+    page.write(*options.report);
+  }
 }
 
 }  // namespace
@@ -89,6 +99,7 @@ void add_measure(CLI::App& program) {
       ->expected(-1);
   command->add_option("--camera", options->camera, "camera.yaml: adds positions and diameters in m");
   command->add_option("--output", options->output, "table to write, .csv or .csv.gz")->required();
+  command->add_option("--report", options->report, "page to write: annotated images, sizes (.html)");
   command->callback([options] { measure(*options); });
 }
 

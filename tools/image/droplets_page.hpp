@@ -1,0 +1,25 @@
+// The page that shows what was measured in images of droplets.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/vision/camera.hpp"
+#include "components/vision/droplets.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::tools {
+
+struct MeasuredImage {
+  std::string name;
+  cv::Mat image;  // CV_8UC1
+  vision::Droplets droplets;
+};
+
+/// Adds to a page: counts and sizes an image, the annotated images, and the distribution of the sizes. Lengths in um
+/// where a camera is given, else in px.
+void add_droplets(report::Page& page, const std::vector<MeasuredImage>& images,
+                  const std::optional<vision::CameraModel>& camera);
+
+}  // namespace invar::tools
