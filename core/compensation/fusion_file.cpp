@@ -70,7 +70,8 @@ void write_fusion(ModelText& text, const FusionFile& model) {
         .number("offset", sensor.offset)
         .number("hysteresis", sensor.hysteresis)
         .number("delay", sensor.delay)
-        .number("noise", sensor.noise);
+        .number("noise", sensor.noise)
+        .integer("longest_repeat", sensor.longest_repeat);
   }
   text.close();
   if (!model.sensors.velocities.empty()) {
@@ -115,6 +116,7 @@ FusionFile read_fusion(const config::Node& root) {
     sensor.hysteresis = node.number("hysteresis", "m");
     sensor.delay = node.number("delay", "s", Range{0.0, 1.0});
     sensor.noise = node.number("noise", "m", Range::positive());
+    sensor.longest_repeat = static_cast<int>(node.integer("longest_repeat", 0, 1000));
     model.sensors.positions.push_back(sensor);
   }
   if (root.has("velocities"))

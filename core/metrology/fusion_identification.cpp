@@ -60,6 +60,13 @@ PositionSensorModel identify_position(const std::vector<FusionRun>& runs, const 
                                       std::vector<std::string>* unidentified) {
   PositionSensorModel model;
   model.step = quantum(runs, sensor);
+  for (const FusionRun& run : runs) {
+    int repeats = 0;
+    for (Eigen::Index i = 1; i < run.time.size() && model.step <= 0.0; ++i) {
+      repeats = run.positions(i, sensor) == run.positions(i - 1, sensor) ? repeats + 1 : 0;
+      model.longest_repeat = std::clamp(repeats, model.longest_repeat, 1000);
+    }
+  }
   // Rows of: where it was when the sensor read it, minus what was read; speed; direction; width of doubt.
   std::vector<double> apart, speed, width;
   for (std::size_t r = 0; r < runs.size(); ++r) {

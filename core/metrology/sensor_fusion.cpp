@@ -254,8 +254,40 @@ bool FusionObserver::refuted_jump(std::size_t position, double reading) const no
   return false;
 }
 
-/// Back by some samples, whose velocities turn out to have been those of a dead sensor; the positions since then
-/// are used again. Bounded by the history.
+/// True where sensor `still` has not changed while `moving` went on by more than both their cells.
+bool FusionObserver::outlived(std::size_t still, std::size_t moving, double reading) const noexcept {
+  const double cells = model_.positions[still].step + model_.positions[moving].step +
+                       10.0 * (model_.positions[still].noise + model_.positions[moving].noise);
+  const double before = position_memory_[still].others[moving];
+  return std::isfinite(before) && std::abs(reading - before) > cells;
+}
+
+/// Sensors that repeat themselves as sound ones do not; what they told since they died is taken back.
+void FusionObserver::watch_for_dead(const FusionSample& sample) noexcept {
+  int back = 0;
+  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
+    VelocityMemory& memory = velocity_memory_[i];
+    if (!memory.dead || memory.faulty) continue;
+    memory.faulty = true;
+    back = std::max(back, memory.repeats);
+  }
+  for (std::size_t i = 0; i < model_.positions.size(); ++i) {
+    PositionMemory& memory = position_memory_[i];
+    const double reading = sample.positions[i];
+    memory.repeats = reading == memory.last ? memory.repeats + 1 : 0;
+    if (memory.repeats == 0 && std::isfinite(reading)) memory.others = sample.positions;
+    const bool continuous = model_.positions[i].step <= 0.0;
+    if (!continuous || memory.repeats <= 3 + 3 * model_.positions[i].longest_repeat) continue;
+    memory.good = 0;
+    if (memory.faulty) continue;
+    memory.faulty = true;
+    back = std::max(back, memory.repeats);
+  }
+  undo(static_cast<std::size_t>(back));
+}
+
+/// Back by some samples, whose readings turn out to have been those of a dead sensor; the others' since then are
+/// used again. Bounded by the history.
 void FusionObserver::undo(std::size_t steps) noexcept {
   if (steps == 0 || steps >= history || steps > steps_) return;
   modes_ = past_[(steps_ - steps) % history].modes;
@@ -263,6 +295,8 @@ void FusionObserver::undo(std::size_t steps) noexcept {
     Past& past = past_[k % history];
     if (k > steps_ - steps) advance(past.sample.period);
     past.modes = modes_;
+    for (std::size_t i = 0; i < model_.velocities.size(); ++i)
+      if (!velocity_memory_[i].faulty) use_velocity(i, past.sample.velocities[i]);
     for (std::size_t i = 0; i < model_.positions.size(); ++i)
       if (!position_memory_[i].faulty) use_position(i, past.sample.positions[i]);
   }
@@ -394,6 +428,17 @@ void FusionObserver::use_position(std::size_t i, double reading) noexcept {
     memory.conflict = memory.pulled = 0.0;
     return;
   }
+  if (memory.odd >= odd_limit)
+    for (std::size_t k = 0; k < model_.positions.size(); ++k)
+      if (k != i && !position_memory_[k].faulty && outlived(k, i, reading)) {
+        position_memory_[k].faulty = true;  // it stood still while this one moved on
+        position_memory_[k].good = 0;
+        memory.faulty = false;
+        memory.odd = 0;
+        memory.conflict = memory.pulled = 0.0;
+        restart_at(sensor, reading);
+        return;
+      }
   if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i, reading)) {
     restart_at(sensor, reading);  // nobody contradicts the sensor: it is the estimate that was lost
     memory.odd = 0;
@@ -437,11 +482,7 @@ FusedPosition FusionObserver::step(const FusionSample& sample) noexcept {
   if (!started_) start(sample);
   learn_noise(sample);
   add_travel(sample);
-  for (std::size_t i = 0; i < velocities; ++i)
-    if (velocity_memory_[i].dead && !velocity_memory_[i].faulty) {
-      velocity_memory_[i].faulty = true;
-      undo(static_cast<std::size_t>(velocity_memory_[i].repeats));
-    }
+  watch_for_dead(sample);
   advance(sample.period);
   const double forget = std::exp(-sample.period / information_memory);
   for (double& value : information_) value *= forget;

@@ -49,6 +49,7 @@ struct PositionSensorModel {
   double hysteresis = 0.0;  // half the difference between directions [m]
   double delay = 0.0;       // [s]
   double noise = 0.0;       // of an edge, or of a continuous reading [m]
+  int longest_repeat = 0;   // how often in a row a sound continuous sensor repeated its reading
 };
 
 /// A velocity sensor: reads offset + f(v(t - lag)) + noise, f(v) = sum_k gains[k] sign(v) |v|^(k+1): a gain that
@@ -105,6 +106,8 @@ class FusionObserver final : public FusionEstimator {
     double believed = 0.0;  // the last reading that was no surprise [m]
     double since = 0.0;     // travel by the velocity sensors since then [m]
     double since_variance = 0.0;
+    std::array<double, most_sensors> others{};  // readings of all when this one last changed
+    int repeats = 0;
     int odd = 0;   // surprising readings in a row
     int good = 0;  // unsurprising ones in a row
     bool faulty = false;
@@ -131,6 +134,8 @@ class FusionObserver final : public FusionEstimator {
   void add_travel(const FusionSample& sample) noexcept;
   [[nodiscard]] bool refuted_standing(std::size_t position) const noexcept;
   [[nodiscard]] bool refuted_jump(std::size_t position, double reading) const noexcept;
+  void watch_for_dead(const FusionSample& sample) noexcept;
+  [[nodiscard]] bool outlived(std::size_t still, std::size_t moving, double reading) const noexcept;
   void undo(std::size_t steps) noexcept;
   void advance(double period) noexcept;
   void restart_at(const PositionSensorModel& sensor, double reading) noexcept;

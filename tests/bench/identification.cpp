@@ -58,7 +58,7 @@ void fusion_step_of_encoder_and_velocity(benchmark::State& state) {
   invar::metrology::FusionModel model;
   model.position_names = {"encoder"};
   model.velocity_names = {"speed"};
-  model.positions = {{2e-3, 0.0, 0.0, 0.0, 2e-6}};
+  model.positions = {{2e-3, 0.0, 0.0, 0.0, 2e-6, 0}};
   model.velocities.resize(1);
   model.start_sigma = 1e-4;
   invar::metrology::FusionObserver observer{model};

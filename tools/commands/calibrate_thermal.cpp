@@ -27,24 +27,51 @@ double rms(const Eigen::VectorXd& values) {
   return std::sqrt(values.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(values.size(), 1)));
 }
 
+/// The columns as vectors; rows in which any of them is empty or nan are left out.
 ThermalReadings read_readings(const recording::Table& table) {
-  const auto column = [&](const char* name, const char* unit, double largest) {
-    const auto values = table.in(name, unit);
-    expect_finite(table.file, name, values, largest);
-    return vector_of(values);
+  struct Wanted {
+    const char* name;
+    const char* unit;
+    double largest;
   };
-  const auto optional_column = [&](const char* name, const char* unit,
-                                   double largest) -> std::optional<Eigen::VectorXd> {
-    if (!table.has(name)) return std::nullopt;
-    return column(name, unit, largest);
-  };
-  ThermalReadings readings;
-  readings.x = column("x", "m", 1e3);
-  readings.temperature = column("temperature", "degC", 1e4);
-  readings.error = column("error", "m", 1.0);
-  readings.heating_rate = optional_column("heating_rate", "K/s", 1e3);
-  readings.direction = optional_column("direction", "1", 1e3);
-  readings.time = optional_column("t", "s", 1e12);
+  static constexpr Wanted wanted[] = {{"x", "m", 1e3},         {"temperature", "degC", 1e4},
+                                      {"error", "m", 1.0},     {"heating_rate", "K/s", 1e3},
+                                      {"direction", "1", 1e3}, {"t", "s", 1e12}};
+  constexpr std::size_t required = 3;
+  std::vector<std::vector<double>> columns;
+  std::vector<bool> complete(table.rows(), true);
+  for (std::size_t k = 0; k < std::size(wanted); ++k) {
+    columns.emplace_back();
+    if (k >= required && !table.has(wanted[k].name)) continue;
+    columns.back() = table.in(wanted[k].name, wanted[k].unit);
+    std::size_t missing = 0;
+    for (std::size_t i = 0; i < columns.back().size(); ++i)
+      if (std::isnan(columns.back()[i])) {
+        complete[i] = false;
+        ++missing;
+      }
+    if (missing == table.rows())
+      throw InputError{table.file.string() + ": column `" + wanted[k].name + "`",
+                       "every value is empty or nan", "record the values"};
+  }
+  const auto kept = Eigen::Index{std::count(complete.begin(), complete.end(), true)};
+  std::vector<Eigen::VectorXd> vectors;
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    vectors.emplace_back(columns[k].empty() ? 0 : kept);
+    Eigen::Index next = 0;
+    for (std::size_t i = 0; i < columns[k].size(); ++i) {
+      if (!complete[i]) continue;
+      if (std::abs(columns[k][i]) > wanted[k].largest)
+        throw InputError{
+            table.file.string() + ": column `" + wanted[k].name + "`, row " + std::to_string(i + 1),
+            number(columns[k][i], 6) + " is out of range", "check the value and its unit"};
+      vectors[k](next++) = columns[k][i];
+    }
+  }
+  ThermalReadings readings{vectors[0], vectors[1], vectors[2], std::nullopt, std::nullopt, std::nullopt};
+  if (!columns[3].empty()) readings.heating_rate = vectors[3];
+  if (!columns[4].empty()) readings.direction = vectors[4];
+  if (!columns[5].empty()) readings.time = vectors[5];
   const std::string file = table.file.string();
   if (readings.x.size() < 8)
     throw InputError{file, "has too few rows (" + std::to_string(readings.x.size()) + "; 8 at least)",

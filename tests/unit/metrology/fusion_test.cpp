@@ -244,6 +244,45 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+TEST(FusionObserver, BelievesTheEncoderThatMovesAndNotTheOneThatStands) {
+  // Two encoders and a velocity of 300 % noise, which is no witness for either.
+  FusionModel model;
+  model.position_names = {"fine", "coarse"};
+  model.velocity_names = {"speed"};
+  model.positions = {{2e-3, 0.0, 0.0, 0.0, 2e-6, 0}, {5e-3, 0.0, 0.0, 0.0, 5e-6, 0}};
+  model.velocities.resize(1);
+  model.start_sigma = 1e-4;
+  FusionObserver observer{model};
+  for (const Eigen::Index stuck : {0, 1}) {
+    FusionRun run = record(Rig{.offset = 0.0, .compression = 0.0}, sinusoid(4.0), 8.0, 3.0, 4);
+    run.positions.conservativeResize(Eigen::NoChange, 2);
+    run.positions.col(1) = 5e-3 * (run.reference.array() / 5e-3).round();
+    const double held = run.positions(1200, stuck);
+    run.positions.col(stuck).tail(run.time.size() - 1200).setConstant(held);
+    EXPECT_LT(rms(observer, run, 1200), 1.5e-3);
+    EXPECT_EQ(fuse(observer, run).back().weights[static_cast<std::size_t>(stuck)], 0.0);
+  }
+}
+
+TEST(FusionObserver, TakesBackWhatAContinuousSensorToldAfterItDied) {
+  FusionModel model;
+  model.position_names = {"analogue"};
+  model.velocity_names = {"speed"};
+  model.positions = {{0.0, 0.0, 0.0, 0.0, 3e-4, 0}};
+  model.velocities.resize(1);
+  model.start_sigma = 3e-4;
+  FusionObserver observer{model};
+  FusionRun run = record(Rig{.offset = 0.0, .compression = 0.0}, sinusoid(4.0), 8.0, 0.05, 4);
+  std::mt19937 random{5};
+  std::normal_distribution<double> normal;
+  for (Eigen::Index i = 0; i < run.time.size(); ++i)
+    run.positions(i, 0) = run.reference(i) + 3e-4 * normal(random);
+  const double held = run.positions(1200, 0);
+  run.positions.bottomRows(run.time.size() - 1200).setConstant(held);
+  EXPECT_LT(rms(observer, run, 1200), 1e-3);  // the velocity alone drifts by half a millimetre
+  EXPECT_EQ(fuse(observer, run).back().weights[0], 0.0);
+}
+
 TEST(WeightedFusion, RecursiveWeightsEqualBatchWeights) {
   const FusionRun run = record(Rig{}, constant_speed(0.1), 1.9, 0.2, 3);
   Eigen::MatrixXd sensors(run.time.size(), 2);

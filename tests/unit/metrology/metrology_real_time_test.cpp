@@ -15,7 +15,7 @@ FusionModel two_sensors() {
   FusionModel model;
   model.position_names = {"encoder"};
   model.velocity_names = {"speed"};
-  model.positions = {{2e-3, 0.0, 1e-4, 2e-4, 2e-6}};
+  model.positions = {{2e-3, 0.0, 1e-4, 2e-4, 2e-6, 0}};
   model.velocities.resize(1);
   model.start_sigma = 1e-4;
   return model;
