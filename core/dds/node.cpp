@@ -9,6 +9,7 @@
 #include "core/dds/connection.hpp"
 #include "core/dds/publishing.hpp"
 #include "core/dds/raw_type.hpp"
+#include "core/dds/shared_memory.hpp"
 
 namespace invar::dds {
 
@@ -74,6 +75,7 @@ struct Node::Parts {
 Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Parts>()} {
   parts_->options = std::move(options);
   parts_->profiles = std::move(profiles);
+  if (parts_->options.shared_memory) remove_shared_memory_leftovers();
   (void)parts_->participant(Traffic::general);  // discovery begins
 }
 

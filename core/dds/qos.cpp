@@ -39,7 +39,7 @@ void set_common(Qos& qos, const Profile& p) {
   limits.max_instances = static_cast<std::int32_t>(p.max_instances);
   limits.max_samples_per_instance = static_cast<std::int32_t>(p.depth);
   limits.max_samples = static_cast<std::int32_t>(p.depth * p.max_instances);
-  limits.allocated_samples = p.traffic == Traffic::realtime ? limits.max_samples : 0;
+  limits.allocated_samples = p.traffic == Traffic::realtime && !p.keep_all ? limits.max_samples : 0;
   limits.extra_samples = 4;
   const ResourceLimitedContainerConfig peers{32, std::numeric_limits<std::size_t>::max(), 8};
   if constexpr (requires { qos.writer_resource_limits(); })
@@ -73,8 +73,7 @@ Profile described_common(const Qos& qos) {
 fdds::DataWriterQos writer_qos(const Profile& p) {
   fdds::DataWriterQos qos;
   set_common(qos, p);
-  if (p.lease.ns != 0)
-    qos.liveliness().announcement_period = wire_time(p.lease / 3);
+  if (p.lease.ns != 0) qos.liveliness().announcement_period = wire_time(p.lease / 3);
   qos.ownership_strength().value = static_cast<std::uint32_t>(p.strength);
   qos.reliability().max_blocking_time = wire_time(p.blocking);
   qos.reliable_writer_qos().times.heartbeatPeriod = {0, 20'000'000};

@@ -6,6 +6,7 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/dds/typed_wire.hpp"
 
 namespace invar::dds {
 
@@ -188,11 +189,8 @@ void SimulatedClockClient::bind(OutputPort& port, Duration separation) {
   const bool& wanted = wanted_.emplace_back(false);
   type->attach_cdr(
       port,
-      [&wanted, &port, separation, due = Instant{INT64_MIN}]() mutable {
-        const Instant now = port.owner().now();
-        if (!wanted || now < due) return false;
-        due = now + separation;
-        return true;
+      [&wanted, &port, thinning = Thinning{separation}]() mutable {
+        return wanted && thinning.passes(port.owner().now());
       },
       [this, number](std::span<const std::byte> cdr) { bundle_.add(number, cdr); });
 
@@ -200,7 +198,6 @@ void SimulatedClockClient::bind(OutputPort& port, Duration separation) {
   outside.reliable = true;
   outside.keep_all = true;
   outside.depth = 1000;
-  outside.max_instances = 2;  // Fast DDS allocates depth times instances at once; a port has one
   outside.lifespan = {};
   outside.flow = 0;
   outside.blocking = Duration::milliseconds(10'000);

@@ -35,7 +35,10 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const config::CellProces
   options.shared_memory = loaded.cell->shared_memory;
   for (const auto& host : loaded.cell->hosts)
     if (host.name == process.host) options.addresses = {host.address};
-  if (process.realtime) options.realtime_priority = std::max(0, process.realtime->priority - 10);
+  if (process.realtime) {
+    options.realtime_priority = std::max(0, process.realtime->priority - 10);
+    options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps
+  }
   return options;
 }
 
@@ -186,7 +189,7 @@ class RunningProcess {
         node_.bind(static_cast<InputPort&>(port));
     });
     record_topics();
-    node_.start();
+    node_.start([this] { return executor_.counters().now; });
     executor_.start();
     const bool up = bring_up();
     while (up && !stop.load() && !asked_to_stop_ && executor_.is_running() && !job_ended_) {

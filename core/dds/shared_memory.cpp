@@ -1,0 +1,53 @@
+#include "core/dds/shared_memory.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <ctime>
+#include <string>
+#include <vector>
+
+namespace invar::dds {
+
+namespace {
+
+/// False also when it cannot be opened: then it is not ours to remove.
+bool is_abandoned(const std::filesystem::path& lock, Duration age) {
+  const int file = open(lock.c_str(), O_RDWR | O_CLOEXEC);
+  if (file < 0) return false;
+  struct stat status {};
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  const bool abandoned = fstat(file, &status) == 0 &&
+                         static_cast<double>(now.tv_sec - status.st_mtim.tv_sec) >= age.in_seconds() &&
+                         flock(file, LOCK_EX | LOCK_NB) == 0;
+  close(file);
+  return abandoned;
+}
+
+}  // namespace
+
+std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, Duration age) {
+  std::error_code error;
+  std::vector<std::filesystem::path> locks;
+  for (const auto& entry : std::filesystem::directory_iterator{folder, error}) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("fastrtps_") && (name.ends_with("_el") || name.ends_with("_sl")))
+      locks.push_back(entry.path());
+  }
+  std::size_t removed = 0;
+  for (const auto& lock : locks) {
+    if (!is_abandoned(lock, age)) continue;
+    const std::string name = lock.filename().string();
+    const std::string subject = name.substr(0, name.size() - 3);
+    std::filesystem::remove(folder / subject, error);
+    std::filesystem::remove(folder / ("sem." + subject + "_mutex"), error);
+    std::filesystem::remove(lock, error);
+    ++removed;
+  }
+  return removed;
+}
+
+}  // namespace invar::dds
