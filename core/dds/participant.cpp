@@ -7,9 +7,11 @@
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <pthread.h>
+#include <unistd.h>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <atomic>
 #include <sstream>
 
 #include "core/base/contract.hpp"
@@ -53,12 +55,21 @@ class Priority {
   sched_param parameters_{};
 };
 
+/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed
+/// and started again has the ports it had before: others then go on writing into the shared memory of the dead one,
+/// for seconds. From the process id it is another one; where another process has it, the library shifts the ports.
+std::int32_t own_number() {
+  static std::atomic<std::int32_t> made{0};
+  return (getpid() * 4 + made++) % 110;
+}
+
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
                                            Traffic traffic, const Profiles& profiles) {
   namespace transport = eprosima::fastdds::rtps;
   fdds::DomainParticipantQos qos;
   qos.name(name);
   qos.transport().use_builtin_transports = false;
+  qos.wire_protocol().participant_id = own_number();
   const bool realtime = traffic == Traffic::realtime;
   if (options.shared_memory) {
     auto shm = std::make_shared<transport::SharedMemTransportDescriptor>();

@@ -13,6 +13,6 @@ namespace invar::dds {
 /// lock nobody holds and that are older than `age` (a younger one may be about to be locked). Returns how many. Called
 /// by every node that uses shared memory. Set-up only.
 std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder = "/dev/shm",
-                                           Duration age = Duration::milliseconds(10'000));
+                                           Duration age = Duration::milliseconds(1000));
 
 }  // namespace invar::dds

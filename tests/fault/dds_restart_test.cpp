@@ -48,7 +48,13 @@ TEST(Restart, ReadersGoOnAfterTheirWriterWasKilledAndStartedAgain) {
   for (std::uint64_t life = 1; life <= 4; ++life) {
     invar::testing::Child writer{
         {"/proc/self/exe", "--write", std::to_string(testing::test_domain()), std::to_string(life)}};
-    EXPECT_TRUE(eventually([&] { return loop_life == life && slow_life == life; })) << "life " << life;
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_TRUE(eventually([&] { return loop_life == life; })) << "life " << life;
+    std::cout << "life " << life << ": loop after "
+              << std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    EXPECT_TRUE(eventually([&] { return slow_life == life; })) << "life " << life;
+    std::cout << " s, state after "
+              << std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() << " s\n";
     kill(writer.pid(), SIGKILL);
     EXPECT_TRUE(eventually([&] { return writer.has_ended(); }));
   }
