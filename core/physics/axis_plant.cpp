@@ -124,7 +124,8 @@ double AxisPlant::push(const AxisPoint& at) const noexcept {
   for (const auto& [term, code] : force_curves_) force += term->curve(variable(code, at));
   for (std::size_t i = 0; i < bristles_.size(); ++i) {
     const auto* p = bristles_[i]->parameters.data();
-    force -= p[1] * PreslidingFriction::deflection(bristle_[i], at.position - bristle_from_, p);
+    force -= PreslidingFriction::force(
+        PreslidingFriction::deflection(bristle_[i], at.position - bristle_from_, p), at.velocity, p);
   }
   return force;
 }

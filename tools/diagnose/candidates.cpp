@@ -338,6 +338,19 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
       }
       if (info->name == "periodic_error" && shapes.empty()) continue;
       add_starts(starts, term, shapes);
+      if (info->name == "additive_disturbance") {  // and as a square wave
+        const auto square = info->index_of("squareness");
+        term.values[square] = 1.0;
+        term.given[square] = true;
+        add_starts(starts, term, shapes);
+      }
+      if (info->name == "periodic_disturbance")  // from a later recording on
+        for (std::size_t r = 1; r < data.recordings.size(); ++r) {
+          const auto onset = info->index_of("onset");
+          term.values[onset] = data.recordings[r].inputs.time.front();
+          term.given[onset] = true;
+          add_starts(starts, term, shapes);
+        }
     }
   }
   return starts;
@@ -352,9 +365,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& /*fitted*/) {
   std::vector<Choice> choices;
   switch (data.model.plant) {
     case Plant::axis:
-      choices = {{"force", "position", 10},     {"force", "position", 28},   {"force", "velocity", 12},
-                 {"force", "time", 12},         {"force", "temperature", 6}, {"actuator", "current", 9},
-                 {"actuator", "temperature", 5}};
+      choices = {{"force", "position", 10},  {"force", "position", 28},     {"force", "position", 60},
+                 {"force", "velocity", 12},  {"force", "time", 12},         {"force", "temperature", 6},
+                 {"actuator", "current", 9}, {"actuator", "temperature", 5}};
       break;
     case Plant::thermal:
       choices = {{"loss", "temperature", 6}, {"loss", "time", 12},   {"source", "time", 12},

@@ -72,6 +72,7 @@ class Search {
   [[nodiscard]] double least_ratio(const Fit& a, const Fit& b) const;
   void weigh_alternatives();
   void try_unmodelled();
+  void sharpen(Fit& curved, Weighing& weighing, double& gain) const;
   void hold_out();
   void conclude();
   void smallest_effects();
@@ -90,8 +91,8 @@ void Search::prepare() {
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
-  d_.weighing = weigh(data_, simulated);
-  d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 6);
+  d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
+  d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
   simulated = simulate(data_, d_.retuned.model);
   d_.weighing = weigh(data_, simulated);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
@@ -158,8 +159,14 @@ bool Search::add_named(double round) {
       if (fits[i].evidence < base.evidence + 2.0) break;
       if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
       if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
-      const Weighing own = weigh(data_, simulate(data_, fits[i].model));
-      auto with_term = fit(data_, own, fits[i].model, data_.model, 6, &fits[i]);
+      // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
+      Weighing plain = weigh(data_, simulate(data_, fits[i].model), false);
+      auto settled = fit(data_, plain, fits[i].model, data_.model, 6, &fits[i]);
+      plain = weigh(data_, simulate(data_, settled.model), false);
+      settled = fit(data_, plain, settled.model, data_.model, 4, &settled);
+      const Weighing own = weigh(data_, simulate(data_, settled.model));
+
+      auto with_term = fit(data_, own, settled.model, data_.model, 6, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double gain = with_term.evidence - without.evidence;
       // A further claim must be one that an engineer would see in the residual.
@@ -278,6 +285,36 @@ void Search::weigh_alternatives() {
     }
 }
 
+/// A dent or a step is narrow: the knots are gathered where the curve is not flat.
+void Search::sharpen(Fit& curved, Weighing& weighing, double& gain) const {
+  const auto& curve = curved.model.terms.back().curve;
+  const double level = median(curve.values);
+  double top = 0.0;
+  for (double v : curve.values) top = std::max(top, std::abs(v - level));
+  std::size_t first = curve.knots.size(), last = 0;
+  for (std::size_t k = 0; k < curve.knots.size(); ++k)
+    if (std::abs(curve.values[k] - level) > 0.3 * top) first = std::min(first, k), last = k;
+  if (first > last || (last - first + 3) * 2 > curve.knots.size()) return;
+  const double spacing = curve.knots[1] - curve.knots[0];
+  const double low = curve.knots[first] - 1.2 * spacing, high = curve.knots[last] + 1.2 * spacing;
+  Model model = curved.model;
+  auto& fine = model.terms.back().curve;
+  fine.knots.clear(), fine.values.clear();
+  constexpr int count = 18;
+  for (int k = 0; k < count; ++k) {
+    fine.knots.push_back(low + (high - low) * k / (count - 1));
+    fine.values.push_back(curve(fine.knots.back()) - level);
+  }
+  auto rough = fit(data_, weighing, model, data_.model, 4);
+  const Weighing own = weigh(data_, simulate(data_, rough.model));
+  auto sharp = fit(data_, own, rough.model, data_.model, 4, &rough);
+  const auto blunt = fit(data_, own, curved.model, data_.model, 3, &curved);
+  if (sharp.evidence < blunt.evidence) return;
+  gain += sharp.evidence - blunt.evidence;
+  curved = std::move(sharp);
+  weighing = own;
+}
+
 void Search::try_unmodelled() {
   progress_(0.78, "looking for physics without a name");
   const auto starts = unmodelled_starts(data_, d_.best);
@@ -303,6 +340,7 @@ void Search::try_unmodelled() {
       const double gain = curved.evidence - without.evidence;
       if (gain > best.gain) best = {std::move(curved), own, gain};
     }
+    if (best.gain > claim_margin) sharpen(best.fit, best.weighing, best.gain);
     return best;
   };
   const bool named = d_.best.model.terms.size() > given();

@@ -16,10 +16,12 @@ struct PeriodicDisturbance {
       .depends_on = {"time"},
       .parameters = {{{"amplitude", "N", {0.0, 1000.0}, Role::amplitude, {0.2}, "size"},
                       {"frequency", "Hz", {0.02, 500.0}, Role::shape, {25.0}, "repetitions per second"},
-                      {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at time zero"}}},
+                      {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at time zero"},
+                      {"onset", "s", {-1e12, 1e12}, Role::reference, {-1e9}, "when it begins"}}},
       .description = "A pump, a fan or a neighbouring machine shakes the axis in its own rhythm.",
       .source = "F = amplitude sin(2 pi frequency t + phase)"};
   static double force(const AxisPoint& at, const double* p) {
+    if (at.time < p[3]) return 0.0;
     return p[0] * std::sin(2.0 * std::numbers::pi * p[1] * at.time + p[2]);
   }
   static constexpr AxisTermKind kind{.info = &info, .force = force};

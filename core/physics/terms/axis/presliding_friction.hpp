@@ -14,17 +14,21 @@ struct PreslidingFriction {
       .plant = Plant::axis,
       .site = "force",
       .depends_on = {"position", "velocity", "direction", "history"},
-      .parameters = {{{"level", "N", {0.0, 500.0}, Role::amplitude, {0.5}, "friction force once sliding"},
-                      {"stiffness",
-                       "N/m",
-                       {1e3, 1e7},
-                       Role::shape,
-                       {5e4, 1e4, 3e5},
-                       "slope of the force just after a reversal"}}},
+      .parameters =
+          {{{"level", "N", {0.0, 500.0}, Role::amplitude, {0.5}, "friction force once sliding"},
+            {"stiffness",
+             "N/m",
+             {1e3, 1e7},
+             Role::shape,
+             {5e4, 1e4, 3e5},
+             "slope of the force just after a reversal"},
+            {"damping", "N s/m", {0.0, 1e5}, Role::amplitude, {5.0}, "of the bristles while they bend"}}},
       .description =
           "Rolling bearings and seals bend before they slide: the friction force follows the way since "
           "the last reversal, with hysteresis, and reaches its level after some level / stiffness.",
-      .source = "Dahl, AIAA Journal 14 (1976), exponent 1: dF/dx = stiffness (1 - F/level sign(v))"};
+      .source =
+          "LuGre at constant level; Dahl, AIAA Journal 14 (1976), exponent 1: dF/dx = stiffness (1 - F/level "
+          "sign(v))"};
   /// The bristle deflection after moving by `way` from a deflection `z` (both m): the exact solution for one
   /// direction of motion, whatever the speed.
   static double deflection(double z, double way, const double* p) {
@@ -32,6 +36,13 @@ struct PreslidingFriction {
     if (!(most > 0.0)) return 0.0;
     const double limit = way >= 0.0 ? most : -most;
     return limit + (z - limit) * std::exp(-std::abs(way) / most);
+  }
+  /// [N] of bristles bent by z at this speed; their damping fades as they begin to slide.
+  static double force(double z, double velocity, const double* p) {
+    const double most = p[0] / p[1];
+    if (!(most > 0.0)) return 0.0;
+    const double bending = 1.0 - (velocity >= 0.0 ? z : -z) / most;
+    return p[1] * z + p[2] * velocity * bending;
   }
   static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::presliding};
 };

@@ -1,0 +1,53 @@
+// Whitening and robust spreads on noise whose colour is known.
+#include "tools/diagnose/statistics.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+namespace invar::diagnose {
+namespace {
+
+std::vector<double> coloured(double pole, unsigned seed, std::size_t n) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  std::vector<double> values(n);
+  double last = 0.0;
+  for (double& v : values) v = last = pole * last + normal(random);
+  return values;
+}
+
+TEST(Whitening, FindsThePoleAndTheSizeOfAutoregressiveNoise) {
+  const auto noise = coloured(0.8, 11, 20000);
+  const auto filter = fit_whitening({noise}, 8);
+  ASSERT_FALSE(filter.a.empty());
+  EXPECT_NEAR(filter.a[0], 0.8, 0.03);
+  EXPECT_NEAR(filter.sigma, 1.0, 0.03);
+}
+
+TEST(Whitening, LeavesWhiteNoiseAsItIs) {
+  const auto filter = fit_whitening({coloured(0.0, 12, 20000)}, 8);
+  EXPECT_LE(filter.a.size(), 3U);
+  EXPECT_NEAR(filter.sigma, 1.0, 0.03);
+}
+
+TEST(Whitening, MakesColouredNoiseWhite) {
+  const auto noise = coloured(0.9, 13, 20000);
+  const auto filter = fit_whitening({noise}, 8);
+  std::vector<double> white(noise.size());
+  whiten(filter, noise, std::vector<bool>(noise.size(), true), white.data());
+  double square = 0.0, lagged = 0.0;
+  for (std::size_t i = 1; i < white.size(); ++i)
+    square += white[i] * white[i], lagged += white[i] * white[i - 1];
+  EXPECT_NEAR(lagged / square, 0.0, 0.03);
+}
+
+TEST(RobustSigma, IsNotMovedByOutliers) {
+  auto noise = coloured(0.0, 14, 5000);
+  for (std::size_t i = 0; i < noise.size(); i += 50) noise[i] = 1000.0;
+  EXPECT_NEAR(robust_sigma(noise), 1.0, 0.06);
+}
+
+}  // namespace
+}  // namespace invar::diagnose
