@@ -52,11 +52,11 @@ void give_start(Case& data, Recording& recording) {
   auto& inputs = recording.inputs;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto& name = data.outputs[o];
-    std::vector<double> first;
-    for (std::size_t i = 0; i < std::min<std::size_t>(7, inputs.rows()); ++i)
-      if (std::isfinite(recording.measured[o][i])) first.push_back(recording.measured[o][i]);
-    if (first.size() < 3) continue;
-    const double begin = median(first), spread = 1.5 * spread_of_differences(recording.measured[o]);
+    // The very first value alone: a few rows later the machine may be on its way.
+    double begin = nothing;
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, inputs.rows()) && !std::isfinite(begin); ++i)
+      begin = recording.measured[o][i];
+    const double spread = 1.5 * spread_of_differences(recording.measured[o]);
     double expected = nothing, doubt = 0.0;
     if (data.model.plant == Plant::thermal) {
       const auto* ambient = inputs.find("ambient");
@@ -69,7 +69,9 @@ void give_start(Case& data, Recording& recording) {
       doubt = 1e-6;
       if (reference != nullptr && reference->size() > 5) doubt += std::abs((*reference)[5] - (*reference)[0]);
     }
-    if (!std::isfinite(expected) || !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt))) continue;
+    if (!std::isfinite(begin) || !std::isfinite(expected) ||
+        !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt)))
+      continue;
     auto& column = inputs.signals[name];
     column.assign(inputs.rows(), nothing);
     column.front() = begin;
