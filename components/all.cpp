@@ -2,6 +2,7 @@
 
 #include "components/calibration/calibration.hpp"
 #include "components/compensation/compensation.hpp"
+#include "components/fusion/fusion.hpp"
 #include "components/interferometer/interferometer.hpp"
 #include "components/recorder/recorder.hpp"
 #include "components/stage/axis_stage.hpp"
@@ -18,6 +19,7 @@ void add_all_components(Registry& registry) {
   registry.add<world::SimulatedHeater>("simulated_heater",
                                        "pad, slide and base behind a heater controller's registers");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
+  registry.add<fusion::Fusion>("fusion", "one position of an axis from its encoder and velocity sensor");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
   registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
