@@ -176,7 +176,14 @@ void fill_sigma(Identification& work, bool has_prior) {
   const RigidPart rigid =
       rigid_part(work.basis, model.squareness, volume_grid(model.chain, model.travel, 5), model.tool);
   grid.values.clear();
-  for (const Eigen::Vector3d& position : volume_grid(model.chain, model.travel, nodes)) {
+  for (Eigen::Vector3d position : volume_grid(model.chain, model.travel, nodes)) {
+    // Beside the node, where no reading stands: on a measured point the model is surer than anywhere else.
+    for (int k = 0; k < 3; ++k) {
+      if (!model.chain.has(k)) continue;
+      const Range r = model.travel[index(k)];
+      position[k] +=
+          (position[k] < r.lower + 0.5 * r.width() ? 0.35 : -0.35) * model.splines[index(k)].spacing();
+    }
     const Eigen::MatrixXd map = shape_map(work.basis, model.squareness, rigid, position, model.tool);
     Eigen::Vector3d sigma;
     const Eigen::MatrixXd moved = map * all;
@@ -240,6 +247,28 @@ std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Ra
     for (int j = 0; j < nodes(1); ++j)
       for (int i = 0; i < nodes(0); ++i) grid.emplace_back(at(0, i), at(1, j), at(2, k));
   return grid;
+}
+
+std::vector<VolumeNode> volume_nodes(const Chain& chain, const std::array<Range, 3>& travel) {
+  constexpr std::array<double, 6> place{0.033765243, 0.169395307, 0.380690407,
+                                        0.619309593, 0.830604693, 0.966234757};
+  constexpr std::array<double, 6> weight{0.085662246, 0.180380787, 0.233956967,
+                                         0.233956967, 0.180380787, 0.085662246};
+  std::vector<VolumeNode> nodes{{Eigen::Vector3d::Zero(), 1.0}};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!chain.has(axis)) continue;
+    std::vector<VolumeNode> more;
+    for (const VolumeNode& node : nodes) {
+      for (std::size_t i = 0; i < place.size(); ++i) {
+        VolumeNode one = node;
+        one.position[axis] = travel[index(axis)].lower + place[i] * travel[index(axis)].width();
+        one.weight *= weight[i];
+        more.push_back(one);
+      }
+    }
+    nodes = std::move(more);
+  }
+  return nodes;
 }
 
 Eigen::MatrixXd RigidPart::rigid(const Chain& chain, const Eigen::Vector3d& p) {

@@ -52,6 +52,13 @@ Eigen::VectorXd predicted_readings(const GeometricModel& model, const CondensedL
 /// Nodes [m] that fill the travels: `count` along each axis.
 std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count);
 
+/// Nodes and weights that average over the travels: Gauss-Legendre, so that they do not fall on the measured points.
+struct VolumeNode {
+  Eigen::Vector3d position;  // m
+  double weight;             // their sum is 1
+};
+std::vector<VolumeNode> volume_nodes(const Chain& chain, const std::array<Range, 3>& travel);
+
 /// The part of a field that is no rigid motion: e - R a, with R the rigid motions (translations, rotations) that best fit
 /// it over `grid`. `map` gives a = map * unknowns; `rigid` the columns of R at a position.
 struct RigidPart {

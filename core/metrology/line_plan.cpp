@@ -54,16 +54,16 @@ PlannedLine line(const Machine& machine, const std::array<double, 3>& from, cons
 /// Directions of the field's shape at a grid: V'V summed, so that the trace with a covariance is a squared RMS.
 Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
                              const std::array<Range, 3>& travel, const Eigen::Vector3d& tool) {
-  const auto grid = volume_grid(basis.chain, travel, 5);
-  const RigidPart rigid = rigid_part(basis, squareness, grid, tool);
-  Eigen::MatrixXd all(3 * static_cast<Eigen::Index>(grid.size()), basis.size);
-  for (std::size_t g = 0; g < grid.size(); ++g) {
-    Eigen::MatrixXd map = shape_map(basis, squareness, rigid, grid[g], tool);
+  const auto nodes = volume_nodes(basis.chain, travel);
+  const RigidPart rigid = rigid_part(basis, squareness, volume_grid(basis.chain, travel, 5), tool);
+  Eigen::MatrixXd all(3 * static_cast<Eigen::Index>(nodes.size()), basis.size);
+  for (std::size_t g = 0; g < nodes.size(); ++g) {
+    Eigen::MatrixXd map = shape_map(basis, squareness, rigid, nodes[g].position, tool);
     for (int k = 0; k < 3; ++k)
       if (!basis.chain.has(k)) map.row(k).setZero();
-    all.middleRows<3>(3 * static_cast<Eigen::Index>(g)) = map;
+    all.middleRows<3>(3 * static_cast<Eigen::Index>(g)) = std::sqrt(nodes[g].weight) * map;
   }
-  return all.transpose() * all / static_cast<double>(grid.size());
+  return all.transpose() * all;
 }
 
 }  // namespace
