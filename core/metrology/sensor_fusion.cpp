@@ -20,7 +20,6 @@ constexpr double surprise = 1e-7;           // probability below which a reading
 constexpr double stuck_conflict = 16.0;     // log odds against a reading that stands still
 constexpr int odd_limit = 5;
 constexpr int good_limit = 20;
-constexpr double noise_memory = 400.0;  // samples
 
 double normal_density(double z) noexcept {
   return std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
@@ -161,37 +160,6 @@ void FusionObserver::predict(double dt) noexcept {
   }
 }
 
-/// White noise of variance s^2 has second differences of variance 6 s^2; motion hardly shows in them.
-void FusionObserver::learn_noise(const FusionSample& sample) noexcept {
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
-    const VelocitySensorModel& sensor = model_.velocities[i];
-    VelocityMemory& memory = velocity_memory_[i];
-    const double reading = sample.velocities[i];
-    if (!std::isfinite(reading)) {
-      memory.seen = 0;
-      continue;
-    }
-    memory.largest = std::max(memory.largest, std::abs(reading));
-    memory.repeats = memory.seen > 0 && reading == memory.last[0] ? memory.repeats + 1 : 0;
-    memory.dead = memory.repeats > 3 * sensor.longest_repeat;
-    if (memory.weight <= 0.0) {
-      // Until the readings tell: the level as given, of the largest reading that runs usually have.
-      const double level = std::isfinite(sample.noise_level) ? std::max(sample.noise_level, 1e-3) : 0.1;
-      memory.variance = std::pow(level * sensor.largest, 2) / 3.0;
-      memory.weight = 4.0;
-    }
-    if (memory.seen >= 2 && memory.repeats == 0) {
-      const double second = reading - 2.0 * memory.last[0] + memory.last[1];
-      const double square = std::min(second * second / 6.0, 16.0 * memory.variance);  // a jump is no noise
-      memory.weight = std::min(memory.weight + 1.0, noise_memory);
-      memory.variance += (square - memory.variance) / memory.weight;
-      memory.variance = std::max(memory.variance, 1e-12 * sensor.largest * sensor.largest);
-    }
-    memory.last = {reading, memory.last[0]};
-    memory.seen = std::min(memory.seen + 1, 2);
-  }
-}
-
 void FusionObserver::renormalise(const std::array<double, models>& likelihood) noexcept {
   double total = 0.0;
   for (std::size_t j = 0; j < models; ++j) {
@@ -206,130 +174,11 @@ void FusionObserver::renormalise(const std::array<double, models>& likelihood) n
   for (Mode& mode : modes_) mode.probability /= floored;
 }
 
-/// What the velocity sensors say was travelled while each position reading stood still.
-void FusionObserver::add_travel(const FusionSample& sample) noexcept {
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
-    const VelocityMemory& velocity = velocity_memory_[i];
-    if (velocity.faulty || velocity.dead || !std::isfinite(sample.velocities[i])) continue;
-    const VelocitySensorModel& sensor = model_.velocities[i];
-    const double gain = std::max(std::abs(sensor.sensitivity(0.0)), 1e-6);
-    const double noise = sensor.correlation * sample.period / gain;
-    for (std::size_t k = 0; k < model_.positions.size(); ++k) {
-      PositionMemory& memory = position_memory_[k];
-      const double moved = (sample.velocities[i] - sensor.offset) / gain * sample.period;
-      const double variance = velocity.variance * noise * noise;
-      memory.travel += moved;
-      memory.travel_variance += variance;
-      memory.since += moved;
-      memory.since_variance += variance;
-    }
-    return;  // one live sensor is witness enough
-  }
-}
-
-/// True where a witness says that a position which reads the same cannot stand still: a velocity sensor beyond
-/// its noise, or another position sensor. A filter that merely expected motion is no witness.
-bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
-  const PositionMemory& memory = position_memory_[position];
-  const double cell =
-      std::max(0.75 * model_.positions[position].step, 10.0 * model_.positions[position].noise);
-  if (std::abs(memory.travel) > cell + 5.0 * std::sqrt(memory.travel_variance) &&
-      memory.travel_variance > 0.0)
-    return true;
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
-    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
-  return false;
-}
-
-/// True where a witness says that the position cannot have gone from what was last believed to this reading.
-bool FusionObserver::refuted_jump(std::size_t position, double reading) const noexcept {
-  const PositionMemory& memory = position_memory_[position];
-  const double cell =
-      std::max(2.0 * model_.positions[position].step, 20.0 * model_.positions[position].noise);
-  if (memory.since_variance > 0.0 &&
-      std::abs(reading - memory.believed - memory.since) > cell + 5.0 * std::sqrt(memory.since_variance))
-    return true;
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
-    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
-  return false;
-}
-
-/// True where sensor `still` has not changed while `moving` went on by more than both their cells.
-bool FusionObserver::outlived(std::size_t still, std::size_t moving, double reading) const noexcept {
-  const double cells = model_.positions[still].step + model_.positions[moving].step +
-                       10.0 * (model_.positions[still].noise + model_.positions[moving].noise);
-  const double before = position_memory_[still].others[moving];
-  return std::isfinite(before) && std::abs(reading - before) > cells;
-}
-
-/// Sensors that repeat themselves as sound ones do not; what they told since they died is taken back.
-void FusionObserver::watch_for_dead(const FusionSample& sample) noexcept {
-  int back = 0;
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
-    VelocityMemory& memory = velocity_memory_[i];
-    if (!memory.dead || memory.faulty) continue;
-    memory.faulty = true;
-    back = std::max(back, memory.repeats);
-  }
-  for (std::size_t i = 0; i < model_.positions.size(); ++i) {
-    PositionMemory& memory = position_memory_[i];
-    const double reading = sample.positions[i];
-    memory.repeats = reading == memory.last ? memory.repeats + 1 : 0;
-    if (memory.repeats == 0 && std::isfinite(reading)) memory.others = sample.positions;
-    const bool continuous = model_.positions[i].step <= 0.0;
-    if (!continuous || memory.repeats <= 3 + 3 * model_.positions[i].longest_repeat) continue;
-    memory.good = 0;
-    if (memory.faulty) continue;
-    memory.faulty = true;
-    back = std::max(back, memory.repeats);
-  }
-  undo(static_cast<std::size_t>(back));
-}
-
-/// Back by some samples, whose readings turn out to have been those of a dead sensor; the others' since then are
-/// used again. Bounded by the history.
-void FusionObserver::undo(std::size_t steps) noexcept {
-  if (steps == 0 || steps >= history || steps > steps_) return;
-  modes_ = past_[(steps_ - steps) % history].modes;
-  for (std::size_t k = steps_ - steps; k < steps_; ++k) {
-    Past& past = past_[k % history];
-    if (k > steps_ - steps) advance(past.sample.period);
-    past.modes = modes_;
-    for (std::size_t i = 0; i < model_.velocities.size(); ++i)
-      if (!velocity_memory_[i].faulty) use_velocity(i, past.sample.velocities[i]);
-    for (std::size_t i = 0; i < model_.positions.size(); ++i)
-      if (!position_memory_[i].faulty) use_position(i, past.sample.positions[i]);
-  }
-}
-
 void FusionObserver::advance(double period) noexcept {
   if (period <= 0.0) return;
   switching_ = std::min(0.3, switching_rate * period);
   mix();
   predict(period);
-}
-
-/// Nothing else is left to trust: begin anew in the cell that is read, at unknown speed.
-void FusionObserver::restart_at(const PositionSensorModel& sensor, double reading) noexcept {
-  double fastest = 0.3;
-  for (const VelocitySensorModel& velocity : model_.velocities) fastest = velocity.largest;
-  const double cell = std::hypot(sensor.step / std::sqrt(12.0), sensor.noise);
-  for (Mode& mode : modes_) {
-    const double gain = mode.mean(3);
-    const double gain_variance = mode.covariance(3, 3);
-    mode.mean << reading + sensor.offset, 0.0, 0.0, gain;
-    mode.covariance.setZero();
-    mode.covariance.diagonal() << cell * cell, fastest * fastest / 4.0, fastest * fastest, gain_variance;
-    mode.probability = 1.0 / models;
-  }
-}
-
-bool FusionObserver::alone(std::size_t position) const noexcept {
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
-    if (i != position && !position_memory_[i].faulty) return false;
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i)
-    if (!velocity_memory_[i].faulty) return false;
-  return true;
 }
 
 void FusionObserver::use_velocity(std::size_t i, double reading) noexcept {

@@ -261,7 +261,10 @@ void calibrate(const Options& options) {
   metrology::FusionOptions how;
   how.polynomial = options.model == "polynomial";
   how.noise_estimated = options.noise == "estimated";
-  const FusionFit fit = metrology::identify_fusion(all.runs, all.positions, all.velocities, how);
+  const FusionFit fit = [&] {
+    const Progress progress{"identifying the sensors and holding out runs"};
+    return metrology::identify_fusion(all.runs, all.positions, all.velocities, how);
+  }();
   const bool observer = fit.method == metrology::FusionMethod::observer;
   compensation::ModelText text{"fusion", options.recordings};
   const bool noise_given = !how.noise_estimated && all.runs.front().noise_level.size() > 0;

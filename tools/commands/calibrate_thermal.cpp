@@ -281,7 +281,10 @@ report::Page page_of(const std::filesystem::path& file, const ThermalReadings& r
 void calibrate(const std::filesystem::path& file, const std::filesystem::path& folder) {
   const auto table = recording::Table::read(file);
   const ThermalReadings readings = read_readings(table);
-  const ThermalFit fit = metrology::identify_thermal(readings);
+  const ThermalFit fit = [&] {
+    const Progress progress{"identifying the surface over position and temperature"};
+    return metrology::identify_thermal(readings);
+  }();
   const Figures figures = figures_of(readings, fit);
 
   compensation::ModelText text{"thermal", {file}};

@@ -1,9 +1,20 @@
 #include "tools/commands/calibration_result.hpp"
 
+#include <unistd.h>
+
 #include <cmath>
 #include <fstream>
+#include <iostream>
 
 namespace invar::tools {
+
+Progress::Progress(const std::string& what) {
+  if (isatty(STDERR_FILENO) != 0) std::cerr << what << " ...\r" << std::flush;
+}
+
+Progress::~Progress() {
+  if (isatty(STDERR_FILENO) != 0) std::cerr << "\x1b[2K" << std::flush;
+}
 
 void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
                        const nlohmann::json& report, const report::Page& page) {

@@ -12,6 +12,15 @@
 
 namespace invar::tools {
 
+/// Says on a terminal what is being done, and clears it when that is over; silent in a pipe.
+class Progress {
+ public:
+  explicit Progress(const std::string& what);
+  ~Progress();
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+};
+
 /// Makes the folder and writes the three files into it. Throws InputError where that fails.
 void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
                        const nlohmann::json& report, const report::Page& page);
