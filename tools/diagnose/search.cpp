@@ -32,8 +32,9 @@ bool stands(const Fit& fit, std::size_t term) {
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
     const auto& p = info.parameters[i];
     if (p.role != Role::shape || p.name == "center" || p.name == "limit") continue;
-    if (p.bounds.lower > 0.0 && values[i] < 1.3 * p.bounds.lower) return false;
-    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > p.bounds.upper / 1.3) return false;
+    if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower && values[i] < 1.3 * p.bounds.lower)
+      return false;
+    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > 0.99 * p.bounds.upper) return false;
   }
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
