@@ -78,6 +78,7 @@ fdds::DataWriterQos writer_qos(const Profile& p) {
   qos.reliability().max_blocking_time = wire_time(p.blocking);
   qos.reliable_writer_qos().times.heartbeatPeriod = {0, 20'000'000};
   qos.reliable_writer_qos().times.nackResponseDelay = {0, 1'000'000};
+  qos.reliable_writer_qos().disable_heartbeat_piggyback = !p.asks_at_once;
   qos.publish_mode().kind = fdds::SYNCHRONOUS_PUBLISH_MODE;
   if (p.flow > 0) {
     qos.publish_mode().kind = fdds::ASYNCHRONOUS_PUBLISH_MODE;

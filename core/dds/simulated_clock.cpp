@@ -28,6 +28,7 @@ Profile answers_profile() {
   p.durability = Durability::transient_local;
   p.max_instances = 64;
   p.blocking = Duration::milliseconds(10'000);
+  p.asks_at_once = false;
   return p;
 }
 
