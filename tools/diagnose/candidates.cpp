@@ -304,7 +304,9 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         term.values[at] = median(all);
         term.given[at] = true;
         if (info->plant == Plant::error_map) {
-          add_starts(starts, term, {median(all)});
+          // Where it reads right is not known; from the wrong side of it a fit would not find over.
+          const auto [low, high] = std::minmax_element(all.begin(), all.end());
+          add_starts(starts, term, {median(all), 1013.25, *low, *high});
           continue;
         }
       }

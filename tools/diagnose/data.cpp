@@ -40,6 +40,19 @@ physics::Record in_order(const physics::Record& raw, DataCount& count) {
   return record;
 }
 
+/// A model without inputs loses nothing by rows that lie closer than its motion.
+void thin(physics::Record& record, std::size_t most) {
+  const std::size_t every = (record.rows() + most - 1) / most;
+  if (every < 2) return;
+  const auto thinned = [every](std::vector<double>& values) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < values.size(); i += every) values[kept++] = values[i];
+    values.resize(kept);
+  };
+  thinned(record.time);
+  for (auto& [name, values] : record.signals) thinned(values);
+}
+
 double median_step(const std::vector<double>& time) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
@@ -97,6 +110,8 @@ Case load_case(const physics::Model& model, const std::vector<std::filesystem::p
     recording.name = file.filename().string();
     data.count.rows += content.record.rows();
     recording.inputs = in_order(content.record, data.count);
+    if (model.plant == physics::Plant::equations && model.equations.inputs.empty())
+      thin(recording.inputs, 6000);
     if (recording.inputs.rows() < 8)
       throw InputError{file.string(), "has fewer than 8 usable rows", "record for longer"};
     for (std::size_t o = 0; o < data.outputs.size(); ++o) {

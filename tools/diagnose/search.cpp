@@ -31,6 +31,8 @@ bool stands(const Fit& fit, std::size_t term) {
   // A shape at the end of its range is another term in disguise.
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
     const auto& p = info.parameters[i];
+    if (p.role == Role::amplitude && p.bounds.upper < 1e100 && std::abs(values[i]) > 0.99 * p.bounds.upper)
+      return false;
     if (p.role != Role::shape || p.name == "center" || p.name == "limit") continue;
     if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower && values[i] < 1.3 * p.bounds.lower)
       return false;
