@@ -84,6 +84,8 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
   age_ = std::min(age_, oldest);
   // Runge-Kutta of fourth order errs by (omega h)^5/120 a step.
   if (fastest > 0.0) longest_substep_ = std::clamp(0.4 / fastest, 1e-4, 1e-3);
+  // A lagging current counts by its mean over a sub-step: exact for the velocity, of second order for the way.
+  if (lag_ > 0.0) longest_substep_ = std::min(longest_substep_, 2.5e-4);
   rest_at(0.0);
 }
 
