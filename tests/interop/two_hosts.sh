@@ -28,10 +28,9 @@ for _ in $(seq 100); do
   ip -n "$a" link show cable | grep -q 'LOWER_UP' && ip -n "$b" link show cable | grep -q 'LOWER_UP' && break; sleep 0.1
 done
 
-# Fields: which topic a sample belongs to, as tshark learns it from discovery. Kinds 2 and 3: writers of users.
-ip netns exec "$a" tshark -l -n -i cable -Y 'rtps.sm.id == 0x15 && (rtps.sm.wrEntityId.entityKind == 0x02)' \
-  -T fields -e rtps.param.topicName >"$work/topics" 2>"$work/tshark" &
-pids+=($!)
+# First everything into a file: a busy machine must not make the dissector lose the discovery that names the topics.
+ip netns exec "$a" tshark -n -B 32 -i cable -w "$work/cable.pcapng" >/dev/null 2>"$work/tshark" &
+capture=$!; pids+=("$capture")
 for _ in $(seq 100); do grep -q 'Capturing' "$work/tshark" && break; sleep 0.1; done
 sleep 2
 
@@ -39,6 +38,10 @@ ip netns exec "$a" "$peer" writer 10.77.0.11 & writer=$!; pids+=("$writer")
 ip netns exec "$b" "$peer" reader 10.77.0.12
 wait "$writer"
 sleep 1
+kill -INT "$capture"; wait "$capture" || true
+# Fields: which topic a sample belongs to, as tshark learns it from discovery. Kinds 2 and 3: writers of users.
+tshark -n -2 -r "$work/cable.pcapng" -Y 'rtps.sm.id == 0x15 && (rtps.sm.wrEntityId.entityKind == 0x02)' \
+  -T fields -e rtps.param.topicName >"$work/topics" 2>>"$work/tshark"
 echo "traffic by topic, as tshark sees it on the cable:"
 tr ',' '\n' <"$work/topics" | sort | uniq -c | sort -rn
 for topic in axis/state heat/node axis/command; do
