@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "tools/diagnose/screen.hpp"
 
@@ -96,9 +97,17 @@ void Search::prepare() {
   drop_outliers(data_, simulated);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
+  for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
+    d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
+  }
   simulated = simulate(data_, d_.retuned.model);
   d_.weighing = weigh(data_, simulated);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
+  // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
+  auto coloured = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
+  d_.retuned = least_ratio(d_.retuned, coloured) < 0.9
+                   ? fit(data_, d_.weighing, d_.retuned.model, data_.model, 0, &d_.retuned)
+                   : std::move(coloured);
   d_.best = d_.retuned;
 }
 
@@ -165,8 +174,13 @@ bool Search::add_named(double round) {
       // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
       Weighing plain = weigh(data_, simulate(data_, fits[i].model), false);
       auto settled = fit(data_, plain, fits[i].model, data_.model, 6, &fits[i]);
-      plain = weigh(data_, simulate(data_, settled.model), false);
-      settled = fit(data_, plain, settled.model, data_.model, 4, &settled);
+      for (int again = 0; again < 3; ++again) {  // the nearer the fit, the finer its scale
+        plain = weigh(data_, simulate(data_, settled.model), false);
+        auto nearer = fit(data_, plain, settled.model, data_.model, 5, &settled);
+        const bool arrived = least_ratio(nearer, settled) > 0.97;
+        settled = std::move(nearer);
+        if (arrived) break;
+      }
       const Weighing own = weigh(data_, simulate(data_, settled.model));
 
       auto with_term = fit(data_, own, settled.model, data_.model, 6, &settled);
@@ -517,8 +531,17 @@ Diagnosis Search::run() {
     if (!add_named(round)) break;
   prune();
   weigh_alternatives();
+  const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   try_unmodelled();
+  const bool curved = unnamed_ || rest_;
   hold_out();
+  if (curved && d_.findings.empty() &&
+      !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
+    std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;
+    d_.heldout.clear();
+    d_.train.clear();
+    hold_out();
+  }
   smallest_effects();
   conclude();
   progress_(1.0, "done");
