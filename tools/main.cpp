@@ -4,6 +4,7 @@
 
 #include "core/base/fault.hpp"
 #include "tools/command.hpp"
+#include "tools/live/commands.hpp"
 
 int main(int argc, char** argv) {
   CLI::App program{
@@ -13,14 +14,27 @@ int main(int argc, char** argv) {
   invar::tools::add_about(program);
   invar::tools::add_calibrate(program);
   invar::tools::add_check(program);
-  invar::tools::add_export(program);
-  invar::tools::add_job(program);
-  invar::tools::add_measure(program);
-  invar::tools::add_predict(program);
-  invar::tools::add_run(program);
-  invar::tools::add_recording(program);
+  invar::tools::add_completion(program);
   invar::tools::add_diagnose(program);
+  invar::tools::add_doctor(program);
+  invar::tools::add_echo(program);
+  invar::tools::add_export(program);
+  invar::tools::add_hz(program);
+  invar::tools::add_job(program);
+  invar::tools::add_latency_test(program);
+  invar::tools::add_lifecycle(program);
+  invar::tools::add_measure(program);
+  invar::tools::add_param(program);
+  invar::tools::add_predict(program);
+  invar::tools::add_profiles(program);
+  invar::tools::add_record(program);
+  invar::tools::add_recording(program);
+  invar::tools::add_replay(program);
+  invar::tools::add_run(program);
   invar::tools::add_simulate(program);
+  invar::tools::add_status(program);
+  invar::tools::add_top(program);
+  invar::tools::add_topics(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::RuntimeError& end) {

@@ -9,7 +9,11 @@ namespace invar::dds {
 
 namespace {
 constexpr std::size_t notices_kept = 5000;
+
+ServiceTopics topics_of(const Node& node, const std::string& cell) {
+  return ServiceTopics{cell.empty() ? node.options().cell : cell};
 }
+}  // namespace
 
 ServiceTopics::ServiceTopics(const std::string& cell) {
   const std::string base = "cell/" + cell + "/process/";
@@ -22,13 +26,13 @@ ServiceTopics::ServiceTopics(const std::string& cell) {
   parameter_reply = base + "parameter_reply";
 }
 
-CellClient::CellClient(Node& node)
+CellClient::CellClient(Node& node, const std::string& cell)
     : client_{(std::uint64_t{std::random_device{}()} << 32U) | std::random_device{}()},
-      lifecycle_{node.writer<lifecycle::LifecycleRequest>(
-          ServiceTopics{node.options().cell}.lifecycle_request, "request")},
-      parameter_{node.writer<lifecycle::ParameterRequest>(
-          ServiceTopics{node.options().cell}.parameter_request, "request")} {
-  const ServiceTopics topics{node.options().cell};
+      lifecycle_{
+          node.writer<lifecycle::LifecycleRequest>(topics_of(node, cell).lifecycle_request, "request")},
+      parameter_{
+          node.writer<lifecycle::ParameterRequest>(topics_of(node, cell).parameter_request, "request")} {
+  const ServiceTopics topics = topics_of(node, cell);
   readers_.push_back(listen(node, topics.lifecycle_reply, lifecycle_replies_));
   readers_.push_back(listen(node, topics.parameter_reply, parameter_replies_));
   readers_.push_back(

@@ -26,7 +26,8 @@ struct ServiceTopics {
 /// Any thread.
 class CellClient {
  public:
-  explicit CellClient(Node& node);
+  /// `cell`: its name, where it is not the node's own.
+  explicit CellClient(Node& node, const std::string& cell = "");
 
   /// The newest status of each process and component that was heard of, by name.
   [[nodiscard]] std::vector<lifecycle::ProcessStatus> processes() const;

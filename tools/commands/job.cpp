@@ -9,7 +9,10 @@ void add_job(CLI::App& program) {
   auto* group = program.add_subcommand(
       "job", "Run, watch and cancel the jobs of a cell; compare runs with simulations");
   group->require_subcommand(1);
-  group->footer("Example: invar job compare --recording recording.csv.gz --machine model.yaml");
+  group->footer(
+      "Example: invar job run deployment/xy-table.yaml calibrate-geometry\n"
+      "         invar job compare --recording recording.csv.gz --machine model.yaml");
+  add_job_run(*group);
   add_job_compare(*group);
 }
 

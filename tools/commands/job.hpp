@@ -6,5 +6,7 @@
 namespace invar::tools {
 
 void add_job_compare(CLI::App& job);
+/// run, list, cancel
+void add_job_run(CLI::App& job);
 
 }  // namespace invar::tools

@@ -1,0 +1,409 @@
+#!/usr/bin/env python3
+"""The commands that look at and act on a running cell, against a small real one in real time.
+
+Usage: commands_test.py INVAR SOURCE_FOLDER
+The cell runs on a random DDS domain and free ports of the loopback, in a temporary folder.
+"""
+import json
+import os
+import pathlib
+import random
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+INVAR = sys.argv.pop(1)
+SOURCE = pathlib.Path(sys.argv.pop(1))
+DOMAIN = random.SystemRandom().randrange(100, 200)
+
+CELL = """
+invar_cell: 1
+name: small
+id: 7
+domain: {domain}
+time: real
+profiles: {source}/deployment/profiles.yaml
+hosts:
+  pc: {{address: 127.0.0.1}}
+processes:
+  motion:
+    host: pc
+    rate: 1000
+    components:
+      world:
+        type: simulated_stage
+        machine: {source}/deployment/machines/xy-table.yaml
+        x: {{mass: 3.2, motor_constant: 12.0, viscous_damping: 18.0}}
+        y: {{mass: 7.5, motor_constant: 24.0, viscous_damping: 30.0}}
+        connect: {{motor_x: stage_x.motor, motor_y: stage_y.motor}}
+        publish: {{tool: 50, feedback_x: 50, feedback_y: 50}}
+      laser:
+        type: interferometer
+        connect: {{tool: world.tool}}
+        publish: {{reading: 100}}
+      compensation:
+        type: compensation
+        axes: 2
+        connect: {{state_x: stage_x.state, state_y: stage_y.state}}
+        publish: {{correction_x: 50, correction_y: 50}}
+      stage_x:
+        type: stage
+        axis: 0
+        travel: [0, 0.2]
+        control: {{kp: 4.0e4, ki: 8.0e5, kd: 300, velocity_filter: 300, limit: 10}}
+        connect: {{feedback: world.feedback_x, correction: compensation.correction_x}}
+        publish: {{state: 100, motor: 50}}
+      stage_y:
+        type: stage
+        axis: 1
+        travel: [0, 0.2]
+        control: {{kp: 4.7e4, ki: 9.0e5, kd: 350, velocity_filter: 300, limit: 10}}
+        connect: {{feedback: world.feedback_y, correction: compensation.correction_y}}
+        publish: {{state: 100, motor: 50}}
+  heat:
+    host: pc
+    rate: 10
+    components:
+      heater:
+        type: simulated_heater
+        map: {source}/deployment/maps/heater.yaml
+        port: {port}
+      thermal:
+        type: thermal
+        modbus: {{host: 127.0.0.1, port: {port}, map: {source}/deployment/maps/heater.yaml}}
+        setpoint: 30
+        power_limit: 120
+        pid: {{kp: 60, ki: 0.4, kd: 0}}
+  calibration:
+    host: pc
+    rate: 100
+    components:
+      calibration:
+        type: calibration
+        axes: 2
+        connect:
+          state_x: stage_x.state
+          state_y: stage_y.state
+          command_x: stage_x.command
+          command_y: stage_y.command
+          reading: laser.reading
+          beam: laser.beam
+          model: compensation.model
+          model_status: compensation.status
+        jobs:
+          - name: long
+            machine: {source}/deployment/machines/xy-table-nominal.yaml
+            interval: 0.01
+            verify_interval: 0.01
+            cycles: 5
+            readings: 4
+            out: out
+            lines:
+              - {{name: X, from: [0, 0], to: [0.2, 0]}}
+              - {{name: Y, from: [0, 0], to: [0, 0.2]}}
+            verify:
+              - {{name: diagonal, from: [0, 0], to: [0.2, 0.2]}}
+jobs: {{long: calibration}}
+"""
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Call:
+    """A command in the background; its end gives status, output and errors."""
+
+    def __init__(self, *words, env=None):
+        self.process = subprocess.Popen([INVAR, *map(str, words)], cwd=FOLDER, stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, text=True, env=env)
+
+    def end(self):
+        out, err = self.process.communicate(timeout=60)
+        return self.process.returncode, out, err
+
+    def interrupt(self):
+        self.process.send_signal(signal.SIGINT)
+        return self.end()
+
+
+def invar(*words, env=None):
+    return Call(*words, env=env).end()
+
+
+def setUpModule():
+    global FOLDER, CELL_FILE, cell
+    print("domain", DOMAIN, file=sys.stderr)
+    FOLDER = pathlib.Path(tempfile.mkdtemp(prefix="invar-commands-"))
+    CELL_FILE = FOLDER / "small.yaml"
+    CELL_FILE.write_text(CELL.format(domain=DOMAIN, source=SOURCE, port=free_port()))
+    with open(FOLDER / "cell.log", "w") as log:
+        cell = subprocess.Popen([INVAR, "run", CELL_FILE, "--real-time"], cwd=FOLDER, stdout=log, stderr=log)
+    for _ in range(20):
+        status, out, _err = invar("status", CELL_FILE, "--wait", 5, "--json")
+        if status == 0 and all(c["state"] == "active" for c in json.loads(out)["components"]):
+            return
+        if cell.poll() is not None:
+            break
+    raise RuntimeError("the cell does not come up: " + out + (FOLDER / "cell.log").read_text())
+
+
+def tearDownModule():
+    cell.send_signal(signal.SIGINT)
+    cell.wait(timeout=60)
+    shutil.rmtree(FOLDER)
+
+
+class Looking(unittest.TestCase):
+    def test_looks_at_the_running_cell(self):
+        # All at once: they wait for discovery most of the time.
+        calls = {
+            "status": Call("status", CELL_FILE, "--wait", 20),
+            "domain": Call("status", "--domain", DOMAIN, "--address", "127.0.0.1", "--json", "--wait", 20),
+            "top": Call("top", CELL_FILE, "--once", "--interval", 3, "--json", "--wait", 20),
+            "topics": Call("topics", CELL_FILE, "--json", "--wait", 20),
+            "echo": Call("echo", CELL_FILE, "stage_x.state", "--count", 3, "--json", "--wait", 20),
+            "text": Call("echo", CELL_FILE, "cell/small/thermal/state", "--count", 1, "--wait", 20),
+            "hz": Call("hz", CELL_FILE, "stage_x.state", "--duration", 3, "--json", "--wait", 20),
+        }
+        ends = {name: call.end() for name, call in calls.items()}
+        for name, (status, out, err) in ends.items():
+            self.assertEqual(status, 0, (name, out, err))
+
+        text = ends["status"][1]
+        for word in ("motion", "heat", "calibration", "stage_x", "simulated_stage", "active", "not asked"):
+            self.assertIn(word, text)
+        self.assertNotIn("\x1b", text, "no colours in a pipe")
+
+        answer = json.loads(ends["domain"][1])
+        self.assertEqual(answer["cell"], "small")
+        self.assertEqual({p["name"] for p in answer["processes"]}, {"motion", "heat", "calibration"})
+        motion = next(p for p in answer["processes"] if p["name"] == "motion")
+        self.assertEqual(motion["rate"], 1000)
+        self.assertTrue(pathlib.Path(f"/proc/{motion['pid']}").exists())
+
+        top = json.loads(ends["top"][1])
+        self.assertIn("cell/small/stage_x/state", top["topics"])
+        self.assertGreater(top["topics"]["cell/small/stage_x/state"]["rate"], 10)
+
+        topics = {t["topic"]: t for t in json.loads(ends["topics"][1])}
+        state = topics["cell/small/stage_x/state"]
+        self.assertEqual([w["participant"] for w in state["writers"]], ["invar/small/motion/realtime"])
+        self.assertIn("invar/small/calibration/realtime", [r["participant"] for r in state["readers"]])
+        self.assertEqual(state["problems"], [])
+
+        samples = [json.loads(line) for line in ends["echo"][1].splitlines()]
+        self.assertEqual(len(samples), 3)
+        self.assertEqual(samples[0]["value"]["cell"], 7)
+        self.assertLess(samples[0]["sequence"], samples[2]["sequence"])
+        self.assertIn("degC", ends["text"][1])
+
+        writer = json.loads(ends["hz"][1].splitlines()[-1])["writers"][0]
+        self.assertGreater(writer["samples"], 50)
+        self.assertAlmostEqual(writer["rate"], 100, delta=30)
+
+    def test_says_when_nothing_answers(self):
+        calls = [Call("status", "--domain", 99, "--wait", 0.3, "--address", "127.0.0.1"),
+                 Call("echo", CELL_FILE, "stage_x.nothing", "--wait", 2),
+                 Call("hz", CELL_FILE, "stage_x.nothing", "--wait", 2)]
+        for call, words in zip(calls, ("no cell answers in domain 99", "nobody writes `cell/small/stage_x/nothing`",
+                                       "nobody writes")):
+            status, _, err = call.end()
+            self.assertEqual(status, 1)
+            self.assertIn(words, err)
+
+
+class Acting(unittest.TestCase):
+    def test_lifecycle_takes_a_component_down_and_up(self):
+        self.assertEqual(invar("lifecycle", CELL_FILE, "laser", "deactivate"), (0, "laser: inactive\n", ""))
+        self.assertEqual(invar("lifecycle", CELL_FILE, "laser", "activate"), (0, "laser: active\n", ""))
+        status, _, err = invar("lifecycle", CELL_FILE, "laser", "cleanup")
+        self.assertEqual(status, 1)
+        self.assertIn("laser", err)
+
+    def test_parameters_are_listed_read_and_changed_within_their_bounds(self):
+        status, out, err = invar("param", "list", CELL_FILE, "thermal", "--json")
+        self.assertEqual(status, 0, err)
+        known = {p["path"]: p for p in json.loads(out)}
+        self.assertEqual(known["setpoint"]["unit"], "degC")
+        self.assertEqual(known["setpoint"]["value"], "30")
+        self.assertEqual(invar("param", "set", CELL_FILE, "thermal", "setpoint", "31.5"), (0, "31.5 degC\n", ""))
+        self.assertEqual(invar("param", "get", CELL_FILE, "thermal", "setpoint"), (0, "31.5 degC\n", ""))
+        status, _, err = invar("param", "set", CELL_FILE, "thermal", "setpoint", "3000")
+        self.assertEqual(status, 1)
+        self.assertRegex(err, r"setpoint|3000")
+        status, _, err = invar("param", "get", CELL_FILE, "thermal", "setpiont")
+        self.assertEqual(status, 1)
+        self.assertIn("has no parameter `setpiont`", err)
+
+    def test_jobs_are_listed_run_and_cancelled(self):
+        status, out, err = invar("job", "list", CELL_FILE)
+        self.assertEqual(status, 0, err)
+        self.assertRegex(out, r"long +calibration +idle")
+        running = Call("job", "run", CELL_FILE, "long")
+        self.wait_for_phase("running")
+        self.assertEqual(invar("job", "run", CELL_FILE, "long")[0], 1, "one at a time")
+        self.assertEqual(invar("job", "cancel", CELL_FILE), (0, "long: cancelled\n", ""))
+        status, out, err = running.end()
+        self.assertEqual(status, 1)
+        self.assertIn("long: cancelled", out)
+        self.assertIn("%", err)
+        again = Call("job", "run", CELL_FILE, "long")
+        self.wait_for_phase("running")
+        status, out, err = again.interrupt()  # Ctrl-C cancels the job
+        self.assertEqual(status, 1)
+        self.assertIn("long: cancelled", out)
+        status, _, err = invar("job", "cancel", CELL_FILE)
+        self.assertEqual(status, 1)
+        self.assertIn("no job is running", err)
+
+    def wait_for_phase(self, wanted):
+        for _ in range(20):
+            _, out, _ = invar("job", "list", CELL_FILE, "--json")
+            if json.loads(out)[0]["phase"] == wanted:
+                return
+        self.fail(f"the job does not get to {wanted}: {out}")
+
+    def test_what_is_recorded_is_replayed_sample_by_sample(self):
+        by_time = Call("record", CELL_FILE, "--out", "all.mcap", "--duration", 2, "--json")
+        by_hand = Call("record", CELL_FILE, "--out", "one.mcap", "--topic", "stage_x.state")
+        time.sleep(5)
+        status, out, err = by_hand.interrupt()
+        self.assertEqual(status, 0, err)
+        self.assertRegex(out, r"cell/small/stage_x/state +\d+ +0 +\d+")
+        status, out, err = by_time.end()
+        self.assertEqual(status, 0, err)
+        ledger = json.loads(out)
+        self.assertEqual(ledger["lost"], 0)
+        self.assertGreater(len(ledger["channels"]), 5)
+
+        status, out, _ = invar("recording", "info", "one.mcap", "--json")
+        recorded = json.loads(out)["channels"][0]
+        self.assertEqual(status, 0)
+        self.assertEqual(recorded["type"], "invar::stage::AxisState")
+
+        status, _, err = invar("replay", CELL_FILE, "one.mcap")
+        self.assertEqual(status, 1)
+        self.assertIn("is written already", err)
+
+        elsewhere = ("--domain", DOMAIN + 1, "--address", "127.0.0.1")
+        hearer = Call("echo", *elsewhere, "--cell", "small", "cell/small/stage_x/state", "--json", "--wait", 30)
+        status, out, err = invar("replay", *elsewhere, "one.mcap", "--rate", 4)
+        self.assertEqual(status, 0, err)
+        self.assertRegex(out, rf"stage_x/state +{recorded['messages']} ")
+        time.sleep(1)
+        status, out, err = hearer.interrupt()
+        self.assertEqual(status, 0, err)
+        heard = [json.loads(line)["value"] for line in out.splitlines()]
+        self.assertEqual(invar("export", "one.mcap", "--out", "tables", "--json")[0], 0)
+        table = next((FOLDER / "tables").glob("*.jsonl"))
+        sent = [json.loads(line) for line in table.read_text().splitlines()]
+        self.assertGreater(len(heard), 0.5 * len(sent))  # best effort: some may be missing, none may differ
+        times = {s.get("value", s)["at"]["time_ns"] for s in sent}
+        self.assertTrue(all(h["at"]["time_ns"] in times for h in heard))
+
+
+class OnThisHost(unittest.TestCase):
+    def test_doctor_says_one_line_a_thing(self):
+        status, out, _ = invar("doctor")
+        self.assertIn(status, (0, 1))
+        for line in out.splitlines():
+            self.assertRegex(line, r"^(good|note|BAD) +\S.*: \S")
+        self.assertEqual(status == 1, "\nBAD" in "\n" + out)
+        self.assertIn("interface lo: 127.0.0.1", out)
+        self.assertIn("/dev/shm", out)
+        levels = {f["level"] for f in json.loads(invar("doctor", "--json")[1])}
+        self.assertLessEqual(levels, {"good", "note", "bad"})
+
+    def test_latency_test_counts_every_cycle(self):
+        status, out, _ = invar("latency-test", "--rate", 500, "--duration", 0.4, "--json")
+        self.assertEqual(status, 0)
+        result = json.loads(out)
+        self.assertGreater(result["cycles"], 0)
+        self.assertLessEqual(result["cycles"], 200)
+        late = result["lateness_ns"]
+        self.assertLessEqual(late["50"], late["99"])
+        self.assertLessEqual(late["99"], late["max"])
+        status, out, _ = invar("latency-test", "--rate", 500, "--duration", 0.1, "--priority", 0, "--no-lock")
+        self.assertEqual(status, 0)
+        self.assertIn("overruns", out)
+
+    def test_profiles_as_xml_are_taken_by_fast_dds(self):
+        self.assertIn("realtime", invar("profiles")[1])
+        status, xml, _ = invar("profiles", "--xml", "fastdds")
+        self.assertEqual(status, 0)
+        good, bad = FOLDER / "good.xml", FOLDER / "bad.xml"
+        good.write_text(xml)
+        bad.write_text(xml.replace("KEEP_LAST", "KEEP_LOST"))
+        # Fast DDS reads the file when the first participant is made, and complains on its error output.
+        for file, complains in ((good, False), (bad, True)):
+            env = dict(os.environ, FASTRTPS_DEFAULT_PROFILES_FILE=str(file))
+            _, out, err = invar("status", "--domain", 98, "--address", "127.0.0.1", "--wait", 0.1, env=env)
+            self.assertEqual("XML" in out + err, complains, out + err)
+        import xml.etree.ElementTree as tree
+        names = [p.get("name") for p in tree.fromstring(invar("profiles", "--xml", "cyclone")[1].encode()).iter()
+                 if p.tag.endswith("qos_profile")]
+        self.assertIn("realtime", names)
+
+
+class WrongCalls(unittest.TestCase):
+    def test_wrong_calls_end_with_status_2_and_say_why(self):
+        (FOLDER / "broken.yaml").write_text("invar_cell: 1\nname: [\n")
+        (FOLDER / "broken.mcap").write_text("this is no recording\n")
+        for words, why in (
+                (["status"], "which cell is meant"),
+                (["status", "nowhere.yaml"], "nowhere.yaml"),
+                (["status", "broken.yaml"], "broken.yaml"),
+                (["status", "--domain", "300"], "300"),
+                (["status", CELL_FILE, "more"], "more"),
+                (["top", CELL_FILE, "--interval", "-1"], "interval"),
+                (["topics", "--domain", DOMAIN, CELL_FILE], "one word too many"),
+                (["echo", CELL_FILE], "TOPIC is missing"),
+                (["echo", CELL_FILE, "a.b", "--count", "many"], "many"),
+                (["hz", CELL_FILE], "TOPIC is missing"),
+                (["hz", CELL_FILE, "a.b", "--duration", "0"], "duration"),
+                (["lifecycle", CELL_FILE, "laser"], "TRANSITION is missing"),
+                (["lifecycle", CELL_FILE, "laser", "explode"], "`explode` is no transition"),
+                (["lifecycle", CELL_FILE, "lazer", "activate"], "`lazer` is no component"),
+                (["lifecycle", CELL_FILE, "laser", "stop"], "only processes are stopped"),
+                (["param", "get", CELL_FILE, "thermal"], "PATH is missing"),
+                (["param", "set", CELL_FILE, "thermal", "setpoint"], "VALUE is missing"),
+                (["param", "list", CELL_FILE, "thermol"], "`thermol` is no component"),
+                (["job", "run", CELL_FILE], "JOB is missing"),
+                (["job", "run", CELL_FILE, "lnog"], "there are: long"),
+                (["record", CELL_FILE], "--out"),
+                (["record", CELL_FILE, "--out", "nowhere/../broken.yaml/x.mcap"], "broken.yaml"),
+                (["replay", CELL_FILE], "FILE is missing"),
+                (["replay", CELL_FILE, "broken.mcap"], "broken.mcap"),
+                (["replay", CELL_FILE, "nothing.mcap"], "nothing.mcap"),
+                (["doctor", "--what"], "--what"),
+                (["latency-test", "--rate", "0"], "rate"),
+                (["latency-test", "--cpu", "4000"], "no core 4000"),
+                (["profiles", "nowhere.yaml"], "nowhere.yaml"),
+                (["profiles", "--xml", "word"], "word")):
+            with self.subTest(" ".join(map(str, words))):
+                status, out, err = invar(*words)
+                self.assertEqual(status, 2, out + err)
+                self.assertIn(why, err)
+                self.assertEqual(err.count("\n"), 1, err)
+
+    def test_help_has_an_example(self):
+        for words in (["status"], ["top"], ["topics"], ["echo"], ["hz"], ["lifecycle"], ["param", "list"],
+                      ["param", "get"], ["param", "set"], ["job", "run"], ["job", "list"], ["job", "cancel"],
+                      ["record"], ["replay"], ["doctor"], ["latency-test"], ["profiles"]):
+            status, out, _ = invar(*words, "--help")
+            self.assertEqual(status, 0)
+            self.assertIn("Example: invar " + " ".join(words), out)
+            self.assertIn("xit status", out)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,101 @@
+// `invar hz`: how often a topic's samples come, how evenly, and how many are missing.
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "tools/live/commands.hpp"
+#include "tools/live/interrupt.hpp"
+#include "tools/live/live_cell.hpp"
+#include "tools/live/text_table.hpp"
+#include "tools/live/topic_watch.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  explicit Options(CLI::App& command)
+      : call{command, {{"TOPIC", "a topic's full name, or component.port"}}} {}
+  CellCall call;
+  double duration = 0.0;
+  bool json = false;
+};
+
+void print(const TopicWatch& watch, const std::string& topic, bool json) {
+  const auto flows = watch.flows();
+  const auto found = flows.find(topic);
+  if (found == flows.end()) return;
+  TextTable table{{"writer", "samples>", "rate [Hz]>", "interval mean [ms]>", "deviation [ms]>", "shortest>",
+                   "longest>", "missing>"}};
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& [writer, flow] : found->second) {
+    const double rate = flow.mean > 0.0 ? 1.0 / flow.mean : 0.0;
+    if (json)
+      list.push_back({{"writer", writer},
+                      {"samples", flow.samples},
+                      {"rate", rate},
+                      {"interval_mean", flow.mean},
+                      {"interval_deviation", flow.deviation()},
+                      {"interval_shortest", flow.shortest},
+                      {"interval_longest", flow.longest},
+                      {"missing", flow.missing}});
+    else
+      table.add({writer, std::to_string(flow.samples), number_text(rate), number_text(flow.mean * 1e3),
+                 number_text(flow.deviation() * 1e3), number_text(flow.shortest * 1e3),
+                 number_text(flow.longest * 1e3), std::to_string(flow.missing)});
+  }
+  if (json)
+    std::cout << nlohmann::ordered_json{{"topic", topic}, {"writers", list}}.dump() << std::endl;
+  else
+    table.print(std::cout);
+}
+
+int hz(Options& options) {
+  using Clock = std::chrono::steady_clock;
+  options.call.resolve();
+  (void)interrupted();
+  LiveCell cell{options.call};
+  if (!cell.found()) {
+    cell.say_not_found("invar hz");
+    return 1;
+  }
+  const std::string topic = cell.topic(options.call.word(0));
+  if (cell.wait_for_writers(options.call.word(0)).empty()) {
+    std::cerr << "invar hz: nobody writes `" << topic << "` within " << cell.patience().in_seconds()
+              << " s; `invar topics` lists what there is\n";
+    return 1;
+  }
+  TopicWatch watch{cell.node(), [&](const std::string& name) { return name == topic; }};
+  watch.look();
+  const auto begin = Clock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  while (sleep_for(Duration::seconds(options.duration > 0.0 ? options.duration - elapsed() : 2.0)) &&
+         options.duration <= 0.0)
+    print(watch, topic, options.json);
+  if (options.duration > 0.0 || interrupted()) print(watch, topic, options.json);
+  const auto flows = watch.flows();
+  const auto found = flows.find(topic);
+  return found != flows.end() && !found->second.empty() ? 0 : 1;
+}
+
+}  // namespace
+
+void add_hz(CLI::App& program) {
+  auto* command = program.add_subcommand("hz", "Measure a topic's rate, its jitter and its losses");
+  command->footer(
+      "Example: invar hz deployment/xy-table.yaml stage_x.state --duration 5\n"
+      "Intervals are between the times at which the writer sent; missing samples are gaps in its numbers.\n"
+      "Ctrl-C ends it. Exit status: 0; 1 nothing came; 2 a fault of the call or the file");
+  auto options = std::make_shared<Options>(*command);
+  command
+      ->add_option("--duration", options->duration,
+                   "end after this time [s]; otherwise every 2 s until Ctrl-C")
+      ->check(CLI::PositiveNumber);
+  command->add_flag("--json", options->json, "one JSON object a look");
+  command->callback([options] {
+    if (const int result = hz(*options); result != 0) throw CLI::RuntimeError(result);
+  });
+}
+
+}  // namespace invar::tools

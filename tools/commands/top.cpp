@@ -1,0 +1,174 @@
+// `invar top`: the state of a running cell and the rates of its topics, again and again.
+#include <unistd.h>
+
+#include <chrono>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "tools/live/commands.hpp"
+#include "tools/live/interrupt.hpp"
+#include "tools/live/live_cell.hpp"
+#include "tools/live/status_view.hpp"
+#include "tools/live/text_table.hpp"
+#include "tools/live/topic_watch.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct Options {
+  explicit Options(CLI::App& command) : call{command, {}} {}
+  CellCall call;
+  double interval = 1.0;
+  bool once = false;
+  bool json = false;
+  bool no_topics = false;
+};
+
+struct Rate {
+  double samples = 0.0, bytes = 0.0;  // per second
+  std::uint64_t missing = 0;          // since the start
+};
+
+/// Rates from the counts of one look to the next.
+class Rates {
+ public:
+  std::map<std::string, Rate> next(const TopicWatch& watch) {
+    const auto now = Clock::now();
+    const double span = std::chrono::duration<double>(now - at_).count();
+    at_ = now;
+    std::map<std::string, Rate> rates;
+    for (const auto& [topic, writers] : watch.flows()) {
+      Flow sum;
+      for (const auto& [writer, flow] : writers) {
+        sum.samples += flow.samples;
+        sum.bytes += flow.bytes;
+        sum.missing += flow.missing;
+      }
+      const Flow& before = before_[topic];
+      rates[topic] = {static_cast<double>(sum.samples - before.samples) / span,
+                      static_cast<double>(sum.bytes - before.bytes) / span, sum.missing};
+      before_[topic] = sum;
+    }
+    return rates;
+  }
+
+ private:
+  Clock::time_point at_ = Clock::now();
+  std::map<std::string, Flow> before_;
+};
+
+/// A process whose status does not get newer for three seconds is silent.
+class Silence {
+ public:
+  std::set<std::string> of(const std::vector<lifecycle::ProcessStatus>& processes) {
+    std::set<std::string> silent;
+    const auto now = Clock::now();
+    for (const auto& process : processes) {
+      auto& last = last_[process.process_name().c_str()];
+      const std::pair stamp{process.at().time_ns(), process.cycles()};
+      // In simulated time the cell's clock may stand while its processes wait: cycles do not count there.
+      if (last.first != stamp || process.simulated()) last = {stamp, now};
+      if (now - last.second > std::chrono::seconds{3}) silent.insert(process.process_name().c_str());
+    }
+    return silent;
+  }
+
+ private:
+  std::map<std::string, std::pair<std::pair<std::int64_t, std::uint64_t>, Clock::time_point>> last_;
+};
+
+void show(const CellStatus& status, const std::map<std::string, Rate>& rates, bool topics,
+          std::ostream& out) {
+  print(status, out);
+  if (!topics) return;
+  TextTable table{{"topic", "rate [Hz]>", "kB/s>", "missing>"}};
+  for (const auto& [topic, rate] : rates)
+    table.add(
+        {topic, number_text(rate.samples), number_text(rate.bytes * 1e-3), std::to_string(rate.missing)});
+  out << '\n';
+  table.print(out);
+}
+
+int top(Options& options) {
+  options.call.resolve();
+  (void)interrupted();
+  LiveCell cell{options.call};
+  CellStatus status;
+  status.cell = cell.name();
+  if (cell.found()) status.missing = cell.wait_for_processes();
+  if (!cell.found() || cell.client().processes().empty()) {
+    cell.say_not_found("invar top");
+    return 1;
+  }
+  TopicWatch watch{cell.node(), [&](const std::string& topic) {
+                     return !options.no_topics && topic.starts_with("cell/" + cell.name() + "/") &&
+                            !is_service_topic(topic);
+                   }};
+  watch.look();
+  if (options.once) sleep_for(Duration::seconds(1.0));  // readers connect
+  Rates rates;
+  Silence silence;
+  const bool screen = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
+  do {
+    if (!sleep_for(Duration::seconds(options.interval))) break;
+    status.processes = cell.client().processes();
+    status.components = cell.client().components();
+    status.silent = silence.of(status.processes);
+    std::erase_if(status.missing, [&](const std::string& name) {
+      return std::any_of(status.processes.begin(), status.processes.end(),
+                         [&](const auto& p) { return name == p.process_name().c_str(); });
+    });
+    const auto now = rates.next(watch);
+    if (options.json) {
+      auto json = to_json(status);
+      for (const auto& [topic, rate] : now)
+        json["topics"][topic] = {
+            {"rate", rate.samples}, {"bytes_per_second", rate.bytes}, {"missing", rate.missing}};
+      std::cout << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+    } else {
+      std::ostringstream text;
+      show(status, now, !options.no_topics, text);
+      // Home, the text, and what is left of an earlier longer one cleared line by line: no flicker.
+      std::string page = text.str();
+      if (screen) {
+        for (std::size_t at = 0; (at = page.find('\n', at)) != std::string::npos; at += 4)
+          page.replace(at, 1, "\x1b[K\n");
+        page = "\x1b[H" + page + "\x1b[J";
+      }
+      std::cout << page << (screen || options.once ? "" : "\n") << std::flush;
+    }
+    watch.look();
+  } while (!options.once && !interrupted());
+  return options.once && !status.healthy() ? 1 : 0;
+}
+
+}  // namespace
+
+void add_top(CLI::App& program) {
+  auto* command =
+      program.add_subcommand("top", "Watch a running cell: states, loops, latencies, topic rates");
+  command->footer(
+      "Example: invar top deployment/xy-table.yaml\n"
+      "         invar top --domain 71 --once --no-topics\n"
+      "Ctrl-C ends it. Topic rates are counted by reading the topics, which costs the cell's network that "
+      "much.\n"
+      "Exit status: 0; 1 no cell answers, or with --once something is not well; 2 a fault of the call or the "
+      "file");
+  auto options = std::make_shared<Options>(*command);
+  command->add_option("--interval", options->interval, "between two looks [s] (1)")
+      ->check(CLI::Range(0.05, 3600.0));
+  command->add_flag("--once", options->once, "one look, then end");
+  command->add_flag("--no-topics", options->no_topics, "leave the topics alone");
+  command->add_flag("--json", options->json, "one JSON object a look");
+  command->callback([options] {
+    if (const int result = top(*options); result != 0) throw CLI::RuntimeError(result);
+  });
+}
+
+}  // namespace invar::tools

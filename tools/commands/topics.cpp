@@ -1,0 +1,123 @@
+// `invar topics`: what is written and read in a cell's domain, and which ends do not meet.
+#include <iostream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "tools/live/commands.hpp"
+#include "tools/live/live_cell.hpp"
+#include "tools/live/text_table.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+struct Options {
+  explicit Options(CLI::App& command) : call{command, {}} {}
+  CellCall call;
+  bool all = false;
+  bool json = false;
+};
+
+struct Topic {
+  std::vector<dds::Endpoint> writers, readers;
+  std::vector<std::string> problems;
+};
+
+std::string qos_text(const dds::Profile& qos) {
+  std::string text = qos.reliable ? "reliable" : "best effort";
+  if (qos.durability == dds::Durability::transient_local) text += ", transient local";
+  if (qos.durability > dds::Durability::transient_local) text += ", persistent";
+  if (qos.exclusive) text += ", exclusive (" + std::to_string(qos.strength) + ")";
+  const auto time = [&](const char* what, Duration value) {
+    if (value.ns != 0)
+      text += std::string{", "} + what + " " + number_text(static_cast<double>(value.ns) * 1e-6) + " ms";
+  };
+  time("deadline", qos.deadline);
+  time("lifespan", qos.lifespan);
+  time("lease", qos.lease);
+  return text;
+}
+
+std::map<std::string, Topic> topics_of(const dds::Snapshot& snapshot, bool all) {
+  std::map<std::string, Topic> topics;
+  for (const auto& end : snapshot.endpoints) {
+    if (end.is_local || (!all && is_service_topic(end.topic))) continue;
+    Topic& topic = topics[end.topic];
+    (end.is_writer ? topic.writers : topic.readers).push_back(end);
+  }
+  for (auto& [name, topic] : topics)
+    for (const auto& writer : topic.writers)
+      for (const auto& reader : topic.readers) {
+        std::string why;
+        if (writer.type != reader.type)
+          why = "type: " + writer.type + " is sent, " + reader.type + " is read";
+        for (const auto& mismatch : dds::mismatches(writer.qos, reader.qos))
+          why += (why.empty() ? "" : "; ") + mismatch.text();
+        if (!why.empty())
+          topic.problems.push_back(writer.participant + " -> " + reader.participant + ": " + why);
+      }
+  return topics;
+}
+
+nlohmann::ordered_json json_of(const std::vector<dds::Endpoint>& ends) {
+  auto list = nlohmann::ordered_json::array();
+  for (const auto& end : ends)
+    list.push_back({{"participant", end.participant}, {"type", end.type}, {"qos", qos_text(end.qos)}});
+  return list;
+}
+
+int topics(Options& options) {
+  options.call.resolve();
+  LiveCell cell{options.call};
+  if (cell.found() && cell.file() != nullptr) cell.wait_for_processes();
+  cell.settle();
+  const auto found = topics_of(cell.node().snapshot(), options.all);
+  bool good = !found.empty();
+  if (options.json) {
+    auto json = nlohmann::ordered_json::array();
+    for (const auto& [name, topic] : found) {
+      json.push_back({{"topic", name},
+                      {"writers", json_of(topic.writers)},
+                      {"readers", json_of(topic.readers)},
+                      {"problems", topic.problems}});
+      good = good && topic.problems.empty();
+    }
+    std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+  } else {
+    TextTable table{{"topic", "type", "writers>", "readers>", "qos of the writer"}};
+    for (const auto& [name, topic] : found) {
+      const auto& end = topic.writers.empty() ? topic.readers.front() : topic.writers.front();
+      table.add({name, end.type, std::to_string(topic.writers.size()), std::to_string(topic.readers.size()),
+                 topic.writers.empty() ? "(nobody writes)" : qos_text(end.qos)});
+    }
+    if (!table.empty()) table.print(std::cout);
+    for (const auto& [name, topic] : found)
+      for (const auto& problem : topic.problems) {
+        std::cout << "no samples flow on " << name << ": " << problem << '\n';
+        good = false;
+      }
+  }
+  if (found.empty()) cell.say_not_found("invar topics");
+  return good ? 0 : 1;
+}
+
+}  // namespace
+
+void add_topics(CLI::App& program) {
+  auto* command =
+      program.add_subcommand("topics", "List a running cell's topics, their types, ends and mismatches");
+  command->footer(
+      "Example: invar topics deployment/xy-table.yaml\n"
+      "Exit status: 0; 1 no topic was found, or a writer and a reader of one topic do not meet; 2 a fault of "
+      "the "
+      "call or the file");
+  auto options = std::make_shared<Options>(*command);
+  command->add_flag("--all", options->all, "also the topics by which processes are watched and kept in step");
+  command->add_flag("--json", options->json, "print it as JSON, with every writer and reader");
+  command->callback([options] {
+    if (const int result = topics(*options); result != 0) throw CLI::RuntimeError(result);
+  });
+}
+
+}  // namespace invar::tools

@@ -1,0 +1,231 @@
+#include "tools/live/live_cell.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <set>
+
+#include "tools/live/interrupt.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
+constexpr Duration look = Duration::milliseconds(50);
+
+/// Waits until `condition`, Ctrl-C or the end of patience.
+template <class Condition>
+bool wait_until(Duration patience, Condition condition) {
+  const auto end = Clock::now() + std::chrono::nanoseconds{patience.ns};
+  while (!condition()) {
+    if (Clock::now() > end || !sleep_for(look)) return false;
+  }
+  return true;
+}
+
+/// The structure of the cell file only: what components ask for is no matter here.
+std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file) {
+  const config::Yaml yaml = config::Yaml::load(file);
+  auto cell = std::make_unique<config::Cell>(config::read_cell(yaml));
+  for (const auto& process : cell->processes)
+    for (const auto& component : process.components) component.node.accept_all();
+  yaml.finish();
+  return cell;
+}
+
+/// "invar/<cell>/<process>" and "invar/<cell>/<process>/realtime".
+std::string cell_of_participant(const std::string& name) {
+  constexpr std::string_view prefix = "invar/";
+  if (!name.starts_with(prefix)) return "";
+  const auto end = name.find('/', prefix.size());
+  if (end == std::string::npos) return "";
+  const std::string cell = name.substr(prefix.size(), end - prefix.size());
+  return cell == tools_name ? "" : cell;
+}
+
+std::set<std::string> cells_in(const dds::Snapshot& snapshot) {
+  std::set<std::string> cells;
+  for (const auto& participant : snapshot.participants)
+    if (const auto cell = cell_of_participant(participant.name); !cell.empty()) cells.insert(cell);
+  return cells;
+}
+
+}  // namespace
+
+CellCall::CellCall(CLI::App& app, std::vector<Word> words)
+    : command{"invar " +
+              (app.get_parent() != nullptr && app.get_parent()->get_parent() != nullptr
+                   ? app.get_parent()->get_name() + " "
+                   : "") +
+              app.get_name()},
+      described_{std::move(words)},
+      words_(described_.size() + 1) {
+  app.add_option("CELL", words_[0], "the cell file; left out with --domain");
+  for (std::size_t i = 0; i < described_.size(); ++i)
+    app.add_option(described_[i].name, words_[i + 1], described_[i].help);
+  app.add_option("--domain", domain, "the cell's DDS domain, instead of its file")->check(CLI::Range(0, 232));
+  app.add_option("--cell", cell, "its name, where several cells share the domain");
+  app.add_option("--address", addresses, "look only on this address of this PC, with --domain")
+      ->allow_extra_args(false);
+  app.add_option("--wait", patience, "how long to wait for the cell [s] (5)")->check(CLI::Range(0.1, 3600.0));
+}
+
+void CellCall::resolve() {
+  if (domain >= 0) {
+    if (!words_.back().empty())
+      throw InputError{command, "has one word too many", "leave the cell file out where --domain is given"};
+    words_.pop_back();
+  } else {
+    if (words_[0].empty())
+      throw InputError{command, "which cell is meant?", "name its cell file first, or give --domain"};
+    file = words_[0];
+    words_.erase(words_.begin());
+  }
+  for (std::size_t i = 0; i < described_.size(); ++i)
+    if (described_[i].required && words_[i].empty())
+      throw InputError{command, described_[i].name + " is missing", described_[i].help + "; see --help"};
+}
+
+LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::seconds(call.patience)} {
+  dds::NodeOptions options;
+  options.cell = tools_name;
+  options.process = call.command;
+  std::replace(options.process.begin(), options.process.end(), ' ', '-');
+  options.addresses = call.addresses;
+  dds::Profiles profiles = dds::standard_profiles();
+  if (!call.file.empty()) {
+    cell_ = read_structure(call.file);
+    options.domain = static_cast<std::uint32_t>(cell_->domain);
+    options.shared_memory = cell_->shared_memory;
+    if (options.addresses.empty()) {
+      const auto add = [&](const std::string& address) {
+        if (std::find(options.addresses.begin(), options.addresses.end(), address) == options.addresses.end())
+          options.addresses.push_back(address);
+      };
+      for (const auto& host : cell_->hosts) add(host.address);
+    }
+    profiles = dds::load_profiles(cell_->profiles);
+    for (const char* needed : {"state", "event", "request", "command"})
+      if (!profiles.contains(needed))
+        throw InputError{cell_->profiles.string(), std::string{"has no profile `"} + needed + "`",
+                         "processes are watched by it: take it from the profiles that ship with Invar"};
+  } else {
+    options.domain = static_cast<std::uint32_t>(call.domain);
+  }
+  where_ = "domain " + std::to_string(options.domain);
+  node_ = std::make_unique<dds::Node>(options, profiles);
+  if (cell_) {
+    name_ = cell_->name;
+  } else if (need == Need::nobody || !call.cell.empty()) {
+    name_ = call.cell;
+  } else {
+    if (!wait_until(patience_, [&] { return !cells_in(node_->snapshot()).empty(); })) return;
+    settle();
+    const auto cells = cells_in(node_->snapshot());
+    if (cells.size() > 1) {
+      std::string list;
+      for (const auto& cell : cells) list += (list.empty() ? "" : ", ") + cell;
+      throw InputError{where_, "has several cells: " + list, "say which one with --cell"};
+    }
+    name_ = *cells.begin();
+  }
+  client_ = std::make_unique<dds::CellClient>(*node_, name_);
+}
+
+std::vector<std::string> LiveCell::wait_for_processes() {
+  std::vector<std::string> missing;
+  const auto all_heard = [&] {
+    const auto heard = client_->processes();
+    missing.clear();
+    for (const auto& process : cell_->processes)
+      if (std::none_of(heard.begin(), heard.end(),
+                       [&](const auto& status) { return process.name == status.process_name().c_str(); }))
+        missing.push_back(process.name);
+    return missing.empty();
+  };
+  if (cell_) {
+    wait_until(patience_, all_heard);
+    return missing;
+  }
+  std::size_t known = 0;
+  auto since = Clock::now();
+  wait_until(patience_, [&] {
+    const std::size_t now = client_->processes().size();
+    if (now != known) since = Clock::now();
+    known = now;
+    return known > 0 && Clock::now() - since > std::chrono::seconds{1};
+  });
+  return missing;
+}
+
+void LiveCell::settle() {
+  std::size_t known = 0;
+  auto since = Clock::now();
+  wait_until(patience_, [&] {
+    const auto snapshot = node_->snapshot();
+    const std::size_t now = snapshot.participants.size() + snapshot.endpoints.size();
+    if (now != known) since = Clock::now();
+    known = now;
+    return Clock::now() - since > std::chrono::seconds{1};
+  });
+}
+
+std::string LiveCell::topic(const std::string& text) const {
+  if (text.find('/') != std::string::npos) return text.front() == '/' ? text.substr(1) : text;
+  const auto dot = text.find('.');
+  if (dot == std::string::npos) return text;
+  return dds::topic_name(name_, text.substr(0, dot), text.substr(dot + 1));
+}
+
+std::vector<dds::Endpoint> LiveCell::wait_for_writers(const std::string& text) {
+  const std::string wanted = topic(text);
+  std::vector<dds::Endpoint> writers;
+  wait_until(patience_, [&] {
+    writers.clear();
+    for (const auto& endpoint : node_->snapshot().endpoints)
+      if (endpoint.topic == wanted && endpoint.is_writer && !endpoint.is_local) writers.push_back(endpoint);
+    return !writers.empty();
+  });
+  return writers;
+}
+
+std::string LiveCell::process_of(const std::string& component) {
+  if (cell_) {
+    for (const auto& process : cell_->processes)
+      for (const auto& candidate : process.components)
+        if (candidate.name == component) return process.name;
+    return "";
+  }
+  wait_until(patience_, [&] { return !client_->process_of(component).empty(); });
+  return client_->process_of(component);
+}
+
+void LiveCell::say_not_found(const std::string& command) const {
+  std::cerr << command << ": no cell answers in " << where_ << " within " << patience_.in_seconds()
+            << " s; is it running, and on an address of this PC?\n";
+}
+
+dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers, std::int64_t depth) {
+  dds::Profile profile;
+  profile.name = "watching";
+  profile.depth = depth;
+  profile.max_instances = 1000;
+  profile.reliable = true;
+  profile.durability = dds::Durability::transient_local;
+  for (const auto& writer : writers) {
+    profile.reliable = profile.reliable && writer.qos.reliable;
+    profile.durability = std::min(profile.durability, writer.qos.durability);
+    profile.exclusive = writer.qos.exclusive;
+    profile.partitions = writer.qos.partitions;
+    profile.representations = writer.qos.representations;
+  }
+  return profile;
+}
+
+bool is_service_topic(const std::string& topic) {
+  return topic.find("/process/") != std::string::npos || topic.find("/lockstep/") != std::string::npos;
+}
+
+}  // namespace invar::tools

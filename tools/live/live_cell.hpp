@@ -1,0 +1,98 @@
+// A running cell as a command finds it: which one is meant, who is there, which topics it has.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/config/cell.hpp"
+#include "core/dds/cell_client.hpp"
+#include "core/dds/node.hpp"
+
+namespace invar::tools {
+
+/// One word of a call, as its help shows it.
+struct Word {
+  std::string name;
+  std::string help;
+  bool required = true;
+};
+
+/// The call of a command about a running cell: `invar NAME CELL WORDS...`, or `invar NAME --domain N WORDS...` where
+/// there is no cell file.
+class CellCall {
+ public:
+  /// Set-up of the command line.
+  CellCall(CLI::App& command, std::vector<Word> words);
+  CellCall(const CellCall&) = delete;
+  CellCall& operator=(const CellCall&) = delete;
+
+  /// After parsing. Throws InputError when a word is missing or there is one too many.
+  void resolve();
+  [[nodiscard]] const std::string& word(std::size_t index) const { return words_[index]; }
+
+  std::string command;
+  std::filesystem::path file;  // empty: none
+  int domain = -1;             // with a file: that of the file unless given
+  std::string cell;            // its name, where several share the domain
+  std::vector<std::string> addresses;
+  double patience = 5.0;  // s
+
+ private:
+  std::vector<Word> described_;
+  std::vector<std::string> words_;  // one more than described: CELL comes first
+};
+
+class LiveCell {
+ public:
+  /// Takes part in the domain of the cell. Without a file, waits for the one cell that is there. Throws InputError for a
+  /// faulty file and where several cells share the domain.
+  /// `nobody`: the call's name of the cell counts, whoever is there.
+  enum class Need { cell, nobody };
+  explicit LiveCell(const CellCall& call, Need need = Need::cell);
+
+  [[nodiscard]] dds::Node& node() { return *node_; }
+  [[nodiscard]] dds::CellClient& client() { return *client_; }
+  /// Empty: no cell was found.
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] bool found() const { return !name_.empty(); }
+  /// Null where the call names none.
+  [[nodiscard]] const config::Cell* file() const { return cell_.get(); }
+  [[nodiscard]] Duration patience() const { return patience_; }
+
+  /// Waits until every process of the file has said how it is; without a file until nobody new has for a second.
+  /// Returns the processes of the file that did not.
+  std::vector<std::string> wait_for_processes();
+  /// Waits until nothing new has been discovered for a second.
+  void settle();
+  /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.
+  std::vector<dds::Endpoint> wait_for_writers(const std::string& text);
+  [[nodiscard]] std::string topic(const std::string& text) const;
+  /// Whose process a component is in: by the file, or by what the cell says. Empty: nobody has it.
+  std::string process_of(const std::string& component);
+
+  /// Says on stderr that no cell answered and where it was looked for.
+  void say_not_found(const std::string& command) const;
+
+ private:
+  std::unique_ptr<config::Cell> cell_;
+  std::unique_ptr<dds::Node> node_;
+  std::string name_;
+  std::unique_ptr<dds::CellClient> client_;
+  Duration patience_;
+  std::string where_;
+};
+
+/// A profile that takes all that `writers` of one topic send: reads as reliably and as late as the weakest of them allows.
+[[nodiscard]] dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers,
+                                          std::int64_t depth = 1000);
+
+/// Data topics, not those by which processes are watched and kept in step.
+[[nodiscard]] bool is_service_topic(const std::string& topic);
+
+}  // namespace invar::tools
