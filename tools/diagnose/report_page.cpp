@@ -121,6 +121,8 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
       plot.y_label = "mean of measured - simulated";
       plot.series.push_back(averaged("refitted", x, difference(data, retuned, o), 60));
       plot.series.push_back(averaged("after", x, difference(data, after, o), 60));
+      // A variable that stood still has nothing to show.
+      if (plot.series[0].x.size() < 2) continue;
       plot.series[0].colour = "#d08770", plot.series[1].colour = "#2e6f9e";
       plots.push_back(std::move(plot));
     }
