@@ -35,4 +35,8 @@ awk -v b="$before" -v a="$after" 'BEGIN { exit !(b > 5 && a < 0.3) }' || { echo 
 table=$(ls tables/*thermal*state*.csv | head -n 1)
 awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i ~ /^temperature/) c = i } END { exit !($c > 29 && $c < 31) }' "$table" ||
   { echo "the slide is not at 30 degC at the end"; exit 1; }
+
+# The recording through the motion process's components once more: they write what they wrote.
+(cd one && "$invar" replay ../deployment/xy-table.yaml out/xy-table/recording.mcap --into motion) ||
+  { echo "the replay differs from the recording"; exit 1; }
 echo "passed"

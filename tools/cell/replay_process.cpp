@@ -115,6 +115,7 @@ class Replayed {
       report.failure = "cannot " + std::string{to_text(transition)} + ": " + outcome.reason;
       return report;
     }
+    up_ = true;  // what was written before the first window went nowhere then either
     std::set<std::string> fed;
     auto messages = file.messages();
     while (const auto message = messages.next()) {
@@ -166,8 +167,8 @@ class Replayed {
     watched.type = recording::built_in_type(type.name());
     type.attach_cdr(
         port,
-        [&port, thinning = dds::Thinning{separation}]() mutable {
-          return thinning.passes(port.owner().now());
+        [this, &port, thinning = dds::Thinning{separation}]() mutable {
+          return up_ && thinning.passes(port.owner().now());
         },
         [&watched](std::span<const std::byte> cdr) {
           const auto* bytes = reinterpret_cast<const std::uint8_t*>(cdr.data());
@@ -187,6 +188,7 @@ class Replayed {
   const config::CellProcess& file_;
   Executor executor_;
   ProcessControl control_;
+  bool up_ = false;
   std::map<std::string, Watched> watched_;
   std::map<std::string, std::vector<std::unique_ptr<dds::Inlet>>> inputs_;
 };
