@@ -308,7 +308,7 @@ class Acting(unittest.TestCase):
         sent = [json.loads(line) for line in table.read_text().splitlines()]
         # Best effort, and the reader joins while the replay runs: some may be missing, none may differ.
         self.assertGreater(len(heard), 20)
-        times = {s.get("value", s)["at"]["time_ns"] for s in sent}
+        times = {s["message"]["at"]["time_ns"] for s in sent}
         self.assertTrue(all(h["at"]["time_ns"] in times for h in heard))
 
 
