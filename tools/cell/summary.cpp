@@ -124,8 +124,7 @@ void add_heater(report::Page& page, const std::filesystem::path& folder, std::os
   }
 }
 
-void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, report::Page& page,
-                   std::ostream& out) {
+void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& out) {
   const std::filesystem::path folder = job.value("result", "");
   out << "job             " << job.value("name", "") << ": " << job.value("text", "") << '\n';
   const auto before_file = folder / "verify_before.csv";
@@ -144,7 +143,6 @@ void summarise_job(const nlohmann::json& job, const LaunchOutcome& outcome, repo
     add_verification(page, before, after);
   }
   add_heater(page, folder, out);
-  (void)outcome;
 }
 
 }  // namespace
@@ -183,7 +181,7 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
   out << '\n';
   if (!job.is_null()) {
     folder = job.value("result", "");
-    summarise_job(job, outcome, page, out);
+    summarise_job(job, page, out);
   }
   page.heading("Processes");
   page.table(header, loops);
