@@ -8,13 +8,17 @@ namespace invar::compensation {
 void write_trajectory(ModelText& text, const metrology::DropletTrajectory& trajectory) {
   const Eigen::Vector3d covariance{trajectory.covariance(0, 0), trajectory.covariance(0, 1),
                                    trajectory.covariance(1, 1)};
-  text.comment("landed - aimed = placement + height * (slope + slowness * stage velocity); m, m/m, s/m")
+  text.comment(
+          "landed - aimed = placement + height * slope + (delay + height * slowness) * stage velocity; m, "
+          "m/m, s, s/m")
       .numbers("placement", Eigen::VectorXd{trajectory.placement})
       .numbers("slope", Eigen::VectorXd{trajectory.slope})
       .number("slowness", trajectory.slowness)
+      .number("delay", trajectory.delay)
       .comment("of (placement, slope) in one direction: xx, xy, yy")
       .numbers("covariance", Eigen::VectorXd{covariance});
   if (std::isfinite(trajectory.slowness_sigma)) text.number("slowness_sigma", trajectory.slowness_sigma);
+  if (std::isfinite(trajectory.delay_sigma)) text.number("delay_sigma", trajectory.delay_sigma);
   text.open("heights")
       .number("least", trajectory.least_height)
       .number("most", trajectory.most_height)
@@ -32,6 +36,9 @@ metrology::DropletTrajectory read_trajectory(const config::Node& root) {
   trajectory.slowness = root.number("slowness", "s/m", Range::not_negative());
   trajectory.slowness_sigma =
       root.number("slowness_sigma", "s/m", Range::not_negative(), std::numeric_limits<double>::infinity());
+  trajectory.delay = root.number("delay", "s", {}, 0.0);
+  trajectory.delay_sigma =
+      root.number("delay_sigma", "s", Range::not_negative(), std::numeric_limits<double>::infinity());
   const auto heights = root.required("heights");
   trajectory.least_height = heights.number("least", "m");
   trajectory.most_height = heights.number("most", "m");

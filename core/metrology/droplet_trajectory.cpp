@@ -54,16 +54,26 @@ Eigen::Vector2d spatial_median(const Eigen::Matrix2Xd& points, const std::vector
   return at;
 }
 
+/// Which columns there are beside the placement: slope x, y; delay; slowness (in this order).
+struct Form {
+  bool tilt = false;
+  bool delay = false;
+  bool carry = false;
+  [[nodiscard]] Eigen::Index columns() const {
+    return 2 + (tilt ? 2 : 0) + (delay ? 1 : 0) + (carry ? 1 : 0);
+  }
+};
+
 struct Solution {
-  Eigen::VectorXd theta;       // placement x, y; slope x, y (two heights); slowness (carry)
+  Eigen::VectorXd theta;
   Eigen::MatrixXd covariance;  // for unit weights' variance
 };
 
 /// Rows of both components of each kept droplet, weighted.
 Solution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, const Eigen::VectorXd& kept,
-               const Eigen::VectorXd& deviation, bool tilt, bool carry) {
+               const Eigen::VectorXd& deviation, const Form& form) {
   const Eigen::Index n = drops.height.size();
-  const Eigen::Index columns = 2 + (tilt ? 2 : 0) + (carry ? 1 : 0);
+  const Eigen::Index columns = form.columns();
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, columns);
   Eigen::VectorXd y = Eigen::VectorXd::Zero(2 * n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -71,8 +81,9 @@ Solution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, const Eige
     for (Eigen::Index k = 0; k < 2; ++k) {
       const double weight = 1.0 / deviation(i);
       a(2 * i + k, k) = weight;
-      if (tilt) a(2 * i + k, 2 + k) = weight * drops.height(i);
-      if (carry) a(2 * i + k, columns - 1) = weight * drops.height(i) * drops.stage_velocity(k, i);
+      if (form.tilt) a(2 * i + k, 2 + k) = weight * drops.height(i);
+      if (form.delay) a(2 * i + k, columns - 2) = weight * drops.stage_velocity(k, i);
+      if (form.carry) a(2 * i + k, columns - 1) = weight * drops.height(i) * drops.stage_velocity(k, i);
       y(2 * i + k) = weight * offset(k, i);
     }
   }
@@ -87,12 +98,13 @@ Solution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, const Eige
   return solution;
 }
 
-Eigen::Matrix2Xd predicted(const Droplets& drops, const Eigen::VectorXd& theta, bool tilt, bool carry) {
+Eigen::Matrix2Xd predicted(const Droplets& drops, const Eigen::VectorXd& theta, const Form& form) {
   Eigen::Matrix2Xd offset(2, drops.height.size());
   for (Eigen::Index i = 0; i < drops.height.size(); ++i) {
     Eigen::Vector2d at = theta.head<2>();
-    if (tilt) at += drops.height(i) * theta.segment<2>(2);
-    if (carry) at += drops.height(i) * theta(theta.size() - 1) * drops.stage_velocity.col(i);
+    if (form.tilt) at += drops.height(i) * theta.segment<2>(2);
+    if (form.delay) at += theta(theta.size() - 2) * drops.stage_velocity.col(i);
+    if (form.carry) at += drops.height(i) * theta(theta.size() - 1) * drops.stage_velocity.col(i);
     offset.col(i) = at;
   }
   return offset;
@@ -181,7 +193,15 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
   std::vector<double> levels;
   const std::vector<int> group = height_groups(drops.height, levels);
   const bool tilt = levels.size() >= 2;
-  const bool moving = drops.stage_velocity.cols() == n && drops.stage_velocity.cwiseAbs().maxCoeff() > 1e-6;
+  // One velocity for all is no information: what it adds cannot be told from placement and tilt.
+  bool moved = false, moving = false;
+  if (drops.stage_velocity.cols() == n) {
+    const Eigen::Vector2d mean = drops.stage_velocity.rowwise().mean();
+    const double largest = drops.stage_velocity.cwiseAbs().maxCoeff();
+    moved = largest > 1e-6;
+    moving = moved && (drops.stage_velocity.colwise() - mean).cwiseAbs().maxCoeff() > 0.05 * largest;
+  }
+  const Form form{.tilt = tilt, .delay = tilt && moving, .carry = moving};
   fit.kept = Eigen::VectorXd::Ones(n);
 
   // A satellite is far smaller than its fellows.
@@ -215,6 +235,12 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
   const Eigen::VectorXd sound = fit.kept;
   Eigen::Matrix2Xd residual = from_median;
   Solution solution;
+  // Where the stage carries droplets to both sides there is no middle: least sum of distances over the whole model.
+  for (int round = 0; moving && round < 30; ++round) {
+    solution = solve(drops, offset, sound, deviation, form);
+    residual = offset - predicted(drops, solution.theta, form);
+    deviation = residual.colwise().norm().cwiseMax(1e-8).cwiseSqrt();
+  }
   for (int round = 0; round < 6; ++round) {
     // Reject by distance in units of the height's own robust scatter (Rayleigh: 3.9 sigma in a plane is 1 in 2000).
     std::vector<double> level_scatter(levels.size(), 0.0);
@@ -241,8 +267,8 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
     scatter_model(residual, fit.kept, group, levels, fit.scatter_at_nozzle, fit.scatter_per_height);
     for (Eigen::Index i = 0; i < n; ++i)
       deviation(i) = std::hypot(fit.scatter_at_nozzle, fit.scatter_per_height * drops.height(i));
-    solution = solve(drops, offset, fit.kept, deviation, tilt, moving);
-    residual = offset - predicted(drops, solution.theta, tilt, moving);
+    solution = solve(drops, offset, fit.kept, deviation, form);
+    residual = offset - predicted(drops, solution.theta, form);
   }
   fit.residual = residual;
 
@@ -276,6 +302,12 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
     path.slowness = solution.theta(solution.theta.size() - 1);
     path.slowness_sigma =
         std::sqrt(solution.covariance(solution.theta.size() - 1, solution.theta.size() - 1));
+  } else if (moved) {
+    fit.unidentified.emplace_back("carry by the stage: all droplets were jetted at one velocity");
+  }
+  if (form.delay) {
+    path.delay = solution.theta(solution.theta.size() - 2);
+    path.delay_sigma = std::sqrt(solution.covariance(solution.theta.size() - 2, solution.theta.size() - 2));
   }
   path.least_height = drops.height.minCoeff();
   path.most_height = drops.height.maxCoeff();

@@ -18,7 +18,7 @@ struct Droplets {
   Eigen::VectorXd diameter;
 };
 
-/// landed - aimed = placement + height * slope + stage_velocity * height / ejection_speed.
+/// landed - aimed = placement + height * slope + stage_velocity * (delay + height / ejection_speed).
 ///
 /// Linear in placement and slope (a, b) = tan(tilt) (cos azimuth, sin azimuth), in which everything is done,
 /// since the azimuth is undefined at zero tilt. The seed's theta is the elevation: tilt = 90 deg - theta
@@ -28,16 +28,20 @@ struct DropletTrajectory {
   Eigen::Vector2d placement = Eigen::Vector2d::Zero();  // [m]
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();      // [m/m]
   double slowness = 0.0;                                // 1 / ejection speed [s/m]; 0: carry not identified
+  double delay = 0.0;  // from trigger to droplet [s]; 0: not identified apart from the carry
   /// Of (placement x, slope x), the same for y, before noise of single droplets [m, 1].
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   double slowness_sigma = std::numeric_limits<double>::infinity();
+  double delay_sigma = std::numeric_limits<double>::infinity();
   double least_height = 0.0;  // of the droplets it was identified from [m]
   double most_height = 0.0;
 
   [[nodiscard]] Eigen::Vector2d offset(
       double height, const Eigen::Vector2d& stage_velocity = Eigen::Vector2d::Zero()) const {
-    return placement + height * (slope + slowness * stage_velocity);
+    return placement + height * slope + lead(height) * stage_velocity;
   }
+  /// By how much earlier a moving stage has to trigger [s].
+  [[nodiscard]] double lead(double height) const { return delay + height * slowness; }
   /// Standard deviation of each component of the predicted offset at rest [m].
   [[nodiscard]] double sigma(double height) const;
   [[nodiscard]] double tilt() const;     // [rad]

@@ -165,6 +165,10 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
                     si(path.slowness_sigma / (path.slowness * path.slowness), "m/s")});
     report["ejection_speed_m_s"] = 1.0 / path.slowness;
   }
+  if (std::isfinite(path.delay_sigma)) {
+    rows.push_back({"delay from trigger to droplet", "t0", si(path.delay, "s"), si(path.delay_sigma, "s")});
+    report["delay_s"] = path.delay;
+  }
   page.table({"parameter (table 5.2)", "symbol", "value", "1 sigma"}, rows);
   page.heading("Before and after, by height (table 5.3)");
   page.table({"height", "droplets", "before (RMS)", "after (RMS)", "improvement"},
