@@ -2,17 +2,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
-#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/staged_model.hpp"
 #include "core/metrology/geometric_model.hpp"
 #include "idl/compensation.h"
 #include "idl/stage.h"
@@ -45,56 +43,26 @@ class Compensation final : public Component {
   };
   explicit Compensation(const Parameters& parameters);
   ~Compensation() override;
-  void configure() override;
+  void configure() override { model_.open(parameters_.model, "calibrate again"); }
   void activate() override;
-  void cleanup() noexcept override;
+  void cleanup() noexcept override { model_.close(); }
   void step(const Tick& tick) noexcept override;
 
  private:
   struct Axis;
-  /// A file that was loaded and checked; kept until cleanup, so that the loop may hold a plain pointer.
-  struct Model {
-    metrology::GeometricModel geometric;
-    std::uint64_t id = 0;
-    std::uint32_t checksum = 0;
-    std::string refusal;  // empty: sound
-  };
-  struct Request {
-    std::uint64_t command = 0;
-    std::array<char, 1025> path{};
-  };
-  struct Loaded {
-    std::uint64_t command = 0;
-    Model* model = nullptr;
-  };
+  using Staged = StagedModel<metrology::GeometricModel>;
 
-  [[nodiscard]] Model* load(const std::filesystem::path& file);
   [[nodiscard]] std::string refusal(const metrology::GeometricModel& model) const;
-  void run_loader();
-  void obey(const ModelCommand& command) noexcept;
-  void take_loaded(const Loaded& loaded) noexcept;
-  void answer(std::uint64_t command, ModelState state, const Model* model, const char* text) noexcept;
   void correct(const Tick& tick) noexcept;
 
   const Parameters& parameters_;
   std::vector<std::unique_ptr<Axis>> axes_;
   Input<thermal::NodeTemperature> temperature_{*this, "temperature", {.optional = true, .profile = "state"}};
-  Inbox<ModelCommand> command_{*this, "model"};
-  Output<ModelStatus> status_{*this, "status", "state"};
+  Staged model_;
 
-  const Model* active_ = nullptr;
-  const Model* staged_ = nullptr;
-  const Model* previous_ = nullptr;
-  ModelStatus reply_;
   Eigen::Vector3d applied_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d setpoint_ = Eigen::Vector3d::Zero();
   bool easing_ = false;  // on the way to another model's correction
-
-  Ring<Request> requests_{8};                   // loop to loader
-  Ring<Loaded> loaded_{8};                      // loader to loop
-  std::vector<std::unique_ptr<Model>> models_;  // the loader's
-  std::atomic<bool> ending_{false};
-  std::thread loader_;
 };
 
 }  // namespace invar::compensation

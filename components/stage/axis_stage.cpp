@@ -1,7 +1,11 @@
 #include "components/stage/axis_stage.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+
+#include "core/compensation/model_file.hpp"
+#include "core/model/model_file.hpp"
 
 namespace invar::stage {
 
@@ -25,7 +29,11 @@ double chosen(double asked, double own) { return asked > 0.0 ? std::min(asked, o
 
 }  // namespace
 
-Stage::Stage(const Parameters& parameters) : parameters_{parameters} {
+Stage::Stage(const Parameters& parameters)
+    : parameters_{parameters},
+      model_{*this,
+             [this](const std::filesystem::path& file, Staged::Model& model) { return load(file, model); },
+             "model", "model_status"} {
   MotorCommand released;
   released.current(0.0);
   released.enabled(false);
@@ -42,6 +50,40 @@ void Stage::activate() {
   current_ = 0.0;
   correction_held_ = 0.0;
   settled_ = false;
+  fed_forward_ = reading_error_ = {};
+  model_changed_ = false;
+  model_.announce();
+}
+
+/// Why this model must not drive the axis; empty: nothing.
+std::string Stage::load(const std::filesystem::path& file, Staged::Model& staged) const {
+  const auto yaml = config::Yaml::load(file);
+  const auto model = model::read(yaml);
+  yaml.finish();
+  if (model.plant != physics::Plant::axis)
+    return "it is a model of plant " + std::string{physics::name_of(model.plant)} + ", not of an axis";
+  staged.content = physics::AxisFeedforward{model};
+  const std::string seal = compensation::checksum(model::patched(yaml, model));
+  (void)std::from_chars(seal.data(), seal.data() + seal.size(), staged.checksum, 16);
+  // At rest and at speed, everywhere in the travel, there must be current left for the servo.
+  for (const double velocity : {0.0, parameters_.limits.velocity, -parameters_.limits.velocity})
+    for (int i = 0; i <= 500; ++i) {
+      const double at = parameters_.travel.lower + parameters_.travel.width() * i / 500.0;
+      staged.content.reset(at);
+      if (const double current = staged.content.current({at, velocity, 0.0});
+          !(std::abs(current) <= 0.8 * parameters_.control.limit))
+        return "it feeds forward " + std::to_string(current) + " A at " + std::to_string(at) +
+               " m; at most 0.8 of the limit may be needed";
+    }
+  staged.content.reset(parameters_.travel.lower);
+  return {};
+}
+
+double Stage::Faded::operator()(double value, bool changed, double period) noexcept {
+  constexpr double fading = 0.1;  // s
+  if (changed) rest = last - value;
+  rest -= rest * std::min(1.0, period / fading);
+  return last = value + rest;
 }
 
 void Stage::deactivate() noexcept { mode_ = AXIS_MODE_DISABLED; }
@@ -132,10 +174,26 @@ void Stage::stop_blindly(const Tick& tick) noexcept {
   if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) mode_ = AXIS_MODE_FAULT;
 }
 
-double Stage::feedforward(const MotionPoint& at) const noexcept {
-  const double current = parameters_.control.feedforward_velocity * at.velocity +
-                         parameters_.control.feedforward_acceleration * at.acceleration;
-  return std::clamp(current, -parameters_.control.limit, parameters_.control.limit);
+double Stage::feedforward(const Tick& tick) noexcept {
+  const Control& control = parameters_.control;
+  MotionPoint at = setpoint(tick);
+  double current =
+      control.feedforward_velocity * at.velocity + control.feedforward_acceleration * at.acceleration;
+  if (auto* model = model_.active()) {
+    auto& axis = model->content;
+    at = trajectory_.at((tick.now - trajectory_start_).in_seconds() + axis.lead());
+    current = axis.current({at.position + correction_held_ - offset_, at.velocity, at.acceleration});
+  }
+  return std::clamp(fed_forward_(current, model_changed_, tick.period), -control.limit, control.limit);
+}
+
+void Stage::read_position(const AxisFeedback& feedback, const Tick& tick) noexcept {
+  const auto* model = model_.active();
+  const double error = model != nullptr ? model->content.reading_error(feedback.position()) : 0.0;
+  const double known = reading_error_(error, model_changed_, tick.period);
+  const auto* fused = fused_.latest();
+  position_ =
+      (fused != nullptr && fused->valid() ? fused->position() : feedback.position() - known) + offset_;
 }
 
 /// What ends a motion: the home switch, the end of the trajectory, a following error or a limit switch.
@@ -180,10 +238,8 @@ void Stage::step(const Tick& tick) noexcept {
   const bool fresh = feedback_.received() != received_;
   received_ = feedback_.received();
   const bool seeing = feedback != nullptr && feedback_.age(tick.now) <= patience;
-  if (seeing) {
-    const auto* fused = fused_.latest();
-    position_ = (fused != nullptr && fused->valid() ? fused->position() : feedback->position()) + offset_;
-  }
+  model_changed_ = model_.update();
+  if (seeing) read_position(*feedback, tick);
   // A correction that stays away is held where it was: no step.
   if (const auto* correction = correction_.latest()) correction_held_ = correction->correction();
   if (seeing && !primed_) prime(tick);
@@ -202,15 +258,15 @@ void Stage::step(const Tick& tick) noexcept {
   const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
   if (driving && !seeing) {
     stop_blindly(tick);
-    current_ = feedforward(setpoint(tick));
+    current_ = feedforward(tick);
   } else if (driving && blind_) {
     mode_ = AXIS_MODE_FAULT;      // sight came back too late: stay stopped until somebody clears the fault
   } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
     const double feedback_current = controller_.step(at.position + correction_held_, position_);
-    current_ =
-        std::clamp(feedback_current + feedforward(at), -parameters_.control.limit, parameters_.control.limit);
+    current_ = std::clamp(feedback_current + feedforward(tick), -parameters_.control.limit,
+                          parameters_.control.limit);
     supervise(tick);
   }
   const bool enabled = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;

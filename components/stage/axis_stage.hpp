@@ -2,12 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 
 #include "components/stage/trajectory.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/staged_model.hpp"
 #include "core/physics/axis_controller.hpp"
+#include "core/physics/axis_feedforward.hpp"
 #include "idl/compensation.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
@@ -15,7 +18,9 @@
 namespace invar::stage {
 
 /// Reads feedback, follows the trajectory of the last command with a PID or cascade law and feedforward, and writes the
-/// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction).
+/// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction). A model.yaml of
+/// the axis, as `invar diagnose` writes it, may be loaded, also while running: then its forces, those of its terms included,
+/// are what is fed forward, and what its encoder terms know is taken out of the reading.
 /// Safe value: motor not enabled. Stops under control on stale feedback, soft limits and following error.
 class Stage final : public Component {
  public:
@@ -61,6 +66,7 @@ class Stage final : public Component {
     Range travel{0.0, 0.2};
     Control control;
     Limits limits;
+    std::filesystem::path model;
     double homing_velocity = 0.01;
     bool absolute_encoder = true;
     double following_error = 1e-3;
@@ -72,6 +78,9 @@ class Stage final : public Component {
       p(travel, "travel", "m", "soft limits");
       p(control, "control", "control law");
       p(limits, "limits", "of the trajectories");
+      p(model, "model",
+        "model.yaml of plant axis: its forces are fed forward in place of feedforward_velocity and "
+        "_acceleration");
       p(homing_velocity, "homing_velocity", "m/s", Range{1e-5, 1.0}, "towards the home switch");
       p(absolute_encoder, "absolute_encoder", "homed from the start");
       p(following_error, "following_error", "m", Range{1e-7, 1.0}, "trip above it", while_running);
@@ -84,11 +93,22 @@ class Stage final : public Component {
   };
 
   explicit Stage(const Parameters& parameters);
+  void configure() override { model_.open(parameters_.model, "diagnose the axis again"); }
   void activate() override;
+  void cleanup() noexcept override { model_.close(); }
   void deactivate() noexcept override;
   void step(const Tick& tick) noexcept override;
 
  private:
+  using Staged = StagedModel<physics::AxisFeedforward>;
+  /// A number whose source may change: the step that would give fades away.
+  struct Faded {
+    double last = 0.0, rest = 0.0;
+    double operator()(double value, bool changed, double period) noexcept;
+  };
+
+  [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
+  void read_position(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void obey(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
   void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
@@ -98,7 +118,7 @@ class Stage final : public Component {
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
   void publish(const Tick& tick, const MotionPoint& setpoint) noexcept;
   [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
-  [[nodiscard]] double feedforward(const MotionPoint& setpoint) const noexcept;
+  [[nodiscard]] double feedforward(const Tick& tick) noexcept;
 
   const Parameters& parameters_;
   Input<AxisFeedback> feedback_{*this, "feedback"};
@@ -107,6 +127,9 @@ class Stage final : public Component {
   Inbox<AxisCommand> command_{*this, "command"};
   Output<MotorCommand> motor_{*this, "motor"};
   Output<AxisState> state_{*this, "state"};
+  Staged model_;
+  Faded fed_forward_, reading_error_;
+  bool model_changed_ = false;
 
   physics::AxisController controller_{{}};
   Trajectory trajectory_ = Trajectory::rest(0.0);

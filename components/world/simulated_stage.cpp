@@ -4,21 +4,36 @@
 
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/components.hpp"
+#include "core/model/model_file.hpp"
 
 namespace invar::world {
+
+namespace {
+
+constexpr double longest_period = 0.01;  // s, of the loop: sizes the history of delays
+
+}  // namespace
 
 /// One drive with its carriage and encoder.
 struct SimulatedStage::Device {
   Device(SimulatedStage& owner, int axis_number, const Axis& axis_parameters)
       : parameters{axis_parameters},
         axis{axis_number},
-        plant{{.mass = parameters.mass,
-               .motor_constant = parameters.motor_constant,
-               .viscous_damping = parameters.viscous_damping},
-              {}},
+        plant{plant_of(parameters)},
         motor{owner, "motor_" + letter(axis_number), {.optional = true}},
         feedback{owner, "feedback_" + letter(axis_number)} {}
 
+  static physics::AxisPlant plant_of(const Axis& axis) {
+    if (axis.model.empty())
+      return {
+          {.mass = axis.mass, .motor_constant = axis.motor_constant, .viscous_damping = axis.viscous_damping},
+          {}};
+    const auto model = model::load(axis.model);
+    if (model.plant != physics::Plant::axis)
+      throw InputError{axis.model.string(), "is of plant " + std::string{physics::name_of(model.plant)},
+                       "name a model.yaml of plant axis"};
+    return physics::make_axis(model, longest_period);
+  }
   static std::string letter(int axis) {
     return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
   }

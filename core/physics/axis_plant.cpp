@@ -166,6 +166,14 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
                h);
 }
 
+void AxisPlant::follow(double position) noexcept {
+  position_ = position;
+  for (std::size_t i = 0; i < bristles_.size(); ++i)
+    bristle_[i] = PreslidingFriction::deflection(bristle_[i], position_ - bristle_from_,
+                                                 bristles_[i]->parameters.data());
+  bristle_from_ = position_;
+}
+
 void AxisPlant::move(double h) noexcept {
   const bool dry = !frictions_.empty();
   // A sub-step may hold a reversal or two; what is left after eight events is done in one go.
@@ -205,12 +213,8 @@ void AxisPlant::move(double h) noexcept {
     }
     if (stuck) next.velocity = 0.0;
     time_ += taken;
-    position_ = next.position, velocity_ = next.velocity, swing_ = next.swing,
-    swing_speed_ = next.swing_speed;
-    for (std::size_t i = 0; i < bristles_.size(); ++i)
-      bristle_[i] = PreslidingFriction::deflection(bristle_[i], position_ - bristle_from_,
-                                                   bristles_[i]->parameters.data());
-    bristle_from_ = position_;
+    velocity_ = next.velocity, swing_ = next.swing, swing_speed_ = next.swing_speed;
+    follow(next.position);
     h -= taken;
   }
   if (h > 0.0) time_ += h;
@@ -284,11 +288,15 @@ double AxisPlant::delayed_position(double age) const noexcept {
 double AxisPlant::reading() const noexcept {
   double shown = play_ != nullptr ? played_ : position_;
   if (age_ > 0.0) shown = delayed_position(age_);
+  return shown + reading_error(shown);
+}
+
+double AxisPlant::reading_error(double position) const noexcept {
   double error = 0.0;
-  for (const auto* term : readings_) error += term->kind->reading(shown, term->parameters.data());
-  const AxisPoint at{time_, shown, velocity_, current_, temperature_};
+  for (const auto* term : readings_) error += term->kind->reading(position, term->parameters.data());
+  const AxisPoint at{time_, position, velocity_, current_, temperature_};
   for (const auto& [term, code] : reading_curves_) error += term->curve(variable(code, at));
-  return shown + error;
+  return error;
 }
 
 }  // namespace invar::physics

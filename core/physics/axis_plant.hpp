@@ -57,6 +57,15 @@ class AxisPlant {
   /// have memory: call it as often as you like between steps, the answer is the same.
   [[nodiscard]] double reading() const noexcept;
   [[nodiscard]] double time() const noexcept { return time_; }
+
+  /// For feedforward: all forces on the carriage in a motion, dry friction against `direction` (+1, -1, 0) included [N].
+  [[nodiscard]] double force(const AxisPoint& at, double direction) const noexcept {
+    return push(at) - direction * hold(direction * at.velocity);
+  }
+  /// For feedforward: goes to a position in no time; bristles bend on the way. Real-time.
+  void follow(double position) noexcept;
+  /// What the encoder shows too much where the carriage stands at `position` [m], delays and backlash aside.
+  [[nodiscard]] double reading_error(double position) const noexcept;
   [[nodiscard]] double position() const noexcept { return position_; }  // of the carriage, the truth
   [[nodiscard]] double velocity() const noexcept { return velocity_; }
   [[nodiscard]] double motor_current() const noexcept { return current_; }  // behind delay and lag

@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <mutex>
 #include <numbers>
 
 #include "core/base/fault.hpp"
@@ -21,48 +23,94 @@ double root_of(double x) { return x > 0.0 ? std::sqrt(x) : 0.0; }  // an empty t
 double logarithm(double x) { return std::log(std::max(x, std::numeric_limits<double>::min())); }
 double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
-/// One running copy of the equations; parsers hold pointers into it, so it is neither copied nor shared.
+/// The expressions, parsed once: reading them takes a hundred times as long as a step. Parsers hold pointers into it.
+class Compiled {
+ public:
+  explicit Compiled(const Model& model) {
+    const auto& equations = model.equations;
+    for (const auto& state : equations.states) names_.push_back(state.name);
+    for (const auto& input : equations.inputs) names_.push_back(input.symbol);
+    names_.emplace_back("t");
+    for (std::size_t i = 0; i < model.parameters.size(); ++i)
+      if (model.parameters[i].name.find('.') == std::string::npos) parameters_.push_back(i);
+    symbols.resize(names_.size(), 0.0);
+    values_.resize(parameters_.size(), 0.0);
+    show_parameters(model);
+    for (const auto& state : equations.states)
+      rates.push_back(parser(model, state.derivative, "states." + state.name));
+    for (const auto& output : equations.outputs)
+      outputs.push_back(parser(model, output.expression, "outputs." + output.name));
+    if (!equations.controlled_input.empty())
+      law.push_back(parser(model, equations.control_law, "controller.expression"));
+  }
+  Compiled(const Compiled&) = delete;
+  Compiled& operator=(const Compiled&) = delete;
+
+  void show_parameters(const Model& model) {
+    for (std::size_t i = 0; i < parameters_.size(); ++i) values_[i] = model.parameters[parameters_[i]].value;
+  }
+  /// The place of a symbol; symbols.size() where there is none of it.
+  [[nodiscard]] std::size_t place(const std::string& symbol) const {
+    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), symbol) - names_.begin());
+  }
+
+  std::vector<double> symbols;  // states, inputs, t
+  std::vector<mu::Parser> rates, outputs, law;
+
+ private:
+  mu::Parser parser(const Model& model, const std::string& expression, const std::string& where) {
+    mu::Parser made;
+    made.DefineConst("pi", std::numbers::pi);
+    made.DefineFun("sqrt", root_of);
+    made.DefineFun("log", logarithm);
+    made.DefineFun("sign", sign_of);
+    for (std::size_t i = 0; i < parameters_.size(); ++i)
+      made.DefineVar(model.parameters[parameters_[i]].name, &values_[i]);
+    for (std::size_t i = 0; i < names_.size(); ++i) made.DefineVar(names_[i], &symbols[i]);
+    made.SetExpr(expression);
+    try {
+      (void)made.Eval();
+    } catch (const mu::Parser::exception_type& error) {
+      throw InputError{where, "`" + expression + "`: " + error.GetMsg(),
+                       "use states, inputs, parameters, t, pi and the functions of the contract"};
+    }
+    return made;
+  }
+
+  std::vector<std::string> names_;
+  std::vector<std::size_t> parameters_;  // places in the model
+  std::vector<double> values_;
+};
+
+/// The equations with the numbers and terms of one model.
 class Machine {
  public:
-  explicit Machine(const Model& model) : model_{model}, states_{model.equations.states.size()} {
-    const auto& equations = model.equations;
-    symbols_.resize(states_ + equations.inputs.size() + 1, 0.0);
-    for (std::size_t i = 0; i < states_; ++i) names_.push_back(equations.states[i].name);
-    for (const auto& input : equations.inputs) names_.push_back(input.symbol);
-    names_.push_back("t");
-    for (const auto& p : model.parameters)
-      if (p.name.find('.') == std::string::npos) constants_.emplace_back(p.name, p.value);
-    for (const auto& state : equations.states)
-      rates_.push_back(parser(state.derivative, "states." + state.name));
-    for (const auto& output : equations.outputs)
-      outputs_.push_back(parser(output.expression, "outputs." + output.name));
-    if (!equations.controlled_input.empty()) {
-      law_.push_back(parser(equations.control_law, "controller.expression"));
-      controlled_ = place(equations.controlled_input);
-    }
+  Machine(Compiled& compiled, const Model& model)
+      : compiled_{compiled},
+        states_{model.equations.states.size()},
+        controlled_{compiled.place(model.equations.controlled_input)} {
+    compiled.show_parameters(model);
     for (const auto& term : model.terms) add(term);
   }
-  Machine(const Machine&) = delete;
-  Machine& operator=(const Machine&) = delete;
 
   [[nodiscard]] std::size_t states() const { return states_; }
   [[nodiscard]] std::size_t all_states() const { return states_ + hidden_.size(); }
 
   using State = std::array<double, 16>;
 
-  void set_input(std::size_t i, double value) { symbols_[states_ + i] = value; }
+  void set_input(std::size_t i, double value) { compiled_.symbols[states_ + i] = value; }
   [[nodiscard]] std::size_t controlled() const { return controlled_; }
 
   void show(const State& s, double t) {
-    std::copy_n(s.begin(), states_, symbols_.begin());
-    symbols_.back() = t;
+    std::copy_n(s.begin(), states_, compiled_.symbols.begin());
+    compiled_.symbols.back() = t;
   }
 
   State slope(const State& s, double t) {
     show(s, t);
     State d{};
-    for (std::size_t i = 0; i < states_; ++i) d[i] = rates_[i].Eval();
-    for (const auto& term : rate_terms_) d[term.on] += term.kind->rate(symbols_[term.with], term.p);
+    for (std::size_t i = 0; i < states_; ++i) d[i] = compiled_.rates[i].Eval();
+    for (const auto& term : rate_terms_) d[term.on] += term.kind->rate(compiled_.symbols[term.with], term.p);
     for (std::size_t h = 0; h < hidden_.size(); ++h) {
       const auto& term = hidden_[h];
       const double difference = s[states_ + h] - s[term.on];
@@ -105,12 +153,16 @@ class Machine {
       rub(s, 0.5 * h);
       for (const auto& term : uppers_) s[term.on] = std::min(s[term.on], term.p[0]);
       for (const auto& term : lowers_) s[term.on] = std::max(s[term.on], term.p[0]);
-      for (const auto& term : overflows_) s[term.on] = std::min(s[term.on], term.p[0]);
+      for (const auto& term : overflows_) {  // what ran over within the step
+        const double surplus = std::max(0.0, s[term.on] - term.p[0]);
+        s[term.on] -= surplus;
+        if (term.with < states_ && term.with != term.on) s[term.with] += term.p[1] * surplus;
+      }
     }
   }
 
-  double output(std::size_t i) { return outputs_[i].Eval(); }
-  double law() { return law_.front().Eval(); }
+  double output(std::size_t i) { return compiled_.outputs[i].Eval(); }
+  double law() { return compiled_.law.front().Eval(); }
 
   /// The largest rate of change of anything [1/s]: the spectral radius of the Jacobian here.
   double fastest(const State& s, double t) {
@@ -140,16 +192,12 @@ class Machine {
     const double* p;
   };
 
-  std::size_t place(const std::string& symbol) const {
-    const auto at = std::find(names_.begin(), names_.end(), symbol);
-    return at == names_.end() ? names_.size() : static_cast<std::size_t>(at - names_.begin());
-  }
-
   void add(const Term& term) {
     const auto* kind = equations_kind(*term.info);
-    const std::size_t on = place(term.on), with = term.with.empty() ? on : place(term.with);
+    const std::size_t on = compiled_.place(term.on),
+                      with = term.with.empty() ? on : compiled_.place(term.with);
     if (on >= states_) return;  // at an input or output: the simulation bends those
-    const Use use{kind, on, std::min(with, names_.size() - 1), term.values.data()};
+    const Use use{kind, on, std::min(with, compiled_.symbols.size() - 1), term.values.data()};
     if (kind->rate != nullptr) rate_terms_.push_back(use);
     switch (kind->memory) {
       case EquationsMemory::dry_friction:
@@ -172,31 +220,8 @@ class Machine {
     }
   }
 
-  mu::Parser parser(const std::string& expression, const std::string& where) {
-    mu::Parser made;
-    made.DefineConst("pi", std::numbers::pi);
-    made.DefineFun("sqrt", root_of);
-    made.DefineFun("log", logarithm);
-    made.DefineFun("sign", sign_of);
-    for (const auto& [name, value] : constants_) made.DefineConst(name, value);
-    for (std::size_t i = 0; i < names_.size(); ++i) made.DefineVar(names_[i], &symbols_[i]);
-    made.SetExpr(expression);
-    try {
-      (void)made.Eval();
-    } catch (const mu::Parser::exception_type& error) {
-      throw InputError{where, "`" + expression + "`: " + error.GetMsg(),
-                       "use states, inputs, parameters, t, pi and the functions of the contract"};
-    }
-    return made;
-  }
-
-  const Model& model_;
-  std::size_t states_;
-  std::vector<std::string> names_;
-  std::vector<double> symbols_;
-  std::vector<std::pair<std::string, double>> constants_;
-  std::vector<mu::Parser> rates_, outputs_, law_;
-  std::size_t controlled_ = 0;
+  Compiled& compiled_;
+  std::size_t states_, controlled_;
   std::vector<Use> rate_terms_, frictions_, uppers_, lowers_, overflows_, hidden_;
 };
 
@@ -260,11 +285,12 @@ class OwnEquations final : public Simulation {
       const auto* values = inputs.find(output.name);
       first_.push_back(values == nullptr || values->empty() ? std::nan("") : values->front());
     }
-    Machine check{structure};  // a wrong expression is found before anything runs
+    compiled_.push_back(std::make_unique<Compiled>(structure));  // finds what is wrong before anything runs
   }
 
   void run(const Model& model, Outputs& outputs) const override {
-    Machine machine{model};
+    auto compiled = borrow(model);
+    Machine machine{*compiled, model};
     const auto& equations = model.equations;
     const std::size_t n = time_.size();
     auto inputs = inputs_;
@@ -312,9 +338,25 @@ class OwnEquations final : public Simulation {
       bend(model, output.name, time_, outputs[o]);
       for (double& value : outputs[o]) value = output.limits.clamp(value);
     }
+    const std::scoped_lock lock{mutex_};
+    compiled_.push_back(std::move(compiled));
   }
 
  private:
+  std::unique_ptr<Compiled> borrow(const Model& model) const {
+    {
+      const std::scoped_lock lock{mutex_};
+      if (!compiled_.empty()) {
+        auto one = std::move(compiled_.back());
+        compiled_.pop_back();
+        return one;
+      }
+    }
+    return std::make_unique<Compiled>(model);
+  }
+
+  mutable std::mutex mutex_;
+  mutable std::vector<std::unique_ptr<Compiled>> compiled_;  // one a thread that runs
   std::vector<double> time_;
   std::vector<std::vector<double>> inputs_;
   std::vector<double> first_;

@@ -70,39 +70,6 @@ std::vector<std::string> places(const Case& data, const TermInfo& info) {
   }
 }
 
-/// The starts of one term: every value of its first shape, the first value of further ones.
-void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes = {}) {
-  const auto& info = *term.info;
-  Start start;
-  bool periodic = false, any_amplitude = false;
-  std::size_t shape = none;
-  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
-    const auto& p = info.parameters[i];
-    if (p.role == Role::phase) periodic = true;
-    if (p.role == Role::amplitude) any_amplitude = true;
-    if (p.role == Role::shape && shape == none) shape = i;
-    if (p.role != Role::reference || !term.given[i])
-      term.values[i] = term.given[i] ? term.values[i] : p.starts[0];
-    term.given[i] = true;
-  }
-  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
-    if (info.parameters[i].role != Role::amplitude) continue;
-    start.directions.push_back({i, 0, false});
-    if (periodic) start.directions.push_back({i, 0, true});
-  }
-  if (!any_amplitude) start.directions.push_back({none, 0, false});
-  std::vector<double> values = first_shapes;
-  if (values.empty() && shape != none)
-    for (double v : info.parameters[shape].starts)
-      if (std::isfinite(v)) values.push_back(v);
-  if (shape == none) values = {0.0};
-  for (double v : values) {
-    start.term = term;
-    if (shape != none) start.term.values[shape] = info.parameters[shape].bounds.clamp(v);
-    starts.push_back(start);
-  }
-}
-
 /// Pitches worth trying where the rows are few: a fine grid of wave numbers between one and the sampling's limit.
 std::vector<double> pitch_grid(const std::vector<double>& positions, std::size_t most) {
   auto sorted = positions;
@@ -149,101 +116,39 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
   return {};
 }
 
-void add_equations(const Case& data, const physics::Model& model, std::vector<Start>& starts) {
-  const auto& equations = data.model.equations;
-  // The usual size of each variable and of each state's rate: the unit in which strengths are tried.
-  Case copy = data;
-  const auto size_of = [&](const std::string& symbol) {
-    for (const auto& output : equations.outputs)
-      if (output.expression == symbol) {
-        std::vector<double> values;
-        for (const auto& r : data.recordings)
-          for (std::size_t o = 0; o < data.outputs.size(); ++o)
-            if (data.outputs[o] == output.name)
-              for (double v : r.measured[o])
-                if (std::isfinite(v)) values.push_back(std::abs(v));
-        if (!values.empty()) return std::max(1e-12, *std::max_element(values.begin(), values.end()));
-      }
-    return std::max(1e-3, std::abs(model.value(symbol + ".initial", 1.0)));
-  };
-  const auto make = [&](const char* name, const std::string& on, const std::string& with) {
-    Term term;
-    term.info = physics::find_term(Plant::equations, name);
-    term.on = on;
-    term.with = with;
-    for (const auto& used : model.terms)
-      if (used.info == term.info && used.on == on && used.with == with) term.info = nullptr;
-    return term;
-  };
-  const double duration =
-      data.recordings.front().inputs.time.back() - data.recordings.front().inputs.time.front();
-  for (const auto& state : equations.states) {
-    // A state whose rate is only another state (x' = v) is kinematics; nothing can be missing there.
-    bool kinematic = false;
-    for (const auto& other : equations.states) kinematic = kinematic || state.derivative == other.name;
-    if (kinematic) continue;
-    for (const char* name : {"linear", "quadratic", "cubic"})
-      for (const auto& other : equations.states) {
-        const bool own = other.name == state.name;
-        auto term = make(std::string{name} == "linear" && !own ? "coupling" : name, state.name,
-                         own ? "" : other.name);
-        if (term.info == nullptr) continue;
-        const double s = size_of(other.name);
-        term.values[0] = 1e-3 * size_of(state.name) /
-                         std::pow(s, name[0] == 'l' ? 1 : (name[0] == 'q' ? 2 : 3)) / duration;
-        term.given[0] = true;
-        add_starts(starts, term);
-      }
-    for (const auto& input : equations.inputs) {
-      auto term = make("coupling", state.name, input.symbol);
-      if (term.info == nullptr) continue;
-      term.values[0] = 1e-3 * size_of(state.name) / duration;
-      term.given[0] = true;
-      add_starts(starts, term);
-    }
-    for (const char* name : {"constant", "dry_friction"}) {
-      auto term = make(name, state.name, "");
-      if (term.info == nullptr) continue;
-      term.values[0] = 1e-3 * size_of(state.name) / duration;
-      term.given[0] = true;
-      add_starts(starts, term);
-    }
-    if (auto term = make("hidden_state", state.name, ""); term.info != nullptr) {
-      term.values[0] = 0.05 / duration;
-      term.given[0] = true;
-      add_starts(starts, term, {0.003 * duration, 0.03 * duration, 0.2 * duration});
-    }
-    const double top = size_of(state.name);
-    for (const char* name : {"upper_limit", "overflow"})
-      for (double share : {0.98, 0.9, 1.1}) {
-        if (std::string{name} == "overflow") {
-          for (const auto& other : equations.states)
-            if (other.name != state.name)
-              if (auto term = make(name, state.name, other.name); term.info != nullptr)
-                add_starts(starts, term, {share * top});
-        } else if (auto term = make(name, state.name, ""); term.info != nullptr) {
-          add_starts(starts, term, {share * top});
-        }
-      }
-  }
-  const double step = duration / static_cast<double>(data.recordings.front().inputs.rows());
-  for (const auto& input : equations.inputs)
-    for (const char* name : {"delay", "lag", "dead_zone"})
-      if (auto term = make(name, input.symbol, ""); term.info != nullptr) {
-        term.values[0] = std::string{name} == "dead_zone" ? 1e-3 : 0.5 * step;
-        term.given[0] = true;
-        add_starts(starts, term);
-      }
-  for (const auto& output : equations.outputs)
-    for (const char* name : {"delay", "lag"})
-      if (auto term = make(name, output.name, ""); term.info != nullptr) {
-        term.values[0] = 0.5 * step;
-        term.given[0] = true;
-        add_starts(starts, term);
-      }
-}
-
 }  // namespace
+
+void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes) {
+  const auto& info = *term.info;
+  Start start;
+  bool periodic = false, any_amplitude = false;
+  std::size_t shape = none;
+  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
+    const auto& p = info.parameters[i];
+    if (p.role == Role::phase) periodic = true;
+    if (p.role == Role::amplitude) any_amplitude = true;
+    if (p.role == Role::shape && shape == none) shape = i;
+    if (p.role != Role::reference || !term.given[i])
+      term.values[i] = term.given[i] ? term.values[i] : p.starts[0];
+    term.given[i] = true;
+  }
+  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
+    if (info.parameters[i].role != Role::amplitude) continue;
+    start.directions.push_back({i, 0, false});
+    if (periodic) start.directions.push_back({i, 0, true});
+  }
+  if (!any_amplitude) start.directions.push_back({none, 0, false});
+  std::vector<double> values = first_shapes;
+  if (values.empty() && shape != none)
+    for (double v : info.parameters[shape].starts)
+      if (std::isfinite(v)) values.push_back(v);
+  if (shape == none) values = {0.0};
+  for (double v : values) {
+    start.term = term;
+    if (shape != none) start.term.values[shape] = info.parameters[shape].bounds.clamp(v);
+    starts.push_back(start);
+  }
+}
 
 std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name) {
   const auto& r = data.recordings[recording];
@@ -274,8 +179,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   std::vector<Start> starts;
   const auto& model = fitted.model;
   if (data.model.plant == Plant::equations) {
-    add_equations(data, model, starts);
-    return starts;
+    return equation_starts(data, model);
   }
   Periods periods;
   if (data.model.plant == Plant::axis) periods = axis_periods(data, weighing, fitted);

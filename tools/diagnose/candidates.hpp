@@ -24,6 +24,11 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
 /// Curves over each variable, for what no name describes.
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
 
+/// Those of a model in the user's own equations.
+std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted);
+/// The starts of one term: every value of its first shape (its own where none is given), the first value of further ones.
+void add_starts(std::vector<Start>& starts, physics::Term term, const std::vector<double>& first_shapes = {});
+
 /// Pitches or frequencies at which a periodic term would explain most, best first (axis: by the adjoint of the loop).
 struct Periods {
   std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency;

@@ -1,15 +1,18 @@
 #include "components/stage/axis_stage.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 
 namespace invar::stage {
 namespace {
 
 /// A carriage without friction that the motor pushes, integrated exactly for a held force; behind real ports.
-struct Bench final : Component {
+struct Bench : Component {
   Input<MotorCommand> motor{*this, "motor"};
   Output<AxisFeedback> feedback{*this, "feedback"};
   Output<AxisCommand> command{*this, "command"};
@@ -25,6 +28,7 @@ struct Bench final : Component {
   Stage stage{parameters};
   double position = 0.05;
   double velocity = 0.0;
+  double spring = 0.0;  // N/m
   bool seeing = true;
   bool at_switch = false;
   std::uint64_t cycle = 0;
@@ -51,7 +55,8 @@ struct Bench final : Component {
     set_now(tick.now);
     stage.set_now(tick.now);
     const auto* drive = motor.latest();
-    const double force = drive != nullptr && drive->enabled() ? force_constant * drive->current() : 0.0;
+    const double force = (drive != nullptr && drive->enabled() ? force_constant * drive->current() : 0.0) -
+                         spring * (position - 0.05);
     position += velocity * period + force / mass * period * period / 2;
     velocity += force / mass * period;
     AxisFeedback sample;
@@ -81,6 +86,99 @@ struct Bench final : Component {
     ASSERT_TRUE(run_until([](const AxisState& s) { return s.enabled(); }, 5));
   }
 };
+
+/// A bench whose carriage hangs on a spring that the servo's numbers know nothing of.
+struct Sprung final : Bench {
+  Output<compensation::ModelCommand> order{*this, "order"};
+  Input<compensation::ModelStatus> answer{*this, "answer"};
+  std::filesystem::path folder = [] {
+    std::string pattern = (std::filesystem::temp_directory_path() / "invar-stage-XXXXXX").string();
+    return std::filesystem::path{mkdtemp(pattern.data())};
+  }();
+  std::uint64_t orders = 0;
+
+  Sprung() {
+    stage.simulated_time = true;
+    join(order, "model");
+    static_cast<OutputPort*>(stage.find_port("model_status"))->connect(answer);
+    spring = 600.0;
+  }
+  ~Sprung() override { std::filesystem::remove_all(folder); }
+
+  std::string model(double stiffness, const std::string& plant = "axis") {
+    const auto file = folder / "model.yaml";
+    std::ofstream{file} << "invar_model: 1\nplant: " << plant
+                        << "\ncolumns: {time: t, reference: r, position: y, current: u}\n"
+                           "controller: {kind: pid, rate: 1000, kp: 1}\n"
+                           "parameters: {mass: {value: 3, unit: kg}, motor_constant: {value: 12, unit: N/A}, "
+                           "viscous_damping: {value: 0, unit: N s/m}}\n"
+                           "terms: [{term: position_stiffness, stiffness: {value: "
+                        << stiffness << ", unit: N/m}, center: {value: 0.05, unit: m}}]\n";
+    return file.string();
+  }
+  compensation::ModelStatus tell(compensation::ModelCommandKind kind, const std::string& path = "") {
+    compensation::ModelCommand sample;
+    sample.id(++orders);
+    sample.kind(kind);
+    sample.path(path);
+    order.write(sample);
+    cycle_once();
+    return *answer.latest();
+  }
+  /// Largest following error of a move there and back.
+  double following_error() {
+    double worst = 0.0;
+    for (const double target : {0.12, 0.05}) {
+      send(AXIS_COMMAND_MOVE, target);
+      EXPECT_TRUE(run_until([&](const AxisState& s) {
+        worst = std::max(worst, std::abs(s.following_error()));
+        return s.command_id() == next_id - 1 && s.command_done() && s.settled();
+      }));
+    }
+    return worst;
+  }
+};
+
+TEST(Stage, FeedsForwardTheForcesOfAModelThatIsLoadedWhileRunning) {
+  Sprung bench;
+  bench.enable();
+  const double before = bench.following_error();
+  EXPECT_EQ(bench.tell(compensation::MODEL_STAGE, bench.model(600.0)).state(), compensation::MODEL_STAGED);
+  EXPECT_EQ(bench.tell(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_ACTIVE);
+  EXPECT_NE(bench.answer.latest()->model_checksum(), 0U);
+  const double after = bench.following_error();
+  EXPECT_LT(after, 0.2 * before) << before << ' ' << after;
+  EXPECT_EQ(bench.tell(compensation::MODEL_ROLLBACK).state(), compensation::MODEL_NONE);
+  EXPECT_NEAR(bench.following_error(), before, 0.05 * before);
+}
+
+TEST(Stage, AnotherModelDoesNotMakeTheCarriageJump) {
+  Sprung bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.12);
+  ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_done() && s.settled(); }));
+  (void)bench.tell(compensation::MODEL_STAGE, bench.model(600.0));
+  const double current = bench.state.latest()->current();
+  (void)bench.tell(compensation::MODEL_ACTIVATE);
+  EXPECT_NEAR(bench.state.latest()->current(), current, 0.06);
+  for (int i = 0; i < 500; ++i) {
+    bench.cycle_once();
+    ASSERT_LT(std::abs(bench.position - 0.12), 2e-6) << i;
+  }
+}
+
+TEST(Stage, RefusesAModelThatIsNoneOfAnAxisOrLeavesNoCurrentForTheServo) {
+  Sprung bench;
+  bench.enable();
+  const auto stiff = bench.tell(compensation::MODEL_STAGE, bench.model(5000.0));
+  EXPECT_EQ(stiff.state(), compensation::MODEL_REFUSED);
+  EXPECT_NE(std::string{stiff.text().c_str()}.find("0.8 of the limit"), std::string::npos)
+      << stiff.text().c_str();
+  EXPECT_EQ(bench.tell(compensation::MODEL_STAGE, bench.model(600.0, "sensor")).state(),
+            compensation::MODEL_REFUSED);
+  EXPECT_EQ(bench.tell(compensation::MODEL_STAGE, "/nowhere.yaml").state(), compensation::MODEL_REFUSED);
+  EXPECT_EQ(bench.tell(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_REFUSED);
+}
 
 TEST(Stage, EnablingDoesNotMoveTheCarriage) {
   Bench bench;

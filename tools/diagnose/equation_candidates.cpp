@@ -1,0 +1,220 @@
+// Candidates for a model in the user's own equations: which terms, on which state, input or output, from which sizes.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "core/physics/library.hpp"
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Plant;
+using physics::Term;
+
+/// Where a variable goes in the fitted model, and how fast.
+struct Span {
+  double low = 0.0, high = 0.0;
+  double rate = 0.0;  // [1/s] times the variable: the largest change a row
+  [[nodiscard]] double size() const { return std::max({std::abs(low), std::abs(high), 1e-12}); }
+  [[nodiscard]] double width() const { return high - low; }
+};
+
+/// What goes over the fitted model: states that nobody measures too.
+class Spans {
+ public:
+  Spans(const Case& data, const physics::Model& fitted) {
+    auto model = fitted;
+    model.equations.outputs.clear();
+    for (const auto& state : model.equations.states)
+      model.equations.outputs.push_back({state.name, state.name, {}});
+    std::erase_if(model.signals, [](const auto& signal) { return signal.is_output; });
+    for (const auto& state : model.equations.states)
+      model.signals.push_back({state.name, state.name, "", true});
+    for (const auto& recording : data.recordings) {
+      const auto& time = recording.inputs.time;
+      duration = std::max(duration, time.back() - time.front());
+      rows = std::max(rows, time.size());
+      physics::Outputs states;
+      physics::prepare(model, recording.inputs)->run(model, states);
+      for (std::size_t i = 0; i < states.size(); ++i) widen(model.equations.states[i].name, time, states[i]);
+      for (const auto& input : model.equations.inputs)
+        if (const auto* values = recording.inputs.find(input.signal)) widen(input.symbol, time, *values);
+      widen("t", time, time);
+      for (std::size_t o = 0; o < data.outputs.size(); ++o)
+        widen(data.outputs[o], time, recording.measured[o]);
+    }
+  }
+  const Span& of(const std::string& name) const { return spans_.at(name); }
+
+  double duration = 0.0;
+  std::size_t rows = 1;
+
+ private:
+  void widen(const std::string& name, const std::vector<double>& time, const std::vector<double>& values) {
+    const auto [at, is_new] = spans_.try_emplace(name);
+    auto& span = at->second;
+    bool first = is_new;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) continue;
+      span.low = first ? values[i] : std::min(span.low, values[i]);
+      span.high = first ? values[i] : std::max(span.high, values[i]);
+      first = false;
+      if (i > 0 && std::isfinite(values[i - 1]) && time[i] > time[i - 1])
+        span.rate = std::max(span.rate, std::abs(values[i] - values[i - 1]) / (time[i] - time[i - 1]));
+    }
+  }
+  std::map<std::string, Span> spans_;
+};
+
+/// The frequencies that stand out of what the fitted model leaves, strongest first.
+std::vector<double> residual_periods(const Case& data, const physics::Model& fitted, std::size_t most) {
+  std::vector<std::pair<double, double>> peaks;  // power, period
+  const auto simulated = simulate(data, fitted);
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      const auto& time = data.recordings[r].inputs.time;
+      const double duration = time.back() - time.front();
+      const std::size_t every = std::max<std::size_t>(1, time.size() / 2000);
+      std::vector<double> power;
+      const auto count = std::min<std::size_t>(300, time.size() / every / 3);
+      for (std::size_t k = 2; k <= count; ++k) {  // half cycles over the recording
+        double sine = 0.0, cosine = 0.0;
+        for (std::size_t i = 0; i < time.size(); i += every) {
+          const double e = data.recordings[r].measured[o][i] - simulated[r][o][i];
+          if (!std::isfinite(e)) continue;
+          const double angle =
+              std::numbers::pi * static_cast<double>(k) * (time[i] - time.front()) / duration;
+          sine += e * std::sin(angle), cosine += e * std::cos(angle);
+        }
+        power.push_back(sine * sine + cosine * cosine);
+      }
+      for (std::size_t i = 1; i + 1 < power.size(); ++i)
+        if (power[i] > power[i - 1] && power[i] > power[i + 1])
+          peaks.emplace_back(power[i], 2.0 * duration / static_cast<double>(i + 2));
+    }
+  std::sort(peaks.rbegin(), peaks.rend());
+  std::vector<double> periods;
+  for (std::size_t i = 0; i < std::min(most, peaks.size()); ++i) periods.push_back(peaks[i].second);
+  return periods;
+}
+
+class Candidates {
+ public:
+  Candidates(const Case& data, const physics::Model& fitted)
+      : data_{data}, model_{fitted}, equations_{data.model.equations}, spans_{data, fitted} {}
+
+  std::vector<Start> all() {
+    for (const auto& state : equations_.states) {
+      // A state whose rate is only another state (x' = v) is kinematics; nothing can be missing there.
+      const bool kinematic = std::any_of(equations_.states.begin(), equations_.states.end(),
+                                         [&](const auto& other) { return state.derivative == other.name; });
+      if (kinematic) continue;
+      add_rates(state.name);
+      add_stores(state.name);
+    }
+    const double step = spans_.duration / static_cast<double>(spans_.rows);
+    for (const auto& input : equations_.inputs) {
+      const auto& span = spans_.of(input.symbol);
+      add_late(input.symbol, step);
+      for (const double share : {0.02, 0.1}) add("dead_zone", input.symbol, "", share * span.width());
+      add_limits(input.symbol, span);
+    }
+    for (const auto& output : equations_.outputs) {
+      add_late(output.name, step);
+      add_limits(output.name, spans_.of(output.name));
+    }
+    return std::move(starts_);
+  }
+
+ private:
+  /// Starts of a term with its amplitude (0: it has none) at `size`, once for each of `shapes`.
+  void add(const char* name, const std::string& on, const std::string& with, double size,
+           const std::vector<double>& shapes = {}) {
+    Term term;
+    term.info = physics::find_term(Plant::equations, name);
+    term.on = on;
+    term.with = with;
+    for (const auto& used : model_.terms)
+      if (used.info == term.info && used.on == on && used.with == with) return;
+    if (size > 0.0) {
+      term.values[0] = size;
+      term.given[0] = true;
+    }
+    add_starts(starts_, term, shapes);
+  }
+
+  /// Whatever may be added to a state's rate: over itself, the other states, inputs and time.
+  void add_rates(const std::string& state) {
+    const auto& own = spans_.of(state);
+    const double rate = 1e-3 * std::max(own.rate, own.size() / spans_.duration);
+    for (const auto& other : equations_.states) {
+      const bool itself = other.name == state;
+      const double s = spans_.of(other.name).size();
+      const std::string with = itself ? "" : other.name;
+      add(itself ? "linear" : "coupling", state, with, rate / s);
+      add("quadratic", state, with, rate / (s * s));
+      add("cubic", state, with, rate / (s * s * s));
+      add("periodic", state, other.name, rate, periods_of(spans_.of(other.name)));
+    }
+    for (const auto& input : equations_.inputs)
+      add("coupling", state, input.symbol, rate / spans_.of(input.symbol).size());
+    add("constant", state, "", rate);
+    add("dry_friction", state, "", rate);
+    add("periodic", state, "t", rate, residual_periods(data_, model_, 6));
+  }
+
+  /// From half a period to some sixteen over the way that the variable goes.
+  static std::vector<double> periods_of(const Span& span) {
+    std::vector<double> periods;
+    if (!(span.width() > 1e-9 * span.size())) return {};
+    for (double k = 0.5; k < 4.0; k += 0.5) periods.push_back(span.width() / k);
+    for (double k = 4.0; k < 16.0; k *= 1.09) periods.push_back(span.width() / k);
+    return periods;
+  }
+
+  /// What bounds a state, and what stores behind it.
+  void add_stores(const std::string& state) {
+    std::vector<double> times;
+    for (double share = 0.002; share < 0.6; share *= 4.0) times.push_back(share * spans_.duration);
+    add("hidden_state", state, "", 0.02 / spans_.duration, times);
+    const auto& span = spans_.of(state);
+    add_limits(state, span);
+    for (const double share : {0.97, 0.9, 0.8, 0.7, 0.55}) {
+      add("overflow", state, "", 0.0, {span.low + share * span.width()});
+      for (const auto& other : equations_.states)
+        if (other.name != state) add("overflow", state, other.name, 0.0, {span.low + share * span.width()});
+    }
+  }
+
+  void add_limits(const std::string& on, const Span& span) {
+    if (!(span.width() > 0.0)) return;
+    for (const double share : {0.97, 0.9, 0.8, 0.7, 0.55}) {
+      add("upper_limit", on, "", 0.0, {span.low + share * span.width()});
+      add("lower_limit", on, "", 0.0, {span.high - share * span.width()});
+    }
+  }
+
+  void add_late(const std::string& on, double step) {
+    for (const double steps : {0.5, 3.0, 12.0}) {
+      add("delay", on, "", steps * step);
+      add("lag", on, "", steps * step);
+    }
+  }
+
+  const Case& data_;
+  const physics::Model& model_;
+  const physics::Equations& equations_;
+  Spans spans_;
+  std::vector<Start> starts_;
+};
+
+}  // namespace
+
+std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted) {
+  return Candidates{data, fitted}.all();
+}
+
+}  // namespace invar::diagnose
