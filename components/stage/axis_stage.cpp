@@ -80,7 +80,7 @@ std::string Stage::load(const std::filesystem::path& file, Staged::Model& staged
 }
 
 double Stage::Faded::operator()(double value, bool changed, double period) noexcept {
-  constexpr double fading = 0.1;  // s
+  constexpr double fading = 0.25;  // s
   if (changed) rest = last - value;
   rest -= rest * std::min(1.0, period / fading);
   return last = value + rest;

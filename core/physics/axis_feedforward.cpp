@@ -41,7 +41,7 @@ double AxisFeedforward::current(const AxisMotion& motion, double temperature) no
   const double direction = motion.velocity > 0.0 ? 1.0 : (motion.velocity < 0.0 ? -1.0 : 0.0);
   AxisPoint at{0.0, motion.position, motion.velocity, 0.0, temperature};
   // The force is straight in the current but for the iron's saturation: a few steps settle it.
-  for (int i = 0; i < 4; ++i)
+  for (int i = 0; i < 12; ++i)
     at.current += (mass_ * motion.acceleration - plant_.force(at, direction)) / motor_constant_;
   if (at.current > 0.0) return at.current + dead_;
   return at.current < 0.0 ? at.current - dead_ : 0.0;
