@@ -184,7 +184,11 @@ double Stage::feedforward(const Tick& tick) noexcept {
     at = trajectory_.at((tick.now - trajectory_start_).in_seconds() + axis.lead());
     current = axis.current({at.position + correction_held_ - offset_, at.velocity, at.acceleration});
   }
-  return std::clamp(fed_forward_(current, model_changed_, tick.period), -control.limit, control.limit);
+  // What the sum has learnt already and the model now brings must not count twice.
+  const bool taken_over = model_changed_ && controller_.shift(fed_forward_.last - current);
+  if (taken_over) fed_forward_.rest = 0.0;
+  return std::clamp(fed_forward_(current, model_changed_ && !taken_over, tick.period), -control.limit,
+                    control.limit);
 }
 
 void Stage::read_position(const AxisFeedback& feedback, const Tick& tick) noexcept {
@@ -264,9 +268,9 @@ void Stage::step(const Tick& tick) noexcept {
   } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
+    const double forward = feedforward(tick);
     const double feedback_current = controller_.step(at.position + correction_held_, position_);
-    current_ = std::clamp(feedback_current + feedforward(tick), -parameters_.control.limit,
-                          parameters_.control.limit);
+    current_ = std::clamp(feedback_current + forward, -parameters_.control.limit, parameters_.control.limit);
     supervise(tick);
   }
   const bool enabled = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;

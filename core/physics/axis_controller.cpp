@@ -20,6 +20,12 @@ void AxisController::reset() noexcept {
   started_ = false;
 }
 
+bool AxisController::shift(double current) noexcept {
+  if (settings_.kind == AxisControllerSettings::Kind::cascade || !(settings_.ki > 0.0)) return false;
+  sum_ += current * settings_.rate / settings_.ki;
+  return true;
+}
+
 double AxisController::step(double reference, double reading) noexcept {
   const double error = reference - reading;
   const bool pid = settings_.kind == AxisControllerSettings::Kind::pid;

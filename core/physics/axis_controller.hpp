@@ -26,6 +26,9 @@ class AxisController {
   explicit AxisController(const AxisControllerSettings& settings);
   /// Sums and filters at zero; the next step is the first. Real-time.
   void reset() noexcept;
+  /// Adds a current to the sum's part of the command, so that somebody else may take it over without a bump; false where
+  /// the law has no sum. Real-time.
+  bool shift(double current) noexcept;
   /// The command [A] for this reference and reading [m]; call once a period.
   [[nodiscard]] double step(double reference, double reading) noexcept;
 

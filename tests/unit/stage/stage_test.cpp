@@ -163,7 +163,7 @@ TEST(Stage, AnotherModelDoesNotMakeTheCarriageJump) {
   EXPECT_NEAR(bench.state.latest()->current(), current, 0.06);
   for (int i = 0; i < 500; ++i) {
     bench.cycle_once();
-    ASSERT_LT(std::abs(bench.position - 0.12), 5e-6) << i;  // without fading some 50 um
+    ASSERT_LT(std::abs(bench.position - 0.12), 2e-6) << i;
   }
 }
 
