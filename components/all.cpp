@@ -9,6 +9,7 @@
 #include "components/supervisor/supervisor.hpp"
 #include "components/thermal/thermal.hpp"
 #include "components/world/simulated_heater.hpp"
+#include "components/world/simulated_sensor.hpp"
 #include "components/world/simulated_stage.hpp"
 
 namespace invar {
@@ -16,6 +17,8 @@ namespace invar {
 void add_all_components(Registry& registry) {
   registry.add<world::SimulatedStage>("simulated_stage",
                                       "drives, encoders and true tool position of a machine");
+  registry.add<world::SimulatedSensor>("simulated_sensor",
+                                       "imperfect position or velocity sensor of a simulated axis");
   registry.add<world::SimulatedHeater>("simulated_heater",
                                        "pad, slide and base behind a heater controller's registers");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");

@@ -1,66 +1,205 @@
 #include "components/fusion/fusion.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "core/compensation/fusion_file.hpp"
+#include "core/metrology/fusion_observer.hpp"
 
 namespace invar::fusion {
 
+namespace {
+
+std::vector<Fusion::Sensor> sensors_of(const Fusion::Parameters& parameters) {
+  std::vector<Fusion::Sensor> sensors = parameters.sensors;
+  if (sensors.empty()) {
+    Fusion::Sensor encoder;
+    encoder.name = "encoder";
+    encoder.from = "feedback";
+    encoder.resolution = parameters.resolution;
+    Fusion::Sensor velocity = encoder;
+    velocity.name = "velocity";
+    velocity.quantity = "velocity";
+    velocity.gain = parameters.velocity_gain;
+    velocity.largest = parameters.largest_velocity;
+    sensors = {encoder, velocity};
+  }
+  std::stable_partition(sensors.begin(), sensors.end(),
+                        [](const auto& sensor) { return sensor.quantity == "position"; });
+  return sensors;
+}
+
+std::size_t positions_in(const std::vector<Fusion::Sensor>& sensors) {
+  return static_cast<std::size_t>(std::count_if(
+      sensors.begin(), sensors.end(), [](const auto& sensor) { return sensor.quantity == "position"; }));
+}
+
+metrology::FusionModel model_of(const std::vector<Fusion::Sensor>& sensors) {
+  metrology::FusionModel model;
+  for (const auto& sensor : sensors) {
+    if (sensor.quantity == "position") {
+      metrology::PositionSensorModel position;
+      position.step = sensor.resolution;
+      position.noise = sensor.noise > 0.0 ? sensor.noise : std::max(0.02 * sensor.resolution, 1e-9);
+      position.delay = sensor.delay;
+      position.delay_sigma = sensor.delay_sigma;
+      model.position_names.push_back(sensor.name);
+      model.positions.push_back(position);
+    } else {
+      metrology::VelocitySensorModel velocity;
+      velocity.gains[0] = sensor.gain;
+      velocity.fastest = velocity.largest = sensor.largest;
+      velocity.lag = sensor.delay;
+      velocity.lag_sigma = sensor.delay_sigma;
+      model.velocity_names.push_back(sensor.name);
+      model.velocities.push_back(velocity);
+    }
+  }
+  const auto& first = model.positions.front();
+  model.start_sigma = std::hypot(first.step / std::sqrt(12.0), first.noise);
+  return model;
+}
+
+}  // namespace
+
+/// Where a sensor's readings come from, and which was the last.
+struct Fusion::Source {
+  Source(Fusion& owner, const Sensor& sensor, std::size_t index)
+      : is_position{sensor.quantity == "position"},
+        place{is_position ? index : index - owner.positions_},
+        bit{index},
+        patience{Duration::seconds(sensor.patience)} {
+    if (sensor.from == "port")
+      reading = std::make_unique<Input<sensing::AxisReading>>(owner, "sensor_" + sensor.name);
+  }
+  bool is_position;
+  std::size_t place;  // among the sensors of its kind
+  std::size_t bit;    // among all
+  Duration patience;
+  std::unique_ptr<Input<sensing::AxisReading>> reading;  // nullptr: from `feedback`
+  std::uint64_t received = 0;
+  Instant last;  // when a sound reading came
+};
+
+Fusion::Fusion(const Parameters& parameters)
+    : parameters_{parameters},
+      sensors_{sensors_of(parameters)},
+      positions_{positions_in(sensors_)},
+      rest_{{parameters.rest.least_weight, parameters.rest.after, parameters.rest.look_again},
+            positions_,
+            sensors_.size()},
+      step_free_{parameters.fade} {
+  bool from_feedback = false;
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    sources_.push_back(std::make_unique<Source>(*this, sensors_[i], i));
+    from_feedback = from_feedback || sources_.back()->reading == nullptr;
+  }
+  if (from_feedback) feedback_ = std::make_unique<Input<stage::AxisFeedback>>(*this, "feedback");
+}
+
+Fusion::~Fusion() = default;
+
 void Fusion::configure() {
+  const std::string mend = "describe one position sensor at least and eight sensors at most";
+  if (positions_ < 1) throw InputError{name, "has no position sensor", mend};
+  if (sensors_.size() > metrology::most_sensors) throw InputError{name, "has more than eight sensors", mend};
   if (parameters_.model.empty()) {
-    metrology::FusionModel model;
-    model.position_names = {"encoder"};
-    model.velocity_names = {"velocity"};
-    model.positions.resize(1);
-    model.positions[0].step = parameters_.resolution;
-    model.positions[0].noise = 0.02 * parameters_.resolution;  // of an edge
-    model.velocities.resize(1);
-    model.velocities[0].gains[0] = parameters_.velocity_gain;
-    model.velocities[0].fastest = model.velocities[0].largest = parameters_.largest_velocity;
-    estimator_ = std::make_unique<metrology::FusionObserver>(model);
+    estimator_ = std::make_unique<metrology::FusionObserver>(model_of(sensors_));
     return;
   }
   const auto yaml = config::Yaml::load(parameters_.model);
   compensation::check_seal(yaml);
   (void)yaml.root().integer("invar_compensation", 1, 1);
   (void)yaml.root().choice("kind", {"fusion"});
+  yaml.root()["identified_from"].accept_all();
   const auto model = compensation::read_fusion(yaml.root());
   yaml.finish();
-  if (model.sensors.positions.size() != 1 || model.sensors.velocities.size() != 1)
-    throw InputError{parameters_.model.string(), "is not of one position and one velocity sensor",
-                     "calibrate with the columns of this axis"};
+  std::vector<std::string> names = model.sensors.position_names;
+  names.insert(names.end(), model.sensors.velocity_names.begin(), model.sensors.velocity_names.end());
+  const bool same = positions_ == model.sensors.position_names.size() &&
+                    std::equal(names.begin(), names.end(), sensors_.begin(), sensors_.end(),
+                               [](const auto& text, const auto& sensor) { return text == sensor.name; });
+  if (!same) {
+    std::string list;
+    for (const auto& text : names) list += (list.empty() ? "" : ", ") + text;
+    throw InputError{parameters_.model.string(), "is of the sensors " + list,
+                     "name the component's sensors so, in this order"};
+  }
   estimator_ = compensation::make_estimator(model);
 }
 
 void Fusion::activate() {
   estimator_->reset();
-  first_ = true;
+  rest_.reset();
+  step_free_.reset();
+  resting_ = 0;
+  started_ = false;
+  for (auto& source : sources_) source->last = now();
+}
+
+/// One sensor's reading into the sample; false where none came yet.
+bool Fusion::read(Source& source, const Tick& tick, metrology::FusionSample& sample) noexcept {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  bool fresh = false;
+  Instant measured = tick.now;
+  if (source.reading != nullptr) {
+    fresh = source.reading->received() != source.received;
+    source.received = source.reading->received();
+    if (const auto* reading = source.reading->latest(); reading != nullptr) {
+      value = source.is_position ? reading->position() : reading->velocity();
+      measured = Instant{reading->at().time_ns()};
+    }
+  } else {
+    fresh = feedback_->received() != source.received;
+    source.received = feedback_->received();
+    if (const auto* feedback = feedback_->latest(); feedback != nullptr)
+      value = source.is_position ? feedback->position() : feedback->velocity();
+  }
+  const Duration age = std::max(tick.now - measured, Duration{});
+  if (fresh && age <= source.patience) {
+    source.last = tick.now;
+    sample.ages[source.bit] = age.in_seconds();
+  } else {
+    value = std::numeric_limits<double>::quiet_NaN();
+    if (tick.now - source.last < source.patience) sample.silent |= 1U << source.bit;
+  }
+  (source.is_position ? sample.positions : sample.velocities)[source.place] = value;
+  return fresh;
 }
 
 void Fusion::step(const Tick& tick) noexcept {
-  const auto* feedback = feedback_.latest();
-  if (feedback == nullptr) return;
   metrology::FusionSample sample;
   sample.positions.fill(std::numeric_limits<double>::quiet_NaN());
   sample.velocities.fill(std::numeric_limits<double>::quiet_NaN());
-  sample.period = first_ ? 0.0 : tick.period;
-  sample.positions[0] = feedback->position();
-  sample.velocities[0] = feedback->velocity();
-  first_ = false;
+  sample.period = started_ ? tick.period : 0.0;
+  sample.selector = parameters_.selector;
+  bool any = false;
+  for (auto& source : sources_) any = (read(*source, tick, sample) && source->is_position) || any;
+  if (!started_ && !any) return;  // says nothing before its first position
+  started_ = true;
+  sample.silent |= resting_;
   const metrology::FusedPosition found = estimator_->step(sample);
+  resting_ = rest_.update(found, tick.period);
 
   sensing::FusedPosition fused;
   fused.cell(cell);
-  fused.axis(feedback->axis());
+  fused.axis(static_cast<std::uint32_t>(parameters_.axis));
   fused.at().time_ns(tick.now.ns);
   fused.at().cycle(tick.cycle);
-  fused.position(found.position);
+  fused.position(step_free_(found, sample.period));
   fused.velocity(found.velocity);
   fused.sigma(found.sigma);
-  fused.sensor_count(2);
-  fused.weights()[0] = found.weights[0];
-  fused.weights()[1] = found.weights[1];
-  fused.residuals()[0] = feedback->position() - found.position;
+  fused.sensor_count(static_cast<std::uint32_t>(sensors_.size()));
+  for (std::size_t i = 0; i < sensors_.size(); ++i) {
+    fused.weights()[i] = found.weights[i];
+    fused.lateness()[i] = found.lateness[i];
+    fused.noise()[i] = found.noise[i];
+    if (i < positions_ && std::isfinite(sample.positions[i]))
+      fused.residuals()[i] = sample.positions[i] - found.position;
+  }
+  fused.live(found.live);
+  fused.resting(resting_);
   fused.valid(found.live != 0);
   fused_.write(fused);
 }

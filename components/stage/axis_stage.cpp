@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
@@ -106,6 +107,22 @@ void Stage::prime(const Tick& tick) noexcept {
   primed_ = true;
 }
 
+bool Stage::start_sine(const AxisCommand& command, const Tick& tick) noexcept {
+  const double from = setpoint(tick).position;
+  const double frequency = 2.0 * std::numbers::pi / command.period();
+  const double speed = std::abs(command.amplitude()) * frequency;
+  const bool possible = command.period() > 0.0 && command.periods() > 0 &&
+                        speed <= parameters_.limits.velocity &&
+                        speed * frequency <= parameters_.limits.acceleration;
+  const Range travel = parameters_.travel;
+  if (mode_ != AXIS_MODE_HOLDING || !homed_ || !possible || !travel.contains(from) ||
+      !travel.contains(from + 2.0 * command.amplitude()))
+    return false;
+  begin(Trajectory::sine(from, command.amplitude(), command.period(), command.periods()), tick,
+        AXIS_MODE_MOVING);
+  return true;
+}
+
 bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
   const Limits& own = parameters_.limits;
   const MotionLimits limits{chosen(command.velocity(), own.velocity),
@@ -144,6 +161,10 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
     case AXIS_COMMAND_MOVE:
     case AXIS_COMMAND_HOME:
       accepted = start_move(command, tick);
+      done = !accepted;
+      break;
+    case AXIS_COMMAND_SINE:
+      accepted = start_sine(command, tick);
       done = !accepted;
       break;
     case AXIS_COMMAND_STOP:

@@ -110,6 +110,7 @@ class Stage final : public Component {
   [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
   void read_position(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void obey(const AxisCommand& command, const Tick& tick) noexcept;
+  [[nodiscard]] bool start_sine(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
   void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
   void prime(const Tick& tick) noexcept;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace invar::stage {
 
@@ -91,9 +92,23 @@ Trajectory Trajectory::stop(const MotionPoint& from, const MotionLimits& limits)
   return result;
 }
 
+Trajectory Trajectory::sine(double from, double amplitude, double period, unsigned periods) noexcept {
+  Trajectory result = rest(from);
+  result.amplitude_ = amplitude;
+  result.frequency_ = 2.0 * std::numbers::pi / period;
+  result.duration_ = period * periods;
+  return result;
+}
+
 MotionPoint Trajectory::at(double time) const noexcept {
-  if (time >= duration_ || count_ == 0) return end_;
   const double t = std::max(time, 0.0);
+  if (amplitude_ != 0.0 && t < duration_) {
+    const double phase = frequency_ * t;
+    const double speed = amplitude_ * frequency_;
+    return {end_.position + amplitude_ * (1.0 - std::cos(phase)), speed * std::sin(phase),
+            speed * frequency_ * std::cos(phase)};
+  }
+  if (t >= duration_ || count_ == 0) return end_;
   std::size_t i = 0;
   while (i + 1 < count_ && pieces_[i + 1].begin <= t) ++i;
   return advanced(pieces_[i].start, pieces_[i].jerk, t - pieces_[i].begin);

@@ -27,6 +27,8 @@ class Trajectory {
   /// Rest to rest in the least time within the limits: the double-S profile of seven pieces (Biagiotti and
   /// Melchiorri, Trajectory Planning for Automatic Machines and Robots, section 3.4).
   static Trajectory move(double from, double to, const MotionLimits& limits) noexcept;
+  /// `periods` times from + amplitude (1 - cos(2 pi t / period)): at rest at both ends, but for a step of the acceleration.
+  static Trajectory sine(double from, double amplitude, double period, unsigned periods) noexcept;
   /// From any motion to rest: first the acceleration is taken back, then a double-S braking.
   static Trajectory stop(const MotionPoint& from, const MotionLimits& limits) noexcept;
 
@@ -45,6 +47,8 @@ class Trajectory {
 
   std::array<Piece, 8> pieces_{};
   std::size_t count_ = 0;
+  double amplitude_ = 0.0;  // of a sine
+  double frequency_ = 0.0;  // [rad/s]
   double duration_ = 0.0;
   MotionPoint end_;
 };

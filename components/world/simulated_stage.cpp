@@ -21,7 +21,8 @@ struct SimulatedStage::Device {
         axis{axis_number},
         plant{plant_of(parameters)},
         motor{owner, "motor_" + letter(axis_number), {.optional = true}},
-        feedback{owner, "feedback_" + letter(axis_number)} {}
+        feedback{owner, "feedback_" + letter(axis_number)},
+        truth{owner, "truth_" + letter(axis_number)} {}
 
   static physics::AxisPlant plant_of(const Axis& axis) {
     if (axis.model.empty())
@@ -43,6 +44,7 @@ struct SimulatedStage::Device {
   physics::AxisPlant plant;
   Input<stage::MotorCommand> motor;
   Output<stage::AxisFeedback> feedback;
+  Output<sensing::AxisReading> truth;
 };
 
 SimulatedStage::SimulatedStage(const Parameters& parameters)
@@ -96,6 +98,13 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     feedback.limit_high(reading > travel.upper + 2e-3);
     feedback.home_switch(reading < travel.lower);
     device->feedback.write(feedback);
+    sensing::AxisReading truth;
+    truth.cell(cell);
+    truth.sensor(static_cast<std::uint32_t>(device->axis));
+    truth.at() = feedback.at();
+    truth.position(device->plant.position());
+    truth.velocity(velocity);
+    device->truth.write(truth);
     position[device->axis] = device->plant.position();
   }
   const Eigen::Vector3d tool = position + metrology::simulated_error(machine_, directions_, position,

@@ -19,7 +19,8 @@
 namespace invar::world {
 
 /// Integrates one physics::AxisPlant an axis of the machine file's chain, and carries the carriages' positions to the tool by
-/// the machine's hidden geometric errors (exact transforms). Every axis `a` has the ports `motor_a` and `feedback_a`.
+/// the machine's hidden geometric errors (exact transforms). Every axis `a` has the ports `motor_a` and `feedback_a`, and
+/// `truth_a` for simulated sensors.
 /// The drive lets go of the motor when its command is older than the watchdog, as real drives do.
 class SimulatedStage final : public Component {
  public:

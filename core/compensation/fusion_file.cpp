@@ -2,10 +2,33 @@
 
 #include <algorithm>
 
+#include "core/metrology/fusion_observer.hpp"
+
 namespace invar::compensation {
 
 using metrology::PositionSensorModel;
 using metrology::VelocitySensorModel;
+
+namespace {
+
+void read_noise(const config::Node& node, metrology::NoiseBySpeed& noise) {
+  noise.speed = node.required("speed").as_numbers("m/s");
+  noise.log_deviation = exactly(node.required("log_deviation"), noise.speed.size(), "1");
+  if (noise.speed.empty() || !std::is_sorted(noise.speed.begin(), noise.speed.end()))
+    node.fault("its speeds do not ascend");
+}
+
+void read_polynomial(const config::Node& node, int sensors, metrology::FusionPolynomial& p) {
+  p.degree = static_cast<int>(node.integer("degree", 2, 6));
+  p.centre = node.number("centre", "m");
+  p.reach = node.number("reach", "m", Range::positive());
+  p.difference_reach = node.number("difference_reach", "m", Range::positive());
+  const auto values =
+      exactly(node.required("coefficients"), metrology::monomials(sensors, p.degree).size(), "m");
+  p.coefficients = Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+}  // namespace
 
 void write_network(ModelText& text, const std::string& key, const numerics::RbfNetwork& network) {
   std::vector<double> ends;
@@ -70,6 +93,7 @@ void write_fusion(ModelText& text, const FusionFile& model) {
         .number("offset", sensor.offset)
         .number("hysteresis", sensor.hysteresis)
         .number("delay", sensor.delay)
+        .number("delay_sigma", sensor.delay_sigma)
         .number("noise", sensor.noise)
         .integer("longest_repeat", sensor.longest_repeat);
   }
@@ -83,6 +107,8 @@ void write_fusion(ModelText& text, const FusionFile& model) {
           .numbers("gains", sensor.gains.data(), sensor.gains.size())
           .number("offset", sensor.offset)
           .number("lag", sensor.lag)
+          .number("gain_sigma", sensor.gain_sigma)
+          .number("lag_sigma", sensor.lag_sigma)
           .number("fastest", sensor.fastest)
           .number("largest", sensor.largest)
           .number("correlation", sensor.correlation)
@@ -93,9 +119,23 @@ void write_fusion(ModelText& text, const FusionFile& model) {
   text.comment("the seed's method: weights over speed and noise level")
       .open("weights")
       .number("intercept", model.weights.intercept)
-      .integer("degree", model.weights.degree)
-      .number("scale", model.weights.scale)
-      .numbers("polynomial", model.weights.polynomial);
+      .numbers("delays", model.weights.delays);
+  if (!model.selector.empty()) text.text("selector", model.selector);
+  if (const auto& noise = model.weights.noise; !noise.speed.empty())
+    text.comment("noise of the first velocity sensor by speed: logarithm of its deviation in m/s")
+        .open("noise_by_speed")
+        .numbers("speed", noise.speed)
+        .numbers("log_deviation", noise.log_deviation)
+        .close();
+  if (const auto& p = model.weights.polynomial; p.degree > 1)
+    text.comment("added to the weighted mean: monomials of it and of each sensor's difference from the first")
+        .open("polynomial")
+        .integer("degree", p.degree)
+        .number("centre", p.centre)
+        .number("reach", p.reach)
+        .number("difference_reach", p.difference_reach)
+        .numbers("coefficients", p.coefficients)
+        .close();
   for (std::size_t i = 0; i < model.weights.weights.size(); ++i)
     write_network(text, "sensor_" + std::to_string(i + 2), model.weights.weights[i]);
   text.close();
@@ -115,6 +155,7 @@ FusionFile read_fusion(const config::Node& root) {
     sensor.offset = node.number("offset", "m");
     sensor.hysteresis = node.number("hysteresis", "m");
     sensor.delay = node.number("delay", "s", Range{0.0, 1.0});
+    sensor.delay_sigma = node.number("delay_sigma", "s", Range{0.0, 1.0});
     sensor.noise = node.number("noise", "m", Range::positive());
     sensor.longest_repeat = static_cast<int>(node.integer("longest_repeat", 0, 1000));
     model.sensors.positions.push_back(sensor);
@@ -127,6 +168,8 @@ FusionFile read_fusion(const config::Node& root) {
       std::copy(gains.begin(), gains.end(), sensor.gains.begin());
       sensor.offset = node.number("offset", "m/s");
       sensor.lag = node.number("lag", "s", Range{0.0, 1.0});
+      sensor.gain_sigma = node.number("gain_sigma", "1", Range{0.0, 1.0});
+      sensor.lag_sigma = node.number("lag_sigma", "s", Range{0.0, 1.0});
       sensor.fastest = node.number("fastest", "m/s", Range::positive());
       sensor.largest = node.number("largest", "m/s", Range::positive());
       sensor.correlation = node.number("correlation", "1", Range::positive());
@@ -141,19 +184,18 @@ FusionFile read_fusion(const config::Node& root) {
   model.weights.positions = static_cast<int>(positions);
   model.weights.velocities = static_cast<int>(velocities);
   model.weights.intercept = weights.number("intercept", "m");
-  model.weights.degree = static_cast<int>(weights.integer("degree", 1, 6));
-  model.weights.scale = weights.number("scale", "m", Range::positive());
-  const auto terms =
-      model.weights.degree > 1
-          ? static_cast<std::size_t>((model.weights.degree + 1) * (model.weights.degree + 2) / 2)
-          : 0U;
-  const auto polynomial = exactly(weights.required("polynomial"), terms, "1");
-  model.weights.polynomial =
-      Eigen::Map<const Eigen::VectorXd>(polynomial.data(), static_cast<Eigen::Index>(terms));
+  model.weights.delays = exactly(weights.required("delays"), positions + velocities, "s");
+  const bool further = weights.has("selector");
+  if (further) model.selector = weights.text("selector");
+  if (weights.has("noise_by_speed")) read_noise(weights["noise_by_speed"], model.weights.noise);
+  if (weights.has("polynomial"))
+    read_polynomial(weights["polynomial"], static_cast<int>(positions + velocities),
+                    model.weights.polynomial);
   for (std::size_t i = 0; i + 1 < positions + velocities; ++i) {
     const auto node = weights.required("sensor_" + std::to_string(i + 2));
     model.weights.weights.push_back(read_network(node));
-    if (model.weights.weights.back().inputs() != 2) node.fault("has not two inputs (speed, noise level)");
+    if (model.weights.weights.back().inputs() != (further ? 3 : 2))
+      node.fault("has not the inputs speed, noise level and, where one is named, the selector");
   }
   return model;
 }

@@ -16,6 +16,7 @@ struct FusionFile {
   bool noise_given = true;  // the selector `noise_level` is a column; otherwise it is estimated
   metrology::FusionModel sensors;
   metrology::WeightModel weights;
+  std::string selector;  // the further attribute of the weights; empty: none
 };
 
 void write_fusion(ModelText& text, const FusionFile& model);

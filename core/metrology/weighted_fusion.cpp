@@ -3,6 +3,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/base/contract.hpp"
 
@@ -59,140 +60,196 @@ Eigen::VectorXd RecursiveWeights::weights() const {
   return weights;
 }
 
-Eigen::VectorXd weights_at(const WeightModel& model, double speed, double noise_level) {
+double NoiseBySpeed::operator()(double at) const noexcept {
+  const std::size_t n = speed.size();
+  if (n == 0) return 0.0;
+  std::size_t k = 0;
+  while (k + 1 < n && speed[k + 1] <= at) ++k;
+  if (k + 1 >= n || at <= speed[k]) return std::exp(log_deviation[k]);
+  const double part = (at - speed[k]) / (speed[k + 1] - speed[k]);
+  return std::exp(log_deviation[k] + part * (log_deviation[k + 1] - log_deviation[k]));
+}
+
+std::vector<Powers> monomials(int variables, int degree) {
+  std::vector<Powers> all;
+  const auto fill = [&](auto&& self, Powers powers, int from, int rest) -> void {
+    if (from + 1 == variables) {
+      powers[static_cast<std::size_t>(from)] = static_cast<unsigned char>(rest);
+      all.push_back(powers);
+      return;
+    }
+    for (int p = rest; p >= 0; --p) {
+      powers[static_cast<std::size_t>(from)] = static_cast<unsigned char>(p);
+      self(self, powers, from + 1, rest - p);
+    }
+  };
+  for (int total = 0; total <= degree; ++total) fill(fill, {}, 0, total);
+  return all;
+}
+
+double monomial(const Powers& powers, const std::array<double, most_sensors>& variables) noexcept {
+  double product = 1.0;
+  for (std::size_t k = 0; k < powers.size(); ++k)
+    for (unsigned p = 0; p < powers[k]; ++p) product *= variables[k];
+  return product;
+}
+
+Eigen::VectorXd weights_at(const WeightModel& model, const Eigen::Ref<const Eigen::VectorXd>& selectors) {
   const Eigen::Index n = model.positions + model.velocities;
   Eigen::VectorXd weights(n);
-  const Eigen::Vector2d at{speed, noise_level};
   for (Eigen::Index i = 1; i < n; ++i)
-    weights(i) = std::clamp(model.weights[static_cast<std::size_t>(i - 1)](at), 0.0, 1.0);
+    weights(i) = std::clamp(model.weights[static_cast<std::size_t>(i - 1)](selectors), 0.0, 1.0);
   const double others = weights.tail(n - 1).sum();
   if (others > 1.0) weights.tail(n - 1) /= others;
   weights(0) = 1.0 - std::min(others, 1.0);
   return weights;
 }
 
-Eigen::VectorXd monomials(double m, double d, int degree) {
-  Eigen::VectorXd terms((degree + 1) * (degree + 2) / 2);
-  Eigen::Index k = 0;
-  for (int total = 0; total <= degree; ++total)
-    for (int q = 0; q <= total; ++q) terms(k++) = std::pow(m, total - q) * std::pow(d, q);
-  return terms;
-}
-
-WeightedFusion::WeightedFusion(const WeightModel& model) : model_{model} {
-  INVAR_EXPECTS(model.positions >= 1 && model.positions + model.velocities <= static_cast<int>(most_sensors),
-                model.positions, model.velocities);
-  for (const numerics::RbfNetwork& network : model.weights)
-    tables_.push_back(numerics::compile<2>(network, 2e-3, 1U << 14U).table);
+WeightedFusion::WeightedFusion(const WeightModel& model)
+    : model_{model},
+      positions_{static_cast<std::size_t>(model.positions)},
+      sensors_{static_cast<std::size_t>(model.positions + model.velocities)},
+      powers_{monomials(static_cast<int>(sensors_), model.polynomial.degree)} {
+  INVAR_EXPECTS(model.positions >= 1 && sensors_ <= most_sensors, model.positions, model.velocities);
+  model_.delays.resize(sensors_, 0.0);
+  for (const numerics::RbfNetwork& network : model.weights) {
+    if (network.inputs() == 2) {
+      tables_.emplace_back(numerics::compile<2>(network, 2e-3, 1U << 14U).table);
+    } else {
+      tables_.emplace_back(numerics::compile<3>(network, 2e-3, 1U << 17U).table);
+    }
+  }
   reset();
 }
 
 void WeightedFusion::reset() noexcept {
-  integral_.fill(0.0);
+  value_.fill(0.0);
   last_.fill(std::numeric_limits<double>::quiet_NaN());
   repeats_.fill(0);
-  moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
+  unread_.fill(0.0);
+  step_moved_ = moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
   started_ = false;
 }
 
-FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
-  const auto positions = static_cast<std::size_t>(model_.positions);
-  const auto velocities = static_cast<std::size_t>(model_.velocities);
-  const std::size_t all = positions + velocities;
-  std::array<double, 2 * most_sensors> value{};
-  FusedPosition fused;
-  if (!started_) {
-    double begin = 0.0;
-    for (std::size_t i = 0; i < positions; ++i)
-      if (std::isfinite(sample.positions[i])) {
-        begin = sample.positions[i];
-        break;
-      }
-    integral_.fill(begin);
-    fused_ = begin;
-    started_ = true;
-  }
-  const double forget = std::exp(-sample.period / speed_memory);
-  double step_moved = 0.0;
-  for (std::size_t i = 0; i < all; ++i) {
-    const bool is_position = i < positions;
-    const double reading = is_position ? sample.positions[i] : sample.velocities[i - positions];
-    const bool same = reading == last_[i];
-    repeats_[i] = same ? repeats_[i] + 1 : 0;
-    bool sound = std::isfinite(reading);
-    if (!is_position) {
-      const std::size_t k = i - positions;
-      sound = sound && repeats_[i] < 5;
-      if (sound) {
-        const double before = std::isfinite(last_[i]) ? last_[i] : reading;
-        integral_[k] += 0.5 * (reading + before) * sample.period;
-        if (k == 0) {
-          step_moved = 0.5 * (reading + before) * sample.period;
-          speed_ = forget * speed_ + (1.0 - forget) * reading;
-          spread_ = 0.99 * spread_ + 0.01 * std::pow(reading - before, 2);
-          largest_ = std::max(largest_, std::abs(speed_));
-        }
-      } else {
-        // Carried on with the fused position, so that a sensor that returns does so without a step.
-        integral_[k] = fused_;
-      }
-      value[i] = integral_[k];
-    } else {
-      if (!same) moved_ = 0.0;
-      value[i] = reading;
+void WeightedFusion::start(const FusionSample& sample) noexcept {
+  for (std::size_t i = 0; i < positions_ && !started_; ++i)
+    if (std::isfinite(sample.positions[i]) && (sample.silent >> i & 1U) == 0U) {
+      fused_ = sample.positions[i];
+      break;
     }
-    last_[i] = reading;
-    if (sound) fused.live |= 1U << i;
-  }
-  moved_ += step_moved;
-  // A position that stands still while the velocity has moved on by far more than it steps: stuck.
-  if (velocities > 0 && (fused.live >> positions & 1U) != 0U && std::abs(moved_) > 0.005)
-    for (std::size_t i = 0; i < positions; ++i)
-      if (repeats_[i] > 20) fused.live &= ~(1U << i);
+  value_.fill(fused_);
+  started_ = true;
+}
 
-  const double level = std::isfinite(sample.noise_level)
-                           ? sample.noise_level
-                           : std::sqrt(1.5 * spread_) / std::max(largest_, 1e-9);
+void WeightedFusion::read_velocity(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept {
+  const double reading = sample.velocities[i - positions_];
+  unread_[i] += sample.period;
+  if ((sample.silent >> i & 1U) != 0U) {  // not asked: goes with the others
+    value_[i] += step_moved_;
+    fused.live |= 1U << i;
+    return;
+  }
+  repeats_[i] = reading == last_[i] ? repeats_[i] + 1 : 0;
+  if (std::isfinite(reading) && repeats_[i] < 5) {
+    const double before = std::isfinite(last_[i]) ? last_[i] : reading;
+    const double moved = 0.5 * (reading + before) * unread_[i];
+    value_[i] += moved;
+    if (i == positions_) {
+      const double forget = std::exp(-unread_[i] / speed_memory);
+      step_moved_ = moved;
+      speed_ = forget * speed_ + (1.0 - forget) * reading;
+      spread_ = 0.99 * spread_ + 0.01 * std::pow(reading - before, 2);
+      largest_ = std::max(largest_, std::abs(speed_));
+    }
+    fused.live |= 1U << i;
+  } else {
+    // Carried on with the fused position, so that a sensor that returns does so without a step.
+    value_[i] = fused_;
+  }
+  unread_[i] = 0.0;
+  last_[i] = reading;
+}
+
+void WeightedFusion::read_position(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept {
+  if ((sample.silent >> i & 1U) != 0U) {
+    value_[i] += step_moved_;
+    fused.live |= 1U << i;
+    return;
+  }
+  const double reading = sample.positions[i];
+  repeats_[i] = reading == last_[i] ? repeats_[i] + 1 : 0;
+  if (repeats_[i] == 0) moved_ = 0.0;
+  last_[i] = reading;
+  value_[i] = reading;
+  if (std::isfinite(reading)) fused.live |= 1U << i;
+}
+
+/// Fills the weights: by the selectors, of those that live, sum one.
+void WeightedFusion::weigh(const FusionSample& sample, FusedPosition& fused) const noexcept {
+  const double speed = std::abs(speed_);
+  double level = sample.noise_level;
+  if (!std::isfinite(level)) {
+    const double deviation = model_.noise.speed.empty() ? std::sqrt(0.5 * spread_) : model_.noise(speed);
+    level = std::sqrt(3.0) * deviation / std::max(largest_, 1e-9);
+    if (sensors_ > positions_) fused.noise[positions_] = deviation;
+  }
   double others = 0.0;
-  for (std::size_t i = 1; i < all; ++i) {
-    const double weight = tables_[i - 1]({std::abs(speed_), level});
+  for (std::size_t i = 1; i < sensors_; ++i) {
+    const double weight = tables_[i - 1].index() == 0
+                              ? (*std::get_if<0>(&tables_[i - 1]))({speed, level})
+                              : (*std::get_if<1>(&tables_[i - 1]))({speed, level, sample.selector});
     fused.weights[i] = weight > 0.0 ? (weight < 1.0 ? weight : 1.0) : 0.0;
     others += fused.weights[i];
   }
   fused.weights[0] = others < 1.0 ? 1.0 - others : 0.0;
   double total = 0.0;
-  for (std::size_t i = 0; i < all; ++i) {
+  for (std::size_t i = 0; i < sensors_; ++i) {
     if ((fused.live >> i & 1U) == 0U) fused.weights[i] = 0.0;
     total += fused.weights[i];
   }
   if (total <= 0.0)  // what lives has no weight here: share alike
-    for (std::size_t i = 0; i < all; ++i)
+    for (std::size_t i = 0; i < sensors_; ++i)
       if ((fused.live >> i & 1U) != 0U) total += fused.weights[i] = 1.0;
-  if (total > 0.0) {
-    double mean = 0.0;
-    double difference = 0.0;
-    for (std::size_t i = 0; i < all; ++i) {
-      fused.weights[i] /= total;
-      if (fused.weights[i] > 0.0) mean += fused.weights[i] * value[i];
-    }
-    if (all >= 2 && (fused.live & 1U) != 0U && std::isfinite(value[all - 1]))
-      difference = value[all - 1] - value[0];
-    fused_ = mean + model_.intercept;
-    if (model_.degree > 1) {
-      const double m = mean / model_.scale;
-      const double d = difference / model_.scale;
-      double sum = 0.0;
-      Eigen::Index k = 0;
-      for (int order = 0; order <= model_.degree; ++order)
-        for (int q = 0; q <= order; ++q) {
-          double term = 1.0;
-          for (int p = 0; p < order - q; ++p) term *= m;
-          for (int p = 0; p < q; ++p) term *= d;
-          sum += model_.polynomial(k++) * term;
-        }
-      fused_ = sum * model_.scale;
-    }
+  if (total > 0.0)
+    for (std::size_t i = 0; i < sensors_; ++i) fused.weights[i] /= total;
+}
+
+/// The polynomial's correction; none where a sensor is missing from it.
+double WeightedFusion::corrected(double mean, const FusedPosition& fused) const noexcept {
+  const FusionPolynomial& p = model_.polynomial;
+  if (p.degree <= 1 || fused.live != (1U << sensors_) - 1U) return mean;
+  std::array<double, most_sensors> z{};
+  z[0] = std::clamp((mean - p.centre) / p.reach, -1.0, 1.0);
+  for (std::size_t i = 1; i < sensors_; ++i)
+    z[i] = std::clamp((value_[i] - value_[0]) / p.difference_reach, -1.0, 1.0);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < powers_.size(); ++k)
+    sum += p.coefficients(static_cast<Eigen::Index>(k)) * monomial(powers_[k], z);
+  return mean + sum;
+}
+
+FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
+  if (!started_) start(sample);
+  FusedPosition fused;
+  step_moved_ = speed_ * sample.period;  // where no velocity sensor says better
+  for (std::size_t i = positions_; i < sensors_; ++i) read_velocity(i, sample, fused);
+  for (std::size_t i = 0; i < positions_; ++i) read_position(i, sample, fused);
+  moved_ += step_moved_;
+  // A position that stands still while the velocity has moved on by far more than it steps: stuck.
+  if (sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U && std::abs(moved_) > 0.005)
+    for (std::size_t i = 0; i < positions_; ++i)
+      if (repeats_[i] > 20) fused.live &= ~(1U << i);
+  weigh(sample, fused);
+
+  double mean = 0.0;
+  double total = 0.0;
+  for (std::size_t i = 0; i < sensors_; ++i) {
+    fused.lateness[i] = model_.delays[i];
+    if (fused.weights[i] <= 0.0) continue;
+    total += fused.weights[i];
+    mean += fused.weights[i] * (value_[i] + (model_.delays[i] + sample.ages[i]) * speed_);
   }
+  if (total > 0.0) fused_ = corrected(mean, fused) + model_.intercept;
   fused.position = fused_;
   fused.velocity = speed_;
   fused.sigma = std::numeric_limits<double>::quiet_NaN();  // the method does not know

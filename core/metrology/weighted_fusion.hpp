@@ -1,8 +1,9 @@
-// The seed's fusion: weights of the sensors' positions, learned by least squares over speed and noise level.
+// The seed's fusion: weights of the sensors' positions, learned by least squares over speed, noise level and more.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
+#include <variant>
 #include <vector>
 
 #include "core/metrology/sensor_fusion.hpp"
@@ -40,27 +41,48 @@ class RecursiveWeights {
   Eigen::VectorXd gain_;
 };
 
-/// The fitted selector: for each sensor but the first a network from (speed [m/s], noise level) to its weight.
+/// Noise of the first velocity sensor as a function of speed (seed, 6.2: two models in series); logarithm of the
+/// deviation [m/s], monotone and straight between the knots. No knots: noise does not follow speed.
+struct NoiseBySpeed {
+  std::vector<double> speed;  // ascending [m/s]
+  std::vector<double> log_deviation;
+
+  [[nodiscard]] double operator()(double at) const noexcept;  // deviation [m/s]; real-time
+};
+
+/// All products of powers of `variables` numbers up to total degree `degree`, in order of degree: the powers.
+using Powers = std::array<unsigned char, most_sensors>;
+std::vector<Powers> monomials(int variables, int degree);
+double monomial(const Powers& powers, const std::array<double, most_sensors>& variables) noexcept;
+
+/// Nonlinear fusion (erratum E29): x = m + sum of c_k times the monomials of the weighted mean m and the difference of each
+/// other sensor from the first, up to `degree`, centred and scaled. Held at the border of what was fitted.
+struct FusionPolynomial {
+  int degree = 1;                 // 1: none
+  double centre = 0.0;            // of m [m]
+  double reach = 1.0;             // of m to either side [m]
+  double difference_reach = 1.0;  // of the differences to either side [m]
+  Eigen::VectorXd coefficients;   // [m]
+};
+
+/// The fitted selector: for each sensor but the first a network from (speed [m/s], noise level, and the run's further
+/// attribute where there is one) to its weight.
 struct WeightModel {
   int positions = 0;
   int velocities = 0;
   std::vector<numerics::RbfNetwork> weights;  // positions + velocities - 1
   double intercept = 0.0;                     // [m]
-  // Nonlinear fusion (erratum E29): x = sum of c_pq m^p d^q, p + q <= degree, of the weighted mean m and each
-  // difference d, scaled; empty for linear fusion.
-  int degree = 1;
-  double scale = 1.0;  // of m and d [m]
-  Eigen::VectorXd polynomial;
+  std::vector<double> delays;                 // how late each sensor is [s]; positions + velocities
+  NoiseBySpeed noise;
+  FusionPolynomial polynomial;
 };
 
-/// Weights of all sensors at a speed and noise level: clipped to [0, 1], sum one.
-Eigen::VectorXd weights_at(const WeightModel& model, double speed, double noise_level);
+/// Weights of all sensors at selectors (speed, noise level, ...): clipped to [0, 1], sum one.
+Eigen::VectorXd weights_at(const WeightModel& model, const Eigen::Ref<const Eigen::VectorXd>& selectors);
 
-/// All monomials m^p d^q with p + q <= degree, in order of p + q.
-Eigen::VectorXd monomials(double m, double d, int degree);
-
-/// Runs the weights: integrates the velocities from the first position reading, looks the weights up by the
-/// low-passed speed and the noise level. A sensor that is missing or repeats itself loses its weight.
+/// Runs the weights: integrates the velocities from the first position reading, moves every sensor on by its delay,
+/// looks the weights up by the low-passed speed and the noise level - given, or by the model from the speed, or
+/// estimated over a window of readings. A sensor that is missing or repeats itself loses its weight.
 class WeightedFusion final : public FusionEstimator {
  public:
   explicit WeightedFusion(const WeightModel& model);
@@ -68,12 +90,25 @@ class WeightedFusion final : public FusionEstimator {
   FusedPosition step(const FusionSample& sample) noexcept override;
 
  private:
+  using Values = std::array<double, most_sensors>;
+  void start(const FusionSample& sample) noexcept;
+  [[nodiscard]] double travel(const FusionSample& sample) noexcept;
+  void read_velocity(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
+  void read_position(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
+  void weigh(const FusionSample& sample, FusedPosition& fused) const noexcept;
+  [[nodiscard]] double corrected(double mean, const FusedPosition& fused) const noexcept;
+
   WeightModel model_;
-  std::vector<numerics::LookupTable<2>> tables_;
-  std::array<double, most_sensors> integral_{};
-  std::array<double, 2 * most_sensors> last_{};
-  std::array<int, 2 * most_sensors> repeats_{};
-  double moved_ = 0.0;  // by the velocities since each position last changed [m]
+  std::size_t positions_, sensors_;
+  using Table = std::variant<numerics::LookupTable<2>, numerics::LookupTable<3>>;
+  std::vector<Table> tables_;
+  std::vector<Powers> powers_;
+  Values value_{};  // position of each sensor
+  Values last_{};   // its reading
+  std::array<int, most_sensors> repeats_{};
+  std::array<double, most_sensors> unread_{};  // time since it was read [s]
+  double step_moved_ = 0.0;                    // by the first velocity sensor in this period [m]
+  double moved_ = 0.0;                         // by it since each position last changed [m]
   double fused_ = 0.0;
   double speed_ = 0.0;
   double spread_ = 0.0;

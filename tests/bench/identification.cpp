@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/metrology/sensor_fusion.hpp"
+#include "core/metrology/fusion_observer.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/numerics/lookup_table.hpp"
 #include "core/numerics/rbf_ridge.hpp"

@@ -35,10 +35,11 @@ std::vector<std::string> sensor_names(const recording::Table& table, const std::
   return names;
 }
 
-/// The rows of a file as runs: a new one where the column `run` changes.
+/// The rows of a file as runs: a new one where the column `run` changes. `selector` names a further attribute that the weights
+/// may depend on; empty: none.
 std::vector<FusionRun> runs_of(const recording::Table& table, const std::vector<std::string>& positions,
-                               const std::vector<std::string>& velocities, bool with_reference,
-                               bool with_noise) {
+                               const std::vector<std::string>& velocities, const std::string& selector,
+                               bool with_reference, bool with_noise) {
   const auto time = table.in("t", "s");
   expect_finite(table.file, "t", time, 1e12);
   const std::size_t rows = time.size();
@@ -64,6 +65,15 @@ std::vector<FusionRun> runs_of(const recording::Table& table, const std::vector<
     noise = table.in("noise_level", "1");
     expect_finite(table.file, "noise_level", noise, 1e6);
   }
+  std::vector<double> attribute;
+  if (!selector.empty()) {
+    const auto* column = table.find("selector_" + selector);
+    if (column == nullptr)
+      throw InputError{table.file.string(), "has no column `selector_" + selector + "`",
+                       "the weights of this model depend on it: add it"};
+    attribute = column->values;
+    expect_finite(table.file, column->name, attribute, 1e9);
+  }
   const auto* run_column = table.find("run");
   const auto same_run = [&](std::size_t i) {
     if (run_column == nullptr || i == 0) return i > 0;
@@ -87,6 +97,7 @@ std::vector<FusionRun> runs_of(const recording::Table& table, const std::vector<
     run.time = part(time);
     if (with_reference) run.reference = part(reference);
     if (with_noise) run.noise_level = part(noise);
+    if (!selector.empty()) run.selector = part(attribute);
     run.positions.resize(n, static_cast<Eigen::Index>(positions.size()));
     run.velocities.resize(n, static_cast<Eigen::Index>(velocities.size()));
     for (std::size_t k = 0; k < readings.size(); ++k) {
@@ -104,6 +115,7 @@ std::vector<FusionRun> runs_of(const recording::Table& table, const std::vector<
 struct Recordings {
   std::vector<std::string> positions;
   std::vector<std::string> velocities;
+  std::string selector;  // empty: none
   std::vector<FusionRun> runs;
 };
 
@@ -117,15 +129,21 @@ Recordings read_recordings(const Options& options) {
       throw InputError{file.string(), "has no position sensor", "add a column `position_<name> [m]`"};
     if (positions.size() + velocities.size() > metrology::most_sensors)
       throw InputError{file.string(), "has more than 8 sensors", "leave some out"};
+    const auto selectors = sensor_names(table, "selector_");
+    if (selectors.size() > 1)
+      throw InputError{file.string(), "has " + std::to_string(selectors.size()) + " columns `selector_...`",
+                       "keep the one that the weights depend on most"};
+    const std::string selector = selectors.empty() ? "" : selectors.front();
     if (&file == &options.recordings.front()) {
       all.positions = positions;
       all.velocities = velocities;
-    } else if (positions != all.positions || velocities != all.velocities) {
+      all.selector = selector;
+    } else if (positions != all.positions || velocities != all.velocities || selector != all.selector) {
       throw InputError{file.string(), "has other sensors than " + options.recordings.front().string(),
                        "give all recordings the same columns"};
     }
     const bool with_noise = options.noise == "given" && table.has("noise_level");
-    for (FusionRun& run : runs_of(table, positions, velocities, true, with_noise)) {
+    for (FusionRun& run : runs_of(table, positions, velocities, selector, true, with_noise)) {
       if (run.time.size() < 10)
         throw InputError{file.string(), "has a run of " + std::to_string(run.time.size()) + " rows only",
                          "record ten rows a run at least"};
@@ -268,8 +286,8 @@ void calibrate(const Options& options) {
   const bool observer = fit.method == metrology::FusionMethod::observer;
   compensation::ModelText text{"fusion", options.recordings};
   const bool noise_given = !how.noise_estimated && all.runs.front().noise_level.size() > 0;
-  compensation::write_fusion(text,
-                             {observer ? "observer" : "weights", noise_given, fit.sensors, fit.weights});
+  compensation::write_fusion(
+      text, {observer ? "observer" : "weights", noise_given, fit.sensors, fit.weights, all.selector});
   write_calibration(options.out, text, report_of(all, fit), page_of(options, all, fit));
 
   std::cout << "fusion of " << all.positions.size() << " position and " << all.velocities.size()
@@ -282,7 +300,10 @@ void calibrate(const Options& options) {
   }
   std::cout << "RMS on runs held out: best single sensor (hindsight) " << si(std::sqrt(single), "m")
             << ", weights " << si(fit.weights_rms, "m") << ", observer " << si(fit.observer_rms, "m");
-  if (fit.polynomial_rms > 0.0) std::cout << ", polynomial " << si(fit.polynomial_rms, "m");
+  if (fit.noise_by_speed_rms > 0.0)
+    std::cout << ", weights with the noise from the speed " << si(fit.noise_by_speed_rms, "m");
+  if (fit.polynomial_rms > 0.0)
+    std::cout << ", polynomial " << si(fit.polynomial_rms, "m") << " (order taken: " << fit.degree << ")";
   std::cout << "\nchosen: " << (observer ? "observer" : "weights") << "; the observer is better on " << wins
             << " of " << fit.held_out.size() << " runs\n";
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
@@ -297,9 +318,9 @@ void add_calibrate_fusion(CLI::App& group) {
   command->footer("Example: invar calibrate fusion --recording quiet.csv --recording noisy.csv --out result");
   auto options = std::make_shared<Options>();
   command
-      ->add_option(
-          "--recording", options->recordings,
-          "t [s], reference [m], position_<name> [m], velocity_<name> [m/s]; optional run, noise_level")
+      ->add_option("--recording", options->recordings,
+                   "t [s], reference [m], position_<name> [m], velocity_<name> [m/s]; optional run, "
+                   "noise_level, selector_<name>")
       ->required();
   command->add_option("--out", options->out, "folder for compensation.yaml, report.json, report.html")
       ->required();
@@ -323,7 +344,8 @@ recording::Table predict_fusion(const config::Yaml& file, const recording::Table
   std::vector<double> position;
   std::vector<double> sigma;
   std::vector<std::vector<double>> weights(names.positions.size() + names.velocities.size());
-  for (const FusionRun& run : runs_of(inputs, names.position_names, names.velocity_names, false, with_noise))
+  for (const FusionRun& run :
+       runs_of(inputs, names.position_names, names.velocity_names, model.selector, false, with_noise))
     for (const auto& fused : metrology::fuse(*estimator, run)) {
       position.push_back(fused.position);
       sigma.push_back(fused.sigma);

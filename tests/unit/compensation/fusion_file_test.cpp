@@ -35,6 +35,9 @@ FusionFile fusion() {
   network.weights = Eigen::Vector3d{0.1, -1.0 / 3.0, 0.4};
   network.constant = 0.5;
   file.weights.weights = {network};
+  file.weights.delays = {0.0, 1e-3 / 3.0};
+  file.weights.noise = {{0.02, 0.6}, {-7.0, -20.0 / 3.0}};
+  file.weights.polynomial = {2, 0.05, 0.06, 1e-3, Eigen::VectorXd::LinSpaced(6, -1e-5, 1e-5)};
   return file;
 }
 
@@ -51,7 +54,6 @@ TEST(FusionFile, ReadsBackBitForBitWithEitherMethod) {
     const auto one = make_estimator(file);
     const auto other = make_estimator(back);
     metrology::FusionSample sample;
-    sample.noise_level = 0.1;
     for (int i = 0; i < 500; ++i) {
       const double t = 2e-3 * i;
       sample.period = i == 0 ? 0.0 : 2e-3;
@@ -60,6 +62,25 @@ TEST(FusionFile, ReadsBackBitForBitWithEitherMethod) {
       EXPECT_EQ(one->step(sample).position, other->step(sample).position);
     }
   }
+}
+
+TEST(FusionFile, KeepsTheFurtherSelectorOfTheWeights) {
+  FusionFile file = fusion();
+  file.method = "weights";
+  file.selector = "load";
+  auto& network = file.weights.weights.front();
+  network.range.push_back({0.0, 5.0});
+  network.input_offset = network.slope = Eigen::VectorXd::Zero(3);
+  network.input_scale = Eigen::Vector3d{0.2, 5.7, 2.5};
+  network.centres = network.widths = Eigen::MatrixXd::Constant(3, 3, 0.7);
+  ModelText text{"fusion", {}};
+  write_fusion(text, file);
+  const auto yaml = parsed(text);
+  const FusionFile back = read_fusion(yaml.root());
+  yaml.finish();
+  EXPECT_EQ(back.selector, "load");
+  const Eigen::Vector3d at{0.3, 0.2, 4.0};
+  EXPECT_EQ(metrology::weights_at(back.weights, at), metrology::weights_at(file.weights, at));
 }
 
 TEST(FusionFile, RefusesAMethodThatIsNone) {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/metrology/fusion_identification.hpp"
+#include "core/metrology/fusion_observer.hpp"
 #include "core/numerics/rbf_kernel.hpp"
 
 namespace invar::metrology {
@@ -32,8 +33,12 @@ FusionRun record(const Rig& rig, Position position, double duration, double nois
   std::mt19937 random{seed};
   std::uniform_real_distribution<double> uniform{-1.0, 1.0};
   const auto n = static_cast<Eigen::Index>(duration / dt) + 1;
-  FusionRun run{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd(n, 1), Eigen::MatrixXd(n, 1),
-                Eigen::VectorXd::Constant(n, noise_level)};
+  FusionRun run{Eigen::VectorXd(n),
+                Eigen::VectorXd(n),
+                Eigen::MatrixXd(n, 1),
+                Eigen::MatrixXd(n, 1),
+                Eigen::VectorXd::Constant(n, noise_level),
+                {}};
   Eigen::VectorXd clean(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double t = dt * static_cast<double>(i);

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "core/metrology/sensor_fusion.hpp"
+#include "core/metrology/fusion_observer.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/metrology/weighted_fusion.hpp"
 #include "tests/support/real_time_guard.hpp"

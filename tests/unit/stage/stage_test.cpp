@@ -222,6 +222,41 @@ TEST(Stage, RefusesMovesOutsideItsSoftLimitsAndWhileMoving) {
   EXPECT_TRUE(bench.state.latest()->command_refused());
 }
 
+TEST(Stage, FollowsASineAndRefusesOneBeyondItsLimits) {
+  Bench bench;
+  bench.enable();
+  AxisCommand sine;
+  sine.kind(AXIS_COMMAND_SINE);
+  sine.amplitude(0.02);
+  sine.period(2.0);
+  sine.periods(2);
+  sine.id(100);
+  bench.command.write(sine);
+  double largest = 0.0;
+  ASSERT_TRUE(bench.run_until([&](const AxisState& s) {
+    largest = std::max(largest, bench.position);
+    return s.command_id() == 100 && s.command_done();
+  }));
+  EXPECT_FALSE(bench.state.latest()->command_refused());
+  EXPECT_NEAR(largest, 0.05 + 2 * 0.02, 5e-6);
+  EXPECT_NEAR(bench.position, 0.05, 5e-6);
+  const auto refused = [&](double amplitude, double period, std::uint32_t periods) {
+    sine.amplitude(amplitude);
+    sine.period(period);
+    sine.periods(periods);
+    sine.id(sine.id() + 1);
+    bench.command.write(sine);
+    return bench.run_until([&](const AxisState& s) { return s.command_id() == sine.id(); }, 5) &&
+           bench.state.latest()->command_refused();
+  };
+  EXPECT_TRUE(refused(0.08, 10.0, 1));  // leaves the travel
+  EXPECT_TRUE(refused(0.02, 1.0, 1));   // 0.126 m/s
+  EXPECT_TRUE(refused(0.001, 0.1, 1));  // 3.9 m/s2
+  EXPECT_TRUE(refused(0.02, 2.0, 0));
+  EXPECT_TRUE(refused(0.02, 0.0, 1));
+  EXPECT_FALSE(refused(-0.02, 2.0, 1));
+}
+
 TEST(Stage, LostFeedbackBrakesUnderControlAndThenLetsGo) {
   Bench bench;
   bench.enable();

@@ -60,6 +60,20 @@ TEST(Trajectory, StopsFromAnyPointOfAMove) {
   }
 }
 
+TEST(Trajectory, SineIsAtRestAtItsEndsAndItsVelocityIsItsSlope) {
+  const auto sine = Trajectory::sine(0.05, -0.02, 1.05, 3);
+  EXPECT_NEAR(sine.duration(), 3.15, 1e-12);
+  EXPECT_EQ(sine.at(0.0).velocity, 0.0);
+  EXPECT_EQ(sine.target(), 0.05);
+  EXPECT_NEAR(sine.at(1.05 / 2).position, 0.01, 1e-12);
+  const double h = 1e-5;
+  for (double t = 0.01; t < 3.1; t += 0.0137) {
+    EXPECT_NEAR(sine.at(t).velocity, (sine.at(t + h).position - sine.at(t - h).position) / (2 * h), 1e-8);
+    EXPECT_NEAR(sine.at(t).acceleration, (sine.at(t + h).velocity - sine.at(t - h).velocity) / (2 * h), 1e-7);
+  }
+  check(Trajectory::stop(sine.at(0.4), limits), sine.at(0.4));
+}
+
 TEST(Trajectory, StandsStillWhereNothingIsAsked) {
   EXPECT_EQ(Trajectory::rest(0.3).at(5.0).position, 0.3);
   EXPECT_EQ(Trajectory::move(0.3, 0.3, limits).duration(), 0.0);

@@ -1,8 +1,9 @@
 // Who is to be believed: noise learned on line, sensors that died, stick or jump, and what to do about it.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
-#include "core/metrology/sensor_fusion.hpp"
+#include "core/metrology/fusion_observer.hpp"
 
 namespace invar::metrology {
 
@@ -12,11 +13,11 @@ constexpr double noise_memory = 400.0;  // samples
 
 /// White noise of variance s^2 has second differences of variance 6 s^2; motion hardly shows in them.
 void FusionObserver::learn_noise(const FusionSample& sample) noexcept {
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
+  for (std::size_t i = 0; i < velocities_; ++i) {
     const VelocitySensorModel& sensor = model_.velocities[i];
     VelocityMemory& memory = velocity_memory_[i];
     const double reading = sample.velocities[i];
-    if (!std::isfinite(reading)) {
+    if (silent(sample, positions_ + i) || !std::isfinite(reading)) {
       memory.seen = 0;
       continue;
     }
@@ -41,24 +42,28 @@ void FusionObserver::learn_noise(const FusionSample& sample) noexcept {
   }
 }
 
-/// What the velocity sensors say was travelled while each position reading stood still.
+/// What the first velocity sensor that lives says was travelled since it was last read.
 void FusionObserver::add_travel(const FusionSample& sample) noexcept {
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
-    const VelocityMemory& velocity = velocity_memory_[i];
-    if (velocity.faulty || velocity.dead || !std::isfinite(sample.velocities[i])) continue;
+  bool witnessed = false;  // one live sensor is witness enough
+  for (std::size_t i = 0; i < velocities_; ++i) {
+    VelocityMemory& velocity = velocity_memory_[i];
+    velocity.unread += sample.period;
+    if (silent(sample, positions_ + i)) continue;
+    const double time = std::exchange(velocity.unread, 0.0);
+    if (witnessed || velocity.faulty || velocity.dead || !std::isfinite(sample.velocities[i])) continue;
+    witnessed = true;
     const VelocitySensorModel& sensor = model_.velocities[i];
     const double gain = std::max(std::abs(sensor.sensitivity(0.0)), 1e-6);
-    const double noise = sensor.correlation * sample.period / gain;
-    for (std::size_t k = 0; k < model_.positions.size(); ++k) {
+    const double noise = sensor.correlation * time / gain;
+    const double moved = (sample.velocities[i] - sensor.offset) / gain * time;
+    const double variance = velocity.variance * noise * noise;
+    for (std::size_t k = 0; k < positions_; ++k) {
       PositionMemory& memory = position_memory_[k];
-      const double moved = (sample.velocities[i] - sensor.offset) / gain * sample.period;
-      const double variance = velocity.variance * noise * noise;
       memory.travel += moved;
       memory.travel_variance += variance;
       memory.since += moved;
       memory.since_variance += variance;
     }
-    return;  // one live sensor is witness enough
   }
 }
 
@@ -71,7 +76,7 @@ bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
   if (std::abs(memory.travel) > cell + 5.0 * std::sqrt(memory.travel_variance) &&
       memory.travel_variance > 0.0)
     return true;
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
+  for (std::size_t i = 0; i < positions_; ++i)
     if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
   return false;
 }
@@ -84,7 +89,7 @@ bool FusionObserver::refuted_jump(std::size_t position, double reading) const no
   if (memory.since_variance > 0.0 &&
       std::abs(reading - memory.believed - memory.since) > cell + 5.0 * std::sqrt(memory.since_variance))
     return true;
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
+  for (std::size_t i = 0; i < positions_; ++i)
     if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
   return false;
 }
@@ -100,13 +105,14 @@ bool FusionObserver::outlived(std::size_t still, std::size_t moving, double read
 /// Sensors that repeat themselves as sound ones do not; what they told since they died is taken back.
 void FusionObserver::watch_for_dead(const FusionSample& sample) noexcept {
   int back = 0;
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i) {
+  for (std::size_t i = 0; i < velocities_; ++i) {
     VelocityMemory& memory = velocity_memory_[i];
     if (!memory.dead || memory.faulty) continue;
     memory.faulty = true;
     back = std::max(back, memory.repeats);
   }
-  for (std::size_t i = 0; i < model_.positions.size(); ++i) {
+  for (std::size_t i = 0; i < positions_; ++i) {
+    if (silent(sample, i)) continue;
     PositionMemory& memory = position_memory_[i];
     const double reading = sample.positions[i];
     memory.repeats = reading == memory.last ? memory.repeats + 1 : 0;
@@ -130,10 +136,10 @@ void FusionObserver::undo(std::size_t steps) noexcept {
     Past& past = past_[k % history];
     if (k > steps_ - steps) advance(past.sample.period);
     past.modes = modes_;
-    for (std::size_t i = 0; i < model_.velocities.size(); ++i)
-      if (!velocity_memory_[i].faulty) use_velocity(i, past.sample.velocities[i]);
-    for (std::size_t i = 0; i < model_.positions.size(); ++i)
-      if (!position_memory_[i].faulty) use_position(i, past.sample.positions[i]);
+    for (std::size_t i = 0; i < velocities_; ++i)
+      if (!velocity_memory_[i].faulty) use_velocity(i, past.sample);
+    for (std::size_t i = 0; i < positions_; ++i)
+      if (!position_memory_[i].faulty) use_position(i, past.sample);
   }
 }
 
@@ -143,19 +149,18 @@ void FusionObserver::restart_at(const PositionSensorModel& sensor, double readin
   for (const VelocitySensorModel& velocity : model_.velocities) fastest = velocity.largest;
   const double cell = std::hypot(sensor.step / std::sqrt(12.0), sensor.noise);
   for (Mode& mode : modes_) {
-    const double gain = mode.mean(3);
-    const double gain_variance = mode.covariance(3, 3);
-    mode.mean << reading + sensor.offset, 0.0, 0.0, gain;
-    mode.covariance.setZero();
-    mode.covariance.diagonal() << cell * cell, fastest * fastest / 4.0, fastest * fastest, gain_variance;
+    mode.mean.head<3>() << reading + sensor.offset, 0.0, 0.0;
+    mode.covariance.topRows<3>().setZero();  // what is known of the sensors stays
+    mode.covariance.leftCols<3>().setZero();
+    mode.covariance.diagonal().head<3>() << cell * cell, fastest * fastest / 4.0, fastest * fastest;
     mode.probability = 1.0 / models;
   }
 }
 
 bool FusionObserver::alone(std::size_t position) const noexcept {
-  for (std::size_t i = 0; i < model_.positions.size(); ++i)
+  for (std::size_t i = 0; i < positions_; ++i)
     if (i != position && !position_memory_[i].faulty) return false;
-  for (std::size_t i = 0; i < model_.velocities.size(); ++i)
+  for (std::size_t i = 0; i < velocities_; ++i)
     if (!velocity_memory_[i].faulty) return false;
   return true;
 }
