@@ -175,16 +175,19 @@ std::vector<double> variable_values(const Case& data, std::size_t recording, con
   return measured(name);
 }
 
-std::vector<Start> named_starts(const Case& data, const Weighing& weighing, const Fit& fitted) {
+std::vector<Start> named_starts(const Case& data, const Weighing& weighing, const Fit& fitted,
+                                const std::set<std::string, std::less<>>& without) {
   std::vector<Start> starts;
   const auto& model = fitted.model;
   if (data.model.plant == Plant::equations) {
-    return equation_starts(data, model);
+    starts = equation_starts(data, model);
+    std::erase_if(starts, [&](const Start& start) { return without.contains(start.term.info->name); });
+    return starts;
   }
   Periods periods;
   if (data.model.plant == Plant::axis) periods = axis_periods(data, weighing, fitted);
   for (const auto* info : physics::terms_of(data.model.plant)) {
-    if (!may_show(data, model, *info)) continue;
+    if (without.contains(info->name) || !may_show(data, model, *info)) continue;
     const bool may_repeat = info->index_of("pitch") != none || info->index_of("frequency") != none;
     for (const auto& on : places(data, *info)) {
       const bool used = std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {

@@ -94,6 +94,12 @@ void give_start(Case& data, Recording& recording) {
 }  // namespace
 
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
+  std::vector<recording::Table> tables;
+  for (const auto& file : files) tables.push_back(recording::Table::read(file));
+  return make_case(model, tables);
+}
+
+Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables) {
   Case data;
   data.model = model;
   data.outputs = model.outputs();
@@ -103,17 +109,16 @@ Case load_case(const physics::Model& model, const std::vector<std::filesystem::p
   for (auto& parameter : data.model.parameters)
     if (model.plant == physics::Plant::sensor && parameter.name == "resolution")
       parameter.value = 0.0, parameter.sigma = 0.0;
-  for (const auto& file : files) {
-    const auto table = recording::Table::read(file);
+  for (const auto& table : tables) {
     const auto content = model::to_record(table, model, true);
     Recording recording;
-    recording.name = file.filename().string();
+    recording.name = table.file.filename().string();
     data.count.rows += content.record.rows();
     recording.inputs = in_order(content.record, data.count);
     if (model.plant == physics::Plant::equations && model.equations.inputs.empty())
       thin(recording.inputs, 6000);
     if (recording.inputs.rows() < 8)
-      throw InputError{file.string(), "has fewer than 8 usable rows", "record for longer"};
+      throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
     for (std::size_t o = 0; o < data.outputs.size(); ++o) {
       const auto& name = data.outputs[o];
       recording.measured.push_back(recording.inputs.signals.at(name));

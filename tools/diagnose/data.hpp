@@ -35,6 +35,8 @@ struct Case {
 
 /// Reads and cleans. Throws InputError for what is unusable.
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files);
+/// The same of tables that are read already.
+Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables);
 
 /// Marks lone values far from their neighbours in the residual (measured - simulated) as unusable and counts them.
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated);

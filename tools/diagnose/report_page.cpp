@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/report.hpp"
 
 namespace invar::diagnose {

@@ -2,69 +2,22 @@
 #pragma once
 
 #include <functional>
+#include <set>
 #include <string>
-#include <vector>
 
-#include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/diagnosis.hpp"
 
 namespace invar::diagnose {
 
-struct Alternative {
-  physics::Term term;
-  double log_odds = 0.0;  // evidence against the finding's; negative: less likely
-};
-
-struct Finding {
-  physics::Term term;
-  std::vector<double> sigmas;  // of the term's parameters
-  double probability = 1.0;
-  double share = 0.0;  // of the mismatch that goes with it
-  std::vector<Alternative> alternatives;
-};
-
-struct Rejection {
-  std::string term, why;
-  double gain = 0.0;  // log evidence
-};
-
-struct Detectable {
-  std::string term, parameter, unit;
-  double value = 0.0;
-};
-
-struct FitRow {
-  std::string signal, unit;
-  double before = 0.0, retuned = 0.0, after = 0.0, noise_floor = 0.0;
-};
-
-enum class Verdict { no_mismatch, parameters_only, explained, partly_explained, ambiguous, unknown_physics };
-
-struct Diagnosis {
-  Verdict verdict = Verdict::no_mismatch;
-  Weighing weighing;
-  Fit nominal, retuned, best;
-  double mismatch_gain = 0.0;        // log evidence of the best model over the nominal one
-  double parameter_excursion = 0.0;  // sigmas
-  std::vector<Finding> findings;
-  std::vector<Rejection> rejected;
-  std::vector<Detectable> detectable;
-  std::vector<FitRow> heldout, train;
-  double unexplained = 1.0;  // residual over noise of the best model
-  std::vector<std::string> unexplained_over;
-  Verdict rest = Verdict::explained;
+/// How a search is to go.
+struct Options {
+  std::set<std::string, std::less<>> without;  // names of terms that are not tried
+  bool refuses = true;                         // false: the best term is claimed whatever it gains
+  std::function<bool()> stopped;  // asked between fits; once true, what is known so far is concluded
 };
 
 /// `progress` is told a share in 0..1 and what is being done.
-Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress);
-
-std::string name_of(Verdict verdict);
-
-/// log evidence by which a term must win before it is claimed; more where many rows would make a trifle significant.
-inline constexpr double claim_margin = 10.0;
-inline double claim_margin_of(const Weighing& weighing) {
-  return claim_margin + 0.001 * weighing.temper * static_cast<double>(weighing.rows);
-}
-/// Alternatives nearer than this cannot be told apart.
-inline constexpr double ambiguous_margin = 3.0;
+Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
+                 const Options& options = {});
 
 }  // namespace invar::diagnose

@@ -1,0 +1,107 @@
+#include "tests/support/mismatch/marks.hpp"
+
+#include <cmath>
+
+#include "core/model/model_file.hpp"
+#include "core/model/record_file.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace invar::test::mismatch {
+
+physics::Model model_of(const Machine& machine) {
+  const auto yaml = config::Yaml::parse(machine.yaml, machine.plant + "/" + machine.effect);
+  auto model = model::read(yaml);
+  yaml.finish();
+  return model;
+}
+
+diagnose::Case case_of(const Machine& machine) {
+  return diagnose::make_case(model_of(machine), machine.recordings);
+}
+
+double to_be_won(const Machine& machine) {
+  auto quiet = diagnose::make_case(model_of(machine), machine.quiet);
+  auto weighing = diagnose::weigh(quiet, diagnose::simulate(quiet, quiet.model), false);
+  for (std::size_t o = 0; o < quiet.outputs.size(); ++o) {
+    const auto& column = quiet.model.signal(quiet.outputs[o])->column;
+    weighing.filters[o] = diagnose::fit_whitening({machine.noise.at(column)}, 16);
+  }
+  auto best = diagnose::fit(quiet, weighing, quiet.model, quiet.model, 10);
+  best = diagnose::fit(quiet, weighing, best.model, quiet.model, 10);
+  return best.cost;
+}
+
+double credit(const Machine& machine, const std::string& term) {
+  double most = 0.0;
+  for (const auto& missing : machine.missing)
+    if (const auto at = missing.names.find(term); at != missing.names.end())
+      most = std::max(most, at->second);
+  return most;
+}
+
+double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched) {
+  const auto content = model::to_record(machine.test_inputs, believed, false);
+  const auto simulation = physics::prepare(believed, content.record);
+  physics::Outputs before, after;
+  simulation->run(believed, before);
+  simulation->run(patched, after);
+  double sum = 0.0, n = 0.0;
+  const auto names = believed.outputs();
+  for (std::size_t o = 0; o < names.size(); ++o) {
+    const auto& signal = *believed.signal(names[o]);
+    const auto truth = machine.test_outputs.in(signal.column, signal.unit);
+    double noise = 0.0, was = 0.0, is = 0.0;
+    for (double v : machine.noise.at(signal.column))
+      noise += v * v / static_cast<double>(machine.noise.at(signal.column).size());
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      was += std::pow(truth[i] - before[o][i], 2) / static_cast<double>(truth.size());
+      is += std::pow(truth[i] - after[o][i], 2) / static_cast<double>(truth.size());
+    }
+    const double floor = std::sqrt(noise), nominal = std::sqrt(was + noise), patch = std::sqrt(is + noise);
+    if (nominal < 1.05 * floor) {  // nothing to gain: but do not spoil it
+      if (patch > 1.05 * std::max(nominal, floor)) sum += -std::log2(patch / nominal), n += 1.0;
+      continue;
+    }
+    const double gain = nominal < 1.25 * floor ? std::log(nominal / patch) / std::log(nominal / floor)
+                                               : (nominal - patch) / (nominal - floor);
+    sum += std::clamp(gain, -1.0, 1.0), n += 1.0;
+  }
+  return n > 0.0 ? sum / n : 1.0;
+}
+
+Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win) {
+  Marks marks;
+  const auto verdict = diagnose::name_of(d.verdict);
+  if (const auto at = machine.verdicts.find(verdict); at != machine.verdicts.end())
+    marks.verdict = at->second;
+  const bool modest = verdict == "no_mismatch" || verdict == "parameters_only";
+  if (machine.missing.empty() && modest && win < plain) marks.verdict = 1.0;
+  if (!machine.missing.empty() && win < plain && modest) marks.verdict = 1.0;
+  for (const auto& missing : machine.missing) {
+    double named = 0.0, located = 0.0;
+    for (const auto& finding : d.findings) {
+      const auto site = diagnose::site_of(data, finding.term);
+      if (const auto at = missing.names.find(std::string{finding.term.info->name}); at != missing.names.end())
+        named = std::max(named, at->second);
+      if (std::find(missing.sites.begin(), missing.sites.end(), site) == missing.sites.end()) continue;
+      const auto over = diagnose::dependence(data, finding.term);
+      const bool meets =
+          missing.depends_on.empty() || std::any_of(over.begin(), over.end(), [&](const auto& name) {
+            return std::find(missing.depends_on.begin(), missing.depends_on.end(), name) !=
+                   missing.depends_on.end();
+          });
+      located = std::max(located, meets ? 1.0 : 0.5);
+    }
+    if (win < plain && modest) named = located = 1.0;
+    marks.named += named / static_cast<double>(machine.missing.size());
+    marks.located += located / static_cast<double>(machine.missing.size());
+  }
+  for (const auto& finding : d.findings) {
+    const std::string name{finding.term.info->name};
+    if (name == "unmodelled" ? machine.missing.empty() : credit(machine, name) == 0.0) ++marks.false_claims;
+  }
+  marks.fit = fit_on_test(machine, data.model, d.best.model);
+  return marks;
+}
+
+}  // namespace invar::test::mismatch

@@ -1,0 +1,31 @@
+// Marks: how well a diagnosis answers for a made machine.
+#pragma once
+
+#include "tests/support/mismatch/machine.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::test::mismatch {
+
+/// How far the best nominal model stays from the quiet truth, as half the sum of squares in units of the noise: the log
+/// likelihood that there is to win. Below `hidden` nobody could claim anything; above `plain` one must.
+double to_be_won(const Machine& machine);
+inline constexpr double hidden = 12.0, plain = 120.0;
+
+struct Marks {
+  double verdict = 0.0;
+  double located = 0.0, named = 0.0;  // means over the missing terms
+  int false_claims = 0;               // findings that are neither true nor a relative
+  double fit = 0.0;                   // share of the achievable on another motion
+  double seconds = 0.0;
+};
+
+physics::Model model_of(const Machine& machine);
+diagnose::Case case_of(const Machine& machine);
+/// `win` is to_be_won.
+Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win);
+/// The share of what a perfect model would gain on the test run over the believed one.
+double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched);
+/// 1, or what a relative counts; 0 for a false claim.
+double credit(const Machine& machine, const std::string& term);
+
+}  // namespace invar::test::mismatch

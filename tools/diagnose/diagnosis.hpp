@@ -1,0 +1,73 @@
+// Diagnosis: what was found, what it stands on, and what was turned down.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/fit.hpp"
+
+namespace invar::diagnose {
+
+struct Alternative {
+  physics::Term term;
+  double log_odds = 0.0;  // evidence against the finding's; negative: less likely
+};
+
+struct Finding {
+  physics::Term term;
+  std::vector<double> sigmas;  // of the term's parameters
+  double probability = 1.0;
+  double share = 0.0;  // of the mismatch that goes with it
+  std::vector<Alternative> alternatives;
+};
+
+struct Rejection {
+  std::string term, why;
+  double gain = 0.0;  // log evidence
+};
+
+struct Detectable {
+  std::string term, parameter, unit;
+  double value = 0.0;
+};
+
+struct FitRow {
+  std::string signal, unit;
+  double before = 0.0, retuned = 0.0, after = 0.0, noise_floor = 0.0;
+};
+
+enum class Verdict { no_mismatch, parameters_only, explained, partly_explained, ambiguous, unknown_physics };
+
+struct Diagnosis {
+  Verdict verdict = Verdict::no_mismatch;
+  Weighing weighing;
+  Fit nominal, retuned, best;
+  double mismatch_gain = 0.0;        // log evidence of the best model over the nominal one
+  double parameter_excursion = 0.0;  // sigmas
+  std::vector<Finding> findings;
+  std::vector<Rejection> rejected;
+  std::vector<Detectable> detectable;
+  std::vector<FitRow> heldout, train;
+  double unexplained = 1.0;  // residual over noise of the best model
+  std::vector<std::string> unexplained_over;
+  bool is_unnamed = false;  // the finding is a curve alone
+  bool has_rest = false;    // the last finding is a curve beside named ones
+
+  /// Remembers the best showing of a term that is not claimed.
+  void reject(const std::string& term, const std::string& why, double gain);
+};
+
+std::string name_of(Verdict verdict);
+
+/// log evidence by which a term must win before it is claimed; more where many rows would make a trifle significant.
+inline constexpr double claim_margin = 10.0;
+inline double claim_margin_of(const Weighing& weighing) {
+  return claim_margin + 0.001 * weighing.temper * static_cast<double>(weighing.rows);
+}
+/// Alternatives nearer than this cannot be told apart.
+inline constexpr double ambiguous_margin = 3.0;
+
+/// The smallest ratio of residual RMS of any output, a over b.
+double least_ratio(const Case& data, const Fit& a, const Fit& b);
+
+}  // namespace invar::diagnose

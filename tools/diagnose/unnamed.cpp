@@ -1,0 +1,109 @@
+#include "tools/diagnose/unnamed.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/diagnose/screen.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Model;
+
+struct Curved {
+  Fit fit;
+  Weighing weighing;
+  double gain = -1e300;  // over what it was added to, under its own filters
+};
+
+/// A dent or a step is narrow: the knots are gathered where the curve is not flat.
+void sharpen(const Case& data, Curved& found) {
+  auto& [curved, weighing, gain] = found;
+  const auto& curve = curved.model.terms.back().curve;
+  const double level = median(curve.values);
+  double top = 0.0;
+  for (double v : curve.values) top = std::max(top, std::abs(v - level));
+  std::size_t first = curve.knots.size(), last = 0;
+  for (std::size_t k = 0; k < curve.knots.size(); ++k)
+    if (std::abs(curve.values[k] - level) > 0.3 * top) first = std::min(first, k), last = k;
+  if (first > last || (last - first + 3) * 2 > curve.knots.size()) return;
+  const double spacing = curve.knots[1] - curve.knots[0];
+  const double low = curve.knots[first] - 1.2 * spacing, high = curve.knots[last] + 1.2 * spacing;
+  Model model = curved.model;
+  auto& fine = model.terms.back().curve;
+  fine.knots.clear(), fine.values.clear();
+  constexpr int count = 18;
+  for (int k = 0; k < count; ++k) {
+    fine.knots.push_back(low + (high - low) * k / (count - 1));
+    fine.values.push_back(curve(fine.knots.back()) - level);
+  }
+  auto rough = fit(data, weighing, model, data.model, 4);
+  const Weighing own = weigh(data, simulate(data, rough.model));
+  auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
+  const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
+  if (sharp.evidence < blunt.evidence) return;
+  gain += sharp.evidence - blunt.evidence;
+  curved = std::move(sharp);
+  weighing = own;
+}
+
+}  // namespace
+
+void add_unnamed(const Case& data, Diagnosis& d) {
+  const std::size_t given = data.model.terms.size();
+  const auto starts = unmodelled_starts(data, d.best);
+  if (starts.empty()) return;
+  const auto best_curve = [&](const Fit& base) {
+    Curved best;
+    const Weighing plain = weigh(data, simulate(data, base.model), false);
+    const Fit under_plain = fit(data, plain, base.model, data.model, 4, &base);
+    const auto screened = screen(data, plain, under_plain, starts, 3);
+    int tried = 0;
+    for (const auto& s : screened) {
+      if (tried++ >= 3 || s.merit < claim_margin) break;
+      const Fit near = with_columns(data, under_plain, s);
+      auto rough = fit(data, plain, near.model, data.model, 2, &near);
+      const Weighing own = weigh(data, simulate(data, rough.model));
+      auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+      const auto without = fit(data, own, base.model, data.model, 4, &base);
+      const double gain = curved.evidence - without.evidence;
+      if (gain > best.gain) best = {std::move(curved), own, gain};
+    }
+    if (best.gain > claim_margin) sharpen(data, best);
+    return best;
+  };
+  const bool named = d.best.model.terms.size() > given;
+  const double margin = 2.0 * claim_margin_of(d.weighing);
+  auto beside = best_curve(d.best);
+  if (named) {
+    auto instead = best_curve(d.retuned);
+    if (instead.gain > margin) {
+      const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
+      if (instead.fit.evidence > named_there.evidence + margin &&
+          instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) {
+        for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
+          d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
+                   1.0);
+        d.best = std::move(instead.fit);
+        d.weighing = std::move(instead.weighing);
+        d.findings.clear();
+        d.is_unnamed = true;
+      }
+    }
+  }
+  // A rest counts where an engineer would see it.
+  if (!d.is_unnamed && beside.gain > margin &&
+      least_ratio(data, beside.fit, d.best) < (named ? 0.9 : 0.985)) {
+    d.best = std::move(beside.fit);
+    d.weighing = std::move(beside.weighing);
+    (named ? d.has_rest : d.is_unnamed) = true;
+  }
+  if (!d.is_unnamed && !d.has_rest) return;
+  Finding finding;
+  finding.term = d.best.model.terms.back();
+  d.findings.push_back(finding);
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,16 @@
+// The verdict: what was found, tried on held-out stretches, weighed and put into one word.
+#pragma once
+
+#include "tools/diagnose/diagnosis.hpp"
+#include "tools/diagnose/screen.hpp"
+
+namespace invar::diagnose {
+
+/// Fits without every third stretch and compares there; takes findings back that do not help on it.
+void hold_out(const Case& data, Diagnosis& d);
+/// What of each screened term would just have been seen.
+void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d);
+/// Probabilities, shares, sigmas and the verdict.
+void conclude(const Case& data, Diagnosis& d);
+
+}  // namespace invar::diagnose
