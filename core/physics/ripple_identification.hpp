@@ -1,0 +1,52 @@
+// Force ripple from what a servo had to do: current and position of runs at constant velocity, both ways.
+#pragma once
+
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/physics/model.hpp"
+
+namespace invar::physics {
+
+/// Samples of runs at constant velocity, so that the current tells the force alone. `run` numbers the passes.
+struct RippleSamples {
+  std::vector<double> position;  // [m]
+  std::vector<double> velocity;  // wanted [m/s]
+  std::vector<double> current;   // [A]
+  std::vector<int> run;
+  [[nodiscard]] std::size_t size() const { return position.size(); }
+};
+
+struct RippleHarmonic {
+  int order = 1;
+  double amplitude = 0.0;  // [N]
+  double phase = 0.0;      // [rad], at position zero
+  double sigma = 0.0;      // of the amplitude [N]
+};
+
+struct RippleFit {
+  double pitch = 0.0;                     // [m]
+  double pitch_sigma = 0.0;               // [m]
+  std::vector<RippleHarmonic> harmonics;  // those that stand out by three sigmas; empty: no ripple
+  double friction = 0.0;                  // what is left of dry friction at these speeds [N]
+  double constant = 0.0;                  // [N]
+  double before = 0.0;                    // RMS of the force left over on runs held out, without ripple [N]
+  double after = 0.0;                     // ... with it
+};
+
+/// motor_constant u = damping v + friction sign(v) - constant - ripple(x), by least squares; the pitch by a scan of
+/// `pitches` and by Newton steps. Mass does not matter at constant velocity. Preconditions: the model is of an axis; at
+/// least two runs, 50 samples.
+RippleFit identify_ripple(const Model& axis, const RippleSamples& samples, Range pitches = {4e-3, 0.1},
+                          int most_harmonics = 6);
+
+/// The ripple as terms of an axis, one `force_ripple` a harmonic.
+std::vector<Term> ripple_terms(const RippleFit& fit);
+
+/// Ripple as a position sensor: how far the ways `travelled` since some start [m] were shifted, if `force` [N] was the
+/// ripple met on them: a start position in [0, pitch). Force alone knows no more: places one pitch apart feel alike.
+/// `misfit` (may be null) gets the RMS of what the ripple does not explain [N].
+double position_from_ripple(const RippleFit& fit, const std::vector<double>& travelled,
+                            const std::vector<double>& force, double* misfit = nullptr);
+
+}  // namespace invar::physics

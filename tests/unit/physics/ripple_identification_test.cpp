@@ -1,0 +1,165 @@
+// Force ripple identified from the current of a servo whose plant has it hidden; checked by motions that were not fitted.
+#include "core/physics/ripple_identification.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "core/physics/axis_controller.hpp"
+#include "core/physics/axis_feedforward.hpp"
+#include "core/physics/library.hpp"
+
+namespace invar::physics {
+namespace {
+
+constexpr double dt = 1e-3;
+constexpr double pitch = 0.0317;
+
+Model nominal() {
+  Model model;
+  model.plant = Plant::axis;
+  model.parameters = {{"mass", "kg", 3.2, {}, {}},
+                      {"motor_constant", "N/A", 12.0, {}, {}},
+                      {"viscous_damping", "N s/m", 18.0, {}, {}}};
+  return model;
+}
+
+Model with(Model model, const char* name, std::array<double, most_parameters> values) {
+  Term term;
+  term.info = find_term(Plant::axis, name);
+  term.values = values;
+  model.terms.push_back(term);
+  return model;
+}
+
+Model truth() {
+  Model model = with(nominal(), "force_ripple", {2.4, pitch, 0.7});
+  model = with(model, "force_ripple", {0.8, pitch / 2, -1.9});
+  model = with(model, "coulomb_friction", {1.5, 1e-4});
+  return with(model, "constant_force", {-0.6});
+}
+
+struct Servo {
+  explicit Servo(const Model& plant_model) : plant{make_axis(plant_model)} { plant.rest_at(0.01); }
+  /// One period towards a reference; returns the current.
+  double step(double reference, double feedforward = 0.0) {
+    const double reading = plant.reading() + 5e-8 * noise(random);
+    const double current = controller.step(reference, reading) + feedforward;
+    plant.step(current, dt);
+    return current;
+  }
+  AxisPlant plant;
+  AxisController controller{
+      {.kp = 2.0e4, .ki = 3.0e5, .kd = 200.0, .velocity_filter_hz = 300.0, .limit = 10.0}};
+  std::mt19937 random{11};
+  std::normal_distribution<double> noise;
+};
+
+/// Runs forth and back at constant velocity between 10 and 190 mm.
+RippleSamples runs(const Model& plant_model, double velocity, int passes) {
+  Servo servo{plant_model};
+  RippleSamples samples;
+  double reference = 0.01;
+  for (int run = 0; run < passes; ++run) {
+    const double way = run % 2 == 0 ? velocity : -velocity;
+    const auto steps = static_cast<int>(0.18 / velocity / dt);
+    for (int k = 0; k < steps; ++k) {
+      reference += way * dt;
+      const double position = servo.plant.position();
+      const double current = servo.step(reference);
+      if (k < 500 || k % 10 != 0) continue;  // the start is no constant velocity
+      samples.position.push_back(position);
+      samples.velocity.push_back(way);
+      samples.current.push_back(current);
+      samples.run.push_back(run);
+    }
+    for (int k = 0; k < 200; ++k) servo.step(reference);
+  }
+  return samples;
+}
+
+double following_rms(const Model& known, double period) {
+  Servo servo{truth()};
+  AxisFeedforward feedforward{known};
+  feedforward.reset(0.01);
+  double squares = 0.0;
+  int count = 0;
+  for (int k = 0; k < 6000; ++k) {
+    const double t = k * dt, w = 2.0 * std::numbers::pi / period;
+    const double reference = 0.01 + 0.08 * (1.0 - std::cos(w * t));
+    const double i =
+        feedforward.current({reference, 0.08 * w * std::sin(w * t), 0.08 * w * w * std::cos(w * t)});
+    if (k >= 500) {
+      squares += std::pow(reference - servo.plant.position(), 2);
+      ++count;
+    }
+    servo.step(reference, i);
+  }
+  return std::sqrt(squares / count);
+}
+
+TEST(RippleIdentification, FindsPitchHarmonicsFrictionAndTilt) {
+  const RippleFit fit = identify_ripple(nominal(), runs(truth(), 0.02, 4));
+  EXPECT_NEAR(fit.pitch, pitch, 2e-5);
+  EXPECT_LT(std::abs(fit.pitch - pitch), 5.0 * fit.pitch_sigma + 1e-6);
+  ASSERT_EQ(fit.harmonics.size(), 2U);
+  EXPECT_EQ(fit.harmonics[0].order, 1);
+  EXPECT_NEAR(fit.harmonics[0].amplitude, 2.4, 0.05);
+  EXPECT_NEAR(fit.harmonics[0].phase, 0.7, 0.03);
+  EXPECT_EQ(fit.harmonics[1].order, 2);
+  EXPECT_NEAR(fit.harmonics[1].amplitude, 0.8, 0.03);
+  EXPECT_NEAR(fit.harmonics[1].phase, -1.9, 0.06);
+  EXPECT_NEAR(fit.friction, 1.5, 0.05);
+  EXPECT_NEAR(fit.constant, -0.6, 0.05);
+  EXPECT_LT(fit.after, 0.15 * fit.before);
+}
+
+TEST(RippleIdentification, ClaimsNoneWhereThereIsNone) {
+  const Model plain = with(nominal(), "coulomb_friction", {1.5, 1e-4});
+  const RippleFit fit = identify_ripple(nominal(), runs(plain, 0.02, 4));
+  double largest = 0.0;
+  for (const auto& harmonic : fit.harmonics) largest = std::max(largest, harmonic.amplitude);
+  EXPECT_LT(largest, 0.02);
+}
+
+TEST(RippleIdentification, FedForwardItLowersTheFollowingErrorOfAnotherMotion) {
+  Model found = nominal();
+  found.terms = ripple_terms(identify_ripple(nominal(), runs(truth(), 0.02, 4)));
+  Model rest = nominal();  // friction and tilt known: what remains is ripple
+  rest = with(with(rest, "coulomb_friction", {1.5, 1e-4}), "constant_force", {-0.6});
+  Model all = rest;
+  all.terms.insert(all.terms.end(), found.terms.begin(), found.terms.end());
+  for (const double period : {3.0, 5.0}) {
+    const double before = following_rms(rest, period);
+    const double after = following_rms(all, period);
+    EXPECT_LT(after, 0.2 * before) << period << " s: " << before << " to " << after;
+    EXPECT_LT(following_rms(found, period), following_rms(nominal(), period));
+  }
+}
+
+TEST(RippleIdentification, RippleAloneTellsThePositionModuloThePitch) {
+  const RippleFit fit = identify_ripple(nominal(), runs(truth(), 0.02, 4));
+  const RippleSamples met = runs(truth(), 0.05, 1);  // another run, at another speed
+  const Model model = nominal();
+  for (const std::size_t first : {std::size_t{0}, std::size_t{40}, std::size_t{90}}) {
+    std::vector<double> travelled, force, shifted;
+    for (std::size_t i = first; i < first + 100; ++i) {  // 50 mm, from an unknown place
+      travelled.push_back(met.position[i] - met.position[first]);
+      force.push_back(18.0 * met.velocity[i] + 1.5 - 12.0 * met.current[i]);
+      shifted.push_back(travelled.back() + pitch);
+    }
+    double misfit = 0.0;
+    const double at = position_from_ripple(fit, travelled, force, &misfit);
+    const double apart = std::remainder(at - met.position[first], fit.pitch);
+    EXPECT_LT(std::abs(apart), 0.2e-3);
+    EXPECT_LT(misfit, 0.3);
+    // One pitch further feels the same.
+    EXPECT_LT(std::abs(std::remainder(position_from_ripple(fit, shifted, force) - at, fit.pitch)), 0.1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace invar::physics
