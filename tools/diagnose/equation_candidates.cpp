@@ -162,7 +162,7 @@ class Candidates {
     for (const auto& input : equations_.inputs)
       add("coupling", state, input.symbol, rate / spans_.of(input.symbol).size());
     add("constant", state, "", rate);
-    add("dry_friction", state, "", rate);
+    if (own.low < 0.0 && own.high > 0.0) add("dry_friction", state, "", rate);  // else it is a constant
     add("periodic", state, "t", rate, residual_periods(data_, model_, 6));
   }
 

@@ -99,6 +99,13 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
     s.columns = columns_of(data, base, at, s.start);
     s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
     const auto& info = *s.start.term.info;
+    if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
+        s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
+      // A term without a strength is there once, not eight times: the gain of one.
+      const double full = s.strength(0);
+      s.gain *= (2.0 * full - 1.0) / (full * full);
+      s.strength(0) = 1.0;
+    }
     // An amplitude without a phase has one possible sign where its bounds say so.
     bool periodic = false;
     std::size_t shapes = 0;
@@ -120,14 +127,14 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   return all;
 }
 
-physics::Model with(const Fit& base, const std::vector<const Screened*>& added) {
+physics::Model with(const Fit& base, const std::vector<const Screened*>& added, double share) {
   physics::Model model = base.model;
   for (const auto* s : added) {
     Term term = s->start.term;
     const auto& info = *term.info;
     for (std::size_t d = 0; d < s->start.directions.size(); ++d) {
       const auto& direction = s->start.directions[d];
-      const double value = s->strength(static_cast<Eigen::Index>(d));
+      const double value = share * s->strength(static_cast<Eigen::Index>(d));
       if (!term.curve.knots.empty()) {
         term.curve.values[direction.knot] = value;
         continue;
@@ -136,7 +143,7 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added) 
       const auto& p = info.parameters[direction.amplitude];
       const auto phase = info.index_of("phase");
       if (phase < none && d + 1 < s->start.directions.size() && s->start.directions[d + 1].quadrature) {
-        const double cosine = s->strength(static_cast<Eigen::Index>(d + 1));
+        const double cosine = share * s->strength(static_cast<Eigen::Index>(d + 1));
         term.values[direction.amplitude] = p.bounds.clamp(std::hypot(value, cosine));
         term.values[phase] = std::atan2(cosine, value);
         ++d;
@@ -152,6 +159,18 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added) 
     model.terms.push_back(term);
   }
   return model;
+}
+
+Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const Screened& added,
+             int iterations) {
+  physics::Model best = with(base, {&added});
+  double least = residual(data, weighing, best).squaredNorm();
+  for (double share = 0.4; share > 0.02 && least > base.residual.squaredNorm(); share *= 0.4) {
+    auto tried = with(base, {&added}, share);
+    const double square = residual(data, weighing, tried).squaredNorm();
+    if (square < least) least = square, best = std::move(tried);
+  }
+  return fit(data, weighing, best, data.model, iterations, &base);
 }
 
 Fit with_columns(const Case& data, const Fit& base, const Screened& added) {

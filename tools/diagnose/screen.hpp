@@ -18,8 +18,13 @@ struct Screened {
 std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
                              const std::vector<Start>& starts, std::size_t keep);
 
-/// The base model with the screened term(s) at their first-order strength.
-physics::Model with(const Fit& base, const std::vector<const Screened*>& added);
+/// The base model with the screened term(s) at a share of their first-order strength.
+physics::Model with(const Fit& base, const std::vector<const Screened*>& added, double share = 1.0);
+
+/// A fit that begins with the screened term at whatever share of its first-order strength comes nearest: where the
+/// system bends, first order may overshoot by far.
+Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const Screened& added,
+             int iterations);
 
 /// For a curve: model, freedoms and sensitivities from which a fit may begin without finding them again.
 Fit with_columns(const Case& data, const Fit& base, const Screened& added);

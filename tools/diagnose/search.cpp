@@ -118,7 +118,7 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   std::vector<Fit> fits;
   double leader = -1e300;
   for (const auto* s : shortlist) {
-    fits.push_back(fit(data_, weighing, with(base, {s}), data_.model, 3, &base));
+    fits.push_back(fit_with(data_, weighing, base, *s, 3));
     leader = std::max(leader, fits.back().evidence);
   }
   for (auto& f : fits) {
@@ -163,6 +163,9 @@ bool Search::add_named(double round) {
       const Weighing own = weigh(data_, simulate(data_, settled.model));
 
       auto with_term = fit(data_, own, settled.model, data_.model, 6, &settled);
+      // As in `prepare`: weights that follow the colour of what is still missing may lead away.
+      if (least_ratio(data_, settled, with_term) < 0.9)
+        with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double gain = with_term.evidence - without.evidence;
       // A further claim must be one that an engineer would see in the residual.
