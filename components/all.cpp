@@ -2,6 +2,8 @@
 
 #include "components/calibration/calibration.hpp"
 #include "components/compensation/compensation.hpp"
+#include "components/dispenser/dispenser.hpp"
+#include "components/dispenser/valve.hpp"
 #include "components/fusion/fusion.hpp"
 #include "components/interferometer/interferometer.hpp"
 #include "components/recorder/recorder.hpp"
@@ -9,8 +11,10 @@
 #include "components/supervisor/supervisor.hpp"
 #include "components/thermal/thermal.hpp"
 #include "components/world/simulated_heater.hpp"
+#include "components/world/simulated_pneumatics.hpp"
 #include "components/world/simulated_sensor.hpp"
 #include "components/world/simulated_stage.hpp"
+#include "components/world/simulated_substrate.hpp"
 
 namespace invar {
 
@@ -21,6 +25,12 @@ void add_all_components(Registry& registry) {
                                        "imperfect position or velocity sensor of a simulated axis");
   registry.add<world::SimulatedHeater>("simulated_heater",
                                        "pad, slide and base behind a heater controller's registers");
+  registry.add<world::SimulatedPneumatics>(
+      "simulated_pneumatics", "reservoir and regulator behind a pressure controller's registers");
+  registry.add<world::SimulatedSubstrate>("simulated_substrate",
+                                          "flight and landing of the droplets that a valve lets go");
+  registry.add<dispenser::Dispenser>("dispenser", "pressure over Modbus TCP, patterns and where to aim them");
+  registry.add<dispenser::Valve>("valve", "jets droplets at the right place, in the loop");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
   registry.add<fusion::Fusion>("fusion", "one position of an axis from its encoder and velocity sensor");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");

@@ -45,4 +45,15 @@ metrology::DropletTrajectory read_trajectory(const config::Node& root) {
   return trajectory;
 }
 
+metrology::DropletTrajectory load_trajectory(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  (void)yaml.root().integer("invar_compensation", 1, 1);
+  (void)yaml.root().choice("kind", {"dispenser"});
+  check_seal(yaml);
+  yaml.root()["identified_from"].accept_all();
+  const auto trajectory = read_trajectory(yaml.root());
+  yaml.finish();
+  return trajectory;
+}
+
 }  // namespace invar::compensation

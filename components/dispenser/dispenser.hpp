@@ -1,0 +1,107 @@
+// Dispenser: the pneumatic controller of a jetting head over Modbus TCP, and where to aim its droplets.
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/dispenser/pattern.hpp"
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/metrology/droplet_trajectory.hpp"
+#include "core/modbus/bus.hpp"
+#include "idl/compensation.h"
+#include "idl/dispensing.h"
+
+namespace invar::dispenser {
+
+/// The slow half of a dispenser, for a worker; `valve` in the motion loop is the fast one. Keeps pressure and purge pressure at
+/// their setpoints, lets go of both on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
+/// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use
+/// (compensation.yaml of kind dispenser; staged, activated and rolled back as the stage's is). Not real-time (Modbus).
+class Dispenser final : public Component {
+ public:
+  struct Modbus {
+    std::string host = "127.0.0.1";
+    std::int64_t port = 502;
+    std::filesystem::path map;
+    void describe(auto& p) {
+      p(host, "host", "name or address of the pneumatic controller");
+      p(port, "port", 1, 65535, "TCP port");
+      p(map, "map", "register map");
+    }
+  };
+  struct Parameters {
+    Modbus modbus;
+    double pressure = 67.2e3;
+    double purge_pressure = 20e3;
+    double band = 500.0;
+    bool pressurise = false;
+    std::filesystem::path model;
+    double bound = 2e-3;
+    double largest_sigma = 1e-4;
+    std::vector<Pattern> patterns;
+    void describe(auto& p) {
+      p(modbus, "modbus", "the pneumatic controller");
+      p(pressure, "pressure", "Pa", Range{0.0, 7e5}, "over ambient; a command changes it");
+      p(purge_pressure, "purge_pressure", "Pa", Range{0.0, 7e5}, "of the purge line; a command changes it");
+      p(band, "band", "Pa", Range{10.0, 5e4}, "in band: pressure no farther from its setpoint");
+      p(pressurise, "pressurise", "from the start; otherwise by command");
+      p(model, "model",
+        "compensation.yaml (dispenser) in use from the start; none: targets stay as they are");
+      p(bound, "bound", "m", Range{0.0, 0.1}, "a model that moves a target farther is refused");
+      p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1},
+        "a pattern at a height where the model is less certain is refused");
+      p(patterns, "patterns", "that can be asked for");
+    }
+  };
+
+  explicit Dispenser(const Parameters& parameters);
+  void configure() override;
+  void activate() override;
+  void deactivate() noexcept override;
+  void cleanup() noexcept override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  /// A trajectory that was loaded and checked; empty: targets stay as they are.
+  struct Model {
+    std::optional<metrology::DropletTrajectory> trajectory;
+    std::uint32_t checksum = 0;
+  };
+  [[nodiscard]] Model load(const std::filesystem::path& file) const;
+  void obey(const compensation::ModelCommand& command);
+  void obey(const dispensing::PressureCommand& command) noexcept;
+  void answer(const dispensing::PatternCommand& command, const Tick& tick);
+  [[nodiscard]] std::string fill(const dispensing::PatternCommand& command,
+                                 dispensing::TriggerPattern& pattern) const;
+  void drive(bool enable) noexcept;
+  void publish(const Tick& tick) noexcept;
+  [[nodiscard]] bool flag(const char* reg) const;
+
+  const Parameters& parameters_;
+  Inbox<dispensing::PressureCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
+  Inbox<dispensing::PatternCommand> wanted_pattern_{*this, "print", {.optional = true, .profile = "command"}};
+  Inbox<compensation::ModelCommand> model_{*this, "model", {.optional = true, .profile = "command"}};
+  Output<dispensing::PressureState> pressure_{*this, "pressure", "state"};
+  Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
+  Output<compensation::ModelStatus> status_{*this, "status", "state"};
+
+  std::unique_ptr<modbus::Bus> bus_;
+  modbus::Device* device_ = nullptr;
+  std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;
+  Model active_, staged_, previous_;
+  double setpoint_ = 0.0;
+  double purge_setpoint_ = 0.0;
+  bool wanted_ = false;
+  bool purge_ = false;
+  bool latched_ = false;  // by an alarm, until a command resets it
+  Instant reset_at_;
+  std::uint64_t next_droplet_ = 1;
+};
+
+}  // namespace invar::dispenser

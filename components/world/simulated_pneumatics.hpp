@@ -1,0 +1,65 @@
+// SimulatedPneumatics: reservoir, regulator and purge line behind the Modbus registers of a real pressure controller.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/modbus/server.hpp"
+#include "idl/dispensing.h"
+
+namespace invar::world {
+
+/// Serves the register map on a TCP port of its own. The regulator follows its setpoint with a lag, as far as the supply
+/// reaches, and vents when it is not enabled: by its owner, by the device's own watchdog when the owner is gone, or by the
+/// latched over-pressure alarm. The reservoir's true pressure is the port `actual`.
+class SimulatedPneumatics final : public Component {
+ public:
+  struct Parameters {
+    std::filesystem::path map;
+    std::string host = "127.0.0.1";
+    std::int64_t port = 1503;
+    std::filesystem::path faults;
+    double supply = 6e5;
+    double lag = 0.15;
+    double over_pressure = 3e5;
+    double noise = 20.0;
+    double leak_through = 0.0;
+    std::int64_t seed = 5;
+    void describe(auto& p) {
+      p(map, "map", "register map to serve");
+      p(host, "host", "address to listen on");
+      p(port, "port", 1, 65535, "TCP port to listen on");
+      p(faults, "faults", "fault script: when its Modbus side refuses, drops, delays or lies");
+      p(supply, "supply", "Pa", Range{0.0, 1.6e6}, "compressed air before the regulator", while_running);
+      p(lag, "lag", "s", Range{1e-3, 60.0}, "time constant of reservoir and purge line");
+      p(over_pressure, "over_pressure", "Pa", Range{1e3, 1.6e6},
+        "of the reservoir, above which it latches and vents");
+      p(noise, "noise", "Pa", Range{0.0, 1e4}, "1 sigma of the pressure sensors");
+      p(leak_through, "leak_through", "Pa", Range{0.0, 1.6e6}, "what a worn regulator adds to its setpoint",
+        while_running);
+      p(seed, "seed", 0, 1'000'000'000, "of the noise");
+    }
+  };
+  explicit SimulatedPneumatics(const Parameters& parameters);
+  void configure() override;
+  void cleanup() noexcept override;
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+
+ private:
+  const Parameters& parameters_;
+  Output<dispensing::PressureState> actual_{*this, "actual", "state"};
+  std::unique_ptr<modbus::Server> server_;
+  double pressure_ = 0.0;
+  double purge_pressure_ = 0.0;
+  bool over_pressure_ = false;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+}  // namespace invar::world
