@@ -10,6 +10,9 @@
 #include "components/stage/axis_stage.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "components/thermal/thermal.hpp"
+#include "components/vision/folder_camera.hpp"
+#include "components/vision/simulated_camera.hpp"
+#include "components/vision/vision_component.hpp"
 #include "components/world/simulated_heater.hpp"
 #include "components/world/simulated_pneumatics.hpp"
 #include "components/world/simulated_sensor.hpp"
@@ -37,6 +40,9 @@ void add_all_components(Registry& registry) {
   registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
   registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
+  registry.add<vision::FolderCamera>("folder_camera", "pictures of a folder as a camera's frames");
+  registry.add<vision::SimulatedCamera>("simulated_camera", "what a camera over the stage would see");
+  registry.add<vision::Vision>("vision", "droplets in frames, in machine coordinates; the camera's scale");
   registry.add<stage::Stage>("stage", "servo of one axis");
   registry.add<supervisor::Supervisor>(
       "supervisor", "watches processes and components, makes safe what depends on lost ones");

@@ -31,6 +31,9 @@ cv::Mat annotate(const cv::Mat& image, const std::vector<AnnotatedOutline>& outl
 cv::Mat annotate(const cv::Mat& image, const Droplets& droplets,
                  const std::vector<AnnotatedTarget>& targets = {});
 
+/// Turns each target's arrow to the nearest sound drop within `reach` px; a target without one keeps none.
+void point_at_nearest(std::vector<AnnotatedTarget>& targets, const Droplets& droplets, double reach);
+
 /// The bytes of a PNG file.
 std::vector<unsigned char> encode_png(const cv::Mat& image);
 

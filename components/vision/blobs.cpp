@@ -185,19 +185,21 @@ struct Level {
   int halvings = 0;
 };
 
-Detection detect_at(const Level& level, int window) {
+Detection detect_at(const Level& level, const DetectionOptions& options) {
   const cv::Mat1b& image = level.image;
   const double scale = 1 << level.halvings;
   Detection out;
-  const Partition parts = partition(image, window);
+  const Partition parts = partition(image, options.window);
   out.noise = parts.noise * scale;
   if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return out;
   const double smallest = 3.0;
   Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
   // Things are round, what lies between them is not.
   const Side* side = light.round_area >= dark.round_area ? &light : &dark;
-  if (light.round_area + dark.round_area <=
-      0.0) {  // everything touches: what borders the image less is the things
+  if (options.polarity != 0) {
+    side = options.polarity > 0 ? &light : &dark;
+  } else if (light.round_area + dark.round_area <=
+             0.0) {  // everything touches: what borders the image less is the things
     const auto inner = [&](const Side& s) {
       double area = 0.0;
       for (const Blob& blob : s.blobs)
@@ -247,12 +249,12 @@ Detection detect(const cv::Mat& image, const DetectionOptions& options) {
     }
     return levels[static_cast<std::size_t>(halvings)];
   };
-  if (options.level >= 0) return detect_at(halve_to(options.level), options.window);
+  if (options.level >= 0) return detect_at(halve_to(options.level), options);
   // Coarse first: it is cheap and sees through noise. Finer where the things turn out small there.
   int halvings = 0;
   while (std::min(image.cols, image.rows) >> (halvings + 1) >= 150) ++halvings;
   for (;; --halvings) {
-    Detection found = detect_at(halve_to(halvings), options.window);
+    Detection found = detect_at(halve_to(halvings), options);
     if (halvings == 0 || (found.radius >= 4.5 * (1 << halvings) && !found.candidates.empty())) return found;
   }
 }

@@ -15,6 +15,7 @@ struct CameraModel {
   double aspect_sigma = 0.0;
   double distortion = 0.0;  // 1/px^2
   double distortion_sigma = 0.0;
+  int width = 0, height = 0;                         // px; of the images that it holds for; 0: not known
   Eigen::Vector2d center = Eigen::Vector2d::Zero();  // px; of the distortion: the middle of the image
 
   /// A point of the image as it is [px] on the object [m].

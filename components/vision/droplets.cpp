@@ -174,11 +174,11 @@ cv::Mat gray(const cv::Mat& image) {
   return scaled;
 }
 
-Droplets measure_droplets(const cv::Mat& image) {
+Droplets measure_droplets(const cv::Mat& image, const MeasureOptions& options) {
   INVAR_EXPECTS(image.type() == CV_8UC1 && image.cols >= 16 && image.rows >= 16, image.type(), image.cols,
                 image.rows);
   Droplets out;
-  const Detection found = detect(image);
+  const Detection found = detect(image, {.polarity = options.polarity});
   out.polarity = found.polarity;
   out.contrast = found.contrast;
   if (!(found.contrast > 0.0)) return out;
@@ -259,11 +259,11 @@ Droplets measure_droplets(const cv::Mat& image) {
         std::clamp(drop.fit.support * std::sqrt(drop.fit.coverage) * d.circularity * strength, 0.0, 1.0);
     const bool clean = drop.fit.support > 0.6 && drop.fit.coverage > 0.3 && strength > 0.4 &&
                        drop.fit.residual < 0.3 + 0.03 * d.radius && drop.shape.axis_ratio() > 0.6;
-    if (!clean) {
+    if (!clean || d.radius > options.largest_radius) {
       d.status = DropletStatus::dust;
     } else if (outside_share(drop.shape, image) > 0.1) {
       d.status = DropletStatus::cut;
-    } else if (d.radius < 0.55 * out.radius) {
+    } else if (d.radius < std::max(options.least_radius, 0.55 * out.radius)) {
       d.status = DropletStatus::satellite;
     }
     if (d.status == DropletStatus::dust && d.radius < 0.3 * out.radius) continue;

@@ -1,6 +1,7 @@
 // Droplets in an image: found, measured to a hundredth of a pixel, and told from satellites, dust and cut ones.
 #pragma once
 
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <string_view>
 #include <vector>
@@ -36,9 +37,16 @@ struct Droplets {
 /// 8-bit grey from any image that OpenCV reads: colour by its luminance, 16 bits scaled to the image's range.
 cv::Mat gray(const cv::Mat& image);
 
-/// Light drops on dark ground or dark on light (found out). Satellites are what is smaller than 0.55 of the typical
-/// radius; a drop of which a tenth of the radius or more lies outside the image is cut. Cost: about that of reading
-/// the image ten times. Any thread; allocates.
-Droplets measure_droplets(const cv::Mat& image);
+/// What is known beforehand; all of it is found out otherwise.
+struct MeasureOptions {
+  int polarity = 0;           // +1 light drops, -1 dark ones; 0: not known
+  double least_radius = 0.0;  // px; smaller drops are satellites, also below 0.55 of the typical radius
+  double largest_radius = std::numeric_limits<double>::infinity();  // px; larger things are dust
+};
+
+/// Light drops on dark ground or dark on light. Satellites are what is smaller than 0.55 of the typical radius; a drop of
+/// which a tenth of the radius or more lies outside the image is cut. Cost: about that of reading the image ten times.
+/// Any thread; allocates.
+Droplets measure_droplets(const cv::Mat& image, const MeasureOptions& options = {});
 
 }  // namespace invar::vision

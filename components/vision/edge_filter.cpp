@@ -12,14 +12,12 @@ namespace invar::vision {
 EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_px} {
   INVAR_EXPECTS(blur > 0.0 && half >= 3 && half <= most_half, blur, half);
   const int n = 2 * half + 1;
-  unit.resize(n), bump.resize(n), inner.resize(n), outer.resize(n);
+  inner.resize(n), outer.resize(n);
   Eigen::MatrixXd design(n, 6);  // 1, S, g, inner, outer, dS/dblur
   for (int i = 0; i < n; ++i) {
     const double k = i - half, u = k / blur;
     const double density = std::exp(-0.5 * u * u) / (blur * std::sqrt(2.0 * std::numbers::pi));
     const double beyond = 0.5 * std::erfc(u / std::numbers::sqrt2);  // Phi(-u)
-    unit(i) = beyond;
-    bump(i) = density;
     inner(i) = k * beyond - blur * blur * density;  // a ramp on one side, blurred like the edge
     outer(i) = k * (1.0 - beyond) + blur * blur * density;
     design.row(i) << 1.0, beyond, density, inner(i), outer(i), density * u;
@@ -33,15 +31,16 @@ EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_p
   with_blur << design.leftCols(3), design.col(5);
   spread = inverse(with_blur);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    ground_f[k] = static_cast<float>(step(0, i));
-    height_f[k] = static_cast<float>(step(1, i));
-    shift_f[k] = static_cast<float>(step(2, i));
-    unit_f[k] = static_cast<float>(unit(i));
-    bump_f[k] = static_cast<float>(bump(i));
-    inner_f[k] = static_cast<float>(inner(i));
-    outer_f[k] = static_cast<float>(outer(i));
+    const double row[] = {step(0, i), step(1, i), step(2, i), inner(i), outer(i)};
+    for (std::size_t r = 0; r < rows; ++r)
+      products[r][static_cast<std::size_t>(i)] = static_cast<float>(row[r]);
   }
+  from_inner = step * inner;
+  from_outer = step * outer;
+  columns = design.leftCols(3).transpose() * design.leftCols(3);
+  inner_inner = inner.squaredNorm();
+  inner_outer = inner.dot(outer);
+  outer_outer = outer.squaredNorm();
 }
 
 int EdgeFilter::half_for(double blur, double radius) {

@@ -20,11 +20,19 @@ struct EdgeFilter {
   Eigen::Matrix<double, 5, Eigen::Dynamic, 0, 5, most>
       sloped;  // the same and the slopes inside and outside [1/px]
   Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most>
-      spread;                        // the same as step and contrast * (change of blur)
-  Profile unit, bump, inner, outer;  // S, g, the ramps of slope inside and outside
+      spread;            // the same as step and contrast * (change of blur)
+  Profile inner, outer;  // the ramps of slope inside and outside
 
-  // The same in single precision for the loop over rays: rows of `step`, and the profiles.
-  std::array<float, most + 1> ground_f{}, height_f{}, shift_f{}, unit_f{}, bump_f{}, inner_f{}, outer_f{};
+  // In single precision for the loop over rays, whose products are taken in `lanes` sums side by side: what a sample
+  // adds to ground, contrast, contrast * offset, and to its product with the two ramps. Zero beyond the last sample.
+  static constexpr std::size_t lanes = 8, padded = 32;
+  enum Row : std::size_t { to_ground, to_height, to_shift, to_inner, to_outer, rows };
+  alignas(64) std::array<std::array<float, padded>, rows> products{};
+  // What the ramps themselves add to ground, contrast, contrast * offset; the products of the columns 1, S, g with one
+  // another, and of the ramps: with them the misfit of a ray follows from its products alone.
+  Eigen::Vector3d from_inner, from_outer;
+  Eigen::Matrix3d columns;
+  double inner_inner = 0.0, inner_outer = 0.0, outer_outer = 0.0;
 
   /// `half`: at least 3. Set-up only, or once a frame (some microseconds).
   EdgeFilter(double blur, int half);

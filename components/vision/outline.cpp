@@ -3,8 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
+#include "components/vision/wide_vectors.hpp"
 #include "core/base/contract.hpp"
 
 namespace invar::vision {
@@ -50,6 +52,17 @@ struct Samples {
   [[nodiscard]] bool holds(double x, double y) const {
     return x >= 0.0 && y >= 0.0 && x <= right && y <= bottom;
   }
+  // Rays cross rows, and every row lies in another page: the waits for them are taken all at once, beforehand.
+  void fetch(const Shape& shape, double reach) const {
+    const double far = shape.radius + std::abs(shape.cos2) + std::abs(shape.sin2) + reach;
+    if (far > 60.0) return;  // more than the first cache holds
+    const int left = static_cast<int>(std::clamp(shape.x - far, 0.0, right)),
+              last = static_cast<int>(std::clamp(shape.x + far, 0.0, right));
+    const int top = static_cast<int>(std::clamp(shape.y - far, 0.0, bottom)),
+              end = static_cast<int>(std::clamp(shape.y + far + 1.0, 0.0, bottom));
+    for (int y = top; y <= end; ++y)
+      for (int x = left; x <= last + 63; x += 64) __builtin_prefetch(data + y * stride + std::min(x, last));
+  }
   // `count` samples a pixel apart from (x, y) in direction (dx, dy).
   void read(double x, double y, double dx, double dy, std::size_t count, float* out) const {
     constexpr double unit = 65536.0;
@@ -59,8 +72,9 @@ struct Samples {
     for (std::size_t j = 0; j < count; ++j, u += step_u, v += step_v) {
       const std::uint8_t* p = data + static_cast<std::ptrdiff_t>(v >> 16) * stride + (u >> 16);
       const int a = (u >> 8) & 255, b = (v >> 8) & 255;
-      const int upper = p[0] * (256 - a) + p[1] * a, lower = p[stride] * (256 - a) + p[stride + 1] * a;
-      out[j] = static_cast<float>(upper * (256 - b) + lower * b) * (1.0F / 65536.0F);
+      const int upper = p[0] * 256 + (p[1] - p[0]) * a,
+                lower = p[stride] * 256 + (p[stride + 1] - p[stride]) * a;
+      out[j] = static_cast<float>(upper * 256 + (lower - upper) * b) * (1.0F / 65536.0F);
     }
   }
 };
@@ -198,6 +212,51 @@ bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double fl
   return fit.shape.radius > 0.5;
 }
 
+// The products of one ray's samples with the rows of a filter, and the sum of their squares.
+struct RayProducts {
+  std::array<double, EdgeFilter::rows> rows;
+  double square;
+};
+
+using Lanes [[gnu::vector_size(EdgeFilter::lanes * sizeof(float))]] = float;
+
+// Also adds the samples to `sums`, by the weights of `harmonic`. `f` is zero beyond `length`. Sums run in lanes of their
+// own, so that every CPU gets the same digits however wide its vectors are.
+INVAR_WIDE_VECTORS
+RayProducts take_products(const std::array<float, EdgeFilter::padded>& f, const EdgeFilter& filter,
+                          std::size_t length, const std::array<float, 3>& harmonic,
+                          std::array<std::array<float, EdgeFilter::padded>, 3>& sums) {
+  Lanes ground{}, height{}, shift{}, inner{}, outer{}, square{};
+  const Lanes level = Lanes{} + harmonic[0], cosine = Lanes{} + harmonic[1], sine = Lanes{} + harmonic[2];
+  Lanes value, other;
+  const auto add = [&](Lanes& sum, EdgeFilter::Row row, std::size_t j) {
+    std::memcpy(&other, &filter.products[row][j], sizeof other);
+    sum += other * value;
+  };
+  const auto add_to = [&](float* to, const Lanes& weight) {
+    std::memcpy(&other, to, sizeof other);
+    other += weight * value;
+    std::memcpy(to, &other, sizeof other);
+  };
+  for (std::size_t j = 0; j < length; j += EdgeFilter::lanes) {
+    std::memcpy(&value, &f[j], sizeof value);
+    add(ground, EdgeFilter::to_ground, j);
+    add(height, EdgeFilter::to_height, j);
+    add(shift, EdgeFilter::to_shift, j);
+    add(inner, EdgeFilter::to_inner, j);
+    add(outer, EdgeFilter::to_outer, j);
+    square += value * value;
+    add_to(&sums[0][j], level);
+    add_to(&sums[1][j], cosine);
+    add_to(&sums[2][j], sine);
+  }
+  const auto total = [](const Lanes& part) {
+    return static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) +
+                               ((part[2] + part[6]) + (part[3] + part[7])));
+  };
+  return {{total(ground), total(height), total(shift), total(inner), total(outer)}, total(square)};
+}
+
 }  // namespace
 
 double Shape::equal_area_radius() const {
@@ -210,7 +269,7 @@ double Shape::axis_ratio() const {
 }
 
 void Rays::choose(double radius) {
-  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 2, most / 16);
+  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 30.0)), 2, most / 16);
   open.fill(true);
   weight.fill(1.0);
 }
@@ -235,6 +294,7 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
   const Samples samples{image};
   const auto& table = directions(rays.count);
   const int half = std::clamp(static_cast<int>(std::ceil(reach)), 3, 30);
+  samples.fetch(shape, half);
   std::array<float, 65> f{};
   std::array<double, Rays::most> heights{}, sorted{};
   std::array<bool, Rays::most> usable{};
@@ -295,13 +355,14 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   const auto& table = directions(rays.count);
   const auto count = static_cast<std::size_t>(rays.count);
   const int half = filter.half;
+  samples.fetch(shape, half);
   const auto length = static_cast<std::size_t>(2 * half + 1);
-  constexpr std::size_t stride = 32;  // EdgeFilter::most, rounded up
-  static_assert(EdgeFilter::most <= static_cast<int>(stride));
-  std::array<float, stride * Rays::most> profiles;  // a row a ray, written before it is read
   std::array<bool, Rays::most> usable{};
+  std::array<RayProducts, Rays::most> products;  // written before they are read
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  std::array<float, stride> level{}, cosine{}, sine{};  // sums over the rays
+  alignas(64) std::array<std::array<float, EdgeFilter::padded>, 3>
+      sums{};  // level, cosine, sine: over the rays
+  alignas(64) std::array<float, EdgeFilter::padded> f{};
   for (std::size_t k = 0; k < count; ++k) {
     if (!rays.open[k]) continue;
     const Direction& d = table[k];
@@ -311,19 +372,14 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
       rays.open[k] = false;
       continue;
     }
-    float* f = &profiles[k * stride];
-    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, length, f);
+    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, length, f.data());
     usable[k] = true;
     const double w = rays.weight[k];
-    if (!(w > 0.0)) continue;
+    const std::array<float, 3> harmonic{static_cast<float>(w), static_cast<float>(w * d.c),
+                                        static_cast<float>(w * d.s)};
+    products[k] = take_products(f, filter, length, harmonic, sums);
     normal(0, 0) += w, normal(0, 1) += w * d.c, normal(0, 2) += w * d.s;
     normal(1, 1) += w * d.c * d.c, normal(1, 2) += w * d.c * d.s, normal(2, 2) += w * d.s * d.s;
-    const auto w1 = static_cast<float>(w), wc = static_cast<float>(w * d.c), ws = static_cast<float>(w * d.s);
-    for (std::size_t j = 0; j < length; ++j) {
-      level[j] += w1 * f[j];
-      cosine[j] += wc * f[j];
-      sine[j] += ws * f[j];
-    }
   }
   OutlineFit fit;
   fit.shape = shape;
@@ -339,8 +395,8 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   for (std::size_t j = 0; j < length; ++j) {
     const auto column = static_cast<Eigen::Index>(j);
     const Eigen::Vector3d harmonic =
-        inverse * Eigen::Vector3d{static_cast<double>(level[j]), static_cast<double>(cosine[j]),
-                                  static_cast<double>(sine[j])};
+        inverse * Eigen::Vector3d{static_cast<double>(sums[0][j]), static_cast<double>(sums[1][j]),
+                                  static_cast<double>(sums[2][j])};
     for (std::size_t m = 0; m < 3; ++m)
       sloped[m] += harmonic(static_cast<Eigen::Index>(m)) * filter.sloped.col(column);
     mean(column) = harmonic(0);
@@ -355,32 +411,29 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
 
   int n = 0;
   std::array<double, Rays::most> misfit{}, sorted{};
-  std::array<float, stride> y{};
   for (std::size_t k = 0; k < count; ++k) {
     if (!usable[k]) continue;
     const Direction& d = table[k];
-    const auto in = static_cast<float>(inside(0) + inside(1) * d.c + inside(2) * d.s);
-    const auto out = static_cast<float>(outside(0) + outside(1) * d.c + outside(2) * d.s);
-    const float* f = &profiles[k * stride];
-    float ground = 0.0F, height = 0.0F, shift = 0.0F, square = 0.0F;
-    for (std::size_t j = 0; j < length; ++j) {
-      y[j] = f[j] - in * filter.inner_f[j] - out * filter.outer_f[j];
-      ground += filter.ground_f[j] * y[j];
-      height += filter.height_f[j] * y[j];
-      shift += filter.shift_f[j] * y[j];
-    }
-    const double contrast = polarity * static_cast<double>(height);
+    const double in = inside(0) + inside(1) * d.c + inside(2) * d.s;
+    const double out = outside(0) + outside(1) * d.c + outside(2) * d.s;
+    const RayProducts& p = products[k];
+    // Least squares is linear: what the slopes give is taken off the result instead of off every sample.
+    const Eigen::Vector3d levels =
+        Eigen::Vector3d{p.rows[EdgeFilter::to_ground], p.rows[EdgeFilter::to_height],
+                        p.rows[EdgeFilter::to_shift]} -
+        in * filter.from_inner - out * filter.from_outer;
+    const double height = levels(1), shift = levels(2), contrast = polarity * height;
     if (contrast < 0.4 * fit.contrast || contrast > 2.5 * fit.contrast) {
       usable[k] = false;
       continue;
     }
-    for (std::size_t j = 0; j < length; ++j) {
-      const float r = y[j] - ground - height * filter.unit_f[j] - shift * filter.bump_f[j];
-      square += r * r;
-    }
+    const double square = p.square -
+                          2.0 * (in * p.rows[EdgeFilter::to_inner] + out * p.rows[EdgeFilter::to_outer]) +
+                          in * in * filter.inner_inner + 2.0 * in * out * filter.inner_outer +
+                          out * out * filter.outer_outer - levels.dot(filter.columns * levels);
     const double limit = 2.0 * filter.blur + 0.5;  // the linear step reaches no farther
-    rays.offset[k] = std::clamp(static_cast<double>(shift / height), -limit, limit);
-    misfit[k] = std::sqrt(static_cast<double>(square));
+    rays.offset[k] = std::clamp(shift / height, -limit, limit);
+    misfit[k] = std::sqrt(std::max(0.0, square));
     sorted[static_cast<std::size_t>(n++)] = misfit[k];
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "components/vision/wide_vectors.hpp"
+
 namespace invar::vision {
 
 namespace {
@@ -47,11 +49,33 @@ class TileSums {
   std::vector<float> cells_;
 };
 
+// From levels at the middles of the tiles to a row of pixels between them, rounded.
+INVAR_WIDE_VECTORS
+void interpolate(const std::vector<float>& levels, std::vector<std::uint8_t>& row) {
+  const int columns = static_cast<int>(levels.size()), width = static_cast<int>(row.size());
+  const auto level = [&](int i) { return levels[static_cast<std::size_t>(std::clamp(i, 0, columns - 1))]; };
+  for (int i = -1; i < columns; ++i) {
+    const float left = level(i), right = level(i + 1);
+    const int slope = static_cast<int>((right - left) * (65536.0F / tile));  // 16 bits below the point
+    const int begin = i * tile + tile / 2, value = static_cast<int>(left * 65536.0F) + slope / 2 + 32768;
+    std::uint8_t* to = row.data() + begin;
+    if (begin >= 0 && begin + tile <= width) {
+      for (int k = 0; k < tile; ++k) to[k] = static_cast<std::uint8_t>((value + k * slope) >> 16);
+    } else {
+      for (int k = std::max(0, -begin); k < std::min(tile, width - begin); ++k)
+        to[k] = static_cast<std::uint8_t>((value + k * slope) >> 16);
+    }
+  }
+}
+
 // A value a tile, read between the tiles' centres by bilinear interpolation, row by row.
 class TileField {
  public:
   TileField(int columns, int rows, int width)
-      : columns_{columns}, rows_{rows}, row_(static_cast<std::size_t>(width)) {
+      : columns_{columns},
+        rows_{rows},
+        levels_(static_cast<std::size_t>(columns)),
+        row_(static_cast<std::size_t>(width)) {
     values_.resize(static_cast<std::size_t>(columns * rows));
   }
   float& at(int i, int j) { return values_[static_cast<std::size_t>(j * columns_ + i)]; }
@@ -66,24 +90,14 @@ class TileField {
     const auto mixed = [&](int i) {
       return std::clamp(at(i, j) + share * (at(i, next) - at(i, j)), 0.0F, 255.0F);
     };
-    const int width = static_cast<int>(row_.size());
-    float left = mixed(0);
-    for (int i = -1; i < columns_; ++i) {
-      const float right = mixed(std::min(i + 1, columns_ - 1));
-      const int slope = static_cast<int>((right - left) * (65536.0F / tile));  // 16 bits below the point
-      const int begin = i * tile + tile / 2;
-      const int from = std::max(0, begin), to = std::min(width, i == columns_ - 1 ? width : begin + tile);
-      int value = static_cast<int>(left * 65536.0F) + slope / 2 + 32768 + slope * (from - begin);
-      for (int x = from; x < to; ++x, value += slope)
-        row_[static_cast<std::size_t>(x)] = static_cast<std::uint8_t>(std::clamp(value >> 16, 0, 255));
-      left = right;
-    }
+    for (int i = 0; i < columns_; ++i) levels_[static_cast<std::size_t>(i)] = mixed(i);
+    interpolate(levels_, row_);
     return row_;
   }
 
  private:
   int columns_, rows_;
-  std::vector<float> values_;
+  std::vector<float> values_, levels_;
   std::vector<std::uint8_t> row_;
 };
 
@@ -94,7 +108,16 @@ double median(std::vector<float>& values) {
   return static_cast<double>(*middle);
 }
 
+// 255 where a pixel lies above `high`, and where it lies below `low`.
+INVAR_WIDE_VECTORS
+void classify(const std::uint8_t* p, const std::uint8_t* high, const std::uint8_t* low, int width,
+              std::uint8_t* light, std::uint8_t* dark) {
+  for (int x = 0; x < width; ++x) light[x] = p[x] > high[x] ? 255 : 0;
+  for (int x = 0; x < width; ++x) dark[x] = p[x] < low[x] ? 255 : 0;
+}
+
 // Adds one row's pixels above and below their thresholds to sums down the columns.
+INVAR_WIDE_VECTORS
 void add_columns(const std::uint8_t* p, const std::vector<std::uint8_t>& high,
                  const std::vector<std::uint8_t>& low, std::vector<std::uint16_t>& up,
                  std::vector<std::uint16_t>& up_n, std::vector<std::uint16_t>& down,
@@ -249,10 +272,7 @@ Partition partition(const cv::Mat1b& image, int window) {
     std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
     const std::uint8_t* down = (y % 2 == 0 ? low.row(y) : low.last()).data();  // two rows hardly differ
     const std::uint8_t* up = (y % 2 == 0 ? high.row(y) : high.last()).data();
-    for (int x = 0; x < width; ++x) {
-      light[x] = p[x] > up[x] ? 255 : 0;
-      dark[x] = p[x] < down[x] ? 255 : 0;
-    }
+    classify(p, up, down, width, light, dark);
   }
   if (!(out.light_contrast > 0.0)) out.light.setTo(0);
   if (!(out.dark_contrast > 0.0)) out.dark.setTo(0);

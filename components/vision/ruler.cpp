@@ -220,6 +220,8 @@ std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<
   camera.aspect = best.value[aspect];
   camera.aspect_sigma = free[aspect] ? best.sigma[aspect] : all.sigma[aspect];
   camera.center = middle;
+  camera.width = image.cols;
+  camera.height = image.rows;
   for (std::size_t i = 0; i < n; ++i) {
     const Shape& shape = circles[i].shape;
     const double expected = sorted[i] / camera.local_scale({shape.x, shape.y}) + fit.offset;

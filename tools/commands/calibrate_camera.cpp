@@ -6,33 +6,18 @@
 #include <nlohmann/json.hpp>
 
 #include "components/vision/annotate.hpp"
+#include "components/vision/camera_file.hpp"
+#include "components/vision/image_file.hpp"
 #include "components/vision/ruler.hpp"
-#include "core/config/yaml.hpp"
+#include "components/vision/ruler_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"
-#include "tools/image/camera_file.hpp"
-#include "tools/image/image_file.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
 
 namespace {
-
-std::vector<double> read_ruler(const std::filesystem::path& file) {
-  const auto yaml = config::Yaml::load(file);
-  const config::Node circles = yaml.root().required("circles");
-  std::vector<double> radii;
-  if (circles.exists() && !circles.is_list())
-    circles.fault("is no list", "write circles: [{radius: 5.0e-4}, ...]");
-  if (circles.is_list())
-    for (const config::Node& circle : circles.children())
-      radii.push_back(circle.number("radius", "m", Range{1e-9, 10.0}));
-  if (circles.is_list() && radii.empty())
-    circles.fault("lists no circle", "give the radius of each circle of the ruler");
-  yaml.finish();
-  return radii;
-}
 
 struct Results {
   const vision::RulerFit& fit;
@@ -120,15 +105,15 @@ report::Page make_page(const Results& r) {
 }
 
 void calibrate_by_ruler(const CameraOptions& options) {
-  const auto radii = read_ruler(*options.ruler);
-  const cv::Mat image = read_gray_image(*options.image);
+  const auto radii = vision::radii_of(vision::read_ruler(*options.ruler));
+  const cv::Mat image = vision::read_gray_image(*options.image);
   vision::RulerFailure failure;
   const auto fit = vision::calibrate_ruler(image, radii, failure);
   if (!fit) throw InputError{options.image->string(), failure.what, "see " + options.ruler->string()};
 
   const Results results{*fit, image};
-  write_camera_result(options.out, camera_yaml(fit->camera, image.cols, image.rows),
-                      report_json(results).dump(2), make_page(results));
+  write_camera_result(options.out, vision::camera_yaml(fit->camera), report_json(results).dump(2),
+                      make_page(results));
   const vision::CameraModel& camera = fit->camera;
   std::cout << "scale " << report::number(camera.scale * 1e6, 7) << " um/px, sigma "
             << report::number(camera.scale_sigma * 1e9, 2) << " nm/px (" << fit->circles.size()

@@ -66,7 +66,7 @@ nlohmann::json numbers(const metrology::PinholeCamera& c) {
           {"tangential", c.tangential}};
 }
 
-std::string camera_yaml(const Rival& best) {
+std::string pinhole_yaml(const Rival& best) {
   const metrology::PinholeCamera &c = best.fit.camera, &s = best.fit.sigma;
   const auto digits = [](double v) { return report::number(v, 10); };
   const auto entry = [&](const char* name, double value, double sigma, const char* unit) {
@@ -184,7 +184,7 @@ void calibrate_by_target(const CameraOptions& options) {
                               {"rms_px", r.fit.rms},
                               {"held_out_rms_px", r.held_out},
                               {"left_out_px", r.left_out}});
-  write_camera_result(options.out, camera_yaml(best), json.dump(2), make_page(rivals, best, views, options));
+  write_camera_result(options.out, pinhole_yaml(best), json.dump(2), make_page(rivals, best, views, options));
   for (const Rival& r : rivals)
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"

@@ -4,12 +4,12 @@
 #include <memory>
 #include <optional>
 
+#include "components/vision/camera_file.hpp"
 #include "components/vision/droplets.hpp"
+#include "components/vision/image_file.hpp"
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
-#include "tools/image/camera_file.hpp"
 #include "tools/image/droplets_page.hpp"
-#include "tools/image/image_file.hpp"
 
 namespace invar::tools {
 
@@ -29,10 +29,10 @@ struct Rows {
 
 void measure(const Options& options) {
   std::optional<vision::CameraModel> camera;
-  if (options.camera) camera = read_camera(*options.camera);
+  if (options.camera) camera = vision::read_camera(*options.camera);
   // Every image is read before anything is measured: a bad one must not cost the time of the good ones.
   std::vector<cv::Mat> images;
-  for (const auto& file : options.images) images.push_back(read_gray_image(file));
+  for (const auto& file : options.images) images.push_back(vision::read_gray_image(file));
 
   Rows rows;
   std::vector<MeasuredImage> shown;

@@ -1,4 +1,4 @@
-#include "tools/image/image_file.hpp"
+#include "components/vision/image_file.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -6,10 +6,10 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "components/vision/camera_file.hpp"
 #include "core/base/fault.hpp"
-#include "tools/image/camera_file.hpp"
 
-namespace invar::tools {
+namespace invar::vision {
 namespace {
 
 using ::testing::HasSubstr;
@@ -68,13 +68,15 @@ TEST_F(ImageFile, EachFaultIsSaidWithTheFilesName) {
 }
 
 TEST_F(ImageFile, ACameraIsReadAsItWasWritten) {
-  vision::CameraModel camera;
+  CameraModel camera;
+  camera.width = 1200;
+  camera.height = 800;
   camera.scale = 1.041772e-5;
   camera.scale_sigma = 6e-10;
   camera.aspect = 1.001;
   camera.distortion = 1.19e-8;
   camera.center = {599.5, 399.5};
-  const auto back = read_camera(write("camera.yaml", camera_yaml(camera, 1200, 800)));
+  const auto back = read_camera(write("camera.yaml", camera_yaml(camera)));
   EXPECT_DOUBLE_EQ(back.scale, camera.scale);
   EXPECT_DOUBLE_EQ(back.aspect, camera.aspect);
   EXPECT_DOUBLE_EQ(back.distortion, camera.distortion);
@@ -98,4 +100,4 @@ TEST_F(ImageFile, ACameraWithoutScaleIsRefused) {
 }
 
 }  // namespace
-}  // namespace invar::tools
+}  // namespace invar::vision

@@ -1,4 +1,4 @@
-#include "tools/image/image_file.hpp"
+#include "components/vision/image_file.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -14,7 +14,7 @@
 #include "components/vision/droplets.hpp"
 #include "core/base/fault.hpp"
 
-namespace invar::tools {
+namespace invar::vision {
 
 namespace {
 
@@ -98,7 +98,7 @@ cv::Mat read_gray_image(const std::filesystem::path& file) {
         file.string(),
         "the image has only " + std::to_string(image.cols) + " x " + std::to_string(image.rows) + " pixels",
         "at least 16 x 16 are needed"};
-  return vision::gray(image);
+  return gray(image);
 }
 
-}  // namespace invar::tools
+}  // namespace invar::vision

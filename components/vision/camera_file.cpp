@@ -1,12 +1,13 @@
-#include "tools/image/camera_file.hpp"
+#include "components/vision/camera_file.hpp"
 
 #include <array>
 #include <cmath>
 #include <cstdio>
 
+#include "core/compensation/model_file.hpp"
 #include "core/config/yaml.hpp"
 
-namespace invar::tools {
+namespace invar::vision {
 
 namespace {
 
@@ -18,16 +19,19 @@ std::string digits(double value) {
 
 }  // namespace
 
-vision::CameraModel read_camera(const std::filesystem::path& file) {
+CameraModel read_camera(const std::filesystem::path& file) {
   const auto yaml = config::Yaml::load(file);
+  compensation::check_seal(yaml);
   const config::Node root = yaml.root();
   if (root.has("invar_camera")) (void)root.integer("invar_camera", 1, 1);
-  if (root.has("image")) root["image"].accept_all();
   if (root.has("model") && root["model"].as_text() != "scale")
-    root["model"].fault("`" + root["model"].as_text() + "` has no scale by itself",
-                        "give a camera calibrated by a ruler");
+    root["model"].fault("this model has no scale by itself", "give a camera calibrated by a ruler");
   if (root.has("note")) root["note"].accept_all();
-  vision::CameraModel camera;
+  CameraModel camera;
+  if (root.has("image")) {
+    camera.width = static_cast<int>(root["image"].integer("width", 1, 100'000));
+    camera.height = static_cast<int>(root["image"].integer("height", 1, 100'000));
+  }
   const config::Quantity scale = root.required("scale").as_quantity("m/px", Range{1e-12, 1.0});
   camera.scale = scale.value;
   camera.scale_sigma = scale.sigma.value_or(0.0);
@@ -52,9 +56,11 @@ vision::CameraModel read_camera(const std::filesystem::path& file) {
   return camera;
 }
 
-std::string camera_yaml(const vision::CameraModel& camera, int width, int height) {
-  std::string text = "invar_camera: 1\nmodel: scale\nimage: {width: " + std::to_string(width) +
-                     ", height: " + std::to_string(height) + "}  # px\n";
+std::string camera_yaml(const CameraModel& camera) {
+  std::string text = "invar_camera: 1\nmodel: scale\n";
+  if (camera.width > 0)
+    text += "image: {width: " + std::to_string(camera.width) + ", height: " + std::to_string(camera.height) +
+            "}  # px\n";
   text +=
       "scale: {value: " + digits(camera.scale) + ", unit: m/px, sigma: " + digits(camera.scale_sigma) + "}\n";
   if (camera.aspect != 1.0)
@@ -66,7 +72,7 @@ std::string camera_yaml(const vision::CameraModel& camera, int width, int height
         "distortion:  # ideal = center + (seen - center) (1 + radial |seen - center|^2)\n  radial: {value: " +
         digits(camera.distortion) + ", unit: 1/px2, sigma: " + digits(camera.distortion_sigma) +
         "}\n  center: [" + digits(camera.center.x()) + ", " + digits(camera.center.y()) + "]  # px\n";
-  return text;
+  return text + "checksum: \"" + compensation::checksum(text) + "\"\n";
 }
 
-}  // namespace invar::tools
+}  // namespace invar::vision

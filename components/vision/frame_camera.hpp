@@ -1,0 +1,66 @@
+// FrameCamera: what every camera component has - when it exposes, where the stage stood, frames with numbers.
+#pragma once
+
+#include <array>
+#include <deque>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "idl/image.h"
+#include "idl/stage.h"
+
+namespace invar::vision {
+
+struct CameraParameters {
+  double rate = 0.0;
+  double exposure = 1e-3;
+  std::int64_t axes = 2;
+  void describe(auto& p) {
+    p(rate, "rate", "Hz", Range{0.0, 1000.0}, "of frames; 0: only on request");
+    p(exposure, "exposure", "s", Range{1e-7, 10.0}, "time of exposure");
+    p(axes, "axes", 1, 3, "how many axes of the stage it looks at: inputs state_x, state_y, state_z");
+  }
+};
+
+/// For a worker, not for the loop. Derive, and give pictures.
+class FrameCamera : public Component {
+ public:
+  explicit FrameCamera(const CameraParameters& parameters);
+  void activate() override;
+  void step(const Tick& tick) noexcept final;
+
+ protected:
+  struct Picture {
+    cv::Mat image;  // CV_8UC1 or CV_16UC1
+    Instant at;     // middle of the exposure
+  };
+  /// A picture that is wanted now; false: there is none. What it throws takes the component to error.
+  virtual bool take_picture(const Tick& tick, std::uint64_t number, Picture& picture) = 0;
+  /// Every step: takes what came.
+  virtual void watch() {}
+
+ private:
+  using Position = std::array<double, 3>;
+  [[nodiscard]] bool is_due(const Tick& tick);
+  void follow_stage(const Tick& tick);
+  [[nodiscard]] Position position_at(Instant time) const;
+  void publish(const Picture& picture, std::uint64_t request, const Tick& tick);
+
+  const CameraParameters& parameters_;
+  Inbox<image::ExposeCommand> expose_{*this, "expose", {.optional = true, .profile = "command"}};
+  Output<image::Frame> frame_{*this, "frame", "image"};
+  std::vector<std::unique_ptr<Input<stage::AxisState>>> axes_;
+  std::deque<std::pair<Instant, Position>> history_;
+  image::Frame sample_;
+  std::uint64_t number_ = 0;
+  std::uint64_t request_ = 0;  // not answered yet
+  Instant requested_, due_;
+  bool free_running_ = false;
+  std::string failure_;
+};
+
+}  // namespace invar::vision

@@ -1,0 +1,272 @@
+#include "components/vision/vision_component.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+
+#include "components/vision/annotate.hpp"
+#include "components/vision/camera_file.hpp"
+#include "components/vision/ruler.hpp"
+#include "components/vision/ruler_file.hpp"
+#include "core/base/fault.hpp"
+
+namespace invar::vision {
+
+namespace {
+
+constexpr int most_attempts = 3;
+constexpr std::size_t most_droplets = 1024;  // the bound of DropletsMeasured.droplets
+
+image::DropletStatus wire_status(DropletStatus status) {
+  switch (status) {
+    case DropletStatus::ok:
+      return image::DROPLET_SOUND;
+    case DropletStatus::satellite:
+      return image::DROPLET_SATELLITE;
+    case DropletStatus::cut:
+      return image::DROPLET_CUT;
+    case DropletStatus::dust:
+      return image::DROPLET_DUST;
+  }
+  return image::DROPLET_DUST;
+}
+
+Eigen::Vector2d stage_at(const image::Frame& frame) { return {frame.position()[0], frame.position()[1]}; }
+
+/// The frame's pixels in place; they live as long as the frame. Empty where its numbers contradict one another.
+cv::Mat pixels_of(const image::Frame& frame) {
+  const bool wide = frame.format() == image::PIXEL_MONO16;
+  const std::size_t wanted = std::size_t{frame.width()} * frame.height() * (wide ? 2U : 1U);
+  if (frame.width() < 16 || frame.height() < 16 || frame.pixels().size() != wanted) return {};
+  return {static_cast<int>(frame.height()), static_cast<int>(frame.width()), wide ? CV_16UC1 : CV_8UC1,
+          const_cast<std::uint8_t*>(frame.pixels().data())};  // NOLINT: nothing writes there
+}
+
+}  // namespace
+
+Vision::Vision(const Parameters& parameters) : parameters_{parameters} {
+  if (parameters.polarity != "auto" && parameters.polarity != "light" && parameters.polarity != "dark")
+    throw InputError{"polarity", "is `" + parameters.polarity + "`", "write light, dark or auto"};
+  polarity_ = parameters.polarity == "light" ? +1 : parameters.polarity == "dark" ? -1 : 0;
+  if (parameters.camera.empty() && parameters.ruler.empty())
+    throw InputError{"camera", "missing, and no `ruler` to calibrate by", "name camera.yaml or ruler.yaml"};
+  if (!parameters.ruler.empty()) radii_ = radii_of(read_ruler(parameters.ruler));
+  if (!parameters.camera.empty()) camera_ = read_camera(parameters.camera);
+}
+
+void Vision::configure() {
+  camera_.reset();
+  if (!parameters_.camera.empty()) camera_ = read_camera(parameters_.camera);
+}
+
+void Vision::activate() {
+  running_.reset();
+  sample_ = {};
+  last_number_ = 0;
+  if (camera_) show_view(camera_->width, camera_->height);
+  report(job::JOB_IDLE, camera_ ? "ready" : "not calibrated");
+}
+
+void Vision::deactivate() noexcept {
+  if (running_) report(job::JOB_CANCELLED, "the component was deactivated");
+  running_.reset();
+}
+
+void Vision::show_view(int width, int height) {
+  if (!camera_ || width <= 0 || height <= 0) return;
+  const Eigen::Vector2d size =
+      camera_->to_metres({width - 0.5, height - 0.5}) - camera_->to_metres({-0.5, -0.5});
+  const double c = std::abs(std::cos(parameters_.mount.rotation)),
+               s = std::abs(std::sin(parameters_.mount.rotation));
+  sample_.view_center() = {parameters_.mount.offset.x(), parameters_.mount.offset.y()};
+  sample_.view_size() = {c * size.x() - s * size.y(), c * size.y() - s * size.x()};
+}
+
+void Vision::report(job::JobPhase phase, const std::string& text) {
+  sample_.cell(cell);
+  sample_.component_id(id);
+  sample_.at().time_ns(now().ns);
+  sample_.at().cycle(cycle_);
+  sample_.phase(phase);
+  sample_.text(text.substr(0, 511));
+  sample_.scale(camera_ ? camera_->scale : 0.0);
+  sample_.scale_sigma(camera_ ? camera_->scale_sigma : 0.0);
+  status_.write(sample_);
+}
+
+void Vision::start(const image::VisionCommand& command) {
+  if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
+  if (running_) {
+    report(job::JOB_RUNNING, "request " + std::to_string(sample_.id()) + " is not done yet; ask again later");
+    return;
+  }
+  sample_.id(command.id());
+  if (command.wanted() == image::VISION_MEASURE && !camera_)
+    return report(job::JOB_FAILED,
+                  "the camera is not calibrated: show it the ruler and ask for a calibration");
+  if (command.wanted() == image::VISION_CALIBRATE && radii_.empty())
+    return report(job::JOB_FAILED, "no `ruler` is known: name ruler.yaml in the cell file");
+  running_ = command;
+  attempts_ = 0;
+  report(job::JOB_RUNNING, "waits for a frame");
+  ask();
+}
+
+void Vision::ask() {
+  image::ExposeCommand command;
+  command.cell(cell);
+  command.component_id(id);
+  command.at().time_ns(now().ns);
+  command.at().cycle(cycle_);
+  command.id(running_->id());
+  expose_.write(command);
+  asked_ = now();
+  ++attempts_;
+}
+
+Duration Vision::since(const image::Frame& frame) const {
+  if (simulated_time) return now() - Instant{frame.at().time_ns()};
+  const auto clock = std::chrono::steady_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(clock).count() - frame.at().time_ns()};
+}
+
+Eigen::Vector2d Vision::middle(const cv::Mat& picture) const {
+  return camera_->to_metres({0.5 * (picture.cols - 1), 0.5 * (picture.rows - 1)});
+}
+
+void Vision::step(const Tick& tick) noexcept {
+  cycle_ = tick.cycle;
+  try {
+    image::VisionCommand command;
+    while (command_.take(command)) start(command);
+    if (const std::uint64_t received = frame_.received(); received != taken_) {
+      taken_ = received;
+      if (const auto* frame = frame_.latest()) take(*frame);
+    }
+    if (!running_ || now() - asked_ < Duration::seconds(parameters_.patience)) return;
+    if (attempts_ < most_attempts) return ask();
+    running_.reset();
+    report(job::JOB_FAILED, "no frame came in " + std::to_string(most_attempts) +
+                                " attempts: is the camera active and connected?");
+  } catch (const std::exception& error) {
+    running_.reset();
+    report(job::JOB_FAILED, error.what());
+  }
+}
+
+void Vision::take(const image::Frame& frame) {
+  if (frame.number() == last_number_) return;
+  sample_.frames_received(sample_.frames_received() + 1);
+  if (last_number_ != 0 && frame.number() > last_number_ + 1)
+    sample_.frames_dropped(sample_.frames_dropped() + frame.number() - last_number_ - 1);
+  last_number_ = frame.number();
+  const cv::Mat seen = pixels_of(frame);
+  if (seen.empty()) throw std::runtime_error{"a frame whose size does not fit its pixels"};
+  const cv::Mat picture = gray(seen);
+  const bool asked = running_ && frame.request() == running_->id();
+  if (asked && running_->wanted() == image::VISION_CALIBRATE) {
+    calibrate(picture);
+    show_view(picture.cols, picture.rows);
+    running_.reset();
+    report(job::JOB_DONE, "calibrated");
+  } else if (camera_) {
+    if (camera_->width > 0 && (camera_->width != picture.cols || camera_->height != picture.rows))
+      throw std::runtime_error{"frames of " + std::to_string(picture.cols) + " x " +
+                               std::to_string(picture.rows) + " px, but the camera was calibrated with " +
+                               std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
+                               ": calibrate again"};
+    show_view(picture.cols, picture.rows);
+    measure(frame, picture, asked);
+    if (asked) {
+      running_.reset();
+      report(job::JOB_DONE, "measured");
+    } else if (!running_) {
+      report(sample_.phase(), sample_.text().c_str());
+    }
+  }
+}
+
+void Vision::calibrate(const cv::Mat& picture) {
+  RulerFailure failure;
+  const auto fit = calibrate_ruler(picture, radii_, failure);
+  if (!fit) throw std::runtime_error{"the image " + failure.what};
+  std::vector<AnnotatedOutline> outlines;
+  for (const RulerCircle& circle : fit->circles) outlines.push_back({circle.outline, Colour::green, ""});
+  write_picture(annotate(picture, outlines));
+  const std::filesystem::path folder = parameters_.out;
+  std::filesystem::create_directories(folder);
+  std::ofstream out{folder / "camera.yaml"};
+  out << camera_yaml(fit->camera);
+  out.close();
+  if (!out) throw std::runtime_error{(folder / "camera.yaml").string() + " cannot be written"};
+  camera_ = fit->camera;
+}
+
+void Vision::measure(const image::Frame& frame, const cv::Mat& picture, bool asked) {
+  MeasureOptions options{.polarity = polarity_};
+  options.least_radius = 0.5 * parameters_.least_diameter / camera_->scale;
+  if (parameters_.largest_diameter > 0.0)
+    options.largest_radius = 0.5 * parameters_.largest_diameter / camera_->scale;
+  const Droplets found = measure_droplets(picture, options);
+  publish(frame, found, asked ? running_->id() : 0);
+  if (!asked || running_->picture_path().size() == 0) return;
+  std::vector<AnnotatedTarget> targets;
+  for (const auto& target : running_->targets()) {
+    const auto seen = camera_->to_pixels(
+        middle(picture) +
+        parameters_.mount.from_machine({target.position()[0], target.position()[1]}, stage_at(frame)));
+    if (seen) targets.push_back({seen->x(), seen->y(), seen->x(), seen->y()});
+  }
+  point_at_nearest(targets, found, 2.0 * found.radius);
+  write_picture(annotate(picture, found, targets));
+}
+
+void Vision::publish(const image::Frame& frame, const Droplets& found, std::uint64_t request) {
+  const Eigen::Vector2d center =
+      camera_->to_metres({0.5 * (frame.width() - 1.0), 0.5 * (frame.height() - 1.0)});
+  const double scale_share = camera_->scale_sigma / camera_->scale;
+  measured_.cell(cell);
+  measured_.component_id(id);
+  measured_.at(frame.at());
+  measured_.frame_number(frame.number());
+  measured_.request(request);
+  measured_.position(frame.position());
+  measured_.droplets().clear();
+  for (const Droplet& drop : found.droplets) {
+    if (measured_.droplets().size() == most_droplets) break;  // the best come first
+    const Eigen::Vector2d away = camera_->to_metres({drop.x, drop.y}) - center;
+    const Eigen::Vector2d at = parameters_.mount.to_machine(away, stage_at(frame));
+    const double scale = camera_->local_scale({drop.x, drop.y}), diameter = 2.0 * drop.radius * scale;
+    image::MeasuredDroplet out;
+    out.status(wire_status(drop.status));
+    out.position({at.x(), at.y()});
+    out.position_sigma(std::hypot(drop.sigma * scale, scale_share * away.norm()));
+    out.diameter(diameter);
+    // A circle's radius is known sqrt(2) times better than a coordinate of its centre.
+    out.diameter_sigma(std::hypot(std::sqrt(2.0) * drop.sigma * scale, scale_share * diameter));
+    out.circularity(drop.circularity);
+    out.score(drop.score);
+    out.pixel({drop.x, drop.y});
+    measured_.droplets().push_back(out);
+  }
+  const Duration latency = since(frame);
+  measured_.latency_ns(latency.ns);
+  sample_.latency_ns(latency.ns);
+  sample_.frames_measured(sample_.frames_measured() + 1);
+  droplets_.write(measured_);
+}
+
+void Vision::write_picture(const cv::Mat& annotated) const {
+  if (!running_ || running_->picture_path().size() == 0) return;
+  const std::filesystem::path file = running_->picture_path().c_str();
+  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
+  const auto bytes = encode_png(annotated);
+  std::ofstream out{file, std::ios::binary};
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.close();
+  if (!out) throw std::runtime_error{file.string() + " cannot be written"};
+}
+
+}  // namespace invar::vision
