@@ -1,5 +1,6 @@
 #include "components/all.hpp"
 
+#include "components/calibration/axis_trial.hpp"
 #include "components/calibration/calibration.hpp"
 #include "components/compensation/compensation.hpp"
 #include "components/dispenser/dispenser.hpp"
@@ -38,6 +39,8 @@ void add_all_components(Registry& registry) {
   registry.add<fusion::Fusion>("fusion", "one position of an axis from its encoder and velocity sensor");
   registry.add<interferometer::Interferometer>("interferometer", "displacement laser");
   registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
+  registry.add<calibration::AxisTrial>("axis_trial",
+                                       "force ripple and tracking error of one axis, measured by jobs");
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
   registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
   registry.add<vision::FolderCamera>("folder_camera", "pictures of a folder as a camera's frames");

@@ -33,8 +33,8 @@ ROOMS = {
 }
 COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/compensation",
              "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
-MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["OpenCV", "core/recording"], "recorder": ["core/recording", "core/dds"],
-            "dispenser": ["core/recording"], "supervisor": ["core/dds"],
+MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["OpenCV", "core/model", "core/recording"],
+            "recorder": ["core/recording", "core/dds"], "dispenser": ["core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "world": ["core/model"]}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')

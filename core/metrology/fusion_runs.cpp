@@ -1,6 +1,6 @@
 #include "core/metrology/fusion_runs.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -16,14 +16,18 @@ Motion motion_of(const FusionRun& run) {
     const Eigen::Index from = std::clamp<Eigen::Index>(i - 2, 0, std::max<Eigen::Index>(0, n - 5));
     const Eigen::Index count = std::min<Eigen::Index>(5, n - from);
     if (count < 3) continue;
-    Eigen::MatrixXd a(count, 3);
-    const Eigen::VectorXd dt = run.time.segment(from, count).array() - run.time(i);
-    a.col(0).setOnes();
-    a.col(1) = dt;
-    a.col(2) = 0.5 * dt.cwiseAbs2();
-    const Eigen::Vector3d p = a.householderQr().solve(run.reference.segment(from, count));
-    motion.velocity(i) = p(1);
-    motion.acceleration(i) = p(2);
+    const double span = run.time(from + count - 1) - run.time(from);
+    Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d moment = Eigen::Vector3d::Zero();
+    for (Eigen::Index k = from; k < from + count; ++k) {
+      const double s = (run.time(k) - run.time(i)) / span;
+      const Eigen::Vector3d row{1.0, s, s * s};
+      gram += row * row.transpose();
+      moment += row * (run.reference(k) - run.reference(i));
+    }
+    const Eigen::Vector3d p = gram.ldlt().solve(moment);
+    motion.velocity(i) = p(1) / span;
+    motion.acceleration(i) = 2.0 * p(2) / (span * span);
   }
   return motion;
 }
@@ -109,6 +113,7 @@ std::vector<FusedPosition> fuse(FusionEstimator& estimator, const FusionRun& run
     for (Eigen::Index k = 0; k < run.velocities.cols(); ++k)
       sample.velocities[static_cast<std::size_t>(k)] = run.velocities(i, k);
     if (run.noise_level.size() > 0) sample.noise_level = run.noise_level(i);
+    if (run.selector.size() > 0) sample.selector = run.selector(i);
     fused.push_back(estimator.step(sample));
   }
   return fused;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/base/contract.hpp"
 
@@ -128,7 +129,7 @@ void WeightedFusion::reset() noexcept {
   repeats_.fill(0);
   unread_.fill(0.0);
   step_moved_ = moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
-  started_ = false;
+  started_ = moving_ = false;
 }
 
 void WeightedFusion::start(const FusionSample& sample) noexcept {
@@ -249,7 +250,16 @@ FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
     total += fused.weights[i];
     mean += fused.weights[i] * (value_[i] + (model_.delays[i] + sample.ages[i]) * speed_);
   }
-  if (total > 0.0) fused_ = corrected(mean, fused) + model_.intercept;
+  if (total > 0.0) {
+    const double before = std::exchange(fused_, corrected(mean, fused) + model_.intercept);
+    const bool tachometer = sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U;
+    if (!tachometer && moving_ && sample.period > 0.0) {  // speed from the position itself
+      const double forget = std::exp(-sample.period / speed_memory);
+      speed_ = forget * speed_ + (1.0 - forget) * (fused_ - before) / sample.period;
+      largest_ = std::max(largest_, std::abs(speed_));
+    }
+    moving_ = true;
+  }
   fused.position = fused_;
   fused.velocity = speed_;
   fused.sigma = std::numeric_limits<double>::quiet_NaN();  // the method does not know

@@ -114,6 +114,7 @@ class WeightedFusion final : public FusionEstimator {
   double spread_ = 0.0;
   double largest_ = 0.0;
   bool started_ = false;
+  bool moving_ = false;  // the fused position has a predecessor
 };
 
 }  // namespace invar::metrology

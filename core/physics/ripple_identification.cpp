@@ -152,6 +152,72 @@ double ripple_at(const RippleFit& fit, double position) {
 
 }  // namespace
 
+RippleSamples constant_velocity_runs(const Record& record) {
+  constexpr double settling = 0.25;  // s
+  constexpr double shortest = 0.5;   // s
+  constexpr std::size_t most = 6000;
+  const auto* reference = record.find("reference");
+  const auto* position = record.find("position");
+  const auto* current = record.find("current");
+  INVAR_EXPECTS(reference != nullptr && position != nullptr && current != nullptr, record.rows());
+  const auto& t = record.time;
+  const std::size_t n = record.rows();
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < n; ++i) steps.push_back(t[i] - t[i - 1]);
+  if (steps.empty()) return {};
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  // Rows to either side for a velocity: 50 ms, so that a reference that is rounded does not look rough.
+  const double usual = std::max(steps[steps.size() / 2], 1e-6);
+  const auto reach = static_cast<std::size_t>(std::clamp(0.05 / usual, 3.0, 2000.0));
+  std::vector<double> velocity(n, 0.0);
+  for (std::size_t i = reach; i + reach < n; ++i)
+    velocity[i] = ((*reference)[i + reach] - (*reference)[i - reach]) / (t[i + reach] - t[i - reach]);
+  const auto steady = [&](std::size_t i) {
+    if (i < 2 * reach || i + 2 * reach >= n || !(std::abs(velocity[i]) > 1e-5)) return false;
+    const double tolerance = 0.01 * std::abs(velocity[i]);
+    return std::abs(velocity[i] - velocity[i - reach]) < tolerance &&
+           std::abs(velocity[i] - velocity[i + reach]) < tolerance;
+  };
+  struct Part {
+    std::size_t from, to;
+  };
+  std::vector<Part> parts;
+  std::size_t rows = 0;
+  for (std::size_t i = 0; i < n;) {
+    if (!steady(i)) {
+      ++i;
+      continue;
+    }
+    std::size_t to = i;
+    while (to < n && steady(to)) ++to;
+    std::size_t from = i;
+    while (from < to && t[from] - t[i] < settling) ++from;
+    if (t[to - 1] - t[i] >= shortest && from < to) {
+      parts.push_back({from, to});
+      rows += to - from;
+    }
+    i = to;
+  }
+  const std::size_t block = 1 + rows / most;
+  RippleSamples samples;
+  for (std::size_t part = 0; part < parts.size(); ++part)
+    for (std::size_t from = parts[part].from; from + block <= parts[part].to; from += block) {
+      double x = 0.0, v = 0.0, i = 0.0;
+      for (std::size_t k = from; k < from + block; ++k) {
+        x += (*position)[k];
+        v += velocity[k];
+        i += (*current)[k];
+      }
+      const auto count = static_cast<double>(block);
+      if (!std::isfinite(x + i)) continue;
+      samples.position.push_back(x / count);
+      samples.velocity.push_back(v / count);
+      samples.current.push_back(i / count);
+      samples.run.push_back(static_cast<int>(part));
+    }
+  return samples;
+}
+
 RippleFit identify_ripple(const Model& axis, const RippleSamples& samples, Range pitches,
                           int most_harmonics) {
   INVAR_EXPECTS(axis.plant == Plant::axis && samples.size() >= 50, samples.size());

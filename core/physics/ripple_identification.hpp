@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/base/range.hpp"
-#include "core/physics/model.hpp"
+#include "core/physics/simulation.hpp"
 
 namespace invar::physics {
 
@@ -16,6 +16,10 @@ struct RippleSamples {
   std::vector<int> run;
   [[nodiscard]] std::size_t size() const { return position.size(); }
 };
+
+/// The parts of a recording (signals `reference`, `position`, `current`) in which the reference moves at constant velocity for
+/// half a second or more, a quarter of a second after each such part began; rows averaged to about 6000.
+RippleSamples constant_velocity_runs(const Record& record);
 
 struct RippleHarmonic {
   int order = 1;

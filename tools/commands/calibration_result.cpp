@@ -16,19 +16,39 @@ Progress::~Progress() {
   if (isatty(STDERR_FILENO) != 0) std::cerr << "\x1b[2K" << std::flush;
 }
 
-void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
-                       const nlohmann::json& report, const report::Page& page) {
+namespace {
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path part{file.string() + ".part"};
+  std::ofstream out{part};
+  out << text;
+  out.close();
+  if (!out) throw InputError{file.string(), "cannot be written", "check the space left"};
+  std::filesystem::rename(part, file);
+}
+
+void write_reports(const std::filesystem::path& folder, const nlohmann::json& report,
+                   const report::Page& page) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed || !std::filesystem::is_directory(folder))
     throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
   page.write(folder / "report.html");
-  std::ofstream json{folder / "report.json.part"};
-  json << report.dump(1) << '\n';
-  json.close();
-  if (!json) throw InputError{(folder / "report.json").string(), "cannot be written", "check the space left"};
-  std::filesystem::rename(folder / "report.json.part", folder / "report.json");
+  write_text(folder / "report.json", report.dump(1) + "\n");
+}
+
+}  // namespace
+
+void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
+                       const nlohmann::json& report, const report::Page& page) {
+  write_reports(folder, report, page);
   model.write(folder / "compensation.yaml");  // last: where it is, all is there
+}
+
+void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
+                       const nlohmann::json& report, const report::Page& page) {
+  write_reports(folder, report, page);
+  write_text(folder / name, model);
 }
 
 void expect_finite(const std::filesystem::path& file, const std::string& column,

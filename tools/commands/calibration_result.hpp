@@ -25,6 +25,10 @@ class Progress {
 void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
                        const nlohmann::json& report, const report::Page& page);
 
+/// The same with a model of another kind, under the name that it has.
+void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
+                       const nlohmann::json& report, const report::Page& page);
+
 /// Throws InputError naming the file, the column and the row (of the file's data, from 1) of the first value
 /// that is missing, infinite or beyond `largest` in size.
 void expect_finite(const std::filesystem::path& file, const std::string& column,

@@ -117,6 +117,36 @@ TEST(RippleIdentification, FindsPitchHarmonicsFrictionAndTilt) {
   EXPECT_LT(fit.after, 0.15 * fit.before);
 }
 
+TEST(RippleIdentification, TakesOnlyTheConstantVelocityOutOfARecording) {
+  Record record;
+  auto& reference = record.signals["reference"];
+  auto& position = record.signals["position"];
+  auto& current = record.signals["current"];
+  const auto add = [&](double seconds, const std::function<double(double)>& velocity) {
+    for (int k = 0; k < static_cast<int>(seconds / dt); ++k) {
+      const double v = velocity(k * dt);
+      reference.push_back((reference.empty() ? 0.0 : reference.back()) + v * dt);
+      position.push_back(reference.back());
+      current.push_back(v);
+      record.time.push_back(static_cast<double>(record.time.size()) * dt);
+    }
+  };
+  const auto constant = [](double v) { return [v](double) { return v; }; };
+  add(0.5, constant(0.0));
+  add(0.2, [](double t) { return 0.1 * t; });
+  add(2.0, constant(0.02));
+  add(0.3, constant(0.05));  // too short
+  add(1.0, [](double t) { return 0.05 - 0.07 * t; });
+  add(2.0, constant(-0.02));
+  const RippleSamples samples = constant_velocity_runs(record);
+  ASSERT_NEAR(static_cast<double>(samples.size()), 2 * 1580.0, 60.0);  // 0.1 s at both ends, 0.25 s to settle
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    EXPECT_NEAR(samples.velocity[i], samples.run[i] == 0 ? 0.02 : -0.02, 2e-4);
+    EXPECT_EQ(samples.current[i], samples.run[i] == 0 ? 0.02 : -0.02);
+  }
+  EXPECT_EQ(samples.run.back(), 1);
+}
+
 TEST(RippleIdentification, ClaimsNoneWhereThereIsNone) {
   const Model plain = with(nominal(), "coulomb_friction", {1.5, 1e-4});
   const RippleFit fit = identify_ripple(nominal(), runs(plain, 0.02, 4));

@@ -1,0 +1,366 @@
+#include "components/calibration/axis_trial.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+#include "core/model/model_file.hpp"
+#include "core/physics/ripple_identification.hpp"
+
+namespace invar::calibration {
+
+namespace {
+
+constexpr double settle = 0.5;  // s, at rest before something is measured
+
+recording::Table record_table() {
+  recording::Table table;
+  table.add("t", "s", {});
+  for (const char* name : {"reference", "position"}) table.add(name, "m", {});
+  table.add("current", "A", {});
+  table.add("following_error", "m", {});
+  table.add("laser", "m", {});
+  return table;
+}
+
+struct Size {
+  double rms = 0.0, largest = 0.0;
+};
+
+/// Of what is left of values when their mean is taken out.
+Size size_of(const std::vector<double>& values) {
+  Size size;
+  double mean = 0.0;
+  for (const double value : values) mean += value / static_cast<double>(values.size());
+  for (const double value : values) {
+    size.rms += std::pow(value - mean, 2) / static_cast<double>(values.size());
+    size.largest = std::max(size.largest, std::abs(value - mean));
+  }
+  size.rms = std::sqrt(size.rms);
+  return size;
+}
+
+std::string micrometres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g um", 1e6 * value);
+  return text;
+}
+
+/// Following error in the parts of constant velocity.
+std::vector<double> following(const recording::Table& table) {
+  const auto time = table.in("t", "s"), reference = table.in("reference", "m"),
+             error = table.in("following_error", "m");
+  std::vector<double> errors;
+  double steady_since = time.empty() ? 0.0 : time.front();
+  double before = 0.0;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    const double velocity = (reference[i] - reference[i - 1]) / (time[i] - time[i - 1]);
+    if (std::abs(velocity - before) > 0.02 * std::abs(velocity) || velocity == 0.0) steady_since = time[i];
+    before = velocity;
+    if (time[i] - steady_since > 0.25) errors.push_back(error[i]);
+  }
+  if (errors.empty()) throw std::runtime_error{"the runs are too short: no constant velocity in them"};
+  return errors;
+}
+
+}  // namespace
+
+void AxisTrial::activate() {
+  task_ = {};
+  report(job::JOB_IDLE, "ready");
+}
+
+void AxisTrial::deactivate() noexcept {
+  if (task_.running()) report(job::JOB_CANCELLED, "the component was deactivated");
+  task_ = {};
+}
+
+void AxisTrial::report(job::JobPhase phase, const std::string& text) {
+  sample_.cell(cell);
+  sample_.component_id(id);
+  sample_.at().time_ns(now().ns);
+  sample_.at().cycle(cycle_);
+  sample_.phase(phase);
+  sample_.progress(progress_);
+  sample_.text(text);
+  status_.write(sample_);
+}
+
+void AxisTrial::start(const job::JobCommand& command) {
+  if (command.kind() == job::JOB_CANCEL) {
+    if (!task_.running()) return;
+    task_ = {};
+    stage::AxisCommand stop;
+    stop.kind(stage::AXIS_COMMAND_STOP);
+    stop.cell(cell);
+    stop.axis(static_cast<std::uint32_t>(parameters_.axis));
+    stop.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+    command_.write(stop);
+    report(job::JOB_CANCELLED, "cancelled");
+    return;
+  }
+  if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
+  if (task_.running()) {
+    report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
+    return;
+  }
+  const std::string wanted{command.name().c_str()};
+  const auto find = [&](const auto& jobs) {
+    return std::find_if(jobs.begin(), jobs.end(), [&](const auto& job) { return job.name == wanted; });
+  };
+  sample_.id(command.id());
+  sample_.name(wanted);
+  progress_ = 0.0;
+  const auto begin = [&](const auto& job) {
+    const auto folder = std::filesystem::absolute(job.out);
+    std::filesystem::create_directories(folder);
+    sample_.result_path(folder.string());
+    task_ = run(job);
+    report(job::JOB_RUNNING, "started");
+  };
+  if (const auto ripple = find(parameters_.ripple); ripple != parameters_.ripple.end()) {
+    begin(*ripple);
+  } else if (const auto tracking = find(parameters_.tracking); tracking != parameters_.tracking.end()) {
+    begin(*tracking);
+  } else {
+    report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
+  }
+}
+
+void AxisTrial::step(const Tick& tick) noexcept {
+  cycle_ = tick.cycle;
+  try {
+    job::JobCommand command;
+    while (job_.take(command)) start(command);
+    if (task_.running()) task_.resume();
+  } catch (const std::exception& error) {
+    task_ = {};
+    report(job::JOB_FAILED, error.what());
+  }
+}
+
+/// The newest state and what the laser says into the record; the setpoint of the laser's instant is known exactly.
+void AxisTrial::take_down(recording::Table& record) {
+  const auto* state = state_.latest();
+  double laser = std::numeric_limits<double>::quiet_NaN();
+  sensing::DisplacementReading reading;
+  while (reading_.take(reading)) {
+    if (state == nullptr || !reading.valid()) continue;
+    const double later = static_cast<double>(reading.at().time_ns() - state->at().time_ns()) * 1e-9;
+    // What the reading would be at the instant of the state, were the following error the same.
+    laser = beam_from_ + reading.displacement() -
+            later * (state->setpoint_velocity() + 0.5 * later * state->setpoint_acceleration());
+  }
+  if (state == nullptr || state->at().time_ns() == taken_) return;
+  taken_ = state->at().time_ns();
+  const double row[] = {static_cast<double>(taken_) * 1e-9,
+                        state->setpoint_position(),
+                        state->position(),
+                        state->current(),
+                        state->following_error(),
+                        laser};
+  for (std::size_t i = 0; i < record.columns.size(); ++i) record.columns[i].values.push_back(row[i]);
+}
+
+Task AxisTrial::wait(double seconds) {
+  const Instant until = now() + Duration::seconds(seconds);
+  while (now() < until) co_await NextStep{};
+}
+
+/// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
+Task AxisTrial::command_axis(stage::AxisCommand command, recording::Table* record) {
+  command.cell(cell);
+  command.axis(static_cast<std::uint32_t>(parameters_.axis));
+  command.at().time_ns(now().ns);
+  command.at().cycle(cycle_);
+  command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+  command_.write(command);
+  const Instant started = now();
+  for (;;) {
+    co_await NextStep{};
+    if (record != nullptr) take_down(*record);
+    const auto* state = state_.latest();
+    const bool answered = state != nullptr && state->command_id() == command.id();
+    if (answered && state->command_refused())
+      throw std::runtime_error{"the axis refused a motion of the job"};
+    if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
+      throw std::runtime_error{"the axis tripped while moving"};
+    if (answered && state->command_done()) co_return;
+    if (!answered && now() - started > Duration::seconds(5.0))
+      throw std::runtime_error{"the axis does not answer: is its stage active?"};
+  }
+}
+
+Task AxisTrial::enable() {
+  const Instant give_up = now() + Duration::seconds(10.0);
+  while (state_.latest() == nullptr || !state_.latest()->enabled()) {  // processes come up in any order
+    stage::AxisCommand command;
+    command.cell(cell);
+    command.axis(static_cast<std::uint32_t>(parameters_.axis));
+    command.kind(stage::AXIS_COMMAND_ENABLE);
+    command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+    command_.write(command);
+    co_await wait(0.5);
+    if (now() > give_up)
+      throw std::runtime_error{"the axis does not answer to `enable`: is its stage active?"};
+  }
+}
+
+Task AxisTrial::move(double target, double velocity, recording::Table* record) {
+  stage::AxisCommand command;
+  command.kind(stage::AXIS_COMMAND_MOVE);
+  command.position(target);
+  command.velocity(velocity);
+  co_await command_axis(command, record);
+}
+
+Task AxisTrial::align(double from) {
+  sensing::BeamCommand beam;
+  beam.cell(cell);
+  beam.at().time_ns(now().ns);
+  beam.id(next_command_++);
+  beam.beam_start()[static_cast<std::size_t>(parameters_.axis)] = from;
+  beam.beam_direction()[static_cast<std::size_t>(parameters_.axis)] = 1.0;
+  beam_.write(beam);
+  beam_from_ = from;
+  co_await wait(0.1);
+  sensing::DisplacementReading before;
+  while (reading_.take(before)) {  // of another beam
+  }
+}
+
+Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64_t passes,
+                               recording::Table& record) {
+  for (std::int64_t pass = 0; pass < passes; ++pass) {
+    co_await move(job.to, velocity, &record);
+    co_await move(job.from, velocity, &record);
+  }
+}
+
+Task AxisTrial::command_model(compensation::ModelCommandKind kind, const std::string& path) {
+  compensation::ModelCommand command;
+  command.cell(cell);
+  command.at().time_ns(now().ns);
+  command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+  command.kind(kind);
+  command.path(path);
+  model_.write(command);
+  const Instant give_up = now() + Duration::seconds(5.0);
+  for (;;) {
+    co_await NextStep{};
+    const auto* status = model_status_.latest();
+    if (status != nullptr && status->command_id() == command.id()) {
+      if (status->state() == compensation::MODEL_REFUSED)
+        throw std::runtime_error{"the stage refused the model: " + std::string{status->text().c_str()}};
+      co_return;
+    }
+    if (now() > give_up)
+      throw std::runtime_error{"the stage does not answer: connect `model` and `model_status`"};
+  }
+}
+
+Task AxisTrial::run(const RippleJob& job) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  const auto yaml = config::Yaml::load(job.model);
+  physics::Model model = model::read(yaml);
+  yaml.finish();
+  if (model.plant != physics::Plant::axis) throw std::runtime_error{"the model is none of an axis"};
+  co_await enable();
+  co_await move(job.from, 0.0, nullptr);
+  co_await wait(settle);
+
+  recording::Table before = record_table();
+  co_await there_and_back(job, job.verify_velocity, 1, before);
+  before.write(folder / "verify_before.csv");
+  progress_ = 0.2;
+  report(job::JOB_RUNNING, "running slowly forth and back");
+  recording::Table runs = record_table();
+  co_await there_and_back(job, job.velocity, job.passes, runs);
+  runs.write(folder / "runs.csv");
+  progress_ = 0.7;
+
+  report(job::JOB_RUNNING, "identifying the ripple");
+  physics::Record record;
+  record.time = runs.in("t", "s");
+  for (const char* signal : {"reference", "position"}) record.signals[signal] = runs.in(signal, "m");
+  record.signals["current"] = runs.in("current", "A");
+  const auto samples = physics::constant_velocity_runs(record);
+  if (samples.size() < 50) throw std::runtime_error{"the runs are too short: no constant velocity in them"};
+  const auto fit = physics::identify_ripple(model, samples);
+  if (fit.harmonics.empty()) {
+    progress_ = 1.0;
+    report(job::JOB_DONE, "no ripple stands out of the noise; nothing was changed");
+    co_return;
+  }
+  for (const auto& term : physics::ripple_terms(fit)) model.terms.push_back(term);
+  const auto patched = folder / "patched.yaml";
+  {
+    std::ofstream file{patched};
+    file << model::patched(yaml, model);
+    if (!file.flush()) throw std::runtime_error{patched.string() + " cannot be written"};
+  }
+  co_await command_model(compensation::MODEL_STAGE, patched.string());
+  co_await command_model(compensation::MODEL_ACTIVATE, patched.string());
+  progress_ = 0.8;
+  report(job::JOB_RUNNING, "the ripple is fed forward; verifying");
+  co_await wait(2.0);  // it fades in
+
+  recording::Table after = record_table();
+  co_await there_and_back(job, job.verify_velocity, 1, after);
+  after.write(folder / "verify_after.csv");
+  const Size was = size_of(following(before));
+  const Size is = size_of(following(after));
+  if (is.rms > was.rms) {
+    co_await command_model(compensation::MODEL_ROLLBACK, patched.string());
+    throw std::runtime_error{"the following error grew from " + micrometres(was.rms) + " to " +
+                             micrometres(is.rms) + " RMS; rolled back"};
+  }
+  progress_ = 1.0;
+  char pitch[32];
+  std::snprintf(pitch, sizeof pitch, "%.4g mm", 1e3 * fit.pitch);
+  report(job::JOB_DONE, std::string{"ripple of pitch "} + pitch + "; following error of runs not fitted " +
+                            micrometres(was.rms) + " to " + micrometres(is.rms) + " RMS");
+}
+
+Task AxisTrial::run(const TrackingJob& job) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  co_await enable();
+  recording::Table all = record_table();
+  all.columns.insert(all.columns.begin(), {"period", "s", {}, {}});
+  std::string found = "tracking error by the laser, RMS:";
+  for (const double period : job.periods) {
+    co_await move(job.from, 0.0, nullptr);
+    co_await wait(settle);
+    co_await align(job.from);
+    recording::Table record = record_table();
+    stage::AxisCommand sine;
+    sine.kind(stage::AXIS_COMMAND_SINE);
+    sine.amplitude(job.amplitude);
+    sine.period(period);
+    sine.periods(static_cast<std::uint32_t>(job.cycles));
+    co_await command_axis(sine, &record);
+    std::vector<double> errors;
+    const auto laser = record.in("laser", "m"), reference = record.in("reference", "m");
+    for (std::size_t i = 0; i < record.rows(); ++i)
+      if (std::isfinite(laser[i])) errors.push_back(laser[i] - reference[i]);
+    if (errors.size() < 10)
+      throw std::runtime_error{"no reading of the laser arrives: connect `reading` and `beam`"};
+    char text[64];
+    std::snprintf(text, sizeof text, "%s %g s ", found.back() == ':' ? "" : ",", period);
+    found += text + micrometres(size_of(errors).rms);
+    all.columns[0].values.insert(all.columns[0].values.end(), record.rows(), period);
+    for (std::size_t i = 0; i < record.columns.size(); ++i)
+      all.columns[i + 1].values.insert(all.columns[i + 1].values.end(), record.columns[i].values.begin(),
+                                       record.columns[i].values.end());
+    progress_ += 1.0 / static_cast<double>(job.periods.size());
+    report(job::JOB_RUNNING, found);
+  }
+  all.write(folder / "tracking.csv");
+  progress_ = 1.0;
+  report(job::JOB_DONE, found);
+}
+
+}  // namespace invar::calibration

@@ -1,0 +1,114 @@
+// AxisTrial: runs of one axis that say how well it follows - force ripple identified and fed forward, sinusoids tracked.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "components/calibration/task.hpp"
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "core/recording/table.hpp"
+#include "idl/compensation.h"
+#include "idl/job.h"
+#include "idl/sensing.h"
+#include "idl/stage.h"
+
+namespace invar::calibration {
+
+/// Slow runs forth and back, the ripple identified from current and position, given to the stage, and faster runs that were
+/// not fitted before and after.
+struct RippleJob {
+  std::string name;
+  std::filesystem::path model;
+  double from = 0.0;
+  double to = 0.0;
+  double velocity = 0.02;
+  double verify_velocity = 0.03;
+  std::int64_t passes = 2;
+  std::string out = "out";
+  void describe(auto& p) {
+    p(name, "name", "what `invar job run` calls it");
+    p(model, "model", "model.yaml of the axis without ripple");
+    p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
+    p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
+    p(velocity, "velocity", "m/s", Range{1e-4, 1.0}, "of the runs to identify from");
+    p(verify_velocity, "verify_velocity", "m/s", Range{1e-4, 1.0}, "of those before and after");
+    p(passes, "passes", 1, 100, "forth and back so often");
+    p(out, "out", "folder for the files, created; relative to where the cell was started");
+  }
+};
+
+/// Sinusoids, followed by the servo and watched by the laser.
+struct TrackingJob {
+  std::string name;
+  double from = 0.0;
+  double amplitude = 0.1;
+  std::vector<double> periods{3.0, 4.0, 5.0, 1.05};
+  std::int64_t cycles = 2;
+  std::string out = "out";
+  void describe(auto& p) {
+    p(name, "name", "what `invar job run` calls it");
+    p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
+    p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
+    p(periods, "periods", "s", "one sinusoid each");
+    p(cycles, "cycles", 1, 1000, "periods of each");
+    p(out, "out", "folder for the files, created; relative to where the cell was started");
+  }
+};
+
+/// One axis: its stage on `state` and `command`, the stage's model on `model`, a laser along the axis on `reading` and `beam`.
+class AxisTrial final : public Component {
+ public:
+  struct Parameters {
+    std::int64_t axis = 0;
+    std::vector<RippleJob> ripple;
+    std::vector<TrackingJob> tracking;
+    void describe(auto& p) {
+      p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
+      p(ripple, "ripple", "jobs that identify the force ripple");
+      p(tracking, "tracking", "jobs that track sinusoids");
+    }
+  };
+  explicit AxisTrial(const Parameters& parameters) : parameters_{parameters} {}
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+  void deactivate() noexcept override;
+
+ private:
+  void start(const job::JobCommand& command);
+  void report(job::JobPhase phase, const std::string& text);
+  Task run(const RippleJob& job);
+  Task run(const TrackingJob& job);
+  Task enable();
+  Task command_axis(stage::AxisCommand command, recording::Table* record);
+  Task move(double target, double velocity, recording::Table* record);
+  Task wait(double seconds);
+  Task there_and_back(const RippleJob& job, double velocity, std::int64_t passes, recording::Table& record);
+  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
+  Task align(double from);
+  void take_down(recording::Table& record);
+
+  const Parameters& parameters_;
+  Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
+  Output<job::JobStatus> status_{*this, "status", "state"};
+  Input<stage::AxisState> state_{*this, "state"};
+  Output<stage::AxisCommand> command_{*this, "command", "command"};
+  Inbox<sensing::DisplacementReading> reading_{
+      *this, "reading", {.optional = true, .profile = "calibration"}, 4096};
+  Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
+  Output<compensation::ModelCommand> model_{*this, "model", "command"};
+  Input<compensation::ModelStatus> model_status_{
+      *this, "model_status", {.optional = true, .profile = "state"}};
+
+  Task task_;
+  job::JobStatus sample_;
+  double progress_ = 0.0;
+  double beam_from_ = 0.0;  // where the laser was zeroed [m]
+  std::uint64_t next_command_ = 1;
+  std::uint64_t cycle_ = 0;
+  std::int64_t taken_ = 0;  // stamp of the last state in a record
+};
+
+}  // namespace invar::calibration
