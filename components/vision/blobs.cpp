@@ -14,10 +14,12 @@ namespace {
 constexpr double round_enough =
     0.965;  // of area^2 / (2 pi moment): two touching discs reach 0.6, a 1.4:1 ellipse 0.94
 
+constexpr double finest = 3.8;  // px of a reduced image; smaller radii are looked for in a finer one
+
 struct Side {
   int polarity = +1;
-  cv::Mat1i labels;
-  std::vector<Blob> blobs;
+  Blobs found;
+  cv::Mat1i labels;         // only of the side that counts
   double round_area = 0.0;  // px^2 of the reduced image
 };
 
@@ -36,8 +38,8 @@ bool is_disc(const Blob& blob, const cv::Mat1b& image) {
 Side make_side(const cv::Mat1b& image, const cv::Mat1b& mask, int polarity, double smallest) {
   Side side;
   side.polarity = polarity;
-  side.blobs = label_blobs(mask, smallest, side.labels);
-  for (const Blob& blob : side.blobs)
+  side.found = label_blobs(mask, smallest);
+  for (const Blob& blob : side.found.blobs)
     if (is_disc(blob, image)) side.round_area += blob.area;
   return side;
 }
@@ -195,33 +197,34 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
   const double smallest = 3.0;
   Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
   // Things are round, what lies between them is not.
-  const Side* side = light.round_area >= dark.round_area ? &light : &dark;
+  Side* side = light.round_area >= dark.round_area ? &light : &dark;
   if (options.polarity != 0) {
     side = options.polarity > 0 ? &light : &dark;
   } else if (light.round_area + dark.round_area <=
              0.0) {  // everything touches: what borders the image less is the things
     const auto inner = [&](const Side& s) {
       double area = 0.0;
-      for (const Blob& blob : s.blobs)
+      for (const Blob& blob : s.found.blobs)
         if (!at_border(blob, image)) area += blob.area;
       return area;
     };
     side = inner(light) >= inner(dark) ? &light : &dark;
   }
+  side->labels = paint_labels(side->found, image.size());
   out.polarity = side->polarity;
   out.contrast = side->polarity > 0 ? parts.light_contrast : parts.dark_contrast;
 
   std::vector<std::pair<double, double>> radii;
-  for (const Blob& blob : side->blobs)
+  for (const Blob& blob : side->found.blobs)
     if (is_disc(blob, image)) radii.emplace_back(std::sqrt(blob.area / std::numbers::pi), blob.area);
   if (radii.empty())
-    for (const Blob& blob : side->blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
+    for (const Blob& blob : side->found.blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
   const double radius = weighted_median(radii);
   out.radius = radius * scale;
   if (!(radius > 0.0)) return out;
 
   const auto full = [&](double v) { return (v + 0.5) * scale - 0.5; };
-  for (const Blob& blob : side->blobs) {
+  for (const Blob& blob : side->found.blobs) {
     if (is_disc(blob, image)) {
       out.candidates.push_back(
           {full(blob.x), full(blob.y), std::sqrt(blob.area / std::numbers::pi) * scale, true});
@@ -255,7 +258,8 @@ Detection detect(const cv::Mat& image, const DetectionOptions& options) {
   while (std::min(image.cols, image.rows) >> (halvings + 1) >= 150) ++halvings;
   for (;; --halvings) {
     Detection found = detect_at(halve_to(halvings), options);
-    if (halvings == 0 || (found.radius >= 4.5 * (1 << halvings) && !found.candidates.empty())) return found;
+    if (halvings == 0 || (found.radius >= finest * (1 << halvings) && !found.candidates.empty()))
+      return found;
   }
 }
 

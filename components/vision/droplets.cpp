@@ -209,7 +209,7 @@ Droplets measure_droplets(const cv::Mat& image, const MeasureOptions& options) {
   out.blur = blur;
 
   // Where noise rules, more rays are worth their time; elsewhere the pixels are used up already.
-  const double density = found.noise > 0.025 * found.contrast ? 2.0 : 1.0;
+  const double density = found.noise > 0.04 * found.contrast ? 1.5 : 1.0;
   for (Measured& drop : drops) drop.rays.choose(density * drop.shape.radius);
   close_rays(drops, 3.0 * blur + 3.0, 1.0 + 1.5 * blur);
   std::vector<double> contrasts;

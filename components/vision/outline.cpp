@@ -3,11 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
-#include "components/vision/wide_vectors.hpp"
-#include "core/base/contract.hpp"
+#include "components/vision/ray_samples.hpp"
 
 namespace invar::vision {
 
@@ -35,49 +33,6 @@ const std::array<Direction, Rays::most>& directions(int count) {
   }();
   return tables[static_cast<std::size_t>(count / 16)];
 }
-
-// Reads the image between its pixels, bilinearly. Positions along a ray count in 1/65536 px.
-struct Samples {
-  const std::uint8_t* data;
-  std::ptrdiff_t stride;
-  double right, bottom;  // the last coordinates that bilinear reading allows
-  explicit Samples(const cv::Mat& image)
-      : data{image.ptr<std::uint8_t>()},
-        stride{static_cast<std::ptrdiff_t>(image.step)},
-        right{image.cols - 1.01},
-        bottom{image.rows - 1.01} {
-    INVAR_EXPECTS(image.type() == CV_8UC1 && image.cols < 32768 && image.rows < 32768, image.type(),
-                  image.cols, image.rows);
-  }
-  [[nodiscard]] bool holds(double x, double y) const {
-    return x >= 0.0 && y >= 0.0 && x <= right && y <= bottom;
-  }
-  // Rays cross rows, and every row lies in another page: the waits for them are taken all at once, beforehand.
-  void fetch(const Shape& shape, double reach) const {
-    const double far = shape.radius + std::abs(shape.cos2) + std::abs(shape.sin2) + reach;
-    if (far > 60.0) return;  // more than the first cache holds
-    const int left = static_cast<int>(std::clamp(shape.x - far, 0.0, right)),
-              last = static_cast<int>(std::clamp(shape.x + far, 0.0, right));
-    const int top = static_cast<int>(std::clamp(shape.y - far, 0.0, bottom)),
-              end = static_cast<int>(std::clamp(shape.y + far + 1.0, 0.0, bottom));
-    for (int y = top; y <= end; ++y)
-      for (int x = left; x <= last + 63; x += 64) __builtin_prefetch(data + y * stride + std::min(x, last));
-  }
-  // `count` samples a pixel apart from (x, y) in direction (dx, dy).
-  void read(double x, double y, double dx, double dy, std::size_t count, float* out) const {
-    constexpr double unit = 65536.0;
-    auto u = static_cast<std::int32_t>(x * unit + 0.5), v = static_cast<std::int32_t>(y * unit + 0.5);
-    const auto step_u = static_cast<std::int32_t>(std::floor(dx * unit + 0.5)),
-               step_v = static_cast<std::int32_t>(std::floor(dy * unit + 0.5));
-    for (std::size_t j = 0; j < count; ++j, u += step_u, v += step_v) {
-      const std::uint8_t* p = data + static_cast<std::ptrdiff_t>(v >> 16) * stride + (u >> 16);
-      const int a = (u >> 8) & 255, b = (v >> 8) & 255;
-      const int upper = p[0] * 256 + (p[1] - p[0]) * a,
-                lower = p[stride] * 256 + (p[stride + 1] - p[stride]) * a;
-      out[j] = static_cast<float>(upper * 256 + (lower - upper) * b) * (1.0F / 65536.0F);
-    }
-  }
-};
 
 double radius_at(const Shape& shape, const Direction& d) {
   return shape.radius + shape.cos2 * d.c2 + shape.sin2 * d.s2;
@@ -147,7 +102,7 @@ bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double fl
   }
   if (used < 8) return false;
   const bool ellipse = used >= 0.6 * rays.count;
-  std::array<double, Rays::most> sizes{}, rest{};
+  std::array<double, Rays::most> sizes, rest{};
   const auto residuals = [&](const Vector5& p) {
     int n = 0;
     for (std::size_t k = 0; k < count; ++k) {
@@ -212,51 +167,6 @@ bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double fl
   return fit.shape.radius > 0.5;
 }
 
-// The products of one ray's samples with the rows of a filter, and the sum of their squares.
-struct RayProducts {
-  std::array<double, EdgeFilter::rows> rows;
-  double square;
-};
-
-using Lanes [[gnu::vector_size(EdgeFilter::lanes * sizeof(float))]] = float;
-
-// Also adds the samples to `sums`, by the weights of `harmonic`. `f` is zero beyond `length`. Sums run in lanes of their
-// own, so that every CPU gets the same digits however wide its vectors are.
-INVAR_WIDE_VECTORS
-RayProducts take_products(const std::array<float, EdgeFilter::padded>& f, const EdgeFilter& filter,
-                          std::size_t length, const std::array<float, 3>& harmonic,
-                          std::array<std::array<float, EdgeFilter::padded>, 3>& sums) {
-  Lanes ground{}, height{}, shift{}, inner{}, outer{}, square{};
-  const Lanes level = Lanes{} + harmonic[0], cosine = Lanes{} + harmonic[1], sine = Lanes{} + harmonic[2];
-  Lanes value, other;
-  const auto add = [&](Lanes& sum, EdgeFilter::Row row, std::size_t j) {
-    std::memcpy(&other, &filter.products[row][j], sizeof other);
-    sum += other * value;
-  };
-  const auto add_to = [&](float* to, const Lanes& weight) {
-    std::memcpy(&other, to, sizeof other);
-    other += weight * value;
-    std::memcpy(to, &other, sizeof other);
-  };
-  for (std::size_t j = 0; j < length; j += EdgeFilter::lanes) {
-    std::memcpy(&value, &f[j], sizeof value);
-    add(ground, EdgeFilter::to_ground, j);
-    add(height, EdgeFilter::to_height, j);
-    add(shift, EdgeFilter::to_shift, j);
-    add(inner, EdgeFilter::to_inner, j);
-    add(outer, EdgeFilter::to_outer, j);
-    square += value * value;
-    add_to(&sums[0][j], level);
-    add_to(&sums[1][j], cosine);
-    add_to(&sums[2][j], sine);
-  }
-  const auto total = [](const Lanes& part) {
-    return static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) +
-                               ((part[2] + part[6]) + (part[3] + part[7])));
-  };
-  return {{total(ground), total(height), total(shift), total(inner), total(outer)}, total(square)};
-}
-
 }  // namespace
 
 double Shape::equal_area_radius() const {
@@ -291,11 +201,10 @@ void Rays::close(const Shape& shape, double reach, double x, double y, double ra
 }
 
 OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, double reach, Rays& rays) {
-  const Samples samples{image};
+  const RaySamples samples{image};
   const auto& table = directions(rays.count);
   const int half = std::clamp(static_cast<int>(std::ceil(reach)), 3, 30);
-  samples.fetch(shape, half);
-  std::array<float, 65> f{};
+  alignas(64) std::array<float, 72> f{};  // 65, and what a read fills up
   std::array<double, Rays::most> heights{}, sorted{};
   std::array<bool, Rays::most> usable{};
   int n = 0;
@@ -351,11 +260,10 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
 
 OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity, const EdgeFilter& filter,
                           Rays& rays) {
-  const Samples samples{image};
+  const RaySamples samples{image};
   const auto& table = directions(rays.count);
   const auto count = static_cast<std::size_t>(rays.count);
   const int half = filter.half;
-  samples.fetch(shape, half);
   const auto length = static_cast<std::size_t>(2 * half + 1);
   std::array<bool, Rays::most> usable{};
   std::array<RayProducts, Rays::most> products;  // written before they are read
@@ -410,7 +318,7 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   fit.blur = std::clamp(filter.blur + common(3) / common(1), 0.5 * filter.blur, 2.0 * filter.blur);
 
   int n = 0;
-  std::array<double, Rays::most> misfit{}, sorted{};
+  std::array<double, Rays::most> misfit, sorted;  // written before they are read
   for (std::size_t k = 0; k < count; ++k) {
     if (!usable[k]) continue;
     const Direction& d = table[k];

@@ -13,7 +13,8 @@ namespace invar::vision {
 
 namespace {
 
-constexpr int tile = 8;  // px a side
+constexpr int tile = 8;                     // px a side
+constexpr int first_row = 2, next_row = 4;  // of a tile: two of its rows are enough for means
 
 // Sums over tiles, then over windows of tiles, by one table of running sums.
 class TileSums {
@@ -49,21 +50,25 @@ class TileSums {
   std::vector<float> cells_;
 };
 
-// From levels at the middles of the tiles to a row of pixels between them, rounded.
-INVAR_WIDE_VECTORS
+// From levels at the middles of the tiles to a row of pixels between them, rounded: 8 bits below the point, in 16.
 void interpolate(const std::vector<float>& levels, std::vector<std::uint8_t>& row) {
+  using Words [[gnu::vector_size(16)]] = std::uint16_t;
+  using Bytes [[gnu::vector_size(8)]] = std::uint8_t;
+  constexpr Words ramp{0, 1, 2, 3, 4, 5, 6, 7};
   const int columns = static_cast<int>(levels.size()), width = static_cast<int>(row.size());
   const auto level = [&](int i) { return levels[static_cast<std::size_t>(std::clamp(i, 0, columns - 1))]; };
   for (int i = -1; i < columns; ++i) {
-    const float left = level(i), right = level(i + 1);
-    const int slope = static_cast<int>((right - left) * (65536.0F / tile));  // 16 bits below the point
-    const int begin = i * tile + tile / 2, value = static_cast<int>(left * 65536.0F) + slope / 2 + 32768;
-    std::uint8_t* to = row.data() + begin;
-    if (begin >= 0 && begin + tile <= width) {
-      for (int k = 0; k < tile; ++k) to[k] = static_cast<std::uint8_t>((value + k * slope) >> 16);
+    const float left = level(i);
+    const int slope = static_cast<int>((level(i + 1) - left) * (256.0F / tile));
+    const int start = static_cast<int>(left * 256.0F) + slope / 2 + 128, begin = i * tile + tile / 2;
+    const Words words =
+        (Words{} + static_cast<std::uint16_t>(start) + ramp * static_cast<std::uint16_t>(slope)) >> 8;
+    const Bytes bytes = __builtin_convertvector(words, Bytes);
+    const int from = std::max(0, -begin), to = std::min(tile, width - begin);
+    if (to - from == tile) {
+      std::memcpy(row.data() + begin, &bytes, sizeof bytes);
     } else {
-      for (int k = std::max(0, -begin); k < std::min(tile, width - begin); ++k)
-        to[k] = static_cast<std::uint8_t>((value + k * slope) >> 16);
+      for (int k = from; k < to; ++k) row[static_cast<std::size_t>(begin + k)] = bytes[k];
     }
   }
 }
@@ -136,10 +141,10 @@ void add_columns(const std::uint8_t* p, const std::vector<std::uint8_t>& high,
 }
 
 double noise_of(const cv::Mat1b& image) {
-  // Second differences along rows: blind to slopes; every other row is enough.
+  // Second differences along rows: blind to slopes.
   std::array<int, 512> histogram{};
   int count = 0;
-  for (int y = 0; y < image.rows; y += 2) {
+  for (int y = first_row; y < image.rows; y += next_row) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     for (int x = 2; x < image.cols; x += 2, ++count)
       ++histogram[static_cast<std::size_t>(std::abs(p[x - 2] - 2 * p[x - 1] + p[x]) & 511)];
@@ -201,7 +206,7 @@ Partition partition(const cv::Mat1b& image, int window) {
 
   // What lies clearly above or below its surroundings' mean.
   TileSums sum{columns, rows}, count{columns, rows};
-  for (int y = 0; y < height; y += 2) {
+  for (int y = first_row; y < height; y += next_row) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     for (int i = 0; i < columns; ++i) {
       const int end = std::min(width, (i + 1) * tile);
@@ -218,13 +223,15 @@ Partition partition(const cv::Mat1b& image, int window) {
       for (int i = 0; i < columns; ++i) mean.at(i, j) = s.at(i, j) / n.at(i, j);
   }
   std::array<int, 256> histogram{};
-  for (int y = 0; y < height; y += 2) {
+  int counted = 0;
+  for (int y = first_row; y < height; y += next_row) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     const auto& level = mean.row(y);
+    counted += (width + 1) / 2;
     for (int x = 0; x < width; x += 2)
       ++histogram[static_cast<std::size_t>(std::abs(p[x] - level[static_cast<std::size_t>(x)]))];
   }
-  int left = static_cast<int>(0.001 * 0.25 * width * height), extreme = 255;
+  int left = static_cast<int>(0.001 * counted), extreme = 255;
   while (extreme > 0 && (left -= histogram[static_cast<std::size_t>(extreme)]) > 0) --extreme;
   const double margin = std::max(5.0 * out.noise + 1.0, 0.2 * extreme);
   if (extreme <= margin) return out.light.setTo(0), out.dark.setTo(0), out;
@@ -240,12 +247,12 @@ Partition partition(const cv::Mat1b& image, int window) {
   const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
   for (int pass = 0; pass < 2; ++pass) {
     TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
-    // Sums down the columns of a row of tiles first: they run over whole rows at once. Every other row is enough.
+    // Sums down the columns of a row of tiles first: they run over whole rows at once.
     std::vector<std::uint16_t> up(static_cast<std::size_t>(width)), up_n(up), down(up), down_n(up);
     for (int j = 0; j < rows; ++j) {
       std::fill(up.begin(), up.end(), 0), std::fill(up_n.begin(), up_n.end(), 0);
       std::fill(down.begin(), down.end(), 0), std::fill(down_n.begin(), down_n.end(), 0);
-      for (int y = j * tile; y < std::min(height, (j + 1) * tile); y += 2)
+      for (int y = j * tile + first_row; y < std::min(height, (j + 1) * tile); y += next_row)
         add_columns(image.ptr<std::uint8_t>(y), high.row(y), low.row(y), up, up_n, down, down_n);
       for (int i = 0; i < columns; ++i) {
         const auto begin = static_cast<std::ptrdiff_t>(i) * tile,
@@ -279,11 +286,9 @@ Partition partition(const cv::Mat1b& image, int window) {
   return out;
 }
 
-std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i& labels) {
-  struct Run {
-    int y, begin, end;  // end is exclusive
-  };
-  std::vector<Run> runs;
+Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
+  Blobs out;
+  auto& runs = out.runs;
   std::vector<int> parent;
   const auto root = [&](int i) {
     while (parent[static_cast<std::size_t>(i)] != i) {
@@ -307,7 +312,7 @@ std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i&
       const int start = x;
       while (x < mask.cols && p[x] != 0) ++x;
       const int id = static_cast<int>(runs.size());
-      runs.push_back({y, start, x});
+      runs.push_back({y, start, x, 0});
       parent.push_back(id);
       while (above < above_end && runs[above].end < start) ++above;
       for (std::size_t k = above; k < above_end && runs[k].begin <= x; ++k) {
@@ -324,7 +329,7 @@ std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i&
   };
   std::vector<Sums> sums(runs.size());
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const Run& run = runs[i];
+    const BlobRun& run = runs[i];
     Sums& s = sums[static_cast<std::size_t>(root(static_cast<int>(i)))];
     const double n = run.end - run.begin, middle = 0.5 * (run.begin + run.end - 1), y = run.y;
     s.n += n;
@@ -338,7 +343,7 @@ std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i&
     s.bottom = std::max(s.bottom, run.y);
   }
   std::vector<int> label(runs.size(), -1);
-  std::vector<Blob> blobs;
+  auto& blobs = out.blobs;
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const Sums& s = sums[i];
     if (s.n < std::max(1.0, smallest)) continue;
@@ -349,15 +354,18 @@ std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i&
     blobs.push_back({label[i], s.n, x, y, s.n * s.n / (2.0 * std::numbers::pi * moment), s.left, s.top,
                      s.right, s.bottom});
   }
-  labels.create(mask.rows, mask.cols);
-  labels.setTo(0);
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    const int value = label[static_cast<std::size_t>(root(static_cast<int>(i)))] + 1;
-    if (value == 0) continue;
-    int* row = labels.ptr<int>(runs[i].y);
-    std::fill(row + runs[i].begin, row + runs[i].end, value);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    runs[i].label = label[static_cast<std::size_t>(root(static_cast<int>(i)))] + 1;
+  return out;
+}
+
+cv::Mat1i paint_labels(const Blobs& blobs, cv::Size size) {
+  cv::Mat1i labels(size, 0);
+  for (const BlobRun& run : blobs.runs) {
+    int* row = labels.ptr<int>(run.y);
+    std::fill(row + run.begin, row + run.end, run.label);
   }
-  return blobs;
+  return labels;
 }
 
 }  // namespace invar::vision

@@ -29,7 +29,21 @@ struct Blob {
   int left = 0, top = 0, right = 0, bottom = 0;  // px, all inclusive
 };
 
-/// Blobs of a mask by runs and union-find; `labels` holds label + 1, 0 outside. Blobs below `smallest` px are left out.
-std::vector<Blob> label_blobs(const cv::Mat1b& mask, double smallest, cv::Mat1i& labels);
+/// Pixels of one row that hang together.
+struct BlobRun {
+  int y, begin, end;  // px; end is exclusive
+  int label;          // of its blob + 1; 0: of one that was left out
+};
+
+struct Blobs {
+  std::vector<Blob> blobs;
+  std::vector<BlobRun> runs;
+};
+
+/// Blobs of a mask by runs and union-find. Those below `smallest` px are left out.
+Blobs label_blobs(const cv::Mat1b& mask, double smallest);
+
+/// An image of label + 1 in each blob, 0 outside.
+cv::Mat1i paint_labels(const Blobs& blobs, cv::Size size);
 
 }  // namespace invar::vision
