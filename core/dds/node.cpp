@@ -1,7 +1,9 @@
 #include "core/dds/node.hpp"
 
+#include <chrono>
 #include <ctime>
 #include <mutex>
+#include <thread>
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
@@ -79,7 +81,17 @@ Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Par
   (void)parts_->participant(Traffic::general);  // discovery begins
 }
 
-Node::~Node() { stop(); }
+Node::~Node() {
+  stop();
+  // Who was killed while it wrote into our shared memory leaves a lock there. Fast DDS gives such a port up and makes another
+  // one after a second; closing the port in that moment, it would use the memory of the old one when it is gone.
+  const auto has_dead_peer = [](const auto& participant) {
+    return participant && participant->has_dead_peer();
+  };
+  if (parts_->options.shared_memory &&
+      (has_dead_peer(parts_->general) || has_dead_peer(parts_->realtime) || has_dead_peer(parts_->raw)))
+    std::this_thread::sleep_for(std::chrono::milliseconds{2500});
+}
 
 const NodeOptions& Node::options() const { return parts_->options; }
 

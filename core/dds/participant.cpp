@@ -11,8 +11,13 @@
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
+#include <algorithm>
 #include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <sstream>
+#include <string_view>
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
@@ -31,6 +36,9 @@ std::string as_text(const T& value) {
   text << value;
   return text.str();
 }
+
+/// Begins the user data of our participants; the process id follows.
+constexpr std::string_view pid_mark = "invar pid ";
 
 /// The library's threads inherit policy and priority of the thread that creates the participant.
 class Priority {
@@ -55,12 +63,47 @@ class Priority {
   sched_param parameters_{};
 };
 
-/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed
-/// and started again has the ports it had before: others then go on writing into the shared memory of the dead one,
-/// for seconds. From the process id it is another one; where another process has it, the library shifts the ports.
-std::int32_t own_number() {
+/// Whether the shared memory of a participant with this number is there, used or left behind.
+bool is_taken(std::uint32_t domain, std::int32_t number) {
+  const std::uint32_t first = 7400U + 250U * domain + 10U + 2U * static_cast<std::uint32_t>(number);
+  return std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(first)) ||
+         std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(first + 1));
+}
+
+/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed and
+/// started again has the ports it had before: others then go on writing into the shared memory of the dead one, and are not
+/// heard. So it is one that left no trace; where another process takes it in the same moment, the library shifts the ports.
+std::int32_t own_number(std::uint32_t domain) {
+  constexpr std::int32_t numbers = 110;
   static std::atomic<std::int32_t> made{0};
-  return (getpid() * 4 + made++) % 110;
+  const auto next = [] { return (getpid() * 4 + made++) % numbers; };
+  std::int32_t number = next();
+  for (std::int32_t tries = 0; tries < numbers && is_taken(domain, number); ++tries) number = next();
+  return number;
+}
+
+/// Not when it has ended and its parent does not know it yet.
+bool is_alive(std::int32_t pid) {
+  std::ifstream stat{"/proc/" + std::to_string(pid) + "/stat"};
+  std::string text;
+  std::getline(stat, text);
+  const auto name_end = text.rfind(") ");
+  return name_end != std::string::npos && text[name_end + 2] != 'Z' && text[name_end + 2] != 'X';
+}
+
+/// Process id of a participant of ours on the same PC as `own_prefix`; 0: none such.
+std::int32_t process_of(const rtps::ParticipantProxyData& peer, const rtps::GuidPrefix_t& own_prefix) {
+  // Fast DDS: two octets of its number, two of the PC.
+  const auto& own = own_prefix.value;
+  const auto& its = peer.m_guid.guidPrefix.value;
+  if (!std::equal(own, own + 4, its)) return 0;
+  const auto data = peer.m_userData.getValue();
+  if (data.size() != pid_mark.size() + sizeof(std::int32_t) ||
+      !std::equal(pid_mark.begin(), pid_mark.end(), data.begin()))
+    return 0;
+  std::int32_t pid = 0;
+  std::memcpy(&pid, data.data() + pid_mark.size(), sizeof pid);
+  return pid;
 }
 
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
@@ -68,8 +111,13 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   namespace transport = eprosima::fastdds::rtps;
   fdds::DomainParticipantQos qos;
   qos.name(name);
+  std::vector<rtps::octet> user_data{pid_mark.begin(), pid_mark.end()};
+  const std::int32_t pid = getpid();
+  user_data.resize(user_data.size() + sizeof pid);
+  std::memcpy(user_data.data() + pid_mark.size(), &pid, sizeof pid);
+  qos.user_data().data_vec(user_data);
   qos.transport().use_builtin_transports = false;
-  qos.wire_protocol().participant_id = own_number();
+  qos.wire_protocol().participant_id = own_number(options.domain);
   const bool realtime = traffic == Traffic::realtime;
   if (options.shared_memory) {
     auto shm = std::make_shared<transport::SharedMemTransportDescriptor>();
@@ -203,10 +251,25 @@ void Participant::remove(fdds::DataReader& reader) {
   const_cast<fdds::Subscriber*>(reader.get_subscriber())->delete_datareader(&reader);  // NOLINT
 }
 
-void Participant::on_participant_discovery(fdds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) {
+bool Participant::has_dead_peer() const {
+  const std::lock_guard lock{peers_mutex_};
+  return std::any_of(peers_.begin(), peers_.end(), [](const auto& peer) { return !is_alive(peer.second); });
+}
+
+void Participant::on_participant_discovery(fdds::DomainParticipant* own,
+                                           rtps::ParticipantDiscoveryInfo&& info) {
   const std::string id = as_text(info.info.m_guid.guidPrefix);
-  if (info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
-      info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT)
+  const bool is_gone = info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+                       info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
+  {
+    const std::lock_guard lock{peers_mutex_};
+    const std::int32_t pid = is_gone ? 0 : process_of(info.info, own->guid().guidPrefix);
+    if (pid != 0)
+      peers_[id] = pid;
+    else
+      peers_.erase(id);
+  }
+  if (is_gone)
     discovery_.remove_participant(id);
   else
     discovery_.add_participant(id, info.info.m_participantName.c_str());

@@ -10,6 +10,7 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
+#include <cstdint>
 #include <map>
 #include <mutex>
 #include <string>
@@ -39,6 +40,9 @@ class Participant final : private fdds::DomainParticipantListener {
                                   fdds::DataReaderListener* listener);
   void remove(fdds::DataWriter& writer);
   void remove(fdds::DataReader& reader);
+  /// A process of this PC that takes part in the cell ended without taking leave (it was killed, or crashed), and its lease
+  /// has not run out yet. Any thread.
+  [[nodiscard]] bool has_dead_peer() const;
 
  private:
   fdds::Topic* topic(const std::string& name, fdds::TopicDataType* type);
@@ -56,6 +60,8 @@ class Participant final : private fdds::DomainParticipantListener {
   std::string name_;
   fdds::DomainParticipant* participant_ = nullptr;
   std::mutex mutex_;
+  mutable std::mutex peers_mutex_;
+  std::map<std::string, std::int32_t> peers_;  // their process ids on this PC, by participant
   std::map<std::vector<std::string>, fdds::Publisher*> publishers_;
   std::map<std::vector<std::string>, fdds::Subscriber*> subscribers_;
 };

@@ -13,15 +13,30 @@ namespace invar::dds {
 
 namespace {
 
+double seconds_since(const timespec& time) {
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  return static_cast<double>(now.tv_sec - time.tv_sec) +
+         1e-9 * static_cast<double>(now.tv_nsec - time.tv_nsec);
+}
+
+/// Nobody reads a lock file: the time of its last access serves to remember when it was first found abandoned.
+bool has_rested(const std::filesystem::path& lock, Duration rest) {
+  struct stat status {};
+  if (stat(lock.c_str(), &status) != 0) return false;
+  const bool is_marked = status.st_atim.tv_sec > status.st_mtim.tv_sec;
+  if (is_marked) return seconds_since(status.st_atim) >= rest.in_seconds();
+  const timespec times[2] = {{0, UTIME_NOW}, {0, UTIME_OMIT}};
+  utimensat(AT_FDCWD, lock.c_str(), times, 0);
+  return rest.ns == 0;
+}
+
 /// False also when it cannot be opened: then it is not ours to remove.
 bool is_abandoned(const std::filesystem::path& lock, Duration age) {
   const int file = open(lock.c_str(), O_RDWR | O_CLOEXEC);
   if (file < 0) return false;
   struct stat status {};
-  timespec now{};
-  clock_gettime(CLOCK_REALTIME, &now);
-  const bool abandoned = fstat(file, &status) == 0 &&
-                         static_cast<double>(now.tv_sec - status.st_mtim.tv_sec) >= age.in_seconds() &&
+  const bool abandoned = fstat(file, &status) == 0 && seconds_since(status.st_mtim) >= age.in_seconds() &&
                          flock(file, LOCK_EX | LOCK_NB) == 0;
   close(file);
   return abandoned;
@@ -29,7 +44,7 @@ bool is_abandoned(const std::filesystem::path& lock, Duration age) {
 
 }  // namespace
 
-std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, Duration age) {
+std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, Duration age, Duration rest) {
   std::error_code error;
   std::vector<std::filesystem::path> locks;
   for (const auto& entry : std::filesystem::directory_iterator{folder, error}) {
@@ -41,6 +56,7 @@ std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, 
   for (const auto& lock : locks) {
     if (!is_abandoned(lock, age)) continue;
     const std::string name = lock.filename().string();
+    if (name.starts_with("fastrtps_port") && !has_rested(lock, rest)) continue;
     const std::string subject = name.substr(0, name.size() - 3);
     std::filesystem::remove(folder / subject, error);
     std::filesystem::remove(folder / ("sem." + subject + "_mutex"), error);

@@ -271,13 +271,14 @@ void SimulatedClockClient::learn(std::uint32_t process, const Membership& member
   peer.topics = membership.written;
   peer.counts.assign(peer.topics.size(), 0);
   peer.inlets.assign(peer.topics.size(), {});
-  if (process == number_) {
-    for (std::size_t i = 0; i < wanted_.size(); ++i) wanted_[i] = tap_ != nullptr;
-    return;  // own outputs are joined with own inputs by the executor
-  }
+  // Signals of one process are joined by its executor and not bound here; an inbox hears its own process as any other.
   for (std::size_t i = 0; i < peer.topics.size(); ++i)
     for (const auto& input : inputs_)
       if (input.topic == peer.topics[i].topic) peer.inlets[i].push_back(input.inlet.get());
+  if (process == number_) {
+    for (std::size_t i = 0; i < wanted_.size(); ++i) wanted_[i] = tap_ != nullptr || !peer.inlets[i].empty();
+    return;
+  }
   for (const auto& topic : membership.wanted)
     for (std::size_t i = 0; i < membership_.written.size(); ++i)
       if (topic == "*" || topic == membership_.written[i].topic) wanted_[i] = true;
@@ -307,7 +308,7 @@ std::string SimulatedClockClient::deliver_all(const lockstep::TimeGrant& grant, 
   std::size_t next = 0;
   for (const auto process : grant.processes()) {
     if (process == number_) {
-      if (tap_ && !deliver(number_, previous_, {grant.from_ns()})) return "malformed samples of its own";
+      if (!deliver(number_, previous_, {grant.from_ns()})) return "malformed samples of its own";
       continue;
     }
     const auto& samples = (*answers)[next++].samples;

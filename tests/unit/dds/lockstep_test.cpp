@@ -6,10 +6,12 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "core/dds/simulated_clock.hpp"
 #include "domain.hpp"
 #include "idl/types.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 extern char** environ;
 
@@ -119,11 +121,10 @@ class Processes {
 };
 
 std::string run_once(Duration window, double* seconds_a_window = nullptr) {
-  const auto folder = std::filesystem::temp_directory_path() / ("invar_lockstep_" + std::to_string(getpid()));
-  std::filesystem::create_directories(folder);
+  const invar::testing::TemporaryFolder folder;
   Node node{testing::local("master"), standard_profiles()};
   SimulatedClockMaster master{node, names, window};
-  Processes processes{folder};
+  Processes processes{folder.path()};
   EXPECT_EQ(master.wait_for_all(Duration::milliseconds(30'000)), "");
   const auto begin = std::chrono::steady_clock::now();
   const Advance advance = master.advance_to({10'000'000'000}, Duration::milliseconds(30'000));
@@ -133,9 +134,7 @@ std::string run_once(Duration window, double* seconds_a_window = nullptr) {
   EXPECT_EQ(advance.reached.ns, 3'000'000'000);
   if (seconds_a_window != nullptr) *seconds_a_window = took.count() / (3e9 / static_cast<double>(window.ns));
   master.end();
-  const std::string words = processes.join();
-  std::filesystem::remove_all(folder);
-  return words;
+  return processes.join();
 }
 
 TEST(SimulatedTime, RepeatsBitForBitOverThreeProcesses) {
@@ -146,6 +145,59 @@ TEST(SimulatedTime, RepeatsBitForBitOverThreeProcesses) {
   EXPECT_THAT(first,
               ::testing::HasSubstr(" 12000 "));  // 300 windows of 30 states and 10 commands
   EXPECT_EQ(run_once(Duration::milliseconds(10)), first);
+}
+
+/// Commands itself once a millisecond.
+class Commander final : public Component {
+ public:
+  Output<stage::AxisCommand> command{*this, "command", "command"};
+  Inbox<stage::AxisCommand> inbox{*this, "inbox"};
+  struct Heard {
+    std::uint64_t id;
+    std::int64_t at_ns;
+  };
+  std::vector<Heard> heard;
+
+  void step(const Tick& tick) noexcept override {
+    set_now(tick.now);
+    for (stage::AxisCommand taken; inbox.take(taken);) heard.push_back({taken.id(), tick.now.ns});
+    stage::AxisCommand next;
+    next.id(tick.cycle);
+    command.write(next);
+  }
+};
+
+TEST(SimulatedTime, AnInboxHearsItsOwnProcessInTheNextWindow) {
+  Node keeper{testing::local("master"), standard_profiles()};
+  Node node{testing::local("alone"), standard_profiles()};
+  Commander component;
+  component.command.topic = component.inbox.topic = "cell/test/alone/inbox";
+  SimulatedClockClient client{node};
+  client.bind(component.command);
+  client.bind(component.inbox);
+  const std::atomic<bool> stop{false};
+  SimulatedClockClient::Run run;
+  std::thread life{[&] {
+    std::uint64_t cycle = 0;
+    run = client.run(
+        [&](Instant until) {
+          for (; static_cast<std::int64_t>(cycle) * 1'000'000 < until.ns; ++cycle)
+            component.step({{static_cast<std::int64_t>(cycle) * 1'000'000}, 1e-3, cycle});
+          return std::string{};
+        },
+        [] { return false; }, stop, Duration::milliseconds(30'000));
+  }};
+  SimulatedClockMaster master{keeper, {"alone"}, Duration::milliseconds(10)};
+  EXPECT_EQ(master.wait_for_all(Duration::milliseconds(30'000)), "");
+  EXPECT_EQ(master.advance_to({50'000'000}, Duration::milliseconds(30'000)).failure, "");
+  master.end();
+  life.join();
+  EXPECT_TRUE(run.ended) << run.failure;
+  ASSERT_EQ(component.heard.size(), 40U);  // those of the last window nobody waits for
+  for (std::size_t k = 0; k < 40; ++k) {
+    EXPECT_EQ(component.heard[k].id, k);
+    EXPECT_EQ(component.heard[k].at_ns, static_cast<std::int64_t>(k / 10 + 1) * 10'000'000);
+  }
 }
 
 TEST(SimulatedTime, SaysWhoIsMissing) {
