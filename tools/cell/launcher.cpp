@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <thread>
 
@@ -27,6 +29,8 @@ using Clock = std::chrono::steady_clock;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
+
+void sleep_a_little() { std::this_thread::sleep_for(std::chrono::milliseconds(5)); }
 
 struct Child {
   std::string name;
@@ -77,7 +81,7 @@ void stop_child(Child& child) {
   const auto begin = Clock::now();
   while (child.running && seconds_since(begin) < 10.0) {
     child.poll(false);
-    if (child.running) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    if (child.running) sleep_a_little();
   }
   if (!child.running) return;
   kill(child.pid, SIGKILL);
@@ -101,6 +105,37 @@ bool keep_alive(std::vector<Child>& children, const LaunchOptions& options,
   return true;
 }
 
+/// Where the processes leave their last words; gone with its owner.
+class Folder {
+ public:
+  Folder() {
+    std::string pattern = (std::filesystem::temp_directory_path() / "invar-run-XXXXXX").string();
+    if (mkdtemp(pattern.data()) == nullptr)
+      throw InputError{pattern, "a folder cannot be made there",
+                       "see that TMPDIR names one that takes files"};
+    path_ = pattern;
+  }
+  ~Folder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::string text(const std::string& file) const {
+    std::ifstream stream{path_ / file};
+    return {std::istreambuf_iterator<char>{stream}, {}};
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
+bool keeps_time(const LaunchOptions& options, const config::Cell& cell) {
+  return options.host.empty() || cell.processes.front().host == options.host;
+}
+
 bool any_ended(std::vector<Child>& children) {
   bool ended = false;
   for (Child& child : children) {
@@ -108,6 +143,15 @@ bool any_ended(std::vector<Child>& children) {
     ended = ended || !child.running;
   }
   return ended;
+}
+
+bool any_runs(std::vector<Child>& children) {
+  bool runs = false;
+  for (Child& child : children) {
+    child.poll(false);
+    runs = runs || child.running;
+  }
+  return runs;
 }
 
 dds::NodeOptions node_options(const config::Cell& cell) {
@@ -128,11 +172,13 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
                                 Clock::time_point begin, LaunchOutcome& outcome) {
   dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
-  for (const Child& child : children) names.push_back(child.name);
+  for (const auto& process : cell.processes) names.push_back(process.name);
   dds::SimulatedClockMaster master{node, names, Duration::milliseconds(20)};
   node.start();
   const auto given_up = [&] { return stop.load() || any_ended(children); };
-  std::string failure = master.wait_for_all(Duration::seconds(30.0), given_up);
+  // Somebody may have to start the other PCs by hand.
+  const Duration patience = Duration::seconds(names.size() > children.size() ? 300.0 : 30.0);
+  std::string failure = master.wait_for_all(patience, given_up);
   outcome.start_seconds = seconds_since(begin);
   if (failure.empty() && !stop) {
     const double most = options.duration > 0.0 ? options.duration : 1e9;
@@ -141,11 +187,7 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   }
   master.end();
   const auto ending = Clock::now();
-  while (seconds_since(ending) < 5.0 &&
-         std::any_of(children.begin(), children.end(), [](const Child& child) { return child.running; })) {
-    any_ended(children);
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
+  while (seconds_since(ending) < 5.0 && any_runs(children)) sleep_a_little();
   return stop ? "" : failure;
 }
 
@@ -165,24 +207,25 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
                      "use a name below `hosts`"};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
 
-  std::string pattern = (std::filesystem::temp_directory_path() / "invar-run-XXXXXX").string();
-  const std::filesystem::path folder = mkdtemp(pattern.data());
+  const Folder folder;
   std::vector<Child> children;
   for (const auto& process : cell.processes)
     if (options.host.empty() || process.host == options.host)
-      children.push_back(spawn(options, process.name, outcome.simulated, folder));
+      children.push_back(spawn(options, process.name, outcome.simulated, folder.path()));
 
-  if (outcome.simulated) {
+  if (outcome.simulated && !keeps_time(options, cell)) {
+    while (!stop && any_runs(children)) sleep_a_little();
+  } else if (outcome.simulated) {
     outcome.failure = keep_simulated_time(options, cell, children, stop, begin, outcome);
   } else {
     while (!stop && (options.duration <= 0.0 || seconds_since(begin) < options.duration) &&
-           (options.job.empty() ? keep_alive(children, options, folder) : !any_ended(children)))
+           (options.job.empty() ? keep_alive(children, options, folder.path()) : !any_ended(children)))
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   for (Child& child : children) {
     const bool by_itself = !child.running;
     stop_child(child);
-    outcome.processes.push_back({child.name, child.status, folder / (child.name + ".json")});
+    outcome.processes.push_back({child.name, child.status, folder.text(child.name + ".json")});
     if (by_itself && child.status != 0 && outcome.failure.empty())
       outcome.failure = "process `" + child.name + "` ended with status " + std::to_string(child.status);
   }

@@ -19,8 +19,8 @@ struct LaunchOptions {
 
 struct ProcessOutcome {
   std::string process;
-  int status = 0;                // of its end
-  std::filesystem::path report;  // JSON that it left; may not exist
+  int status = 0;      // of its end
+  std::string report;  // JSON that it left; may be empty
 };
 
 struct LaunchOutcome {

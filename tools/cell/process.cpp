@@ -152,6 +152,8 @@ class RunningProcess {
     runs_job_ = true;
     status->add_sink([this](const job::JobStatus& sample, Instant) {
       const std::scoped_lock lock{job_mutex_};
+      if (sample.phase() == job::JOB_RUNNING && job_.phase() != job::JOB_RUNNING)
+        job_began_ns_ = sample.at().time_ns();
       job_ = sample;
       job_ended_ = sample.phase() == job::JOB_DONE || sample.phase() == job::JOB_FAILED ||
                    sample.phase() == job::JOB_CANCELLED;
@@ -354,7 +356,7 @@ class RunningProcess {
                         {"done", job_.phase() == job::JOB_DONE},
                         {"text", job_.text().c_str()},
                         {"result", job_.result_path().c_str()},
-                        {"simulated_seconds", static_cast<double>(job_.at().time_ns()) * 1e-9}};
+                        {"seconds", static_cast<double>(job_.at().time_ns() - job_began_ns_) * 1e-9}};
     }
     std::ofstream{options_.outcome} << outcome.dump(2) << '\n';
   }
@@ -377,6 +379,7 @@ class RunningProcess {
   bool runs_job_ = false;
   std::mutex job_mutex_;
   job::JobStatus job_;
+  std::int64_t job_began_ns_ = 0;
   std::atomic<bool> job_ended_{false};
 };
 

@@ -1,7 +1,6 @@
 #include "tools/cell/summary.hpp"
 
 #include <cmath>
-#include <fstream>
 #include <iomanip>
 #include <nlohmann/json.hpp>
 
@@ -154,8 +153,7 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
   std::filesystem::path folder;
   nlohmann::json job;
   for (const ProcessOutcome& process : outcome.processes) {
-    std::ifstream stream{process.report};
-    const auto report = nlohmann::json::parse(stream, nullptr, false);
+    const auto report = nlohmann::json::parse(process.report, nullptr, false);
     if (report.is_discarded()) {
       loops.push_back(
           {process.process, "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
@@ -186,7 +184,7 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
   page.heading("Processes");
   page.table(header, loops);
   out << "time            " << number(outcome.wall_seconds, 3) << " s";
-  if (!job.is_null()) out << " for " << number(job.value("simulated_seconds", 0.0), 4) << " s of the cell";
+  if (!job.is_null()) out << " for a job of " << number(job.value("seconds", 0.0), 4) << " s of the cell";
   out << '\n';
   if (folder.empty()) return;
   page.write(folder / "report.html");
