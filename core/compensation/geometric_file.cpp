@@ -1,5 +1,6 @@
 #include "core/compensation/geometric_file.hpp"
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
@@ -36,6 +37,13 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
   text.text("outside", "end values are held");
   text.comment("Lost motion of each axis [m], forward minus backward.");
   text.numbers("reversal", model.reversal.data(), 3);
+  if (model.reference_temperature) {
+    text.comment("All else holds at the reference; an axis grows by expansion * (T - reference) * position.");
+    text.open("temperature").number("reference", *model.reference_temperature).text("unit", "degC");
+    text.numbers("expansion", model.expansion.data(), 3);
+    text.numbers("expansion_sigma", model.expansion_sigma.data(), 3);
+    text.close();
+  }
   text.open("squareness");
   for (int pair = 0; pair < squareness_count; ++pair) {
     const double cosine = model.squareness[index(pair)];
@@ -92,6 +100,18 @@ GeometricModel read_geometric(const config::Node& root) {
   model.tool = {tool[0], tool[1], tool[2]};
   const auto reversal = exactly(root.required("reversal"), 3, "m");
   for (std::size_t k = 0; k < 3; ++k) model.reversal[k] = reversal[k];
+  if (const config::Node temperature = root["temperature"]; temperature.exists()) {
+    model.reference_temperature = temperature.number("reference", "degC", {-50.0, 200.0});
+    (void)temperature.choice("unit", {"degC"});
+    const auto expansion = exactly(temperature.required("expansion"), 3, "1/K");
+    const auto sigma = exactly(temperature.required("expansion_sigma"), 3, "1/K");
+    for (std::size_t k = 0; k < 3; ++k) {
+      model.expansion[k] = expansion[k];
+      model.expansion_sigma[k] = sigma[k];
+      if (std::abs(expansion[k]) > 1e-3)
+        temperature["expansion"].fault("an expansion beyond 1e-3 1/K", "calibrate again");
+    }
+  }
   const config::Node squareness = root.required("squareness");
   for (int pair = 0; pair < squareness_count; ++pair) {
     const config::Node one = squareness[metrology::squareness_iso_name(pair)];

@@ -17,6 +17,8 @@ constexpr int drift_terms = 4;              // Legendre polynomials 1..4 of the 
 constexpr int nuisances = 1 + drift_terms;  // reversal first
 constexpr double wide = 1e-3;               // m, sd of what is not known beforehand: offset, reversal, steps
 constexpr double point_tolerance = 1e-7;    // m, commanded positions nearer than this are one point
+constexpr double expansion_sd = 2e-5;       // 1/K, beforehand: steel 1.2e-5, aluminium 2.3e-5
+constexpr double steady = 0.02;             // K, a temperature that varies less stands still
 
 /// Median of a copy; NaN of nothing.
 double median(std::vector<double> values) {
@@ -36,6 +38,8 @@ struct Work {
   Eigen::VectorXd y;           // reading minus nominal
   Eigen::MatrixXd regressors;  // rows x (reversal, drift, steps)
   std::vector<int> breaks;
+  bool expanding = false;  // expansion is a regressor, after the drift
+  double temperature = std::numeric_limits<double>::quiet_NaN();
   Eigen::VectorXd weights;
   Eigen::VectorXd nuisance;
   Eigen::MatrixXd nuisance_covariance;  // per unit noise variance
@@ -46,6 +50,32 @@ struct Work {
   [[nodiscard]] int rows() const { return static_cast<int>(y.size()); }
   [[nodiscard]] int points() const { return static_cast<int>(first_row.size()); }
 };
+
+/// Regressor of the expansion about the line's mean temperature, where the temperature changed within the line.
+void add_expansion(Work& work) {
+  double sum = 0.0;
+  double count = 0.0;
+  double lowest = std::numeric_limits<double>::infinity();
+  double highest = -lowest;
+  for (const Reading& reading : work.line->readings) {
+    if (!std::isfinite(reading.temperature)) continue;
+    sum += reading.temperature;
+    count += 1.0;
+    lowest = std::min(lowest, reading.temperature);
+    highest = std::max(highest, reading.temperature);
+  }
+  if (count == 0.0) return;
+  work.temperature = sum / count;
+  if (highest - lowest < steady) return;
+  work.expanding = true;
+  work.regressors.conservativeResize(Eigen::NoChange, work.regressors.cols() + 1);
+  for (int i = 0; i < work.rows(); ++i) {
+    const Reading& reading = work.line->readings[static_cast<std::size_t>(i)];
+    const double warmer = std::isfinite(reading.temperature) ? reading.temperature - work.temperature : 0.0;
+    work.regressors(i, work.regressors.cols() - 1) =
+        warmer * work.beam.direction.dot(reading.position - work.beam.start);
+  }
+}
 
 Work prepare(const DisplacementLine& line) {
   Work work;
@@ -73,6 +103,7 @@ Work prepare(const DisplacementLine& line) {
     work.regressors.row(i) << 0.5 * reading.direction, t, 0.5 * (3.0 * t2 - 1.0), 0.5 * t * (5.0 * t2 - 3.0),
         0.125 * (35.0 * t2 * t2 - 30.0 * t2 + 3.0);
   }
+  add_expansion(work);
   return work;
 }
 
@@ -204,6 +235,7 @@ bool find_break(Work& work) {
 Eigen::VectorXd prior_variances(const Work& work, const std::array<double, drift_terms>& drift) {
   Eigen::VectorXd variance = Eigen::VectorXd::Constant(work.regressors.cols(), wide * wide);
   for (int k = 0; k < drift_terms; ++k) variance[1 + k] = std::max(drift[static_cast<std::size_t>(k)], 1e-22);
+  if (work.expanding) variance[nuisances] = expansion_sd * expansion_sd;
   return variance;
 }
 
@@ -289,6 +321,14 @@ CondensedLine finish(Work& work, const Eigen::VectorXd& prior_variance) {
   noise.reversal = work.nuisance[0];
   noise.reversal_sigma = work.scale * std::sqrt(work.nuisance_covariance(0, 0));
   noise.drift = 2.0 * (work.nuisance[1] + work.nuisance[3]);
+  if (work.expanding) {
+    const double own = 1.0 / (variance * work.nuisance_covariance(nuisances, nuisances));
+    const double told = std::max(own - 1.0 / (expansion_sd * expansion_sd), 0.0);
+    noise.expansion_information = told;
+    // Without the share of the expectation, which comes in once for all lines.
+    noise.expansion = told > 0.0 ? work.nuisance[nuisances] * own / told : 0.0;
+  }
+  result.temperature = work.temperature;
   noise.readings = work.rows();
   noise.outliers = static_cast<int>((work.weights.array() < 0.05).count());
   noise.breaks = work.breaks;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,8 @@ struct Reading {
   Eigen::Vector3d tool = Eigen::Vector3d::Zero();      // offset of the reflector
   double displacement = 0.0;                           // along the beam, zero at the line's first reading
   int direction = 1;                                   // sense of the motion along the line, +1 or -1
+  double temperature =
+      std::numeric_limits<double>::quiet_NaN();  // degC, of the machine; NaN where not measured
 };
 
 /// The readings of one set-up of the laser, in the order of measurement.
@@ -31,28 +34,34 @@ struct Beam {
 };
 Beam beam_of(const DisplacementLine& line);
 
-/// How one line disturbs its readings y = mean of its point + reversal + drift + steps + noise.
+/// How one line disturbs its readings y = mean of its point + reversal + drift + expansion + steps + noise.
 struct LineNoise {
   double noise = 0.0;           // m, sd of one reading
   double degrees = 0.0;         // degrees of freedom behind it
   double reversal = 0.0;        // m, reading forward minus reading backward
   double reversal_sigma = 0.0;  // m
   double drift = 0.0;           // m, end minus beginning of the measurement
+  /// 1/K, of the length along the beam, from temperatures that changed within the line, with what the line tells of it
+  /// (K^2): readings are reduced to the line's mean temperature by it. Information 0 where the temperature stood still.
+  double expansion = 0.0;
+  double expansion_information = 0.0;
   int readings = 0;
   int outliers = 0;
   std::vector<int> breaks;  // rows (of this line) before which the count jumped
 };
 
 /// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points, the readings
-/// say  -2 log likelihood = constant - 2 weighted'e + e' information e,  zero noise, reversal, drift and steps
-/// marginalised. Units 1/m^2, 1/m.
+/// say  -2 log likelihood = constant - 2 weighted'e + e' information e,  zero noise, reversal, drift, steps and expansion
+/// about the mean temperature marginalised. Units 1/m^2, 1/m.
 struct CondensedLine {
   std::string name;
   Beam beam;
   std::vector<Eigen::Vector3d> points;  // J commanded positions
   std::vector<Eigen::Vector3d> tools;   // J
-  Eigen::MatrixXd information;          // J x J, symmetric, rank J less the offset
-  Eigen::VectorXd weighted;             // J
+  double temperature =
+      std::numeric_limits<double>::quiet_NaN();  // degC, mean over the readings; NaN: not measured
+  Eigen::MatrixXd information;                   // J x J, symmetric, rank J less the offset
+  Eigen::VectorXd weighted;                      // J
   double constant = 0.0;
   Eigen::VectorXd deviation;        // J, mean of reading minus nominal after the nuisances, m
   Eigen::VectorXd deviation_sigma;  // J, of that mean, m

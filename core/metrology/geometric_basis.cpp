@@ -52,6 +52,13 @@ double largest_arm(const Chain& chain, const std::array<Range, 3>& ranges,
 
 }  // namespace
 
+void GeometricBasis::add_expansion(double temperature) {
+  reference_temperature = temperature;
+  for (int k = 0; k < 3; ++k)
+    if (chain.has(k)) expanding.push_back(k);
+  size += static_cast<int>(expanding.size());
+}
+
 Eigen::VectorXd GeometricBasis::spline_coefficients(int component, const Eigen::VectorXd& unknowns) const {
   for (const Block& block : blocks)
     if (block.component == component) return block.coefficients * unknowns.segment(block.first, block.size());

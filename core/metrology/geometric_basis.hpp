@@ -27,9 +27,15 @@ struct GeometricBasis {
   std::array<double, 3> origin{};                 // m, of the gauge
   std::vector<Block> blocks;
   std::vector<int> pairs;  // squareness constants, after the blocks
-  int size = 0;            // unknowns in all
+  std::vector<int>
+      expanding;  // axes with an expansion coefficient [1/K], after the squareness; none without temperatures
+  double reference_temperature = 0.0;  // degC, at which all the others hold
+  int size = 0;                        // unknowns in all
 
-  [[nodiscard]] int first_squareness() const { return size - static_cast<int>(pairs.size()); }
+  [[nodiscard]] int first_squareness() const { return first_expansion() - static_cast<int>(pairs.size()); }
+  [[nodiscard]] int first_expansion() const { return size - static_cast<int>(expanding.size()); }
+  /// One more unknown an axis of the chain.
+  void add_expansion(double reference_temperature);
   /// Coefficients of a component's spline; zeros for one that cannot show.
   [[nodiscard]] Eigen::VectorXd spline_coefficients(int component, const Eigen::VectorXd& unknowns) const;
   [[nodiscard]] Squareness squareness(const Eigen::VectorXd& unknowns) const;
@@ -41,7 +47,7 @@ struct GeometricBasis {
 GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges,
                           const std::array<int, 3>& intervals, const std::vector<Eigen::Vector3d>& tools);
 
-/// e(P, p) = V * unknowns to first order about the given squareness: 3 x size. With `squareness` not zero the constant
+/// e(P, p) = V * unknowns at the reference temperature, to first order about the given squareness: 3 x size. With `squareness` not zero the constant
 /// remainder is `squareness_remainder`.
 Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
                           const Eigen::Vector3d& position, const Eigen::Vector3d& tool);

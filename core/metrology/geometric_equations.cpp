@@ -28,6 +28,11 @@ BlockPrior block_prior(const GeometricBasis& basis, const GeometricPrior& prior,
   return result;
 }
 
+/// Of a squareness or expansion, the unknowns after the blocks.
+double constant_sd(const GeometricBasis& basis, const GeometricPrior& prior, int unknown) {
+  return unknown < basis.first_expansion() ? prior.squareness : prior.expansion;
+}
+
 /// H = A'C^-1 A + Q, factored; log|H| - log|Q|.
 struct System {
   Eigen::LLT<Eigen::MatrixXd> factor;
@@ -45,10 +50,10 @@ System build(const NormalEquations& equations, const GeometricBasis& basis, cons
     h.block(block.first, block.first, block.size(), block.size()) += system.blocks.back().precision;
     log_prior += system.blocks.back().log_determinant;
   }
-  const double stiffness = 1.0 / (prior.squareness * prior.squareness);
   for (int i = basis.first_squareness(); i < basis.size; ++i) {
-    h(i, i) += stiffness;
-    log_prior += std::log(stiffness);
+    const double sd = constant_sd(basis, prior, i);
+    h(i, i) += 1.0 / (sd * sd);
+    log_prior -= 2.0 * std::log(sd);
   }
   system.factor.compute(h);
   INVAR_EXPECTS(system.factor.info() == Eigen::Success, basis.size);
@@ -73,6 +78,15 @@ LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const S
     const auto i = static_cast<std::size_t>(j);
     all.row(j) = beam * field_map(basis, squareness, line.points[i], line.tools[i]) - start;
     result.remainder[j] = beam.dot(squareness_remainder(basis, squareness, line.points[i])) - start_remainder;
+  }
+  result.expansion = Eigen::VectorXd::Zero(basis.size);
+  for (std::size_t e = 0; e < basis.expanding.size() && std::isfinite(line.temperature); ++e) {
+    const int k = basis.expanding[e];
+    result.expansion[basis.first_expansion() + static_cast<Eigen::Index>(e)] = beam[k] * beam[k];
+    const double warmer = line.temperature - basis.reference_temperature;
+    for (Eigen::Index j = 0; j < points; ++j)
+      all(j, basis.first_expansion() + static_cast<Eigen::Index>(e)) =
+          beam[k] * warmer * (line.points[static_cast<std::size_t>(j)][k] - line.beam.start[k]);
   }
   for (int c = 0; c < basis.size; ++c)
     if (all.col(c).cwiseAbs().maxCoeff() > 1e-14) result.unknowns.push_back(c);
@@ -116,6 +130,8 @@ NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vec
       information = 0.5 * (information + information.transpose().eval());
     }
     sum.constant += constant;
+    sum.normal += rows[l].expansion * lines[l].noise.expansion_information * rows[l].expansion.transpose();
+    sum.right += lines[l].noise.expansion_information * lines[l].noise.expansion * rows[l].expansion;
     const Eigen::MatrixXd product = information * rows[l].rows;
     const Eigen::MatrixXd normal = rows[l].rows.transpose() * product;
     const Eigen::VectorXd right = rows[l].rows.transpose() * weighted;
@@ -143,7 +159,7 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
         system.blocks[k].precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
   }
   for (int i = basis.first_squareness(); i < basis.size; ++i)
-    posterior.prior_covariance(i, i) = prior.squareness * prior.squareness;
+    posterior.prior_covariance(i, i) = std::pow(constant_sd(basis, prior, i), 2);
   return posterior;
 }
 
@@ -161,22 +177,81 @@ Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
   const System system = build(equations, basis, prior);
   Evidence result;
   result.value = system.log_evidence;
-  // dL = 1/2 sum_k [ u' dK u + tr(dK K^-1 N (Sigma_kk - Q_k^-1) N' K^-1) ],  u = K^-1 N theta_k.
-  Eigen::MatrixXd inverse = Eigen::MatrixXd::Identity(basis.size, basis.size);
-  system.factor.matrixL().solveInPlace(inverse);
-  for (std::size_t k = 0; k < basis.blocks.size(); ++k) {
-    const auto& block = basis.blocks[k];
-    const BlockPrior& own = system.blocks[k];
-    const auto columns = inverse.block(block.first, block.first, basis.size - block.first, block.size());
-    const Eigen::MatrixXd change =
-        columns.transpose() * columns -
-        own.precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
-    const Eigen::MatrixXd w = own.solved * change * own.solved.transpose();
-    const Eigen::VectorXd u = own.solved * system.mean.segment(block.first, block.size());
-    for (const auto& slope : coefficient_covariance_slopes(basis, prior, block.component))
-      result.slope[slope.strength] += 0.5 * (u.dot(slope.matrix * u) + slope.matrix.cwiseProduct(w).sum());
+  // What the readings tell about the unknowns once the prior is known: G = Q - Q H^-1 Q. In the coefficients of the splines,
+  // W = K^-1 N Q^-1 G Q^-1 N' K^-1 = K^-1 N (Q^-1 - H^-1) N' K^-1, the precision of the coefficients' marginal data. Then
+  //   dL/dh = 1/2 [ u' dK u - tr(dK W_kk) ],  u = K^-1 N theta_k,   F_hg = 1/2 sum_ab tr(W_ba dK_h,a W_ab dK_g,b).
+  const Eigen::MatrixXd inverse = system.factor.solve(Eigen::MatrixXd::Identity(basis.size, basis.size));
+  struct Part {
+    std::size_t block;
+    std::vector<int> strengths;
+    Eigen::MatrixXd product;  // W(:, block) dK
+  };
+  std::vector<Eigen::Index> first;
+  Eigen::Index all = 0;
+  for (const auto& block : basis.blocks) {
+    first.push_back(all);
+    all += block.coefficients.rows();
+  }
+  Eigen::MatrixXd w = Eigen::MatrixXd::Zero(all, all);
+  for (std::size_t b = 0; b < basis.blocks.size(); ++b) {
+    const auto& own = basis.blocks[b];
+    const Eigen::MatrixXd& right = system.blocks[b].solved;
+    for (std::size_t a = 0; a <= b; ++a) {
+      const auto& other = basis.blocks[a];
+      Eigen::MatrixXd middle = -inverse.block(other.first, own.first, other.size(), own.size());
+      if (a == b)
+        middle += system.blocks[b].precision.llt().solve(Eigen::MatrixXd::Identity(own.size(), own.size()));
+      const Eigen::MatrixXd product = system.blocks[a].solved * middle * right.transpose();
+      w.block(first[a], first[b], product.rows(), product.cols()) = product;
+      if (a != b) w.block(first[b], first[a], product.cols(), product.rows()) = product.transpose();
+    }
+  }
+  std::vector<Part> parts;
+  for (std::size_t b = 0; b < basis.blocks.size(); ++b) {
+    const auto& block = basis.blocks[b];
+    const Eigen::Index n = block.coefficients.rows();
+    const Eigen::VectorXd u = system.blocks[b].solved * system.mean.segment(block.first, block.size());
+    for (auto& slope : coefficient_covariance_slopes(basis, prior, block.component)) {
+      const double change = 0.5 * (u.dot(slope.matrix * u) -
+                                   slope.matrix.cwiseProduct(w.block(first[b], first[b], n, n)).sum());
+      for (const int strength : slope.strengths) result.slope[strength] += change;
+      parts.push_back({b, std::move(slope.strengths), w.middleCols(first[b], n) * slope.matrix});
+    }
+  }
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      const Eigen::Index at_i = first[parts[i].block];
+      const Eigen::Index at_j = first[parts[j].block];
+      const double sum =
+          0.5 * parts[i]
+                    .product.middleRows(at_j, parts[j].product.cols())
+                    .cwiseProduct(parts[j].product.middleRows(at_i, parts[i].product.cols()).transpose())
+                    .sum();
+      for (const int h : parts[i].strengths) {
+        for (const int g : parts[j].strengths) {
+          result.information(h, g) += sum;
+          if (i != j) result.information(g, h) += sum;
+        }
+      }
+    }
   }
   return result;
+}
+
+Eigen::MatrixXd strength_effects(const GeometricBasis& basis, const GeometricPrior& prior,
+                                 const Posterior& posterior) {
+  // H theta = b and dQ = -N' K^-1 dK K^-1 N, so dtheta = H^-1 N' K^-1 dK K^-1 N theta.
+  Eigen::MatrixXd effects = Eigen::MatrixXd::Zero(basis.size, strength_count);
+  for (const auto& block : basis.blocks) {
+    const BlockPrior own = block_prior(basis, prior, block);
+    const Eigen::VectorXd u = own.solved * posterior.mean.segment(block.first, block.size());
+    for (const auto& slope : coefficient_covariance_slopes(basis, prior, block.component)) {
+      const Eigen::VectorXd moved = posterior.covariance.middleCols(block.first, block.size()) *
+                                    (own.solved.transpose() * (slope.matrix * u));
+      for (const int strength : slope.strengths) effects.col(strength) += moved;
+    }
+  }
+  return effects;
 }
 
 }  // namespace invar::metrology

@@ -15,6 +15,7 @@ struct LineRows {
   std::vector<int> unknowns;  // the columns that are not zero
   Eigen::MatrixXd rows;       // J x columns: d'(V(P_j) - V(S))
   Eigen::VectorXd remainder;  // J, what the squareness' linear form leaves out along the beam, m
+  Eigen::VectorXd expansion;  // size, the line's own expansion (`LineNoise`) by those of the axes
 };
 LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const Squareness& squareness);
 
@@ -35,7 +36,8 @@ NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vec
 /// The posterior of the unknowns under a prior: theta ~ N(mean, covariance).
 struct Posterior {
   Eigen::VectorXd mean;
-  Eigen::MatrixXd covariance;        // H^-1
+  Eigen::MatrixXd covariance;  // H^-1
+  Eigen::MatrixXd widened;     // the same, the strengths of the prior not known exactly either; may be empty
   Eigen::MatrixXd prior_covariance;  // Q^-1, block diagonal
   double log_evidence = 0.0;         // up to a constant of the data
 };
@@ -45,15 +47,26 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
 Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
                      const GeometricPrior& prior);
 
-/// Log evidence of a prior and its gradient by the log strengths.
+/// Log evidence of a prior, its gradient by the log strengths, and what the readings are expected to tell about these
+/// (Fisher's information).
 struct Evidence {
   double value = 0.0;
   Strengths slope = Strengths::Zero();
+  StrengthMatrix information = StrengthMatrix::Zero();
 };
 Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& prior);
 
-/// The prior that explains the readings best, under weak log-normal expectations about `expected`. About 30 evaluations.
-GeometricPrior most_evident(const NormalEquations& equations, const GeometricBasis& basis,
-                            const GeometricPrior& expected, const GeometricPrior& start);
+/// The prior that explains the readings best, and how well its log strengths are known from these readings.
+struct EvidentPrior {
+  GeometricPrior prior;
+  StrengthMatrix covariance = StrengthMatrix::Zero();  // of the log strengths
+};
+/// Fisher scoring from `start` under weak log-normal expectations about `expected`; about ten evaluations.
+EvidentPrior most_evident(const NormalEquations& equations, const GeometricBasis& basis,
+                          const GeometricPrior& expected, const GeometricPrior& start);
+
+/// How the unknowns move with the log strengths: size x strength_count. `posterior` must be that of `prior`.
+Eigen::MatrixXd strength_effects(const GeometricBasis& basis, const GeometricPrior& prior,
+                                 const Posterior& posterior);
 
 }  // namespace invar::metrology

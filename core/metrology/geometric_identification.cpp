@@ -1,5 +1,6 @@
 #include "core/metrology/geometric_identification.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -29,7 +30,8 @@ std::array<Range, 3> ranges_of(const Machine& machine, const std::vector<Condens
 }
 
 /// Spline pieces of an axis: one a data interval of the line that resolves it finest.
-int intervals_of(const std::vector<CondensedLine>& lines, int axis, Range range, int most) {
+int intervals_of(const std::vector<CondensedLine>& lines, int axis, Range range,
+                 const IdentificationOptions& options) {
   double finest = range.width() / 8.0;
   for (const auto& line : lines) {
     std::vector<double> places;
@@ -43,7 +45,8 @@ int intervals_of(const std::vector<CondensedLine>& lines, int axis, Range range,
                      steps.end());
     finest = std::min(finest, steps[steps.size() / 2]);
   }
-  return std::clamp(static_cast<int>(std::lround(range.width() / finest)), 8, std::max(8, most));
+  return std::clamp(static_cast<int>(std::lround(range.width() / finest)), options.least_intervals,
+                    std::max(options.least_intervals, options.most_intervals));
 }
 
 std::vector<Eigen::Vector3d> tools_of(const Machine& machine, const std::vector<CondensedLine>& lines) {
@@ -128,29 +131,36 @@ bool weaken_outlying_points(Identification& work, const Eigen::VectorXd& unknown
   return moved;
 }
 
-/// The covariance that standard deviations are told from. Of H^-1 = H^-1 M H^-1 + H^-1 Q H^-1 the first part is what the
-/// noise moves, the second what only the prior holds; the prior's strength comes from a handful of curves, so what it alone
-/// holds is known less well than it says (metrology.md section 4: up to 1.4 times on rank-deficient sets).
-Eigen::MatrixXd cautious_covariance(const Identification& work, bool has_prior) {
-  constexpr double caution = 1.7;  // of the variance that the prior alone holds
+/// Widens the posterior's covariance by what follows from not knowing the prior's strengths exactly. Of H^-1 = H^-1 M H^-1 +
+/// H^-1 Q H^-1 the first part is what the noise moves, the second what only the prior holds: it grows by the mean of
+/// exp(2 (log strength - its estimate)), component by component. And the unknowns themselves move with the strengths.
+void widen_by_strengths(Identification& work) {
+  constexpr double other_form =
+      0.15;  // of a log strength: real curves are no draws of this prior (metrology.md section 4)
+  const StrengthMatrix& strengths = work.strengths;
   const Eigen::MatrixXd& h = work.posterior.covariance;
-  if (!has_prior) return h;
-  Eigen::MatrixXd product = h;  // H^-1 Q, Q block diagonal
+  Eigen::MatrixXd product = h;  // H^-1 Q^(1/2), Q block diagonal, each block by its own growth
   for (const auto& block : work.basis.blocks) {
-    const Eigen::MatrixXd own =
-        work.posterior.prior_covariance.block(block.first, block.first, block.size(), block.size());
+    const int kind = static_cast<int>(kind_of(block.component));
+    const int own = first_relative + block.component;
+    const double variance =
+        strengths(kind, kind) + 2.0 * strengths(kind, own) + strengths(own, own) + other_form;
+    const double growth = std::expm1(2.0 * std::min(variance, 0.5));
+    const Eigen::LLT<Eigen::MatrixXd> prior{
+        work.posterior.prior_covariance.block(block.first, block.first, block.size(), block.size())};
     const Eigen::MatrixXd columns = h.middleCols(block.first, block.size());
-    product.middleCols(block.first, block.size()) = own.llt().solve(columns.transpose()).transpose();
+    product.middleCols(block.first, block.size()) =
+        std::sqrt(growth) * prior.matrixL().solve(columns.transpose()).transpose();
   }
-  for (int i = work.basis.first_squareness(); i < work.basis.size; ++i)
-    product.col(i) /= work.posterior.prior_covariance(i, i);
-  return h + (caution - 1.0) * product * h;
+  product.rightCols(work.basis.size - work.basis.first_squareness()).setZero();  // their prior is wide open
+  const Eigen::MatrixXd effects = strength_effects(work.basis, work.prior, work.posterior);
+  work.posterior.widened = h + product * product.transpose() + effects * strengths * effects.transpose();
 }
 
 /// Component and field standard deviations from the posterior.
-void fill_sigma(Identification& work, bool has_prior) {
+void fill_sigma(Identification& work) {
   GeometricModel& model = work.model;
-  const Eigen::MatrixXd all = cautious_covariance(work, has_prior);
+  const Eigen::MatrixXd& all = work.posterior.widened;
   for (const auto& block : work.basis.blocks) {
     const auto& spline = work.basis.splines[index(axis_of(block.component))];
     const Eigen::MatrixXd covariance = all.block(block.first, block.first, block.size(), block.size());
@@ -214,8 +224,7 @@ void fill_reversal(Identification& work) {
   }
 }
 
-void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges,
-                bool has_prior) {
+void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges) {
   GeometricModel& model = work.model;
   model.chain = machine.chain;
   model.travel = ranges;
@@ -226,7 +235,14 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
         work.basis.spline_coefficients(block.component, work.posterior.mean);
   model.squareness = work.basis.squareness(work.posterior.mean);
   fill_reversal(work);
-  fill_sigma(work, has_prior);
+  fill_sigma(work);
+  if (work.basis.expanding.empty()) return;
+  model.reference_temperature = work.basis.reference_temperature;
+  for (std::size_t e = 0; e < work.basis.expanding.size(); ++e) {
+    const Eigen::Index c = work.basis.first_expansion() + static_cast<Eigen::Index>(e);
+    model.expansion[index(work.basis.expanding[e])] = work.posterior.mean[c];
+    model.expansion_sigma[index(work.basis.expanding[e])] = std::sqrt(work.posterior.widened(c, c));
+  }
 }
 
 void make_rows(Identification& work, const Squareness& squareness) {
@@ -327,9 +343,16 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
   const auto ranges = ranges_of(machine, work.lines);
   std::array<int, 3> intervals{1, 1, 1};
   for (int k = 0; k < 3; ++k)
-    if (machine.chain.has(k))
-      intervals[index(k)] = intervals_of(work.lines, k, ranges[index(k)], options.most_intervals);
+    if (machine.chain.has(k)) intervals[index(k)] = intervals_of(work.lines, k, ranges[index(k)], options);
   work.basis = make_basis(machine.chain, ranges, intervals, tools_of(machine, work.lines));
+  double warmth = 0.0;
+  double warm_lines = 0.0;
+  for (const auto& line : work.lines) {
+    if (!std::isfinite(line.temperature)) continue;
+    warmth += line.temperature;
+    warm_lines += 1.0;
+  }
+  if (warm_lines > 0.0) work.basis.add_expansion(warmth / warm_lines);
   work.prior = expected_prior(options.prior, ranges);
   work.misfit = options.misfit;
   double squares = 0.0;
@@ -346,23 +369,31 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
   make_rows(work, work.basis.squareness(work.posterior.mean));
   work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit);
 
+  const GeometricPrior expected = work.prior;
+  work.strengths = options.strengths;
+  for (int round = 0; round < 2 && options.search_prior; ++round) {
+    say(0.2 + 0.4 * round, "searching the prior");
+    const EvidentPrior found = most_evident(work.equations, work.basis, expected, work.prior);
+    work.prior = found.prior;
+    work.strengths = found.covariance;
+    work.misfit = most_evident_misfit(work, options.misfit);
+    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+    const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
+    if (!weaken_outlying_points(work, mean) && round > 0) break;
+    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+  }
+  work.posterior = solve(work.equations, work.basis, work.prior);
+  widen_by_strengths(work);
   if (options.method == IdentificationMethod::displacement) {
-    work.posterior = solve_in_stages(work.lines, work.rows, work.basis, work.prior, work.misfit);
-  } else {
-    const GeometricPrior expected = work.prior;
-    for (int round = 0; round < 2 && options.search_prior; ++round) {
-      say(0.2 + 0.4 * round, "searching the prior");
-      work.prior = most_evident(work.equations, work.basis, expected, work.prior);
-      work.misfit = most_evident_misfit(work, options.misfit);
-      work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
-      const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
-      if (!weaken_outlying_points(work, mean) && round > 0) break;
-      work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
-    }
-    work.posterior = solve(work.equations, work.basis, work.prior);
+    // Steps that use each line once have an error beside the posterior's: where all lines at once would have put it.
+    const Eigen::VectorXd mean = mean_in_stages(work.lines, work.rows, work.basis, expected, options.misfit);
+    const Eigen::VectorXd off = mean - work.posterior.mean;
+    work.posterior.mean = mean;
+    work.posterior.covariance += off * off.transpose();
+    work.posterior.widened += off * off.transpose();
   }
   say(0.9, "field and its deviation");
-  fill_model(work, machine, ranges, options.method == IdentificationMethod::full);
+  fill_model(work, machine, ranges);
   return work;
 }
 

@@ -20,10 +20,12 @@ enum class IdentificationMethod {
 
 struct IdentificationOptions {
   IdentificationMethod method = IdentificationMethod::full;
-  int most_intervals = 24;   // spline pieces an axis at most
-  bool search_prior = true;  // by evidence; false keeps `prior` and `misfit`
-  GeometricPrior prior;      // expected beforehand; lengths of zero mean a third of the longest travel
-  double misfit = 5e-8;      // m
+  int least_intervals = 8;   // spline pieces an axis at least
+  int most_intervals = 24;   // and at most
+  bool search_prior = true;  // by evidence; false keeps `prior`, `strengths` and `misfit`
+  StrengthMatrix strengths = StrengthMatrix::Zero();  // how well the prior's log strengths are known
+  GeometricPrior prior;  // expected beforehand; lengths of zero mean a third of the longest travel
+  double misfit = 5e-8;  // m
   std::function<void(double part, const std::string& what)> progress;  // may be empty
 };
 
@@ -32,6 +34,7 @@ struct Identification {
   GeometricModel model;
   GeometricBasis basis;
   GeometricPrior prior;
+  StrengthMatrix strengths = StrengthMatrix::Zero();  // covariance of the prior's log strengths
   double misfit = 0.0;
   NormalEquations equations;
   Posterior posterior;

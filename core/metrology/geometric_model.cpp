@@ -86,4 +86,26 @@ Eigen::Vector3d GeometricModel::sigma_at(const Eigen::Vector3d& position,
   return result.cwiseSqrt();
 }
 
+Eigen::Vector3d GeometricModel::expansion_at(const Eigen::Vector3d& position,
+                                             double temperature) const noexcept {
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3 && reference_temperature; ++k)
+    if (chain.has(k))
+      result[k] =
+          expansion[index(k)] * (temperature - *reference_temperature) * travel[index(k)].clamp(position[k]);
+  return result;
+}
+
+Eigen::Vector3d GeometricModel::expansion_sigma_at(const Eigen::Vector3d& position,
+                                                   double temperature) const noexcept {
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3 && reference_temperature; ++k) {
+    if (!chain.has(k)) continue;
+    const Range r = travel[index(k)];
+    result[k] = std::abs(expansion_sigma[index(k)] * (temperature - *reference_temperature) *
+                         (r.clamp(position[k]) - 0.5 * (r.lower + r.upper)));
+  }
+  return result;
+}
+
 }  // namespace invar::metrology

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "core/base/range.hpp"
@@ -34,6 +35,10 @@ struct GeometricModel {
   /// Lost motion of each axis [m]: where it stands after moving forward minus after moving backward, half to either side
   /// of `error`. Zero where no line along the axis was measured both ways.
   std::array<double, 3> reversal{};
+  /// Where temperatures were measured: all else holds at the reference; an axis grows by expansion * (T - reference) * q.
+  std::optional<double> reference_temperature;  // degC
+  std::array<double, 3> expansion{};            // 1/K, of each axis with its scale
+  std::array<double, 3> expansion_sigma{};      // 1/K
   SigmaGrid field_sigma;
 
   [[nodiscard]] double component(int component, double q) const noexcept;
@@ -48,6 +53,12 @@ struct GeometricModel {
   /// convention. Another tool than the calibration's adds the angles' share as if independent.
   [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position,
                                          const Eigen::Vector3d& tool) const noexcept;
+  /// What another temperature [degC] adds to `error` [m], and its standard deviation about mid travel; zero without a
+  /// reference.
+  [[nodiscard]] Eigen::Vector3d expansion_at(const Eigen::Vector3d& position,
+                                             double temperature) const noexcept;
+  [[nodiscard]] Eigen::Vector3d expansion_sigma_at(const Eigen::Vector3d& position,
+                                                   double temperature) const noexcept;
 };
 
 }  // namespace invar::metrology

@@ -38,6 +38,8 @@ Strengths log_strengths(const GeometricPrior& prior) {
   logs[6] = std::log(prior.fine_amplitude[0]);
   logs[7] = std::log(prior.fine_amplitude[1]);
   logs[8] = std::log(prior.fine_length);
+  for (int c = 0; c < component_count; ++c)
+    logs[first_relative + c] = std::log(prior.relative[static_cast<std::size_t>(c)]);
   return logs;
 }
 
@@ -50,6 +52,8 @@ GeometricPrior with_log_strengths(const GeometricPrior& prior, const Strengths& 
   result.fine_amplitude[0] = std::exp(logs[6]);
   result.fine_amplitude[1] = std::exp(logs[7]);
   result.fine_length = std::exp(logs[8]);
+  for (int c = 0; c < component_count; ++c)
+    result.relative[static_cast<std::size_t>(c)] = std::exp(logs[first_relative + c]);
   return result;
 }
 
@@ -58,11 +62,12 @@ Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const Geomet
   const auto axis = static_cast<std::size_t>(axis_of(component));
   const auto& spline = basis.splines[axis];
   const MotionKind kind = kind_of(component);
-  const double variance = prior.amplitude[index(kind)] * prior.amplitude[index(kind)];
+  const double amplitude = prior.amplitude_of(component);
+  const double variance = amplitude * amplitude;
   const double fine = prior.fine_amplitude[index(kind)] * prior.fine_amplitude[index(kind)];
   const double width = spline.interval().width();
-  const double slope = kind == MotionKind::positioning ? prior.positioning_slope * width
-                                                       : prior.angle_slope * prior.amplitude[index(kind)];
+  const double slope =
+      kind == MotionKind::positioning ? prior.positioning_slope * width : prior.angle_slope * amplitude;
   Eigen::MatrixXd covariance(spline.size(), spline.size());
   for (int i = 0; i < spline.size(); ++i) {
     for (int j = 0; j <= i; ++j) {
@@ -85,18 +90,18 @@ std::vector<CovarianceSlope> coefficient_covariance_slopes(const GeometricBasis&
   const auto& spline = basis.splines[axis];
   const MotionKind kind = kind_of(component);
   const int k = static_cast<int>(kind);
-  const double variance = prior.amplitude[index(kind)] * prior.amplitude[index(kind)];
+  const double variance = prior.amplitude_of(component) * prior.amplitude_of(component);
   const double fine = prior.fine_amplitude[index(kind)] * prior.fine_amplitude[index(kind)];
   GeometricPrior coarse = prior;  // only what scales with the amplitude
   coarse.fine_amplitude[index(kind)] = 0.0;
   coarse.positioning_slope = 0.0;
   std::vector<CovarianceSlope> slopes;
-  slopes.push_back({k, 2.0 * coefficient_covariance(basis, coarse, component)});
+  slopes.push_back({{k, first_relative + component}, 2.0 * coefficient_covariance(basis, coarse, component)});
   const auto fill = [&](int strength, auto entry) {
     Eigen::MatrixXd matrix(spline.size(), spline.size());
     for (int i = 0; i < spline.size(); ++i)
       for (int j = 0; j <= i; ++j) matrix(i, j) = matrix(j, i) = entry(spline.place(i) - spline.place(j));
-    slopes.push_back({strength, std::move(matrix)});
+    slopes.push_back({{strength}, std::move(matrix)});
   };
   fill(3 + k, [&](double d) { return variance * matern52(d, prior.length[index(kind)]).slope; });
   if (kind == MotionKind::angle) return slopes;

@@ -24,21 +24,35 @@ struct GeometricPrior {
   double positioning_slope = 2e-4;                        // sd of the scale error of an axis
   double angle_slope = 2.0;  // sd of an angle's linear part over the axis' range, in amplitudes
   double squareness = 5e-3;  // rad, sd
+  double expansion = 2e-5;   // 1/K, sd: steel 1.2e-5, aluminium 2.3e-5
+  /// Of the amplitude of its kind, by component: no two axes of a machine are equally good.
+  std::array<double, component_count> relative = [] {
+    std::array<double, component_count> ones{};
+    ones.fill(1.0);
+    return ones;
+  }();
+  [[nodiscard]] double amplitude_of(int component) const {
+    return amplitude[static_cast<std::size_t>(kind_of(component))] *
+           relative[static_cast<std::size_t>(component)];
+  }
 };
 
 /// The prior's covariance of the spline coefficients of one component: Matern 5/2 at their places + diffuse slope
 /// and offset (the gauge removes the latter).
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior,
                                        int component);
-/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length.
-inline constexpr int strength_count = 9;
+/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length, and
+/// how much stronger each component is than its kind.
+inline constexpr int first_relative = 9;
+inline constexpr int strength_count = first_relative + component_count;
 using Strengths = Eigen::Matrix<double, strength_count, 1>;
+using StrengthMatrix = Eigen::Matrix<double, strength_count, strength_count>;
 Strengths log_strengths(const GeometricPrior& prior);
 GeometricPrior with_log_strengths(const GeometricPrior& prior, const Strengths& logs);
 
-/// Derivatives of a component's covariance by the log strengths that act on it.
+/// Derivative of a component's covariance by the log strengths that act on it alike.
 struct CovarianceSlope {
-  int strength = 0;
+  std::vector<int> strengths;
   Eigen::MatrixXd matrix;
 };
 std::vector<CovarianceSlope> coefficient_covariance_slopes(const GeometricBasis& basis,

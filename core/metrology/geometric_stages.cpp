@@ -55,14 +55,14 @@ Role step_of(int component) {
 
 }  // namespace
 
-Posterior solve_in_stages(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
-                          const GeometricBasis& basis, const GeometricPrior& prior, double misfit) {
+Eigen::VectorXd mean_in_stages(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                               const GeometricBasis& basis, const GeometricPrior& prior, double misfit) {
   NormalEquations nothing;
   nothing.normal = Eigen::MatrixXd::Zero(basis.size, basis.size);
   nothing.right = Eigen::VectorXd::Zero(basis.size);
-  Posterior result = solve(nothing, basis, prior);  // mean zero, covariance of the prior
+  const Eigen::MatrixXd beforehand = solve(nothing, basis, prior).prior_covariance;
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(basis.size);
   const std::vector<Role> roles = roles_of(lines);
-  std::vector<int> known;
   for (const Role step : {Role::axis, Role::parallel, Role::plane_diagonal, Role::elsewhere}) {
     std::vector<CondensedLine> chosen_lines;
     std::vector<LineRows> chosen_rows;
@@ -76,31 +76,21 @@ Posterior solve_in_stages(const std::vector<CondensedLine>& lines, const std::ve
       if (step_of(block.component) == step)
         for (int i = 0; i < block.size(); ++i) unknown.push_back(block.first + i);
     if (step == Role::plane_diagonal)
-      for (int i = basis.first_squareness(); i < basis.size; ++i) unknown.push_back(i);
-    if (!chosen_lines.empty() && !unknown.empty()) {
-      const NormalEquations equations = assemble(chosen_lines, chosen_rows, basis.size, misfit);
-      const Eigen::MatrixXd precision =
-          result.prior_covariance(unknown, unknown)
-              .llt()
-              .solve(Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(unknown.size()),
-                                               static_cast<Eigen::Index>(unknown.size())));
-      const Eigen::LLT<Eigen::MatrixXd> factor{
-          Eigen::MatrixXd{equations.normal(unknown, unknown) + precision}};
-      const Eigen::MatrixXd carried = -factor.solve(Eigen::MatrixXd{equations.normal(unknown, known)});
-      const Eigen::VectorXd mean = factor.solve(Eigen::VectorXd{equations.right(unknown)}) +
-                                   carried * Eigen::VectorXd{result.mean(known)};
-      const Eigen::MatrixXd shared = carried * Eigen::MatrixXd{result.covariance(known, known)};
-      const Eigen::MatrixXd own =
-          factor.solve(Eigen::MatrixXd::Identity(precision.rows(), precision.cols())) +
-          shared * carried.transpose();
-      result.mean(unknown) = mean;
-      result.covariance(unknown, unknown) = own;
-      result.covariance(unknown, known) = shared;
-      result.covariance(known, unknown) = shared.transpose();
-    }
-    known.insert(known.end(), unknown.begin(), unknown.end());
+      for (int i = basis.first_squareness(); i < basis.first_expansion(); ++i) unknown.push_back(i);
+    if (step == Role::axis)
+      for (int i = basis.first_expansion(); i < basis.size; ++i) unknown.push_back(i);
+    if (chosen_lines.empty() || unknown.empty()) continue;
+    const NormalEquations equations = assemble(chosen_lines, chosen_rows, basis.size, misfit);
+    const auto count = static_cast<Eigen::Index>(unknown.size());
+    const Eigen::MatrixXd covariance = beforehand(unknown, unknown);
+    const Eigen::MatrixXd precision = covariance.llt().solve(Eigen::MatrixXd::Identity(count, count));
+    // What earlier steps found is taken as known; the unknowns of this one are still zero in `mean`.
+    const Eigen::VectorXd right = equations.right - equations.normal * mean;
+    const Eigen::MatrixXd normal = equations.normal(unknown, unknown) + precision;
+    const Eigen::VectorXd found = normal.llt().solve(Eigen::VectorXd{right(unknown)});
+    mean(unknown) = found;
   }
-  return result;
+  return mean;
 }
 
 }  // namespace invar::metrology

@@ -10,9 +10,8 @@ namespace invar::metrology {
 /// Positioning from the axis lines, angles from the parallels beside them (difference of readings over the offset,
 /// erratum E9), straightness and squareness from the diagonals of the coordinate planes after every known term is
 /// subtracted (E8, E11, E12: what one reading cannot split goes to both in equal measure), rolls from the
-/// diagonals elsewhere (E13). The prior only smooths and shares; its strengths stay as given. Uncertainty is handed
-/// from step to step; what no step sees keeps the prior's.
-Posterior solve_in_stages(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
-                          const GeometricBasis& basis, const GeometricPrior& prior, double misfit);
+/// diagonals elsewhere (E13). The prior only smooths and shares; its strengths stay as given. What no step sees is zero.
+Eigen::VectorXd mean_in_stages(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                               const GeometricBasis& basis, const GeometricPrior& prior, double misfit);
 
 }  // namespace invar::metrology

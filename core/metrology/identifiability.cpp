@@ -52,6 +52,7 @@ Identifiability identifiability(const GeometricBasis& basis, const Posterior& po
                                 const Squareness& squareness, const std::array<Range, 3>& travel,
                                 const Eigen::Vector3d& tool) {
   Identifiability result;
+  const Eigen::MatrixXd& told = posterior.widened.size() > 0 ? posterior.widened : posterior.covariance;
   std::vector<Eigen::MatrixXd> scaled;  // rows at knots over the component's prior sd
   std::vector<int> first;
   for (const auto& block : basis.blocks) {
@@ -64,7 +65,7 @@ Identifiability identifiability(const GeometricBasis& basis, const Posterior& po
     const double before = part(posterior.prior_covariance);
     const double after = part(posterior.covariance);
     result.components.push_back({std::string{iso_name(block.component)}, std::min(after / before, 1.0),
-                                 std::sqrt(after / static_cast<double>(rows.rows()))});
+                                 std::sqrt(part(told) / static_cast<double>(rows.rows()))});
     scaled.push_back(rows / std::sqrt(before));
     first.push_back(block.first);
   }
@@ -74,7 +75,7 @@ Identifiability identifiability(const GeometricBasis& basis, const Posterior& po
     const double after = posterior.covariance(k, k);
     // Its prior is very wide, so a tenth of the standard deviation left is much already.
     result.components.push_back({std::string{squareness_iso_name(basis.pairs[i])},
-                                 std::min(std::sqrt(after / before), 1.0), std::sqrt(after)});
+                                 std::min(std::sqrt(after / before), 1.0), std::sqrt(told(k, k))});
     scaled.push_back(Eigen::MatrixXd::Constant(1, 1, 1.0 / std::sqrt(before)));
     first.push_back(static_cast<int>(k));
   }
@@ -111,7 +112,7 @@ Identifiability identifiability(const GeometricBasis& basis, const Posterior& po
   }
   std::stable_sort(result.unidentified.begin(), result.unidentified.end(),
                    [](const auto& a, const auto& b) { return a.left > b.left; });
-  result.volumetric_rms = volumetric(basis, posterior.covariance, squareness, travel, tool);
+  result.volumetric_rms = volumetric(basis, told, squareness, travel, tool);
   result.volumetric_rms_prior = volumetric(basis, posterior.prior_covariance, squareness, travel, tool);
   return result;
 }

@@ -1,6 +1,7 @@
 #include "core/metrology/line_plan.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -43,15 +44,15 @@ std::string name_of(const Machine& machine, const Eigen::Vector3d& from, const E
 }
 
 PlannedLine line(const Machine& machine, const std::array<double, 3>& from, const std::array<double, 3>& to) {
-  PlannedLine result;
-  result.from = at(machine, from[0], from[1], from[2]);
-  result.to = at(machine, to[0], to[1], to[2]);
-  result.tool = machine.tool;
-  result.name = name_of(machine, result.from, result.to);
-  return result;
+  return line_between(machine, at(machine, from[0], from[1], from[2]), at(machine, to[0], to[1], to[2]));
 }
 
-/// Directions of the field's shape at a grid: V'V summed, so that the trace with a covariance is a squared RMS.
+}  // namespace
+
+PlannedLine line_between(const Machine& machine, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  return {name_of(machine, from, to), from, to, machine.tool};
+}
+
 Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
                              const std::array<Range, 3>& travel, const Eigen::Vector3d& tool) {
   const auto nodes = volume_nodes(basis.chain, travel);
@@ -65,8 +66,6 @@ Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squa
   }
   return all.transpose() * all;
 }
-
-}  // namespace
 
 std::vector<PlannedLine> recipe_lines(const Machine& machine, int level) {
   using P = std::array<double, 3>;
@@ -166,6 +165,29 @@ CondensedLine planned_equations(const PlannedLine& planned, const Effort& effort
   return result;
 }
 
+GeometricPrior assumed_prior(const Machine& machine, double motions, double angles) {
+  GeometricPrior prior;
+  double longest = 0.0;
+  for (int k = 0; k < 3; ++k)
+    if (machine.chain.has(k)) longest = std::max(longest, machine.travel[index(k)].width());
+  prior.length.fill(longest / 3.0);
+  // The share of a curve's variance that is left about its best line, over the longest axis.
+  GeometricBasis basis;
+  basis.splines.fill(numerics::CubicBSpline{Range{0.0, longest}, 20});
+  GeometricPrior waves = prior;
+  waves.angle_slope = 0.0;
+  const Eigen::MatrixXd covariance = coefficient_covariance(basis, waves, rotation(0, 0));
+  const auto n = covariance.rows();
+  Eigen::MatrixXd line(n, 2);
+  line << Eigen::VectorXd::Ones(n), Eigen::VectorXd::LinSpaced(n, -1.0, 1.0);
+  const Eigen::MatrixXd apart =
+      Eigen::MatrixXd::Identity(n, n) - line * (line.transpose() * line).inverse() * line.transpose();
+  const double share = (apart * covariance * apart).trace() / static_cast<double>(n) /
+                       (waves.amplitude[2] * waves.amplitude[2]);
+  prior.amplitude = {motions / std::sqrt(share), motions / std::sqrt(share), angles / std::sqrt(share)};
+  return prior;
+}
+
 Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
                    const GeometricPrior& given, double misfit) {
   Expectation result;
@@ -199,7 +221,7 @@ std::vector<NextLine> next_lines(const Machine& machine, const Identification& f
   const auto& basis = found.basis;
   const Eigen::MatrixXd weight =
       shape_weight(basis, found.model.squareness, found.model.travel, found.model.tool);
-  const Eigen::MatrixXd& covariance = found.posterior.covariance;
+  const Eigen::MatrixXd& covariance = found.posterior.widened;
   const double now = covariance.cwiseProduct(weight).sum();
   const Eigen::MatrixXd spread = covariance * weight * covariance;
   double readings = 0.0;

@@ -25,6 +25,9 @@ std::vector<PlannedLine> recipe_lines(const Machine& machine, int level);
 /// Lines worth considering beside the recipe's: parallels along every edge, both body diagonals and their like.
 std::vector<PlannedLine> candidate_lines(const Machine& machine);
 
+/// The line from one point to another, named by what moves and what stands off, with the machine's tool.
+PlannedLine line_between(const Machine& machine, const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 struct Effort {
   double interval = 0.02;  // m, along a line
   int passes = 6;          // readings of each point
@@ -37,13 +40,22 @@ int points_of(const PlannedLine& line, double interval);
 /// The line as equations without readings, for predicting accuracy: zero point and reversal free.
 CondensedLine planned_equations(const PlannedLine& line, const Effort& effort);
 
-/// What to expect from a set of lines under a prior (defaults are a decent machine; better: those of a pilot).
+/// The prior of a machine whose error motions have these RMS sizes about their best straight lines [m, rad]; for planning
+/// without a pilot. A prior's amplitude is more: it also holds what the straight line takes away.
+GeometricPrior assumed_prior(const Machine& machine, double motions, double angles);
+
+/// What to expect from a set of lines under a prior (of a pilot, or assumed).
 struct Expectation {
   Identifiability knowledge;
   int readings = 0;
 };
 Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
                    const GeometricPrior& prior, double misfit = 5e-8);
+
+/// Weight of the field's shape: its trace with a covariance of the unknowns is the mean square of the error vector [m^2]
+/// over the travels, rigid motion removed.
+Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
+                             const std::array<Range, 3>& travel, const Eigen::Vector3d& tool);
 
 /// A line not yet measured and what it would leave of the expected volumetric error.
 struct NextLine {

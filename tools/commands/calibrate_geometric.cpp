@@ -2,6 +2,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -103,12 +104,23 @@ recording::Table predict_geometric(const config::Yaml& model_file, const recordi
     (void)fill("tool_" + letter, tools);
   }
   if (!any) (void)inputs.in("x", "m");  // says what is missing
+  const auto temperature = inputs.optionally_in("temperature", "degC");
+  if (temperature && !model.reference_temperature)
+    std::cerr
+        << model_file.file().string()
+        << ": was calibrated without temperatures; the column `temperature` of the inputs changes nothing\n";
   recording::Table result;
   std::array<std::vector<double>, 6> columns;
   for (std::size_t i = 0; i < positions.size(); ++i) {
-    const Eigen::Vector3d error = model.error(positions[i], tools[i]);
-    const Eigen::Vector3d sigma = model.sigma_at(positions[i], tools[i]);
-    const bool known = positions[i].allFinite() && tools[i].allFinite();
+    Eigen::Vector3d error = model.error(positions[i], tools[i]);
+    Eigen::Vector3d sigma = model.sigma_at(positions[i], tools[i]);
+    bool known = positions[i].allFinite() && tools[i].allFinite();
+    if (temperature && model.reference_temperature) {
+      known = known && std::isfinite((*temperature)[i]);
+      error += model.expansion_at(positions[i], (*temperature)[i]);
+      const Eigen::Vector3d more = model.expansion_sigma_at(positions[i], (*temperature)[i]);
+      sigma = (sigma.cwiseAbs2() + more.cwiseAbs2()).cwiseSqrt();
+    }
     for (int k = 0; k < 3; ++k) {
       const auto c = static_cast<std::size_t>(k);
       columns[c].push_back(known ? error[k] : std::numeric_limits<double>::quiet_NaN());

@@ -1,4 +1,6 @@
 // `invar calibrate plan`: the lines, interval and passes to measure for a wanted accuracy, and what to expect of them.
+#include <unistd.h>
+
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +10,7 @@
 
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/line_plan.hpp"
+#include "core/metrology/line_search.hpp"
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
@@ -27,11 +30,15 @@ struct Options {
   std::filesystem::path output;
   double accuracy = 0.0;
   double noise = 1e-6;
+  double motions = 2e-6;
+  double angles = 8e-6;
   double setup_minutes = 15.0;
   double reading_seconds = 3.0;
+  bool search = false;
 };
 
 struct Choice {
+  bool searched = false;
   std::vector<PlannedLine> lines;
   Effort effort;
   metrology::Expectation expectation;
@@ -68,8 +75,7 @@ void write_lines(const Choice& choice, const std::filesystem::path& file) {
 
 void plan(const Options& options) {
   metrology::Machine machine = machine::load_machine(options.machine);
-  metrology::GeometricPrior prior;
-  prior.length = {0.0, 0.0, 0.0};
+  metrology::GeometricPrior prior = metrology::assumed_prior(machine, options.motions, options.angles);
   double noise = options.noise;
   double misfit = 5e-8;
   if (!options.pilot.empty()) {
@@ -85,12 +91,30 @@ void plan(const Options& options) {
   for (int k = 0; k < 3; ++k)
     if (machine.chain.has(k))
       longest = std::max(longest, machine.travel[static_cast<std::size_t>(k)].width());
+  struct Set {
+    bool searched;
+    std::vector<PlannedLine> lines;
+  };
+  std::vector<Set> sets;
+  for (int level = 0; level < 3; ++level) sets.push_back({false, metrology::recipe_lines(machine, level)});
+  for (int level = 0; level < 3 && options.search; ++level) {
+    const bool watched = isatty(STDERR_FILENO) != 0;
+    const auto progress = [&](double part) {
+      if (watched)
+        std::cerr << "\r\033[K" << static_cast<int>(100.0 * (level + part) / 3.0) << " % searching lines"
+                  << std::flush;
+    };
+    sets.push_back({true, metrology::search_lines(machine, metrology::recipe_lines(machine, level),
+                                                  {longest / 20.0, 6, noise}, prior, misfit, progress)});
+    if (watched) std::cerr << "\r\033[K" << std::flush;
+  }
   std::vector<Choice> choices;
-  for (int level = 0; level < 3; ++level) {
+  for (const Set& set : sets) {
     for (const double pieces : {10.0, 20.0, 40.0}) {
       for (const int passes : {2, 6}) {
         Choice choice;
-        choice.lines = metrology::recipe_lines(machine, level);
+        choice.searched = set.searched;
+        choice.lines = set.lines;
         choice.effort = {longest / pieces, passes, noise};
         choice.expectation = metrology::expect(machine, choice.lines, choice.effort, prior, misfit);
         choice.minutes = static_cast<double>(choice.lines.size()) * options.setup_minutes +
@@ -101,20 +125,22 @@ void plan(const Options& options) {
   }
   const Choice* best = nullptr;
   const Choice* finest = &choices.front();
-  std::printf("%6s %10s %7s %9s %8s %12s\n", "lines", "interval", "passes", "readings", "minutes",
+  std::printf("%6s %-8s %10s %7s %9s %8s %12s\n", "lines", "", "interval", "passes", "readings", "minutes",
               "expected RMS");
   for (const Choice& choice : choices) {
     const double expected = choice.expectation.knowledge.volumetric_rms;
-    std::printf("%6zu %7.1f mm %7d %9d %8.0f %9.2f um\n", choice.lines.size(), 1e3 * choice.effort.interval,
-                choice.effort.passes, choice.expectation.readings, choice.minutes, 1e6 * expected);
+    std::printf("%6zu %-8s %7.1f mm %7d %9d %8.0f %9.2f um\n", choice.lines.size(),
+                choice.searched ? "searched" : "recipe", 1e3 * choice.effort.interval, choice.effort.passes,
+                choice.expectation.readings, choice.minutes, 1e6 * expected);
     if (expected < finest->expectation.knowledge.volumetric_rms) finest = &choice;
     if (expected <= options.accuracy && (best == nullptr || choice.minutes < best->minutes)) best = &choice;
   }
   std::fflush(stdout);
   if (best == nullptr) {
     std::cout << um(options.accuracy) << " is out of reach with these lines: the best is "
-              << um(finest->expectation.knowledge.volumetric_rms)
-              << "; a quieter laser, more passes or a machine that repeats better would be needed\n";
+              << um(finest->expectation.knowledge.volumetric_rms) << "; "
+              << (options.search ? "" : "--search looks for better lines; else ")
+              << "a quieter laser, more passes or a machine that repeats better would be needed\n";
     throw CLI::RuntimeError(1);
   }
   std::cout << "\nmeasure " << best->lines.size() << " lines every "
@@ -135,7 +161,8 @@ void plan(const Options& options) {
 void add_calibrate_plan(CLI::App& group) {
   auto* command =
       group.add_subcommand("plan", "Propose the displacement lines to measure for a wanted accuracy");
-  command->footer("Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --output plan.csv");
+  command->footer(
+      "Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --search --output plan.csv");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
@@ -146,6 +173,18 @@ void add_calibrate_plan(CLI::App& group) {
   command->add_option("--noise", options->noise, "standard deviation of one reading [m], without a pilot")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  command
+      ->add_option("--motions", options->motions,
+                   "positioning and straightness expected, RMS about the best line [m], without a pilot")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command
+      ->add_option("--angles", options->angles,
+                   "angular error motions expected, RMS about the best line [rad], without a pilot")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->add_flag("--search", options->search,
+                    "also search end points freely over the travels, not only the recipe (some seconds)");
   command->add_option("--setup", options->setup_minutes, "time to set up a line [min]")
       ->capture_default_str();
   command->add_option("--reading", options->reading_seconds, "time a reading takes [s]")

@@ -34,6 +34,8 @@ std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count
   out << "// Volumetric error by Invar: actual minus commanded position, mm; axes as measured (ISO 841).\n"
       << "// Tool offset of the calibration: " << 1e3 * model.tool.x() << ' ' << 1e3 * model.tool.y() << ' '
       << 1e3 * model.tool.z() << " mm. Compensation list: file_format ISG_CSV, interpolation GRID.\n";
+  if (model.reference_temperature)
+    out << "// Holds at a machine temperature of " << *model.reference_temperature << " degC.\n";
   for (int k = 0; k < 3; ++k)
     if (model.chain.has(k)) out << upper(k) << ' ';
   for (int k = 0; k < 3; ++k)
@@ -70,6 +72,9 @@ std::string linuxcnc_compensation(const metrology::GeometricModel& model, int ax
     const double half = 0.5 * model.reversal[index(axis)];
     out << 1e3 * position[axis] << ' ' << 1e3 * (actual + half) << ' ' << 1e3 * (actual - half) << '\n';
   }
+  // The controller stops reading at the first line that is no triplet, so words can only stand at the end.
+  out << "# joint of " << upper(axis) << ": nominal, actual moving forward, actual moving backward [mm], "
+      << "COMP_FILE_TYPE = 0\n";
   return out.str();
 }
 

@@ -1,5 +1,6 @@
 // The HTML page of a geometric calibration: what was found, how sure it is, what it leaves, what is still open.
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -18,6 +19,10 @@ using report::Series;
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
 
+std::string place(const Eigen::Vector3d& p) {
+  return "(" + number(1e3 * p.x(), 4) + ", " + number(1e3 * p.y(), 4) + ", " + number(1e3 * p.z(), 4) + ")";
+}
+
 Series series(const std::string& label, Series::Style style, const std::string& colour) {
   Series result;
   result.label = label;
@@ -26,8 +31,45 @@ Series series(const std::string& label, Series::Style style, const std::string& 
   return result;
 }
 
-/// A component over its axis with its two-sigma band.
-Plot component_plot(const GeometricModel& model, int component) {
+/// What the readings say of a component: its fit plus what is left of each reading, over the component's share in it. Only
+/// readings in which it weighs at least half as much as it can.
+Series component_data(const GeometricResult& result, int component) {
+  const auto& found = result.found;
+  const GeometricModel& model = found.model;
+  const int axis = metrology::axis_of(component);
+  const Eigen::Matrix3d directions = metrology::axis_directions(model.chain, model.squareness);
+  const Eigen::Vector3d along = Eigen::Vector3d::Unit(metrology::direction_of(component));
+  struct Point {
+    double q, share, rest;
+  };
+  std::vector<Point> points;
+  double largest = 0.0;
+  for (std::size_t l = 0; l < found.lines.size(); ++l) {
+    const auto& line = found.lines[l];
+    if (std::abs(line.beam.direction[axis]) < 1e-6) continue;  // its axis stands still
+    for (std::size_t j = 0; j < line.points.size(); ++j) {
+      const double rest = result.rest[l][static_cast<Eigen::Index>(j)];
+      if (!std::isfinite(rest)) continue;
+      const Eigen::Vector3d arm =
+          metrology::lever_arms(model.chain, directions, line.points[j], line.tools[j]).col(axis);
+      const double share =
+          line.beam.direction.dot(metrology::is_rotation(component) ? along.cross(arm) : along);
+      points.push_back({line.points[j][axis], share, rest});
+      largest = std::max(largest, std::abs(share));
+    }
+  }
+  Series data = series("", Series::Style::points, "#c98a2b");
+  for (const Point& point : points) {
+    if (std::abs(point.share) < 0.5 * largest || largest < 1e-9) continue;
+    data.x.push_back(1e3 * point.q);
+    data.y.push_back(1e6 * (model.component(component, point.q) + point.rest / point.share));
+  }
+  return data;
+}
+
+/// A component over its axis with its two-sigma band and what the readings say of it.
+Plot component_plot(const GeometricResult& result, int component) {
+  const GeometricModel& model = result.found.model;
   const bool angle = metrology::is_rotation(component);
   const int axis = metrology::axis_of(component);
   const Range range = model.travel[index(axis)];
@@ -47,7 +89,7 @@ Plot component_plot(const GeometricModel& model, int component) {
   plot.title = std::string{metrology::iso_name(component)} + " = " + metrology::seed_name(component);
   plot.x_label = letter(axis) + " [mm]";
   plot.y_label = angle ? "[urad]" : "[um]";
-  plot.series = {band, line};
+  plot.series = {band, component_data(result, component), line};
   plot.width = 380;
   plot.height = 240;
   return plot;
@@ -61,9 +103,10 @@ Plot line_plot(const GeometricResult& result, std::size_t l) {
   for (std::size_t j = 0; j < order.size(); ++j) order[j] = j;
   const auto along = [&](std::size_t j) { return line.beam.direction.dot(line.points[j] - line.beam.start); };
   std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return along(a) < along(b); });
-  Series measured = series("before", Series::Style::points, "#c0392b");
-  Series model = series("model", Series::Style::line, "#1f5fa8");
-  Series left = series("after", Series::Style::line, "#2e8b57");
+  Series measured = series("", Series::Style::points, "#c0392b");
+  Series model = series("", Series::Style::line, "#1f5fa8");
+  Series left = series("", Series::Style::line, "#2e8b57");
+  Series unseen = series("", Series::Style::dashed, "#7d3c98");
   double offset = 0.0;
   double count = 0.0;
   for (const std::size_t j : order) {
@@ -82,12 +125,16 @@ Plot line_plot(const GeometricResult& result, std::size_t l) {
     model.y.push_back(1e6 * fitted[i]);
     left.x.push_back(q);
     left.y.push_back(1e6 * (line.deviation[i] - offset - fitted[i]));
+    if (result.unseen[l].size() == 0) continue;
+    unseen.x.push_back(q);
+    unseen.y.push_back(1e6 * result.unseen[l][i]);
   }
   Plot plot;
   plot.title = "line " + line.name;
   plot.x_label = "along the beam [mm]";
   plot.y_label = "[um]";
   plot.series = {measured, model, left};
+  if (!unseen.x.empty()) plot.series.push_back(unseen);
   plot.width = 480;
   plot.height = 260;
   return plot;
@@ -150,16 +197,9 @@ Plot field_plot(const GeometricModel& model) {
 
 Plot residual_histogram(const GeometricResult& result) {
   std::vector<double> rest;
-  for (std::size_t l = 0; l < result.found.lines.size(); ++l) {
-    const auto& line = result.found.lines[l];
-    const Eigen::VectorXd left = line.deviation - metrology::predicted_readings(result.found.model, line);
-    double mean = 0.0;
-    double count = 0.0;
-    for (Eigen::Index j = 0; j < left.size(); ++j)
-      if (std::isfinite(left[j])) mean += left[j], count += 1.0;
-    for (Eigen::Index j = 0; j < left.size(); ++j)
-      if (std::isfinite(left[j])) rest.push_back(1e6 * (left[j] - mean / count));
-  }
+  for (const auto& line : result.rest)
+    for (const double value : line)
+      if (std::isfinite(value)) rest.push_back(1e6 * value);
   double square = 0.0;
   for (const double r : rest) square += r * r;
   const double sigma = std::sqrt(square / static_cast<double>(std::max<std::size_t>(rest.size(), 1)));
@@ -222,9 +262,27 @@ void write_lines(report::Page& page, const GeometricResult& result) {
         "Errors of displacement in um. \"Unseen\" is the line predicted from the others alone, as it would "
         "have "
         "been without measuring it.");
+  std::vector<std::vector<std::string>> paths;
+  for (std::size_t l = 0; l < result.found.lines.size(); ++l) {
+    const auto& line = result.found.lines[l];
+    if ((line.beam.direction.array().abs() > 1e-6).count() < 2) continue;
+    const auto& f = result.figures[l];
+    const double after = full ? f.unseen_max : f.after_max;
+    const Eigen::Vector3d end = line.beam.start + line.beam.length * line.beam.direction;
+    paths.push_back({line.name, place(line.beam.start), place(end), number(1e3 * line.beam.length, 4),
+                     number(1e6 * f.before_max), number(1e6 * after),
+                     number(100.0 * (1.0 - after / std::max(f.before_max, 1e-12)))});
+  }
+  if (!paths.empty())
+    page.table({"diagonal", "from [mm]", "to [mm]", "range [mm]", "max error before [um]",
+                full ? "max error after, not fitted [um]" : "max error after [um]", "improvement [%]"},
+               paths);
   std::vector<Plot> plots;
   for (std::size_t l = 0; l < result.found.lines.size(); ++l) plots.push_back(line_plot(result, l));
-  page.plots(std::move(plots), "Displacement error along each line before and after compensation.");
+  page.plots(std::move(plots),
+             "Displacement error along each line: measured before compensation (points), the model (blue), "
+             "left after it (green), and "
+             "left after a compensation that never saw this line (dashed).");
 }
 
 void write_components(report::Page& page, const GeometricResult& result) {
@@ -243,7 +301,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
   std::vector<Plot> plots;
   for (int c = 0; c < metrology::component_count; ++c) {
     if (model.coefficients[index(c)].size() == 0) continue;
-    plots.push_back(component_plot(model, c));
+    plots.push_back(component_plot(result, c));
     const Range range = model.travel[index(metrology::axis_of(c))];
     double lowest = std::numeric_limits<double>::infinity();
     double highest = -lowest;
@@ -259,7 +317,9 @@ void write_components(report::Page& page, const GeometricResult& result) {
   }
   page.table({"component", "seed's symbol", "lowest", "highest", "2 sigma at most", "unit"}, rows);
   page.plots(std::move(plots),
-             "Each error motion with its two-sigma band. Zero at the origin of its axis; straightness "
+             "Each error motion with its two-sigma band; points: the fit plus what is left of each reading, "
+             "over the "
+             "motion's share in it. Zero at the origin of its axis; straightness "
              "without end-point slope, which is squareness.");
 }
 
@@ -275,10 +335,6 @@ void write_knowledge(report::Page& page, const GeometricResult& result) {
   if (!result.next.empty()) {
     std::vector<std::vector<std::string>> rows;
     for (const auto& next : result.next) {
-      const auto place = [](const Eigen::Vector3d& p) {
-        return "(" + number(1e3 * p.x(), 4) + ", " + number(1e3 * p.y(), 4) + ", " + number(1e3 * p.z(), 4) +
-               ")";
-      };
       rows.push_back(
           {next.line.name, place(next.line.from), place(next.line.to), report::si(next.volumetric_rms, "m")});
     }
@@ -302,6 +358,36 @@ void write_knowledge(report::Page& page, const GeometricResult& result) {
   page.table({"component", "left open", "sigma [um or urad]"}, rows);
 }
 
+/// Accuracy against data interval, from the same readings thinned.
+void write_intervals(report::Page& page, const GeometricResult& result) {
+  page.heading("Data interval");
+  Series expected = series("expected over the volume", Series::Style::line, "#1f5fa8");
+  Series on_points = series("on all points, those left out included", Series::Style::dashed, "#2e8b57");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& one : result.intervals) {
+    rows.push_back({report::si(one.interval, "m"), std::to_string(one.points),
+                    report::si(one.points_rms, "m"), number(1e7 * one.integral),
+                    report::si(one.expected_rms, "m")});
+    expected.x.push_back(1e3 * one.interval);
+    expected.y.push_back(1e6 * one.expected_rms);
+    on_points.x.push_back(1e3 * one.interval);
+    on_points.y.push_back(1e6 * one.points_rms);
+  }
+  if (const auto* chosen = interval_to_choose(result))
+    page.callout("Choose " + report::si(chosen->interval, "m") +
+                     ": the coarsest interval that costs at most a tenth of the accuracy.",
+                 "good");
+  page.table({"interval", "points used", "RMS on all points", "integral on the longest line [1e-7 m2]",
+              "expected over the volume"},
+             rows);
+  Plot plot;
+  plot.title = "accuracy against data interval";
+  plot.x_label = "interval [mm]";
+  plot.y_label = "RMS [um]";
+  plot.series = {expected, on_points};
+  page.plot(std::move(plot));
+}
+
 }  // namespace
 
 report::Page report_page(const GeometricResult& result) {
@@ -319,6 +405,8 @@ report::Page report_page(const GeometricResult& result) {
   page.paragraph(std::to_string(found.lines.size()) + " lines, " + std::to_string(result.input.rows) +
                  " readings; noise of one reading " + report::si(found.noise, "m") +
                  ", what no smooth model explains " + report::si(found.misfit, "m") + ".");
+  if (const std::string words = temperature_words(result); !words.empty())
+    page.paragraph("Temperature" + words.substr(std::string{"temperature"}.size()) + ".");
   for (const auto& name : result.input.without_length)
     page.callout("Line " + name + " has no length and was left out.", "warn");
   if (result.input.far_off > 0)
@@ -332,12 +420,7 @@ report::Page report_page(const GeometricResult& result) {
   page.heading("Field");
   page.plots({field_plot(found.model), residual_histogram(result)});
   if (!result.intervals.empty()) {
-    page.heading("Data interval");
-    std::vector<std::vector<std::string>> rows;
-    for (const auto& one : result.intervals)
-      rows.push_back({report::si(one.interval, "m"), std::to_string(one.points),
-                      report::si(one.points_rms, "m"), report::si(one.expected_rms, "m")});
-    page.table({"interval", "points used", "RMS on all points", "expected over the volume"}, rows);
+    write_intervals(page, result);
   }
   return page;
 }

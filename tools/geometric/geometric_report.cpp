@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <ostream>
 
 namespace invar::tools {
@@ -10,23 +11,40 @@ namespace {
 
 using metrology::Identification;
 
+/// Of the values that are numbers.
 double rms(const Eigen::VectorXd& values) {
-  return values.size() == 0 ? 0.0 : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+  double square = 0.0;
+  double count = 0.0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    square += value * value;
+    count += 1.0;
+  }
+  return count > 0.0 ? std::sqrt(square / count) : 0.0;
 }
 
-/// Measured deviation less its prediction from `unknowns`, both zero at their mean over the line's good points: where
-/// the laser was zeroed is no property of the machine.
+double largest(const Eigen::VectorXd& values) {
+  double result = 0.0;
+  for (const double value : values)
+    if (std::isfinite(value)) result = std::max(result, std::abs(value));
+  return result;
+}
+
+/// Measured deviation less its prediction from `unknowns`, zero at its mean over the line's good points: where the laser
+/// was zeroed is no property of the machine. NaN where no reading is left or the point does not fit.
 Eigen::VectorXd rest_of(const Identification& found, std::size_t l, const Eigen::VectorXd& unknowns) {
   Eigen::VectorXd rest = found.lines[l].deviation - found.rows[l].remainder;
   for (Eigen::Index i = 0; i < found.rows[l].rows.cols(); ++i)
     rest -= found.rows[l].rows.col(i) * unknowns[found.rows[l].unknowns[static_cast<std::size_t>(i)]];
-  std::vector<double> good;
-  for (Eigen::Index j = 0; j < rest.size(); ++j)
-    if (std::isfinite(rest[j]) && found.point_weights[l][j] > 0.5) good.push_back(rest[j]);
   double mean = 0.0;
-  for (const double value : good) mean += value / static_cast<double>(good.size());
-  return Eigen::Map<const Eigen::VectorXd>(good.data(), static_cast<Eigen::Index>(good.size())).array() -
-         mean;
+  double count = 0.0;
+  for (Eigen::Index j = 0; j < rest.size(); ++j) {
+    if (found.point_weights[l][j] <= 0.5) rest[j] = std::numeric_limits<double>::quiet_NaN();
+    if (!std::isfinite(rest[j])) continue;
+    mean += rest[j];
+    count += 1.0;
+  }
+  return rest.array() - mean / std::max(count, 1.0);
 }
 
 /// The unknowns from all lines but one, at the same prior.
@@ -51,27 +69,23 @@ void evaluate(GeometricResult& result) {
   double points = 0.0;
   for (std::size_t l = 0; l < found.lines.size(); ++l) {
     LineFigures figures;
-    const Eigen::VectorXd untouched = rest_of(found, l, Eigen::VectorXd::Zero(found.basis.size));
-    Eigen::VectorXd raw(found.lines[l].deviation.size());
-    Eigen::Index good = 0;
-    for (Eigen::Index j = 0; j < raw.size(); ++j)
-      if (std::isfinite(found.lines[l].deviation[j])) raw[good++] = found.lines[l].deviation[j];
-    raw.conservativeResize(good);
+    const Eigen::VectorXd& raw = found.lines[l].deviation;
     const Eigen::VectorXd fitted = rest_of(found, l, found.posterior.mean);
     const bool full = result.method == "full" && found.lines.size() > 1;
-    const Eigen::VectorXd predicted = full ? rest_of(found, l, without(found, l)) : untouched;
     figures.before_rms = rms(raw);
-    figures.before_max = raw.size() > 0 ? raw.cwiseAbs().maxCoeff() : 0.0;
+    figures.before_max = largest(raw);
     figures.after_rms = rms(fitted);
-    figures.after_max = fitted.size() > 0 ? fitted.cwiseAbs().maxCoeff() : 0.0;
-    figures.unseen_rms = full ? rms(predicted) : 0.0;
-    figures.unseen_max = full && predicted.size() > 0 ? predicted.cwiseAbs().maxCoeff() : 0.0;
+    figures.after_max = largest(fitted);
+    result.rest.push_back(fitted);
+    result.unseen.push_back(full ? rest_of(found, l, without(found, l)) : Eigen::VectorXd{});
+    figures.unseen_rms = rms(result.unseen.back());
+    figures.unseen_max = largest(result.unseen.back());
     result.figures.push_back(figures);
-    result.unseen.push_back(predicted);
-    before += raw.squaredNorm();
-    after += fitted.squaredNorm();
-    unseen += full ? predicted.squaredNorm() : 0.0;
-    points += static_cast<double>(fitted.size());
+    const double count = static_cast<double>((fitted.array() == fitted.array()).count());
+    before += count * figures.before_rms * figures.before_rms;
+    after += count * figures.after_rms * figures.after_rms;
+    unseen += count * figures.unseen_rms * figures.unseen_rms;
+    points += count;
     result.unseen_max = std::max(result.unseen_max, figures.unseen_max);
   }
   result.before_rms = std::sqrt(before / points);
@@ -79,9 +93,19 @@ void evaluate(GeometricResult& result) {
   result.unseen_rms = std::sqrt(unseen / points);
   result.knowledge = metrology::identifiability(found.basis, found.posterior, found.model.squareness,
                                                 found.model.travel, found.model.tool);
-  result.knowledge.volumetric_rms = std::hypot(
-      result.knowledge.volumetric_rms, std::sqrt(static_cast<double>(found.basis.chain.axes)) * found.misfit);
+  // What repeats but no smooth model explains stays, whatever is measured more.
+  const double stays = std::sqrt(static_cast<double>(found.basis.chain.axes)) * found.misfit;
+  result.knowledge.volumetric_rms = std::hypot(result.knowledge.volumetric_rms, stays);
   if (result.method == "full") result.next = metrology::next_lines(result.machine, found, 3);
+  for (auto& next : result.next) next.volumetric_rms = std::hypot(next.volumetric_rms, stays);
+}
+
+const IntervalFigures* interval_to_choose(const GeometricResult& result) {
+  constexpr double enough = 1.1;  // times the accuracy at the finest interval
+  const IntervalFigures* chosen = nullptr;
+  for (const auto& one : result.intervals)
+    if (one.expected_rms <= enough * result.intervals.front().expected_rms) chosen = &one;
+  return chosen;
 }
 
 void study_intervals(GeometricResult& result) {
@@ -117,10 +141,14 @@ void study_intervals(GeometricResult& result) {
     metrology::IdentificationOptions how;
     how.search_prior = false;
     how.prior = all.prior;
+    how.strengths = all.strengths;
     how.misfit = all.misfit;
+    for (const auto& spline : all.basis.splines)
+      how.least_intervals = std::max(how.least_intervals, spline.intervals());
     const auto found = metrology::identify(result.machine, kept, how);
     double square = 0.0;
     double count = 0.0;
+    double integral = 0.0;
     for (const auto& line : all.lines) {
       Eigen::VectorXd rest = line.deviation - metrology::predicted_readings(found.model, line);
       std::vector<double> good;
@@ -130,11 +158,50 @@ void study_intervals(GeometricResult& result) {
       for (const double value : good) mean += value / static_cast<double>(good.size());
       for (const double value : good) square += (value - mean) * (value - mean);
       count += static_cast<double>(good.size());
+      if (line.beam.length < length - 1e-9 || integral > 0.0) continue;
+      for (const double value : good)
+        integral += std::abs(value - mean) * line.beam.length / static_cast<double>(good.size());
     }
     const auto knowledge = metrology::identifiability(found.basis, found.posterior, found.model.squareness,
                                                       found.model.travel, found.model.tool);
-    result.intervals.push_back({interval, points, std::sqrt(square / count), knowledge.volumetric_rms});
+    const double expected = std::hypot(knowledge.volumetric_rms,
+                                       std::sqrt(static_cast<double>(all.basis.chain.axes)) * all.misfit);
+    result.intervals.push_back({interval, points, std::sqrt(square / count), expected, integral});
   }
+}
+
+std::vector<Expansion> expansions(const Identification& found) {
+  std::vector<Expansion> result;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    if (!found.model.reference_temperature || !found.model.chain.has(k)) continue;
+    result.push_back({std::string(1, metrology::axis_letters[i]), found.model.expansion[i],
+                      found.model.expansion_sigma[i],
+                      found.model.expansion_sigma[i] < 0.5 * found.prior.expansion});
+  }
+  return result;
+}
+
+std::string temperature_words(const GeometricResult& result) {
+  if (!result.found.model.reference_temperature || !result.input.temperature) return "";
+  const Range range = *result.input.temperature;
+  std::string known;
+  std::string open;
+  for (const auto& one : expansions(result.found)) {
+    if (one.known)
+      known += (known.empty() ? "" : ", ") + one.axis + " " + micro(one.value) + " +- " + micro(one.sigma) +
+               " ppm/K";
+    else
+      open += (open.empty() ? "" : ", ") + one.axis;
+  }
+  std::string words = "temperature " + report::number(range.lower, 4) + " to " +
+                      report::number(range.upper, 4) + " degC: the model holds at " +
+                      report::number(*result.found.model.reference_temperature, 4) + " degC";
+  if (!known.empty()) words += "; expansion " + known;
+  if (!open.empty())
+    words += "; the readings do not tell the expansion of " + open + " (assumed 0 +- " +
+             micro(result.found.prior.expansion) + " ppm/K)";
+  return words;
 }
 
 nlohmann::json report_json(const GeometricResult& result) {
@@ -148,6 +215,15 @@ nlohmann::json report_json(const GeometricResult& result) {
   json["lines_rms"] = {{"before", result.before_rms}, {"after", result.after_rms}, {"unit", "m"}};
   if (result.method == "full" && found.lines.size() > 1) json["lines_rms"]["unseen"] = result.unseen_rms;
   json["volumetric_rms_predicted"] = result.knowledge.volumetric_rms;
+  if (found.model.reference_temperature) {
+    json["temperature"] = {{"reference", *found.model.reference_temperature},
+                           {"lowest", result.input.temperature->lower},
+                           {"highest", result.input.temperature->upper},
+                           {"unit", "degC"}};
+    for (const auto& one : expansions(found))
+      json["temperature"]["expansion"][one.axis] = {
+          {"value", one.value}, {"sigma", one.sigma}, {"known", one.known}, {"unit", "1/K"}};
+  }
   json["unidentified"] = nlohmann::json::array();
   for (const auto& one : result.knowledge.unidentified) {
     // One component alone is its bare name; a combination names all its members.
@@ -167,7 +243,9 @@ nlohmann::json report_json(const GeometricResult& result) {
     json["intervals"].push_back({{"interval", one.interval},
                                  {"points", one.points},
                                  {"points_rms", one.points_rms},
+                                 {"integral", one.integral},
                                  {"volumetric_rms_predicted", one.expected_rms}});
+  if (const auto* chosen = interval_to_choose(result)) json["interval_to_choose"] = chosen->interval;
   for (int pair = 0; pair < metrology::squareness_count; ++pair) {
     const auto p = static_cast<std::size_t>(pair);
     if (found.model.squareness_sigma[p] <= 0.0) continue;
@@ -202,7 +280,13 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   if (result.unseen_rms > 0.0) out << ", " << micro(result.unseen_rms) << " um on lines not fitted";
   out << " (RMS)\nexpected over the volume: " << micro(result.knowledge.volumetric_rms)
       << " um (RMS of the vector)\n";
+  if (const std::string words = temperature_words(result); !words.empty()) out << words << '\n';
   for (const auto& one : result.knowledge.unidentified) out << "not identified: " << one.words() << '\n';
+  if (const auto* chosen = interval_to_choose(result))
+    out << "data interval to choose: " << report::si(chosen->interval, "m") << ", expected "
+        << micro(chosen->expected_rms) << " um over the volume ("
+        << report::si(result.intervals.front().interval, "m") << ": "
+        << micro(result.intervals.front().expected_rms) << " um)\n";
   if (!result.next.empty() && !result.knowledge.unidentified.empty())
     out << "the next line that would help most: " << result.next.front().line.name << ", expected then "
         << micro(result.next.front().volumetric_rms) << " um\n";

@@ -29,6 +29,8 @@ struct IntervalFigures {
   int points = 0;
   double points_rms = 0.0;    // m, over all points, those left out included
   double expected_rms = 0.0;  // m, over the volume
+  double integral =
+      0.0;  // m^2, of the error's size along the first of the longest lines, as in the seed's Table 2.3
 };
 
 struct GeometricResult {
@@ -41,7 +43,9 @@ struct GeometricResult {
   std::vector<metrology::NextLine> next;   // that would help most
   std::vector<IntervalFigures> intervals;  // filled by study_intervals
   std::vector<LineFigures> figures;        // by line
-  std::vector<Eigen::VectorXd> unseen;     // by line: measured minus predicted from the others, m
+  std::vector<Eigen::VectorXd> rest;  // by line and point: measured minus model, m; NaN for points left out
+  std::vector<Eigen::VectorXd>
+      unseen;  // the same predicted from the other lines alone; empty where impossible
   double before_rms = 0.0, after_rms = 0.0, unseen_rms = 0.0, unseen_max = 0.0;  // m, over all lines
 };
 
@@ -50,6 +54,18 @@ void evaluate(GeometricResult& result);
 
 /// Accuracy against data interval (every second, fourth, eighth point of the lines), at the prior found.
 void study_intervals(GeometricResult& result);
+/// The coarsest interval that costs at most a tenth of the accuracy; nullptr without a study.
+const IntervalFigures* interval_to_choose(const GeometricResult& result);
+
+/// Expansion of an axis with its scale [1/K]; `known` where the readings tell it better than half of what was expected.
+struct Expansion {
+  std::string axis;
+  double value = 0.0, sigma = 0.0;
+  bool known = false;
+};
+std::vector<Expansion> expansions(const metrology::Identification& found);
+/// One line on temperatures: range, reference, expansion; empty without the column.
+std::string temperature_words(const GeometricResult& result);
 
 nlohmann::json report_json(const GeometricResult& result);
 report::Page report_page(const GeometricResult& result);

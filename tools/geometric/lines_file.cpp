@@ -72,6 +72,17 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
   const auto displacement = table.in("displacement", "m");
   const auto positions = read_positions(table, machine);
   const auto direction = table.optionally_in("direction", "1");
+  const auto temperature = table.optionally_in("temperature", "degC");
+  for (std::size_t i = 0; temperature && i < temperature->size(); ++i) {
+    const double value = (*temperature)[i];
+    if (std::isfinite(value) && (value < -50.0 || value > 200.0))
+      refuse(table, "temperature", i, report::number(value, 6) + " degC is no temperature of a machine",
+             "check the value and its unit");
+    if (!std::isfinite(value)) continue;
+    result.temperature = result.temperature ? Range{std::min(result.temperature->lower, value),
+                                                    std::max(result.temperature->upper, value)}
+                                            : Range{value, value};
+  }
   std::vector<Eigen::Vector3d> tools(table.rows(), machine.tool);
   for (int k = 0; k < 3; ++k) {
     const auto values = table.optionally_in(column_name("tool_", k), "m");
@@ -97,6 +108,7 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
     reading.tool = tools[i];
     reading.displacement = displacement[i];
     reading.direction = direction && (*direction)[i] < 0.0 ? -1 : 1;
+    if (temperature) reading.temperature = (*temperature)[i];
     result.lines[found->second].readings.push_back(reading);
   }
   if (first_value == table.rows())

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/base/range.hpp"
 #include "core/metrology/displacement_line.hpp"
 #include "core/metrology/machine.hpp"
 
@@ -16,6 +18,7 @@ struct LinesFile {
   int without_value = 0;  // rows with an empty displacement
   int far_off = 0;        // rows so wrong that no statistics are needed (1 % of the line and more)
   std::vector<std::string> without_length;  // lines that were left out
+  std::optional<Range> temperature;         // degC, of all readings; nothing without the column
 };
 
 /// Reads the columns of calibration.md. `interval` [m] above 0 keeps only points at its multiples from the line's start

@@ -21,8 +21,12 @@ class GeometricFileTest : public ::testing::Test {
     std::mt19937_64 random{11};
     machine = metrology::testing::random_machine({{1, 0, 2}, 2}, {0.2, 0.2, 0.0}, random);
     std::vector<metrology::DisplacementLine> lines;
+    metrology::testing::Laser laser;
+    laser.temperature = 20.0;
+    laser.warming = 1.0;
     for (const auto& one : metrology::recipe_lines(machine, 1))
-      lines.push_back(metrology::testing::measure(machine, one.name, one.from, one.to, 11, one.tool, random));
+      lines.push_back(
+          metrology::testing::measure(machine, one.name, one.from, one.to, 11, one.tool, random, laser));
     model = metrology::identify(machine, lines).model;
     ModelText text{"geometric", {}};
     write_geometric(text, model);
@@ -50,6 +54,10 @@ TEST_F(GeometricFileTest, ReadsBackTheSameField) {
     EXPECT_EQ(read.sigma_at(position, model.tool).head<2>(), model.sigma_at(position, model.tool).head<2>());
   }
   EXPECT_EQ(read.reversal, model.reversal);
+  ASSERT_TRUE(read.reference_temperature);
+  EXPECT_EQ(*read.reference_temperature, *model.reference_temperature);
+  EXPECT_EQ(read.expansion_at({0.1, 0.05, 0.0}, 25.0), model.expansion_at({0.1, 0.05, 0.0}, 25.0));
+  EXPECT_GT(read.expansion_sigma_at({0.2, 0.0, 0.0}, 25.0).x(), 0.0);
 }
 
 TEST_F(GeometricFileTest, RefusesADamagedFile) {

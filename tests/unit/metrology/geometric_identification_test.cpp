@@ -8,6 +8,7 @@
 
 #include "core/metrology/identifiability.hpp"
 #include "core/metrology/line_plan.hpp"
+#include "core/metrology/line_search.hpp"
 #include "core/metrology/volumetric_table.hpp"
 #include "tests/unit/metrology/simulated_machine.hpp"
 
@@ -120,12 +121,59 @@ TEST(Identification, SurvivesOutliersReversalDriftAndABeamBreak) {
   EXPECT_NEAR(found.noise, std::hypot(1e-6, 0.5e-6), 0.2e-6);
 }
 
+TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {
+  std::mt19937_64 random{14};
+  RecordProperty("seed", 14);
+  Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  machine.errors->expansion = {11e-6, 23e-6, 0.0};
+  machine.errors->reference_temperature = 21.5;
+  std::vector<DisplacementLine> with;
+  Laser laser;
+  laser.warming = 0.6;
+  laser.temperature = 20.0;
+  for (const auto& one : recipe_lines(machine, 1)) {
+    with.push_back(measure(machine, one.name, one.from, one.to, 21, one.tool, random, laser));
+    laser.temperature += 0.5;  // it warms up from line to line
+  }
+  auto without = with;
+  for (auto& line : without)
+    for (auto& reading : line.readings) reading.temperature = std::numeric_limits<double>::quiet_NaN();
+  const GeometricModel model = identify(machine, with).model;
+  ASSERT_TRUE(model.reference_temperature);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_LT(model.expansion_sigma[k], 3e-6);
+    EXPECT_NEAR(model.expansion[k], machine.errors->expansion[k], 3.5 * model.expansion_sigma[k]);
+  }
+  // The truth is asked for at 21.5 degC, the model's reference is another: scale it there.
+  const auto at_truth = [&](const GeometricModel& any) {
+    const auto directions = axis_directions(machine.chain, machine.errors->squareness);
+    const auto grid = volume_grid(machine.chain, machine.travel, 7);
+    Eigen::MatrixXd modes(2 * static_cast<long>(grid.size()), 3);
+    Eigen::VectorXd field(modes.rows());
+    for (std::size_t g = 0; g < grid.size(); ++g) {
+      const Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool, {0, 0, 0}, 21.5) -
+                                any.error(grid[g], machine.tool) - any.expansion_at(grid[g], 21.5);
+      field.segment<2>(2 * static_cast<long>(g)) = e.head<2>();
+      modes.middleRows<2>(2 * static_cast<long>(g)) << 1, 0, -grid[g].y(), 0, 1, grid[g].x();
+    }
+    field -= modes * modes.householderQr().solve(field).eval();
+    return std::sqrt(field.squaredNorm() / static_cast<double>(grid.size()));
+  };
+  const double ignoring = at_truth(identify(machine, without).model);
+  EXPECT_LT(at_truth(model), 1.0e-6);
+  EXPECT_LT(at_truth(model), 0.5 * ignoring);
+  EXPECT_GT(model.expansion_sigma_at({0.2, 0.0, 0.0}, 31.5).x(),
+            model.expansion_sigma_at({0.2, 0.0, 0.0}, 22.5).x());
+  EXPECT_FALSE(identify(machine, without).model.reference_temperature);
+}
+
 TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
   std::mt19937_64 random{5};
   RecordProperty("seed", 5);
   double before = 0.0;
   double steps = 0.0;
   double full = 0.0;
+  double inside = 0.0;
   for (int m = 0; m < 4; ++m) {
     const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
     auto plan = recipe_lines(machine, 1);
@@ -138,9 +186,11 @@ TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
     const GeometricModel in_steps = identify(machine, lines, options).model;
     full += left_over(machine, &at_once).rms;
     steps += left_over(machine, &in_steps).rms;
+    inside += left_over(machine, &in_steps).inside / 4;
   }
   EXPECT_LT(steps, 0.8 * before);
   EXPECT_LT(full, 1.15 * steps);
+  EXPECT_GT(inside, 0.85);  // the steps' sigma is as honest
 }
 
 TEST(Identifiability, NamesWhatTwoLinesAndFourLinesLeaveOpen) {
@@ -187,6 +237,35 @@ TEST(LinePlan, ExpectsWhatIsFoundAndProposesTheMissingLine) {
       identifiability(better.basis, better.posterior, better.model.squareness, machine.travel, machine.tool)
           .volumetric_rms;
   EXPECT_NEAR(then, next.front().volumetric_rms, 0.35 * then);
+}
+
+TEST(LinePlan, SearchedLinesBeatTheRecipeOnMachinesThatTheSearchDidNotKnow) {
+  std::mt19937_64 random{15};
+  RecordProperty("seed", 15);
+  Machine any;
+  any.chain = xy;
+  any.travel = {Range{0, 0.2}, Range{0, 0.2}, Range{0, 0}};
+  const GeometricPrior prior = assumed_prior(any, 2e-6, 8e-6);
+  const Effort effort{0.02, 6, std::hypot(1e-6, 0.5e-6)};
+  const auto recipe = recipe_lines(any, 0);
+  const auto searched = search_lines(any, recipe, effort, prior);
+  ASSERT_EQ(searched.size(), recipe.size());
+  EXPECT_EQ((searched[0].to - searched[0].from).norm(), 0.2);  // the axes stay
+  const double expected = expect(any, searched, effort, prior).knowledge.volumetric_rms;
+  EXPECT_LT(expected, 0.95 * expect(any, recipe, effort, prior).knowledge.volumetric_rms);
+  double square = 0.0;
+  double better = 0.0;  // mean log of what the recipe leaves over what the searched lines leave
+  constexpr int machines = 24;
+  for (int m = 0; m < machines; ++m) {
+    const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+    const auto found = identify(machine, measured(machine, searched, 11, random));
+    const double left = left_over(machine, &found.model).rms;
+    const auto other = identify(machine, measured(machine, recipe, 11, random));
+    square += left * left / machines;
+    better += std::log(left_over(machine, &other.model).rms / left) / machines;
+  }
+  EXPECT_NEAR(std::sqrt(square) / expected, 1.0, 0.35);
+  EXPECT_GT(better, 0.05);
 }
 
 TEST(LinePlan, TheRecipeLeavesNothingOpenForAnyChain) {
@@ -256,6 +335,56 @@ TEST(Evidence, ItsGradientIsThatOfFiniteDifferences) {
         2e-3;
     EXPECT_NEAR(slope[i], difference, 1e-3 + 1e-3 * std::abs(difference)) << "strength " << i;
   }
+}
+
+TEST(Evidence, TheUnknownsMoveWithTheStrengthsAsFiniteDifferencesSay) {
+  std::mt19937_64 random{11};
+  RecordProperty("seed", 11);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  const auto found = identify(machine, measured(machine, recipe_lines(machine, 0), 11, random));
+  const Posterior posterior = solve(found.equations, found.basis, found.prior);
+  const Eigen::MatrixXd effects = strength_effects(found.basis, found.prior, posterior);
+  const Strengths logs = log_strengths(found.prior);
+  for (int i = 0; i < strength_count; ++i) {
+    Strengths up = logs;
+    Strengths down = logs;
+    up[i] += 1e-3;
+    down[i] -= 1e-3;
+    const Eigen::VectorXd difference =
+        (solve_mean(found.equations, found.basis, with_log_strengths(found.prior, up)).mean -
+         solve_mean(found.equations, found.basis, with_log_strengths(found.prior, down)).mean) /
+        2e-3;
+    EXPECT_LT((effects.col(i) - difference).norm(), 1e-3 * difference.norm() + 1e-10) << "strength " << i;
+  }
+}
+
+TEST(Evidence, ItsInformationIsTheMeanCurvatureOverReadingsDrawnFromThePrior) {
+  // Draw unknowns and readings from the prior itself: the mean of slope * slope' is Fisher's information.
+  std::mt19937_64 random{12};
+  RecordProperty("seed", 12);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  const auto found = identify(machine, measured(machine, recipe_lines(machine, 0), 11, random));
+  const Posterior prior = solve(found.equations, found.basis, found.prior);
+  const Eigen::MatrixXd root = prior.prior_covariance.llt().matrixL();
+  const Eigen::MatrixXd noise =
+      Eigen::MatrixXd{found.equations.normal + 1e-9 * found.equations.normal.trace() *
+                                                   Eigen::MatrixXd::Identity(root.rows(), root.cols())}
+          .llt()
+          .matrixL();
+  std::normal_distribution<double> normal;
+  NormalEquations drawn = found.equations;
+  constexpr int draws = 400;
+  Strengths square = Strengths::Zero();
+  for (int d = 0; d < draws; ++d) {
+    const Eigen::VectorXd unknowns =
+        root * Eigen::VectorXd::NullaryExpr(root.cols(), [&] { return normal(random); });
+    drawn.right = found.equations.normal * unknowns +
+                  noise * Eigen::VectorXd::NullaryExpr(root.cols(), [&] { return normal(random); });
+    square += evidence(drawn, found.basis, found.prior).slope.cwiseAbs2() / draws;
+  }
+  const StrengthMatrix information = evidence(found.equations, found.basis, found.prior).information;
+  for (const int i : {0, 1, 3, 4, first_relative + translation(0, 0), first_relative + translation(1, 0)})
+    EXPECT_NEAR(square[i] / information(i, i), 1.0, 0.3) << "strength " << i;
 }
 
 }  // namespace

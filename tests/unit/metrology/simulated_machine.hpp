@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -20,9 +21,9 @@ struct MachineSpread {
   double squareness = 30e-6;   // rad, one sigma
 };
 
-/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as 1/h, sampled at 81
-/// places; `rms` about its best straight line where `straight`, else about its mean.
-inline std::vector<double> random_curve(double travel, bool straight, double rms, std::mt19937_64& random,
+/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as 1/h^2, sampled at 81
+/// places; `rms` about its best straight line, which is taken away (a slope is squareness, scale or a turned frame).
+inline std::vector<double> random_curve(double travel, double rms, std::mt19937_64& random,
                                         std::vector<double>& places) {
   std::normal_distribution<double> normal;
   constexpr int count = 81;
@@ -30,8 +31,8 @@ inline std::vector<double> random_curve(double travel, bool straight, double rms
   places.clear();
   for (int i = 0; i < count; ++i) places.push_back(travel * i / (count - 1));
   for (int h = 1; h <= 6; ++h) {
-    const double in = normal(random) / h;
-    const double out = normal(random) / h;
+    const double in = normal(random) / (h * h);
+    const double out = normal(random) / (h * h);
     for (std::size_t i = 0; i < count; ++i) {
       const double angle = 3.141592653589793 * h * places[i] / travel;
       values[i] += in * std::sin(angle) + out * std::cos(angle);
@@ -46,7 +47,7 @@ inline std::vector<double> random_curve(double travel, bool straight, double rms
     slope += t * values[i];
     moment += t * t;
   }
-  slope = straight ? slope / moment : 0.0;
+  slope /= moment;
   double power = 0.0;
   for (std::size_t i = 0; i < count; ++i) {
     const double rest = values[i] - mean - slope * (places[i] - 0.5 * travel);
@@ -74,7 +75,7 @@ inline Machine random_machine(const Chain& chain, const std::array<double, 3>& t
       const double rms =
           is_rotation(c) ? spread.angle : (is_positioning(c) ? spread.positioning : spread.straightness);
       std::vector<double> places;
-      std::vector<double> values = random_curve(travel[a], !is_rotation(c), rms, random, places);
+      std::vector<double> values = random_curve(travel[a], rms, random, places);
       std::vector<ErrorFunction::Harmonic> waves;
       std::vector<double> polynomial;
       if (is_positioning(c)) {
@@ -96,6 +97,9 @@ struct Laser {
   double reversal = 0.0;          // m
   double drift = 0.0;             // m over the line
   double outliers = 0.0;          // share of readings 20 um off
+  double temperature =
+      std::numeric_limits<double>::quiet_NaN();  // degC, at the first reading; NaN: not measured
+  double warming = 0.0;                          // K, over the line
 };
 
 /// A line of `points` readings from `from` to `to` (m), measured as a laser zeroed at the first one would.
@@ -116,8 +120,11 @@ inline DisplacementLine measure(const Machine& machine, const std::string& name,
     reading.position = from + (to - from) * step / (points - 1);
     reading.tool = tool;
     reading.direction = pass % 2 == 0 ? 1 : -1;
+    reading.temperature = laser.temperature + laser.warming * row / rows;
+    const double warmth =
+        std::isnan(laser.temperature) ? machine.errors->reference_temperature : reading.temperature;
     const Eigen::Vector3d actual =
-        reading.position + simulated_error(machine, directions, reading.position, tool);
+        reading.position + simulated_error(machine, directions, reading.position, tool, {0, 0, 0}, warmth);
     double value = beam.dot(actual) + laser.noise * normal(random) + laser.repeatability * normal(random) +
                    0.5 * laser.reversal * reading.direction + laser.drift * row / rows;
     if (row > 0 && uniform(random) < laser.outliers) value += 20e-6;

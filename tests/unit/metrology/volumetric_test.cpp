@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -109,6 +110,17 @@ TEST(Volumetric, ShowsTheNullVectorOfTheFourLines) {
   for (int i = 0; i < 21; ++i)
     for (int j = 0; j < 21; ++j) sum += field(0.01 * i, 0.01 * j).squaredNorm();
   EXPECT_NEAR(std::sqrt(sum / 441), 1.9518 * um, 1e-10);
+  // After the best planar rigid motion.
+  Eigen::MatrixXd modes(2 * 441, 3);
+  Eigen::VectorXd all(2 * 441);
+  for (int i = 0; i < 441; ++i) {
+    const double x = 0.01 * (i % 21);
+    const double y = 0.01 * (i / 21);
+    modes.middleRows<2>(2 * i) << 1, 0, -y, 0, 1, x;
+    all.segment<2>(2 * i) = field(x, y).head<2>();
+  }
+  all -= modes * modes.householderQr().solve(all).eval();
+  EXPECT_NEAR(std::sqrt(all.squaredNorm() / 441), 1.3555 * um, 1e-10);
 }
 
 TEST(Components, NamesFollowIsoAndTheSeed) {

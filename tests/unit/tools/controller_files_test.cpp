@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cstdio>
 #include <random>
 #include <sstream>
 
@@ -51,7 +52,15 @@ TEST(ControllerFiles, TheIsgGridReadsBackAsTheSameField) {
 TEST(ControllerFiles, TheLinuxCncFileHoldsBothDirectionsInAtMost256Points) {
   const auto model = some_model();
   const std::string text = linuxcnc_compensation(model, 0);
-  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 256);
+  std::istringstream lines{text};
+  std::string line;
+  int triplets = 0;
+  // As the controller reads it: triplets until the first line that is none.
+  for (double a = 0.0, b = 0.0, c = 0.0; std::getline(lines, line); ++triplets)
+    if (std::sscanf(line.c_str(), "%lf %lf %lf", &a, &b, &c) != 3) break;
+  EXPECT_GE(triplets, 2);
+  EXPECT_LE(triplets, 256);
+  EXPECT_EQ(line.rfind("# joint of X: nominal, actual", 0), 0U) << line;
   EXPECT_NEAR(model.reversal[0], 2e-6, 5e-7);
   for (const double x : {0.0, 0.033, 0.1, 0.171, 0.2}) {
     const double error = model.error({x, 0.0, 0.0}, model.tool).x();
