@@ -56,6 +56,8 @@ struct Calibration::Axis {
 Calibration::Calibration(const Parameters& parameters) : parameters_{parameters} {
   for (std::size_t i = 0; i < static_cast<std::size_t>(parameters.axes); ++i)
     axes_.push_back(std::make_unique<Axis>(*this, i));
+  JobHost& host = *this;
+  if (!parameters.prints.empty()) printing_ = std::make_unique<Printing>(*this, host);
 }
 
 Calibration::~Calibration() = default;
@@ -84,15 +86,15 @@ void Calibration::report(job::JobPhase phase, const std::string& text) {
 void Calibration::start(const job::JobCommand& command) {
   if (command.kind() == job::JOB_CANCEL) {
     if (!task_.running()) return;
-    task_ = {};
-    for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_STOP, 0.0);
+    stop();
     report(job::JOB_CANCELLED, "cancelled");
     return;
   }
   if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
   const std::string wanted{command.name().c_str()};
-  const auto found = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
-                                  [&](const GeometricJob& job) { return job.name == wanted; });
+  const auto named = [&](const auto& job) { return job.name == wanted; };
+  const auto found = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(), named);
+  const auto print = std::find_if(parameters_.prints.begin(), parameters_.prints.end(), named);
   if (task_.running()) {
     report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
     return;
@@ -100,12 +102,13 @@ void Calibration::start(const job::JobCommand& command) {
   sample_.id(command.id());
   sample_.name(wanted);
   progress_ = 0.0;
-  if (found == parameters_.jobs.end()) {
+  if (found == parameters_.jobs.end() && print == parameters_.prints.end()) {
     report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
     return;
   }
-  sample_.result_path(std::filesystem::absolute(found->out).string());
-  task_ = run(*found);
+  const bool geometric = found != parameters_.jobs.end();
+  sample_.result_path(std::filesystem::absolute(geometric ? found->out : print->out).string());
+  task_ = geometric ? run(*found) : run(*print);
   report(job::JOB_RUNNING, "started");
 }
 
@@ -122,22 +125,34 @@ void Calibration::step(const Tick& tick) noexcept {
       }
     }
   } catch (const std::exception& error) {
-    task_ = {};
-    for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_STOP, 0.0);
+    stop();
     report(job::JOB_FAILED, error.what());
   }
 }
 
-void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double position) {
+void Calibration::stop() {
+  task_ = {};
+  for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_STOP);
+  if (printing_) printing_->make_safe();
+}
+
+void Calibration::tell(const std::string& text, double progress) {
+  progress_ = progress;
+  report(job::JOB_RUNNING, text);
+}
+
+void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double position, const Pace& pace) {
   stage::AxisCommand command;
   command.cell(cell);
   command.axis(static_cast<std::uint32_t>(axis));
   command.at().time_ns(now().ns);
   command.at().cycle(cycle_);
-  command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+  command.id(next_id());
   command.kind(kind);
   command.position(position);
-  command.velocity(parameters_.velocity);
+  command.velocity(pace.velocity > 0.0 ? pace.velocity : parameters_.velocity);
+  command.acceleration(pace.acceleration);
+  command.jerk(pace.jerk);
   axes_[axis]->last_command = command.id();
   axes_[axis]->command.write(command);
 }
@@ -148,7 +163,7 @@ Task Calibration::enable_axes() {
   Instant ask_at = now();
   for (;;) {
     if (now() >= ask_at) {
-      for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_ENABLE, 0.0);
+      for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_ENABLE);
       ask_at = now() + Duration::seconds(0.5);
     }
     co_await NextStep{};
@@ -157,14 +172,24 @@ Task Calibration::enable_axes() {
       return state != nullptr && state->command_id() == axis->last_command && state->enabled();
     });
     if (all) co_return;
-    if (now() > give_up) throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
+    if (now() > give_up)
+      throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
   }
 }
 
-/// Moves all axes and waits until they have settled there.
-Task Calibration::move_to(Point target) {
+/// Moves all axes and waits until they have settled there. With a pace every axis takes its share of it, so that the path is
+/// straight.
+Task Calibration::move_to(Point target, Pace pace) {
+  Point way = Point::Zero();
   for (std::size_t i = 0; i < axes_.size(); ++i)
-    send(i, stage::AXIS_COMMAND_MOVE, target[static_cast<Eigen::Index>(i)]);
+    if (const auto* state = axes_[i]->state.latest(); state != nullptr)
+      way[static_cast<Eigen::Index>(i)] = target[static_cast<Eigen::Index>(i)] - state->setpoint_position();
+  const Point share = way.norm() > 0.0 ? Point{way.cwiseAbs() / way.norm()} : Point::Zero();
+  for (std::size_t i = 0; i < axes_.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    send(i, stage::AXIS_COMMAND_MOVE, target[k],
+         {share[k] * pace.velocity, share[k] * pace.acceleration, share[k] * pace.jerk});
+  }
   std::optional<Instant> arrived;
   const Instant started = now();
   for (;;) {
@@ -219,7 +244,7 @@ Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cy
   const Point to = point_of(line.to);
   const double length = (to - from).norm();
   const auto intervals = std::max<std::int64_t>(1, std::llround(length / interval));
-  co_await move_to(from);
+  co_await move_to(from, {});
   sensing::BeamCommand beam;
   beam.cell(cell);
   beam.at().time_ns(now().ns);
@@ -235,7 +260,7 @@ Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cy
       const bool forth = k <= intervals;
       const auto index = forth ? k : 2 * intervals + 1 - k;
       const Point target = from + (to - from) * (static_cast<double>(index) / static_cast<double>(intervals));
-      co_await move_to(target);
+      co_await move_to(target, {});
       double mean = 0.0;
       co_await average_reading(readings, mean);
       append(table, line.name, target, mean, static_cast<double>(cycle + 1), forth ? 1.0 : -1.0);
@@ -289,6 +314,23 @@ Calibration::Verification Calibration::evaluate(const recording::Table& table) c
 }
 
 Task Calibration::run(const GeometricJob& job) {
+  co_await calibrate(job);
+  progress_ = 1.0;
+  report(job::JOB_DONE, "done");
+}
+
+Task Calibration::run(const PrintJob& job) {
+  if (!job.first.empty()) {
+    const auto first = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
+                                    [&](const GeometricJob& other) { return other.name == job.first; });
+    co_await calibrate(*first);
+  }
+  co_await printing_->run(job);
+  progress_ = 1.0;
+  report(job::JOB_DONE, "done");
+}
+
+Task Calibration::calibrate(const GeometricJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   std::filesystem::create_directories(folder);
   const double share = 1.0 / static_cast<double>(job.lines.size() + 2 * job.verify.size() + 1);
@@ -324,8 +366,6 @@ Task Calibration::run(const GeometricJob& job) {
           "the compensation makes the error larger on lines that were not fitted; rolled back"};
     }
   }
-  progress_ = 1.0;
-  report(job::JOB_DONE, "done");
 }
 
 }  // namespace invar::calibration

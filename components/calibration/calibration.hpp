@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -9,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "components/calibration/job_host.hpp"
+#include "components/calibration/printing.hpp"
 #include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
@@ -60,19 +63,27 @@ struct GeometricJob {
   }
 };
 
-class Calibration final : public Component {
+class Calibration final : public Component, private JobHost {
  public:
   struct Parameters {
     std::int64_t axes = 2;
     double settle_timeout = 2.0;
     double velocity = 0.0;
     std::vector<GeometricJob> jobs;
+    std::vector<PrintJob> prints;
     void describe(auto& p) {
       p(axes, "axes", 1, 3, "how many axes the machine has");
       p(settle_timeout, "settle_timeout", "s", Range{0.01, 600.0},
         "the job fails when an axis needs longer to settle");
       p(velocity, "velocity", "m/s", Range{0.0, 10.0}, "of the moves; 0: the stage's own");
-      p(jobs, "jobs", "what can be run");
+      p(jobs, "jobs", "geometric calibrations that can be run");
+      p(prints, "prints", "print jobs that can be run");
+      if constexpr (requires { p.node(); })
+        for (const PrintJob& print : prints)
+          if (!print.first.empty() && std::none_of(jobs.begin(), jobs.end(),
+                                                   [&](const auto& job) { return job.name == print.first; }))
+            p.node()["prints"].fault("`" + print.first + "` is no job of `jobs`",
+                                     "name one of them, or leave `first` out");
     }
   };
   explicit Calibration(const Parameters& parameters);
@@ -89,15 +100,20 @@ class Calibration final : public Component {
 
   void start(const job::JobCommand& command);
   Task run(const GeometricJob& job);
-  Task enable_axes();
-  Task move_to(Point target);
+  Task run(const PrintJob& job);
+  Task calibrate(const GeometricJob& job);
+  Task enable_axes() override;
+  Task move_to(Point target, Pace pace) override;
+  void tell(const std::string& text, double progress) override;
+  std::uint64_t next_id() override { return static_cast<std::uint64_t>(id) << 32U | next_command_++; }
+  void stop();
   Task average_reading(std::int64_t count, double& mean);
   Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
                double share, recording::Table& table);
   Task command_model(compensation::ModelCommandKind kind, const std::string& path);
   Verification evaluate(const recording::Table& table) const;
   void report(job::JobPhase phase, const std::string& text);
-  void send(std::size_t axis, stage::AxisCommandKind kind, double position);
+  void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const Pace& pace = {});
 
   const Parameters& parameters_;
   Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
@@ -109,6 +125,7 @@ class Calibration final : public Component {
       *this, "model_status", {.optional = true, .profile = "state"}};
   struct Axis;
   std::vector<std::unique_ptr<Axis>> axes_;
+  std::unique_ptr<Printing> printing_;  // only where there are print jobs: its ports must be connected
 
   Task task_;
   job::JobStatus sample_;

@@ -71,7 +71,7 @@ void Dispenser::drive(bool enable) noexcept {
 }
 
 void Dispenser::obey(const PressureCommand& command) noexcept {
-  constexpr Range sound{0.0, 7e5};
+  constexpr Range sound{1.0, 7e5};
   if (sound.contains(command.setpoint())) setpoint_ = command.setpoint();
   if (sound.contains(command.purge_setpoint())) purge_setpoint_ = command.purge_setpoint();
   wanted_ = command.enabled();

@@ -65,8 +65,8 @@ void Vision::activate() {
   running_.reset();
   sample_ = {};
   last_number_ = 0;
-  if (camera_) show_view(camera_->width, camera_->height);
-  report(job::JOB_IDLE, camera_ ? "ready" : "not calibrated");
+  show_view(camera_ ? camera_->width : 0, camera_ ? camera_->height : 0);
+  reported_ = false;
 }
 
 void Vision::deactivate() noexcept {
@@ -75,16 +75,17 @@ void Vision::deactivate() noexcept {
 }
 
 void Vision::show_view(int width, int height) {
+  sample_.view_center() = {parameters_.mount.offset.x(), parameters_.mount.offset.y()};
   if (!camera_ || width <= 0 || height <= 0) return;
   const Eigen::Vector2d size =
       camera_->to_metres({width - 0.5, height - 0.5}) - camera_->to_metres({-0.5, -0.5});
   const double c = std::abs(std::cos(parameters_.mount.rotation)),
                s = std::abs(std::sin(parameters_.mount.rotation));
-  sample_.view_center() = {parameters_.mount.offset.x(), parameters_.mount.offset.y()};
   sample_.view_size() = {c * size.x() - s * size.y(), c * size.y() - s * size.x()};
 }
 
 void Vision::report(job::JobPhase phase, const std::string& text) {
+  reported_ = true;
   sample_.cell(cell);
   sample_.component_id(id);
   sample_.at().time_ns(now().ns);
@@ -139,6 +140,8 @@ Eigen::Vector2d Vision::middle(const cv::Mat& picture) const {
 void Vision::step(const Tick& tick) noexcept {
   cycle_ = tick.cycle;
   try {
+    // Not in `activate`: what is written before the first step reaches nobody in simulated time.
+    if (!reported_) report(job::JOB_IDLE, camera_ ? "ready" : "not calibrated");
     image::VisionCommand command;
     while (command_.take(command)) start(command);
     if (const std::uint64_t received = frame_.received(); received != taken_) {

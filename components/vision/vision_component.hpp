@@ -73,6 +73,7 @@ class Vision final : public Component {
   std::optional<CameraModel> camera_;  // as loaded or calibrated
   std::optional<image::VisionCommand> running_;
   int attempts_ = 0;
+  bool reported_ = false;
   Instant asked_;
   image::VisionStatus sample_;
   image::DropletsMeasured measured_;

@@ -7,6 +7,7 @@
 #include "core/recording/export.hpp"
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/table.hpp"
+#include "tools/cell/print_summary.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -141,6 +142,7 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
                  after.rms < before.rms ? "good" : "bad");
     add_verification(page, before, after);
   }
+  summarise_print(folder, page, out);
   add_heater(page, folder, out);
 }
 
