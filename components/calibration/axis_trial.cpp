@@ -274,7 +274,7 @@ Task AxisTrial::run(const RippleJob& job) {
 
   recording::Table before = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, before);
-  before.write(folder / "verify_before.csv");
+  before.write(folder / "ripple_before.csv");
   progress_ = 0.2;
   report(job::JOB_RUNNING, "running slowly forth and back");
   recording::Table runs = record_table();
@@ -310,7 +310,7 @@ Task AxisTrial::run(const RippleJob& job) {
 
   recording::Table after = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, after);
-  after.write(folder / "verify_after.csv");
+  after.write(folder / "ripple_after.csv");
   const Size was = size_of(following(before));
   const Size is = size_of(following(after));
   if (is.rms > was.rms) {

@@ -68,7 +68,7 @@ void SimulatedStage::Axis::describe(auto& p) {
   p(mass, "mass", "kg", Range{0.01, 1e4}, "all that moves");
   p(motor_constant, "motor_constant", "N/A", Range{1e-3, 1e5}, "force per current");
   p(viscous_damping, "viscous_damping", "N s/m", Range{0.0, 1e5}, "force per speed");
-  p(resolution, "resolution", "m", Range{0.0, 1e-3}, "one count of the encoder; 0: none");
+  p(resolution, "resolution", "m", Range{0.0, 0.01}, "one count of the encoder; 0: none");
   p(noise, "noise", "m", Range{0.0, 1e-3}, "1 sigma of the encoder");
   p(velocity_noise, "velocity_noise", "m/s", Range{0.0, 1.0}, "1 sigma of the velocity sensor");
   p(start, "start", "m", Range{-10.0, 10.0}, "where the carriage stands at the start");

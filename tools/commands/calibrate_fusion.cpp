@@ -245,6 +245,7 @@ nlohmann::json report_of(const Recordings& all, const FusionFit& fit) {
   report["held_out_rms_m"] = {{"observer", fit.observer_rms}, {"weights", fit.weights_rms}};
   if (fit.polynomial_rms > 0.0) report["held_out_rms_m"]["polynomial"] = fit.polynomial_rms;
   report["polynomial_degree"] = fit.degree;
+  if (fit.noise_by_speed_rms > 0.0) report["held_out_rms_m"]["noise_by_speed"] = fit.noise_by_speed_rms;
   report["unidentified"] = fit.unidentified;
   report["notes"] = fit.notes;
   for (std::size_t i = 0; i < fit.sensors.positions.size(); ++i) {

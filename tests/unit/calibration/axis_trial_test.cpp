@@ -136,7 +136,7 @@ TEST(AxisTrial, IdentifiesTheRippleAndLowersTheFollowingErrorOfRunsNotFitted) {
     }
     return std::sqrt(sum / count);
   };
-  EXPECT_LT(rms("verify_after.csv"), 0.5 * rms("verify_before.csv"));
+  EXPECT_LT(rms("ripple_after.csv"), 0.5 * rms("ripple_before.csv"));
   std::filesystem::remove_all(out.parent_path());
 }
 
