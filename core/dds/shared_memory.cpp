@@ -42,25 +42,41 @@ bool is_abandoned(const std::filesystem::path& lock, Duration age) {
   return abandoned;
 }
 
+void remove(const std::filesystem::path& folder, const std::string& subject) {
+  std::error_code error;
+  std::filesystem::remove(folder / subject, error);
+  std::filesystem::remove(folder / ("sem." + subject + "_mutex"), error);
+  for (const char* lock : {"_el", "_sl"}) std::filesystem::remove(folder / (subject + lock), error);
+}
+
+/// A port whose lock a peer of the dead process has removed: nobody listens there.
+bool is_unlocked_port(const std::filesystem::path& folder, const std::string& name, Duration age) {
+  struct stat status {};
+  return name.starts_with("fastrtps_port") && name.find('_', 13) == std::string::npos &&
+         !std::filesystem::exists(folder / (name + "_el")) &&
+         !std::filesystem::exists(folder / (name + "_sl")) && stat((folder / name).c_str(), &status) == 0 &&
+         seconds_since(status.st_mtim) >= age.in_seconds();
+}
+
 }  // namespace
 
 std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, Duration age, Duration rest) {
   std::error_code error;
   std::vector<std::filesystem::path> locks;
+  std::vector<std::string> unlocked;
   for (const auto& entry : std::filesystem::directory_iterator{folder, error}) {
     const std::string name = entry.path().filename().string();
     if (name.starts_with("fastrtps_") && (name.ends_with("_el") || name.ends_with("_sl")))
       locks.push_back(entry.path());
+    if (is_unlocked_port(folder, name, rest * 2)) unlocked.push_back(name);
   }
-  std::size_t removed = 0;
+  for (const auto& name : unlocked) remove(folder, name);
+  std::size_t removed = unlocked.size();
   for (const auto& lock : locks) {
     if (!is_abandoned(lock, age)) continue;
     const std::string name = lock.filename().string();
     if (name.starts_with("fastrtps_port") && !has_rested(lock, rest)) continue;
-    const std::string subject = name.substr(0, name.size() - 3);
-    std::filesystem::remove(folder / subject, error);
-    std::filesystem::remove(folder / ("sem." + subject + "_mutex"), error);
-    std::filesystem::remove(lock, error);
+    remove(folder, name.substr(0, name.size() - 3));
     ++removed;
   }
   return removed;
