@@ -55,7 +55,6 @@ int hz(Options& options) {
   using Clock = std::chrono::steady_clock;
   options.call.resolve();
   (void)interrupted();
-  options.call.takes_raw = true;
   LiveCell cell{options.call};
   if (!cell.found()) {
     cell.say_not_found("invar hz");
@@ -69,7 +68,6 @@ int hz(Options& options) {
   }
   TopicWatch watch{cell.node(), [&](const std::string& name) { return name == topic; }};
   watch.look();
-  cell.wait_until([&] { return watch.has_samples(); });
   const auto begin = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   while (sleep_for(Duration::seconds(options.duration > 0.0 ? options.duration - elapsed() : 2.0)) &&

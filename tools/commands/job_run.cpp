@@ -1,7 +1,6 @@
 // `invar job run|list|cancel`: the jobs of a running cell - started, followed, stopped.
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -23,9 +22,6 @@ namespace invar::tools {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// Commands of jobs may be repeated: the component knows the job's id.
-constexpr std::chrono::milliseconds again{500};
 
 struct Options {
   Options(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
@@ -70,18 +66,23 @@ class Jobs {
 
   /// Finds the topics by which jobs are commanded; waits for one of `component`, or for any.
   bool find(const std::string& component) {
-    return cell_.wait_until([&] {
+    const auto end = Clock::now() + std::chrono::nanoseconds{cell_.patience().ns};
+    while (Clock::now() < end) {
       look();
-      return component.empty() ? !components_.empty() : components_.contains(component);
-    });
+      if (component.empty() ? !components_.empty() : components_.contains(component)) break;
+      if (!sleep_for(Duration::milliseconds(50))) break;
+    }
+    return component.empty() ? !components_.empty() : components_.contains(component);
   }
-  /// Waits until each has said how it is. False: one did not.
-  bool wait_for_statuses() {
-    return cell_.wait_until([this] {
+  /// Waits until each says how it is, as far as it does.
+  void wait_for_statuses() {
+    const auto end = Clock::now() + std::chrono::seconds{2};
+    while (Clock::now() < end) {
       look();
-      return std::all_of(components_.begin(), components_.end(),
-                         [this](const auto& entry) { return status(entry.first).has_value(); });
-    });
+      bool complete = true;
+      for (const auto& [component, parts] : components_) complete = complete && status(component).has_value();
+      if (complete || !sleep_for(Duration::milliseconds(50))) return;
+    }
   }
   [[nodiscard]] std::vector<std::string> names() const {
     std::vector<std::string> names;
@@ -104,7 +105,10 @@ class Jobs {
       writer = std::make_unique<dds::Writer<job::JobCommand>>(
           cell_.node().writer<job::JobCommand>(dds::topic_name(cell_.name(), component, "job"), profile));
     }
-    if (!cell_.wait_until([&] { return writer->connection().matched() > 0; })) return false;
+    const auto end = Clock::now() + std::chrono::nanoseconds{cell_.patience().ns};
+    while (writer->connection().matched() == 0)
+      if (Clock::now() > end || !sleep_for(Duration::milliseconds(20))) return false;
+    sleep_for(Duration::milliseconds(100));  // the reader's side of the match
     job::JobCommand command;
     if (cell_.file() != nullptr) command.cell(cell_.file()->id);
     command.id(id);
@@ -206,16 +210,14 @@ int report(const Options& options, const std::string& component, const job::JobS
 
 int follow(const Options& options, Jobs& jobs, const std::string& component, const std::string& name,
            std::uint64_t id) {
-  const std::chrono::duration<double> patience{options.call.patience};
   Progress progress;
-  std::optional<Clock::time_point> cancelling;
+  bool cancelling = false;
   auto last_heard = Clock::now();
   auto last_sent = Clock::now();
   std::int64_t last_time = 0;
   for (;;) {
     const auto status = jobs.status(component);
     if (status && status->id() == id) {
-      if (options.detach) return 0;
       if (status->at().time_ns() != last_time) last_heard = Clock::now();
       last_time = status->at().time_ns();
       progress.show(*status);
@@ -223,28 +225,25 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
         progress.end();
         return report(options, component, *status);
       }
-    } else if (Clock::now() - last_heard > patience) {
+    } else if (Clock::now() - last_heard > std::chrono::seconds{5}) {
       progress.end();
       std::cerr << options.call.command << ": `" << component << "` does not take the job"
                 << (status && status->phase() == job::JOB_RUNNING ? std::string{": "} + status->text().c_str()
                                                                   : "; is it active?")
                 << '\n';
       return 1;
-    } else if (!cancelling && Clock::now() - last_sent > again) {
-      last_sent = Clock::now();
+    } else if (Clock::now() - last_sent > std::chrono::seconds{1}) {
+      last_sent = Clock::now();  // the same id is carried out once
       jobs.send(component, job::JOB_RUN, id, name, options.arguments);
     }
     if (interrupted() && !cancelling) {
       progress.end();
       std::cerr << "cancelling `" << name << "`\n";
-      cancelling = Clock::now();
-      last_sent = {};
-    }
-    if (cancelling && Clock::now() - last_sent > again) {
-      last_sent = Clock::now();
       jobs.send(component, job::JOB_CANCEL, id, name, "");
+      cancelling = true;
+      last_sent = Clock::now();
     }
-    if (cancelling && Clock::now() - *cancelling > patience) {
+    if (cancelling && Clock::now() - last_sent > std::chrono::seconds{5}) {
       std::cerr << options.call.command << ": `" << component << "` does not confirm that it stopped\n";
       return 1;
     }
@@ -276,7 +275,9 @@ int run(Options& options) {
     std::cerr << options.call.command << ": `" << component << "` cannot be reached\n";
     return 1;
   }
-  return follow(options, jobs, component, name, id);
+  if (!options.detach) return follow(options, jobs, component, name, id);
+  sleep_for(Duration::milliseconds(300));
+  return 0;
 }
 
 int list(Options& options) {
@@ -324,33 +325,23 @@ int cancel(Options& options) {
     cell.say_not_found(options.call.command);
     return 1;
   }
-  const bool all_answered = jobs.wait_for_statuses();
+  jobs.wait_for_statuses();
   const std::string& name = options.call.word(0);
   for (const auto& component : jobs.names()) {
     const auto status = jobs.status(component);
-    if (!status) {
-      std::cerr << options.call.command << ": `" << component << "` does not say how it is\n";
-      continue;
-    }
-    if (status->phase() != job::JOB_RUNNING) continue;
+    if (!status || status->phase() != job::JOB_RUNNING) continue;
     if (!name.empty() && name != status->name().c_str()) continue;
     if (!options.component.empty() && component != options.component) continue;
-    const auto runs = [&] { return jobs.status(component)->phase() == job::JOB_RUNNING; };
-    auto send_at = Clock::now();
-    cell.wait_until([&] {
-      if (runs() && Clock::now() >= send_at) {
-        (void)jobs.send(component, job::JOB_CANCEL, status->id(), status->name().c_str(), "");
-        send_at = Clock::now() + again;
-      }
-      return !runs();
-    });
+    if (!jobs.send(component, job::JOB_CANCEL, status->id(), status->name().c_str(), "")) return 1;
+    const auto end = Clock::now() + std::chrono::seconds{5};
+    while (Clock::now() < end && jobs.status(component)->phase() == job::JOB_RUNNING)
+      if (!sleep_for(Duration::milliseconds(20))) break;
     const auto after = jobs.status(component);
     std::cout << after->name().c_str() << ": " << phase_text(after->phase()) << '\n';
     return after->phase() == job::JOB_CANCELLED ? 0 : 1;
   }
-  if (all_answered)
-    std::cerr << options.call.command << ": " << (name.empty() ? "no job" : "no job `" + name + "`")
-              << " is running\n";
+  std::cerr << options.call.command << ": " << (name.empty() ? "no job" : "no job `" + name + "`")
+            << " is running\n";
   return 1;
 }
 

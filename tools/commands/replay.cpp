@@ -25,12 +25,10 @@ struct Options {
   double from = 0.0;
   bool fast = false;
   bool beside = false;
-  bool for_readers = false;
   std::string process;
 };
 
 struct Channel {
-  dds::Profile qos;
   std::unique_ptr<dds::Connection> writer;
   std::uint64_t published = 0;
 };
@@ -67,19 +65,6 @@ std::vector<std::string> written_already(LiveCell& cell, const std::set<std::str
   for (const auto& end : cell.node().snapshot().endpoints)
     if (end.is_writer && !end.is_local && topics.contains(end.topic)) found.insert(end.topic);
   return {found.begin(), found.end()};
-}
-
-/// Whether every reader that is there and can take what a channel sends is connected with it.
-bool readers_connected(LiveCell& cell, const std::map<std::string, Channel>& channels) {
-  std::map<std::string, std::size_t> readers;
-  for (const auto& end : cell.node().snapshot().endpoints)
-    if (const auto found = channels.find(end.topic); found != channels.end() && !end.is_writer &&
-                                                     !end.is_local &&
-                                                     dds::mismatches(found->second.qos, end.qos).empty())
-      ++readers[end.topic];
-  return std::all_of(readers.begin(), readers.end(), [&](const auto& topic) {
-    return channels.at(topic.first).writer->matched() >= topic.second;
-  });
 }
 
 /// The recording through the components of one process in simulated time.
@@ -121,10 +106,9 @@ int replay(Options& options) {
   if (options.from > 0.0) selection.from = file.statistics().start + Duration::seconds(options.from);
   if (options.call.file.empty() && options.call.cell.empty()) options.call.cell = "replay";
 
-  options.call.takes_raw = true;
   LiveCell cell{options.call, LiveCell::Need::nobody};
   std::map<std::string, Channel> channels;
-  cell.settle(LiveCell::Need::nobody);
+  cell.settle();
   if (const auto taken = written_already(cell, selection.topics); !taken.empty() && !options.beside) {
     std::cerr << "invar replay: `" << taken.front() << "` is written already"
               << (taken.size() > 1 ? " (and " + std::to_string(taken.size() - 1) + " more)" : "")
@@ -132,24 +116,10 @@ int replay(Options& options) {
     return 1;
   }
   for (const auto& [id, channel] : file.channels())
-    if (selection.topics.contains(channel.topic) && !channels.contains(channel.topic)) {
-      auto& made = channels[channel.topic];
-      made.qos = profile_of(cell.node().profiles(), channel);
-      made.writer = cell.node().raw_writer(channel.topic, type_of(file, channel), made.qos);
-    }
-  if (options.for_readers) {
-    const auto unread = [&] {
-      return std::find_if(channels.begin(), channels.end(),
-                          [](const auto& c) { return c.second.writer->matched() == 0; });
-    };
-    if (!cell.wait_until([&] { return unread() == channels.end(); })) {
-      std::cerr << "invar replay: nobody reads `" << unread()->first << "` within "
-                << cell.patience().in_seconds() << " s\n";
-      return 1;
-    }
-  }
-  cell.wait_until([&] { return readers_connected(cell, channels); });
-  sleep_for(Duration::milliseconds(200));  // their side of it
+    if (selection.topics.contains(channel.topic) && !channels.contains(channel.topic))
+      channels[channel.topic].writer = cell.node().raw_writer(channel.topic, type_of(file, channel),
+                                                              profile_of(cell.node().profiles(), channel));
+  sleep_for(Duration::seconds(1.0));  // readers that are there connect
 
   const double speed = options.fast ? recording::Replayer::as_fast_as_possible : options.rate;
   recording::Replayer player{file.messages(selection), dds::monotonic_now(), speed};
@@ -204,8 +174,6 @@ void add_replay(CLI::App& program) {
   command->add_option("--from", options->from, "leave out so much of the beginning [s]")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--fast", options->fast, "as fast as possible")->excludes(rate);
-  command->add_flag("--for-readers", options->for_readers,
-                    "begin when every topic has a reader, within --wait");
   command->add_flag("--beside", options->beside, "also topics that somebody writes now");
   command
       ->add_option("--into", options->process, "feed this process of the cell file, and compare its outputs")

@@ -98,7 +98,6 @@ void show(const CellStatus& status, const std::map<std::string, Rate>& rates, bo
 int top(Options& options) {
   options.call.resolve();
   (void)interrupted();
-  options.call.takes_raw = true;
   LiveCell cell{options.call};
   CellStatus status;
   status.cell = cell.name();
@@ -112,7 +111,7 @@ int top(Options& options) {
                             !is_service_topic(topic);
                    }};
   watch.look();
-  if (options.once) cell.wait_until([&] { return watch.is_connected(); });
+  if (options.once) sleep_for(Duration::seconds(1.0));  // readers connect
   Rates rates;
   Silence silence;
   const bool screen = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;

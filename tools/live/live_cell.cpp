@@ -13,7 +13,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
-constexpr Duration look = Duration::milliseconds(20);
+constexpr Duration look = Duration::milliseconds(50);
+
+/// Waits until `condition`, Ctrl-C or the end of patience.
+template <class Condition>
+bool wait_until(Duration patience, Condition condition) {
+  const auto end = Clock::now() + std::chrono::nanoseconds{patience.ns};
+  while (!condition()) {
+    if (Clock::now() > end || !sleep_for(look)) return false;
+  }
+  return true;
+}
 
 /// The structure of the cell file only: what components ask for is no matter here.
 std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file) {
@@ -78,21 +88,12 @@ void CellCall::resolve() {
       throw InputError{command, described_[i].name + " is missing", described_[i].help + "; see --help"};
 }
 
-bool LiveCell::wait_until(const std::function<bool()>& condition) const {
-  const auto end = Clock::now() + std::chrono::nanoseconds{patience_.ns};
-  while (!condition()) {
-    if (Clock::now() > end || !sleep_for(look)) return false;
-  }
-  return true;
-}
-
 LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::seconds(call.patience)} {
   dds::NodeOptions options;
   options.cell = tools_name;
   options.process = call.command;
   std::replace(options.process.begin(), options.process.end(), ' ', '-');
   options.addresses = call.addresses;
-  options.raw_soon = call.takes_raw;
   dds::Profiles profiles = dds::standard_profiles();
   if (!call.file.empty()) {
     cell_ = read_structure(call.file);
@@ -120,7 +121,7 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
   } else if (need == Need::nobody || !call.cell.empty()) {
     name_ = call.cell;
   } else {
-    if (!wait_until([&] { return !cells_in(node_->snapshot()).empty(); })) return;
+    if (!wait_until(patience_, [&] { return !cells_in(node_->snapshot()).empty(); })) return;
     settle();
     const auto cells = cells_in(node_->snapshot());
     if (cells.size() > 1) {
@@ -145,12 +146,12 @@ std::vector<std::string> LiveCell::wait_for_processes() {
     return missing.empty();
   };
   if (cell_) {
-    wait_until(all_heard);
+    wait_until(patience_, all_heard);
     return missing;
   }
   std::size_t known = 0;
   auto since = Clock::now();
-  wait_until([&] {
+  wait_until(patience_, [&] {
     const std::size_t now = client_->processes().size();
     if (now != known) since = Clock::now();
     known = now;
@@ -159,17 +160,15 @@ std::vector<std::string> LiveCell::wait_for_processes() {
   return missing;
 }
 
-void LiveCell::settle(Need need) {
-  const std::chrono::milliseconds quiet{need == Need::cell ? 500 : 1000};
+void LiveCell::settle() {
   std::size_t known = 0;
   auto since = Clock::now();
-  wait_until([&] {
-    std::size_t now = 0;
-    for (const auto& endpoint : node_->snapshot().endpoints)
-      if (!endpoint.participant.starts_with(std::string{"invar/"} + tools_name + "/")) ++now;
+  wait_until(patience_, [&] {
+    const auto snapshot = node_->snapshot();
+    const std::size_t now = snapshot.participants.size() + snapshot.endpoints.size();
     if (now != known) since = Clock::now();
     known = now;
-    return (known > 0 || need == Need::nobody) && Clock::now() - since > quiet;
+    return Clock::now() - since > std::chrono::seconds{1};
   });
 }
 
@@ -183,7 +182,7 @@ std::string LiveCell::topic(const std::string& text) const {
 std::vector<dds::Endpoint> LiveCell::wait_for_writers(const std::string& text) {
   const std::string wanted = topic(text);
   std::vector<dds::Endpoint> writers;
-  wait_until([&] {
+  wait_until(patience_, [&] {
     writers.clear();
     for (const auto& endpoint : node_->snapshot().endpoints)
       if (endpoint.topic == wanted && endpoint.is_writer && !endpoint.is_local) writers.push_back(endpoint);
@@ -199,7 +198,7 @@ std::string LiveCell::process_of(const std::string& component) {
         if (candidate.name == component) return process.name;
     return "";
   }
-  wait_until([&] { return !client_->process_of(component).empty(); });
+  wait_until(patience_, [&] { return !client_->process_of(component).empty(); });
   return client_->process_of(component);
 }
 

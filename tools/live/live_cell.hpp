@@ -5,7 +5,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -42,8 +41,7 @@ class CellCall {
   int domain = -1;             // with a file: that of the file unless given
   std::string cell;            // its name, where several share the domain
   std::vector<std::string> addresses;
-  double patience = 5.0;   // s
-  bool takes_raw = false;  // the command reads or writes samples as they travel
+  double patience = 5.0;  // s
 
  private:
   std::vector<Word> described_;
@@ -66,15 +64,12 @@ class LiveCell {
   /// Null where the call names none.
   [[nodiscard]] const config::Cell* file() const { return cell_.get(); }
   [[nodiscard]] Duration patience() const { return patience_; }
-  /// Waits until `condition`; false: not within the patience, or Ctrl-C.
-  bool wait_until(const std::function<bool()>& condition) const;
 
   /// Waits until every process of the file has said how it is; without a file until nobody new has for a second.
   /// Returns the processes of the file that did not.
   std::vector<std::string> wait_for_processes();
-  /// Waits until something was discovered and then nothing new for half a second; where nobody need be there, until there
-  /// was nothing new for a second. Other commands do not count: they come and go.
-  void settle(Need need = Need::cell);
+  /// Waits until nothing new has been discovered for a second.
+  void settle();
   /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.
   std::vector<dds::Endpoint> wait_for_writers(const std::string& text);
   [[nodiscard]] std::string topic(const std::string& text) const;

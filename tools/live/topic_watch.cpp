@@ -58,16 +58,6 @@ std::map<std::string, std::map<std::string, Flow>> TopicWatch::flows() const {
   return flows_;
 }
 
-bool TopicWatch::is_connected() const {
-  return std::all_of(readers_.begin(), readers_.end(),
-                     [](const auto& reader) { return reader.second->matched() > 0; });
-}
-
-bool TopicWatch::has_samples() const {
-  const std::lock_guard lock{mutex_};
-  return std::any_of(flows_.begin(), flows_.end(), [](const auto& topic) { return !topic.second.empty(); });
-}
-
 std::uint64_t TopicWatch::lost() const {
   std::uint64_t sum = 0;
   for (const auto& [topic, reader] : readers_) sum += reader->lost();

@@ -42,9 +42,6 @@ class TopicWatch {
   /// Begins to read the wanted topics that were discovered since the last call.
   void look();
   [[nodiscard]] std::size_t topics() const { return readers_.size(); }
-  /// Every reader has found a writer.
-  [[nodiscard]] bool is_connected() const;
-  [[nodiscard]] bool has_samples() const;
   /// By topic and writer.
   [[nodiscard]] std::map<std::string, std::map<std::string, Flow>> flows() const;
   /// Samples that the middleware lost on this side.
