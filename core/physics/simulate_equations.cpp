@@ -117,6 +117,8 @@ class Machine {
       d[term.on] += term.p[0] * difference;
       d[states_ + h] = -difference / term.p[1];
     }
+    for (const auto& rub : frictions_)
+      d[rub.use.on] = rub.stuck ? 0.0 : d[rub.use.on] - rub.direction * rub.use.p[0];
     for (const auto& term : overflows_)
       if (s[term.on] >= term.p[0] && d[term.on] > 0.0) {
         if (term.with < states_ && term.with != term.on) d[term.with] += term.p[1] * d[term.on];
@@ -129,28 +131,10 @@ class Machine {
     return d;
   }
 
-  /// Dry friction as an impulse: it takes at most what is there. Twice half a step keeps second order.
-  void rub(State& s, double h) const {
-    for (const auto& term : frictions_) {
-      const double most = term.p[0] * h;
-      s[term.on] -= std::clamp(s[term.on], -most, most);
-    }
-  }
-
   void advance(State& s, double t, double h, int parts) {
     h /= parts;
-    const std::size_t n = all_states();
-    const auto moved = [n](const State& from, const State& by, double share) {
-      State next = from;
-      for (std::size_t i = 0; i < n; ++i) next[i] += share * by[i];
-      return next;
-    };
     for (int part = 0; part < parts; ++part, t += h) {
-      rub(s, 0.5 * h);
-      const State a = slope(s, t), b = slope(moved(s, a, 0.5 * h), t + 0.5 * h),
-                  c = slope(moved(s, b, 0.5 * h), t + 0.5 * h), d = slope(moved(s, c, h), t + h);
-      for (std::size_t i = 0; i < n; ++i) s[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
-      rub(s, 0.5 * h);
+      frictions_.empty() ? void(s = moved(s, t, h)) : slide(s, t, h);
       for (const auto& term : uppers_) s[term.on] = std::min(s[term.on], term.p[0]);
       for (const auto& term : lowers_) s[term.on] = std::max(s[term.on], term.p[0]);
       for (const auto& term : overflows_) {  // what ran over within the step
@@ -159,6 +143,8 @@ class Machine {
         if (term.with < states_ && term.with != term.on) s[term.with] += term.p[1] * surplus;
       }
     }
+    for (auto& rub : frictions_)
+      rub.direction = 0.0, rub.stuck = false;  // elsewhere the rates are those without it
   }
 
   double output(std::size_t i) { return compiled_.outputs[i].Eval(); }
@@ -191,6 +177,68 @@ class Machine {
     std::size_t on, with;
     const double* p;
   };
+  struct Friction {
+    Use use;
+    double direction = 0.0;
+    bool stuck = false;
+  };
+
+  /// One step of the classical Runge-Kutta rule.
+  State moved(const State& s, double t, double h) {
+    const std::size_t n = all_states();
+    const auto by = [&](const State& rate, double share) {
+      State next = s;
+      for (std::size_t i = 0; i < n; ++i) next[i] += share * rate[i];
+      return next;
+    };
+    const State a = slope(s, t), b = slope(by(a, 0.5 * h), t + 0.5 * h),
+                c = slope(by(b, 0.5 * h), t + 0.5 * h), d = slope(by(c, h), t + h);
+    State next = s;
+    for (std::size_t i = 0; i < n; ++i) next[i] += h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]);
+    return next;
+  }
+
+  /// Which way each friction acts from here; at rest it holds up to its level.
+  void turn(const State& s, double t) {
+    for (auto& rub : frictions_) {
+      const double speed = s[rub.use.on];
+      rub.direction = sign_of(speed);
+      rub.stuck = false;
+      if (speed != 0.0) continue;
+      const double push = slope(s, t)[rub.use.on];
+      rub.stuck = std::abs(push) <= rub.use.p[0];
+      rub.direction = rub.stuck ? 0.0 : sign_of(push);
+    }
+  }
+
+  /// A step under dry friction: reversals are found, so that what comes out is smooth in every number.
+  void slide(State& s, double t, double h) {
+    for (int events = 0; events < 8 && h > 0.0; ++events) {
+      turn(s, t);
+      State next = moved(s, t, h);
+      double taken = h;
+      for (auto& rub : frictions_) {
+        const std::size_t on = rub.use.on;
+        if (rub.stuck || !(next[on] * rub.direction < 0.0)) continue;
+        if (s[on] == 0.0) {  // would slide back at once: it stays
+          rub.stuck = true;
+          next = moved(s, t, taken);
+          continue;
+        }
+        double low = 0.0, low_speed = s[on], high = taken, high_speed = next[on];
+        for (int i = 0; i < 6 && std::abs(next[on]) > 1e-13 * std::abs(s[on]); ++i) {  // regula falsi
+          taken = low + (high - low) * low_speed / (low_speed - high_speed);
+          next = moved(s, t, taken);
+          (next[on] * rub.direction > 0.0 ? low : high) = taken;
+          (next[on] * rub.direction > 0.0 ? low_speed : high_speed) = next[on];
+        }
+        next[on] = 0.0;
+      }
+      s = next;
+      t += taken;
+      h -= taken;
+    }
+  }
 
   void add(const Term& term) {
     const auto* kind = equations_kind(*term.info);
@@ -201,7 +249,7 @@ class Machine {
     if (kind->rate != nullptr) rate_terms_.push_back(use);
     switch (kind->memory) {
       case EquationsMemory::dry_friction:
-        frictions_.push_back(use);
+        frictions_.push_back({use});
         break;
       case EquationsMemory::upper_limit:
         uppers_.push_back(use);
@@ -222,7 +270,8 @@ class Machine {
 
   Compiled& compiled_;
   std::size_t states_, controlled_;
-  std::vector<Use> rate_terms_, frictions_, uppers_, lowers_, overflows_, hidden_;
+  std::vector<Friction> frictions_;
+  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_;
 };
 
 /// What terms at inputs and outputs do to a whole column.

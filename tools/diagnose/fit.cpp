@@ -197,7 +197,8 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
   in_parallel(free.size(), [&](std::size_t j) {
     Model changed = model;
     const double value = get(model, free[j]);
-    double step = 1e-2 * free[j].scale;
+    // Equations that swing for long answer in phase: there a larger step would not be small.
+    double step = (model.plant == physics::Plant::equations ? 1e-4 : 1e-2) * free[j].scale;
     if (value + step > free[j].bounds.upper) step = -step;
     set(changed, free[j], value + step);
     auto column = columns.col(static_cast<Eigen::Index>(j));
@@ -250,6 +251,30 @@ Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<F
   return all;
 }
 
+/// The damped Newton step; a number that stands at a bound and would leave through it is held while the others move.
+Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient, double damping,
+                            const Fit& at) {
+  const Eigen::Index n = gradient.size();
+  Eigen::MatrixXd damped = hessian;
+  for (Eigen::Index k = 0; k < n; ++k) damped(k, k) += damping * hessian(k, k) + 1e-300;
+  Eigen::VectorXd downhill = -gradient;
+  for (;;) {
+    const Eigen::VectorXd step = damped.ldlt().solve(downhill);
+    bool held = false;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const auto& f = at.free[static_cast<std::size_t>(k)];
+      const double value = get(at.model, f);
+      if (!((step(k) < 0.0 && value <= f.bounds.lower) || (step(k) > 0.0 && value >= f.bounds.upper))) continue;
+      damped.row(k).setZero();
+      damped.col(k).setZero();
+      damped(k, k) = 1.0;
+      downhill(k) = 0.0;
+      held = true;
+    }
+    if (!held) return step;
+  }
+}
+
 }  // namespace
 
 Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
@@ -275,6 +300,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   best.cost = best.data_cost + priors(best.model);
   best.columns = nearly(data, best.model, best.free, near);
   bool fresh = near == nullptr, verified = fresh;
+  const bool cheap = data.model.plant == physics::Plant::equations;  // to simulate: always fresh sensitivities
   Eigen::MatrixXd j = whitened(data, weighing, best.columns);
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
@@ -293,9 +319,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   double damping = 1e-3;
   int failures = 0;
   for (int i = 0; i < iterations && n > 0; ++i) {
-    Eigen::MatrixXd damped = hessian;
-    for (Eigen::Index k = 0; k < n; ++k) damped(k, k) += damping * hessian(k, k) + 1e-300;
-    const Eigen::VectorXd step = damped.ldlt().solve(-gradient);
+    const Eigen::VectorXd step = step_within(hessian, gradient, damping, best);
     if (!step.allFinite()) break;
     Model tried = best.model;
     Eigen::VectorXd taken(n), scale(n);
@@ -316,7 +340,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
     const double cost = data_cost + priors(tried);
     if (cost < best.cost) {
       const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
-      if (const double length = taken.dot(by_scale); length > 0.0) {
+      if (const double length = taken.dot(by_scale); length > 0.0 && !cheap) {
         // Broyden: the sensitivities now give the change that was seen.
         j += (r - best.residual - j * taken) * by_scale.transpose() / length;
         Eigen::VectorXd change = raw_tried - raw - best.columns * taken;
@@ -332,12 +356,12 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       damping = std::max(1e-9, 0.1 * damping);
       const bool settled = gained < 0.2;
       if (settled && (verified || iterations < 4)) break;
-      if (settled) {  // with sensitivities from elsewhere: only fresh ones can say so
+      if (settled || cheap) {  // with sensitivities from elsewhere: only fresh ones can say so
         best.columns = sensitivities(data, best.model, best.free);
         j = whitened(data, weighing, best.columns);
         verified = true;
       }
-      fresh = settled;
+      fresh = settled || cheap;
       derive();
     } else if (cost < best.cost + 0.05 && (fresh || iterations < 4)) {
       break;  // as good as it gets
