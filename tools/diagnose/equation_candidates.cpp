@@ -137,8 +137,11 @@ class Candidates {
     term.info = physics::find_term(Plant::equations, name);
     term.on = on;
     term.with = with;
-    for (const auto& used : model_.terms)
+    for (std::size_t t = 0; t < model_.terms.size(); ++t) {
+      const auto& used = model_.terms[t];
       if (used.info == term.info && used.on == on && used.with == with) return;
+      if (t >= data_.model.terms.size() && same_law(used, term)) return;
+    }
     if (size > 0.0) {
       term.values[0] = size;
       term.given[0] = true;
@@ -212,6 +215,19 @@ class Candidates {
 };
 
 }  // namespace
+
+std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name) {
+  const auto& span = Spans{data, model}.of(name);
+  return {span.low, span.high};
+}
+
+bool same_law(const Term& one, const Term& other) {
+  const auto is_power = [](const Term& term) {
+    const auto name = term.info->name;
+    return name == "linear" || name == "coupling" || name == "quadratic" || name == "cubic";
+  };
+  return is_power(one) && is_power(other) && one.on == other.on && one.with == other.with;
+}
 
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted) {
   return Candidates{data, fitted}.all();

@@ -251,6 +251,17 @@ Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<F
   return all;
 }
 
+/// What a term in the user's own equations costs because few machines have it: a rate that goes with the third power of a
+/// speed is rare where air and oil know the first and second; one that goes with another variable had many to choose from.
+double rarity(const Model& model, const physics::Term& term) {
+  if (model.plant != physics::Plant::equations) return 0.0;
+  if (!term.with.empty())
+    return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size()));
+  const bool speed = std::any_of(model.equations.states.begin(), model.equations.states.end(),
+                                 [&](const auto& state) { return state.derivative == term.on; });
+  return term.info->name == "cubic" && speed ? 3.0 : 0.0;
+}
+
 /// The damped Newton step; a number that stands at a bound and would leave through it is held while the others move.
 Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient, double damping,
                             const Fit& at) {
@@ -264,7 +275,8 @@ Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorX
     for (Eigen::Index k = 0; k < n; ++k) {
       const auto& f = at.free[static_cast<std::size_t>(k)];
       const double value = get(at.model, f);
-      if (!((step(k) < 0.0 && value <= f.bounds.lower) || (step(k) > 0.0 && value >= f.bounds.upper))) continue;
+      if (!((step(k) < 0.0 && value <= f.bounds.lower) || (step(k) > 0.0 && value >= f.bounds.upper)))
+        continue;
       damped.row(k).setZero();
       damped.col(k).setZero();
       damped(k, k) = 1.0;
@@ -300,7 +312,8 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   best.cost = best.data_cost + priors(best.model);
   best.columns = nearly(data, best.model, best.free, near);
   bool fresh = near == nullptr, verified = fresh;
-  const bool cheap = data.model.plant == physics::Plant::equations;  // to simulate: always fresh sensitivities
+  const bool cheap =
+      data.model.plant == physics::Plant::equations;  // to simulate: always fresh sensitivities
   Eigen::MatrixXd j = whitened(data, weighing, best.columns);
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
@@ -398,6 +411,8 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       mains = mains || std::abs(f - hum) < 0.003 * hum;
     if (!mains) complexity += 4.0;
   }
+  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
+    complexity += rarity(best.model, best.model.terms[t]);
   best.evidence = -best.cost - complexity;
   Eigen::MatrixXd regular = hessian;
   for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;

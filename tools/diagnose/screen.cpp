@@ -127,6 +127,83 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   return all;
 }
 
+namespace {
+
+/// A strength that its bounds forbid, or a limit that would hardly be there.
+bool is_impossible(const Start& start, const Eigen::VectorXd& strength, Eigen::Index at) {
+  if (start.directions.size() != 1) return false;  // a sine has any phase
+  const auto& d = start.directions.front();
+  if (d.amplitude >= none) return strength(at) < 0.2;
+  return strength(at) < 0.0 && start.term.info->parameters[d.amplitude].bounds.lower >= 0.0;
+}
+
+double price(const Start& start, double observations) {
+  std::size_t numbers = start.directions.size();
+  for (std::size_t k = 0; k < start.term.info->parameter_count(); ++k)
+    numbers += start.term.info->parameters[k].role == Role::shape ? 1U : 0U;
+  return 0.5 * static_cast<double>(numbers) * std::log(observations);
+}
+
+}  // namespace
+
+std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighing, const Fit& base,
+                                       const std::vector<Start>& starts, std::size_t most) {
+  // Of each term the two starts that gain most alone. What repeats shows alone, at its own place in the spectrum.
+  const auto single = screen(data, weighing, base, starts, 0);
+  std::vector<Start> chosen;
+  for (const auto& s : single) {
+    const auto same = std::count_if(chosen.begin(), chosen.end(), [&](const Start& start) {
+      const auto &a = start.term, &b = s.start.term;
+      return a.info == b.info && a.on == b.on && a.with == b.with;
+    });
+    if (same < 2 && s.start.directions.size() == 1) chosen.push_back(s.start);
+  }
+  const auto n = nuisance(data, weighing, base);
+  const Eigen::VectorXd at = differences(data, simulate(data, base.model));
+  std::vector<Eigen::Index> begins{0};
+  for (const auto& start : chosen)
+    begins.push_back(begins.back() + static_cast<Eigen::Index>(start.directions.size()));
+  Eigen::MatrixXd columns(at.size(), begins.back());
+  in_parallel(chosen.size(), [&](std::size_t i) {
+    columns.middleCols(begins[i], begins[i + 1] - begins[i]) = columns_of(data, base, at, chosen[i]);
+  });
+  columns = whitened(data, weighing, columns);
+  const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
+  const Eigen::MatrixXd all = weighing.temper * (columns.transpose() * columns);
+  const Eigen::MatrixXd gram = all - b.transpose() * n.hessian.solve(b);
+  const Eigen::VectorXd slope = weighing.temper * (columns.transpose() * base.residual);
+  const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
+  std::vector<ScreenedPair> pairs;
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    for (std::size_t k = i + 1; k < chosen.size(); ++k) {
+      const auto &one = chosen[i].term, &two = chosen[k].term;
+      if ((one.info == two.info && one.on == two.on && one.with == two.with) || same_law(one, two)) continue;
+      std::vector<Eigen::Index> places;
+      for (auto c = begins[i]; c < begins[i + 1]; ++c) places.push_back(c);
+      const auto second = static_cast<Eigen::Index>(places.size());
+      for (auto c = begins[k]; c < begins[k + 1]; ++c) places.push_back(c);
+      Eigen::MatrixXd m = gram(places, places);
+      for (Eigen::Index c = 0; c < m.rows(); ++c) {
+        const auto place = places[static_cast<std::size_t>(c)];
+        m(c, c) += 1e-6 * all(place, place) + 1e-300;
+      }
+      const Eigen::VectorXd g = slope(places);
+      const Eigen::VectorXd strength = -m.ldlt().solve(g);
+      if (!strength.allFinite() || is_impossible(chosen[i], strength, 0) ||
+          is_impossible(chosen[k], strength, second))
+        continue;
+      ScreenedPair pair;
+      pair.merit = -0.5 * strength.dot(g) - price(chosen[i], observations) - price(chosen[k], observations);
+      pair.first.start = chosen[i], pair.second.start = chosen[k];
+      pair.first.strength = strength.head(second),
+      pair.second.strength = strength.tail(strength.size() - second);
+      pairs.push_back(std::move(pair));
+    }
+  std::sort(pairs.begin(), pairs.end(), [](const auto& x, const auto& y) { return x.merit > y.merit; });
+  if (pairs.size() > most) pairs.resize(most);
+  return pairs;
+}
+
 physics::Model with(const Fit& base, const std::vector<const Screened*>& added, double share) {
   physics::Model model = base.model;
   for (const auto* s : added) {

@@ -18,6 +18,15 @@ struct Screened {
 std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
                              const std::vector<Start>& starts, std::size_t keep);
 
+struct ScreenedPair {
+  Screened first, second;  // with the strengths that they have together
+  double merit = 0.0;
+};
+
+/// The pairs of `starts` that would gain most together, to first order; of each term its two best starts. Best first.
+std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighing, const Fit& base,
+                                       const std::vector<Start>& starts, std::size_t most);
+
 /// The base model with the screened term(s) at a share of their first-order strength.
 physics::Model with(const Fit& base, const std::vector<const Screened*>& added, double share = 1.0);
 

@@ -6,6 +6,8 @@
 #include <set>
 #include <tuple>
 
+#include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/verdict.hpp"
@@ -17,41 +19,6 @@ namespace {
 using physics::Model;
 using physics::Role;
 using physics::Term;
-
-std::string label(const Term& term) {
-  std::string text{term.info->name};
-  if (!term.on.empty()) text += "@" + term.on;
-  if (!term.with.empty()) text += "+" + term.with;
-  return text;
-}
-
-/// A claim must have a strength that is possible and clearly not zero.
-bool stands(const Fit& fit, std::size_t term) {
-  const auto& info = *fit.model.terms[term].info;
-  const auto& values = fit.model.terms[term].values;
-  // A shape at the end of its range is another term in disguise.
-  for (std::size_t i = 0; i < info.parameter_count(); ++i) {
-    const auto& p = info.parameters[i];
-    if (p.role == Role::amplitude && p.bounds.upper < 1e100 && std::abs(values[i]) > 0.99 * p.bounds.upper)
-      return false;
-    if (p.role != Role::shape || p.name == "center" || p.name == "limit") continue;
-    if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower && values[i] < 1.3 * p.bounds.lower)
-      return false;
-    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > 0.99 * p.bounds.upper) return false;
-  }
-  // Friction that is smaller at rest than at speed is none.
-  if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
-
-  for (std::size_t k = 0; k < fit.free.size(); ++k) {
-    const auto& f = fit.free[k];
-    if (f.where != Freedom::Where::term || f.term != term) continue;
-    if (info.parameters[f.index].role != Role::amplitude) continue;
-    if (std::abs(get(fit.model, f)) > 3.0 * fit.sigma(static_cast<Eigen::Index>(k))) return true;
-  }
-  for (std::size_t i = 0; i < info.parameter_count(); ++i)
-    if (info.parameters[i].role == Role::amplitude) return false;
-  return true;  // a term of shapes alone, or a curve
-}
 
 class Search {
  public:
@@ -65,6 +32,8 @@ class Search {
   /// Candidates fitted on top of `base`, best first.
   std::vector<Fit> shortlisted(const Weighing& weighing, const Fit& base, double share);
   bool add_named(double round);
+  /// Two terms at once, where neither does anything alone; where a simulation is cheap enough to try many.
+  bool add_pair();
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
@@ -127,7 +96,7 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
       f = fit(data_, weighing, f.model, data_.model, 8, &f);
     leader = std::max(leader, f.evidence);
   }
-  std::erase_if(fits, [](const Fit& f) { return !stands(f, f.model.terms.size() - 1); });
+  std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
   std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
   last_screen_ = std::move(screened);
   return fits;
@@ -170,7 +139,7 @@ bool Search::add_named(double round) {
       const double gain = with_term.evidence - without.evidence;
       // A further claim must be one that an engineer would see in the residual.
       const double ratio = rivals_.empty() ? 0.995 : 0.95;
-      if (gain > best_gain && stands(with_term, with_term.model.terms.size() - 1) &&
+      if (gain > best_gain && stands(data_, with_term, with_term.model.terms.size() - 1) &&
           least_ratio(data_, with_term, without) < ratio) {
         best_gain = gain, winner = i;
         own_weighing = own, own_fit = std::move(with_term), own_base = std::move(without);
@@ -219,7 +188,7 @@ void Search::prune() {
     auto without = fit(data_, d_.weighing, model, data_.model, 10);
     bool possible = true;
     for (std::size_t t = given(); t < without.model.terms.size(); ++t)
-      possible = possible && stands(without, t);
+      possible = possible && stands(data_, without, t);
     if (!possible) continue;
     if (without.evidence < d_.best.evidence - claim_margin_of(d_.weighing) &&
         least_ratio(data_, d_.best, without) < 0.95)
@@ -248,7 +217,7 @@ void Search::weigh_alternatives() {
         model.terms[place] = rival;
         auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
         const double odds = f.evidence - d_.best.evidence;
-        if (odds > 0.5 && stands(f, place)) {  // better after all, beside the other terms
+        if (odds > 0.5 && stands(data_, f, place)) {  // better after all, beside the other terms
           kept.push_back(d_.best.model.terms[place]);
           finding.alternatives.push_back({d_.best.model.terms[place], -odds});
           for (auto& a : finding.alternatives) a.log_odds -= odds;
@@ -268,9 +237,22 @@ void Search::weigh_alternatives() {
     }
 }
 
+bool Search::add_pair() {
+  if (data_.model.plant != physics::Plant::equations) return false;
+  progress_(0.05, "screening pairs");
+  auto claim = claim_pair(data_, d_.best, options_.without);
+  if (!claim) return false;
+  d_.best = std::move(claim->fit);
+  d_.weighing = std::move(claim->weighing);
+  rivals_ = std::move(claim->rivals);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  return true;
+}
+
 Diagnosis Search::run() {
   prepare();
-  for (int round = 0; round < 3; ++round)
+  const bool paired = add_pair();
+  for (int round = paired ? 2 : 0; round < 3; ++round)
     if (!add_named(round)) break;
   prune();
   weigh_alternatives();

@@ -1,0 +1,16 @@
+// What a term must be before it is claimed: of possible strength, clearly not zero, and seen to act.
+#pragma once
+
+#include <string>
+
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+/// "overflow@x1+x2"
+std::string label(const physics::Term& term);
+
+/// A claim must have a strength that is possible and clearly not zero.
+bool stands(const Case& data, const Fit& fit, std::size_t term);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,104 @@
+#include "tools/diagnose/pairs.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// A fit and its scale settle together; every row counts alike.
+struct Settled {
+  Fit fit;
+  Weighing weighing;
+  double score = 0.0;  // log likelihood of all rows at the scale found, less the price of the numbers
+};
+
+Settled settle(const Case& data, Fit start, int rounds) {
+  Settled s{std::move(start), {}, 0.0};
+  for (int round = 0; round < rounds; ++round) {
+    s.weighing = weigh(data, simulate(data, s.fit.model), false);
+    auto nearer = fit(data, s.weighing, s.fit.model, data.model, 8, &s.fit);
+    const bool arrived = least_ratio(data, nearer, s.fit) > 0.99;
+    s.fit = std::move(nearer);
+    if (arrived) break;
+  }
+  s.weighing = weigh(data, simulate(data, s.fit.model), false);
+  double rows = 0.0;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    double count = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r)
+      count += static_cast<double>(
+          std::count(s.weighing.present[r][o].begin(), s.weighing.present[r][o].end(), true));
+    s.score -= count * std::log(s.weighing.filters[o].sigma);
+    rows += count;
+  }
+  s.score -= 0.5 * static_cast<double>(s.fit.free.size()) * std::log(std::max(10.0, rows));
+  return s;
+}
+
+Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const ScreenedPair& pair) {
+  physics::Model best;
+  double least = 1e300;
+  for (const double share : {1.0, 0.4, 0.15}) {
+    auto tried = with(base, {&pair.first, &pair.second}, share);
+    const double square = residual(data, weighing, tried).squaredNorm();
+    if (square < least) least = square, best = std::move(tried);
+  }
+  return fit(data, weighing, best, data.model, 5, &base);
+}
+
+}  // namespace
+
+std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
+                                     const std::set<std::string, std::less<>>& without) {
+  const Weighing plain = weigh(data, simulate(data, base.model), false);
+  const Fit under = fit(data, plain, base.model, data.model, 4, &base);
+  const auto pairs = screen_pairs(data, plain, under, named_starts(data, plain, under, without), 10);
+  std::vector<Fit> rough;
+  for (const auto& pair : pairs) rough.push_back(begin(data, plain, under, pair));
+  std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+  std::vector<Settled> settled;
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, rough.size()); ++i)
+    settled.push_back(settle(data, std::move(rough[i]), 4));
+  std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
+  const std::size_t given = data.model.terms.size();
+  for (auto& best : settled) {
+    const std::size_t first = best.fit.model.terms.size() - 2;
+    if (first < given || !stands(data, best.fit, first) || !stands(data, best.fit, first + 1)) continue;
+    // Neither alone: an engineer must see what the other adds.
+    bool needed = true;
+    for (const std::size_t dropped : {first, first + 1}) {
+      auto alone = best.fit.model;
+      alone.terms.erase(alone.terms.begin() + static_cast<std::ptrdiff_t>(dropped));
+      const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
+      needed = needed && least_ratio(data, best.fit, single.fit) < 0.8;
+    }
+    if (!needed) continue;
+    JointClaim claim;
+    claim.weighing = weigh(data, simulate(data, best.fit.model));
+    claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
+    if (least_ratio(data, best.fit, claim.fit) < 0.9)
+      claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 0, &best.fit);
+    const auto rival = fit(data, claim.weighing, base.model, data.model, 6, &base);
+    if (claim.fit.evidence - rival.evidence < 2.0 * claim_margin_of(claim.weighing)) continue;
+    claim.rivals.resize(2);
+    for (const auto& other : settled) {
+      if (&other == &best) continue;
+      for (std::size_t i = 0; i < 2; ++i)
+        for (std::size_t k = 0; k < 2; ++k) {
+          const auto &kept = best.fit.model.terms[first + 1 - i],
+                     &same = other.fit.model.terms[first + 1 - k];
+          const auto &mine = best.fit.model.terms[first + i], &instead = other.fit.model.terms[first + k];
+          if (label(kept) == label(same) && label(mine) != label(instead)) claim.rivals[i].push_back(instead);
+        }
+    }
+    return claim;
+  }
+  return std::nullopt;
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,25 @@
+// Pairs: two effects that each do nothing alone may explain a recording together.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "tools/diagnose/screen.hpp"
+
+namespace invar::diagnose {
+
+struct JointClaim {
+  Fit fit;  // the base and two terms, under filters of its own residual
+  Weighing weighing;
+  std::vector<std::vector<physics::Term>> rivals;  // of each: terms that did nearly as well in its place
+};
+
+/// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size of
+/// what is left both say so.
+std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
+                                     const std::set<std::string, std::less<>>& without);
+
+}  // namespace invar::diagnose
