@@ -22,7 +22,7 @@ Settled settle(const Case& data, Fit start, int rounds) {
   for (int round = 0; round < rounds; ++round) {
     s.weighing = weigh(data, simulate(data, s.fit.model), false);
     auto nearer = fit(data, s.weighing, s.fit.model, data.model, 8, &s.fit);
-    const bool arrived = least_ratio(data, nearer, s.fit) > 0.99;
+    const bool arrived = least_ratio(data, nearer, s.fit) > 0.995;
     s.fit = std::move(nearer);
     if (arrived) break;
   }
@@ -48,7 +48,7 @@ Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const Scr
     const double square = residual(data, weighing, tried).squaredNorm();
     if (square < least) least = square, best = std::move(tried);
   }
-  return fit(data, weighing, best, data.model, 5, &base);
+  return fit(data, weighing, best, data.model, 8, &base);
 }
 
 }  // namespace
@@ -61,9 +61,11 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
   std::vector<Fit> rough;
   for (const auto& pair : pairs) rough.push_back(begin(data, plain, under, pair));
   std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+  // What swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
+  const bool quick = data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
   std::vector<Settled> settled;
-  for (std::size_t i = 0; i < std::min<std::size_t>(5, rough.size()); ++i)
-    settled.push_back(settle(data, std::move(rough[i]), 4));
+  for (std::size_t i = 0; i < std::min<std::size_t>(quick ? 5 : 3, rough.size()); ++i)
+    settled.push_back(settle(data, std::move(rough[i]), quick ? 12 : 3));
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   const std::size_t given = data.model.terms.size();
   for (auto& best : settled) {
