@@ -360,8 +360,10 @@ class OwnEquations final : public Simulation {
       machine.show(s, time_[row]);
       if (!equations.controlled_input.empty() && machine.controlled() >= machine.states())
         machine.set_input(machine.controlled() - machine.states(), machine.law());
-      if (row % std::max<std::size_t>(1, n / 8) == 0)
-        fastest = std::max(fastest, machine.fastest(s, time_[row]));
+      if (row % std::max<std::size_t>(1, n / 32) == 0) {
+        const double now = machine.fastest(s, time_[row]);
+        fastest = std::max(now, 0.5 * fastest);  // where it was fast, it may soon be again
+      }
       machine.show(s, time_[row]);
       for (std::size_t o = 0; o < outputs.size(); ++o) outputs[o][row] = machine.output(o);
       if (row + 1 == n) break;

@@ -5,6 +5,7 @@
 
 namespace invar::tools {
 
+void add_job_apply(CLI::App& job);
 void add_job_compare(CLI::App& job);
 /// run, list, cancel
 void add_job_run(CLI::App& job);

@@ -64,7 +64,7 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
   // What swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
   const bool quick = data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
   std::vector<Settled> settled;
-  for (std::size_t i = 0; i < std::min<std::size_t>(quick ? 5 : 3, rough.size()); ++i)
+  for (std::size_t i = 0; i < std::min<std::size_t>(3, rough.size()); ++i)
     settled.push_back(settle(data, std::move(rough[i]), quick ? 12 : 3));
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   const std::size_t given = data.model.terms.size();
