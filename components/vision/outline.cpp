@@ -179,7 +179,7 @@ double Shape::axis_ratio() const {
 }
 
 void Rays::choose(double radius) {
-  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 30.0)), 2, most / 16);
+  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 2, most / 16);
   open.fill(true);
   weight.fill(1.0);
 }

@@ -1,6 +1,6 @@
 #include "components/vision/ray_samples.hpp"
 
-#include <cmath>
+#include <array>
 #include <cstring>
 
 #include "components/vision/wide_vectors.hpp"
@@ -26,26 +26,34 @@ INVAR_WIDE_VECTORS
 void read_ray(const Ray& ray, std::size_t count, float* out) {
   constexpr Numbers ramp{0, 1, 2, 3, 4, 5, 6, 7};
   Numbers u = ray.u + ramp * ray.step_u, v = ray.v + ramp * ray.step_v;
+  const std::int32_t first = (ray.v >> 16) * ray.stride + (ray.u >> 16);
+  const auto pair_at = [](const std::uint8_t* from) {
+    std::uint16_t pair = 0;
+    std::memcpy(&pair, from, sizeof pair);
+    return pair;
+  };
   for (std::size_t j = 0; j < count; j += lanes) {
-    const Numbers at = (v >> 16) * ray.stride + (u >> 16);
-    // Two neighbours at once; what lies beyond the last sample is not touched.
-    Pairs upper_pair{}, lower_pair{};
-    const std::size_t here = std::min(lanes, count - j);
-    for (std::size_t k = 0; k < here; ++k) {
-      std::uint16_t pair = 0;
-      const std::uint8_t* from = ray.data + at[k];
-      std::memcpy(&pair, from, sizeof pair);
-      upper_pair[k] = pair;
-      std::memcpy(&pair, from + ray.stride, sizeof pair);
-      lower_pair[k] = pair;
-    }
+    // Beyond the last sample the first is read once more, and counts nothing.
+    const Numbers inside = ramp < static_cast<std::int32_t>(count - j);
+    const Numbers at = (((v >> 16) * ray.stride + (u >> 16)) & inside) | (first & ~inside);
+    std::array<std::int32_t, lanes> place;
+    std::memcpy(place.data(), &at, sizeof at);
+    const std::uint8_t *upper_row = ray.data, *lower_row = ray.data + ray.stride;
+    const auto pairs_of = [&](const std::uint8_t* row, Pairs& pairs) {
+      pairs = Pairs{pair_at(row + place[0]), pair_at(row + place[1]), pair_at(row + place[2]),
+                    pair_at(row + place[3]), pair_at(row + place[4]), pair_at(row + place[5]),
+                    pair_at(row + place[6]), pair_at(row + place[7])};
+    };
+    Pairs upper_pair, lower_pair;
+    pairs_of(upper_row, upper_pair);
+    pairs_of(lower_row, lower_pair);
     const Numbers up = __builtin_convertvector(upper_pair, Numbers),
                   low = __builtin_convertvector(lower_pair, Numbers);
     const Numbers a = (u >> 8) & 255, b = (v >> 8) & 255;
     const Numbers up_left = up & 255, low_left = low & 255;
     const Numbers upper = up_left * 256 + ((up >> 8) - up_left) * a,
                   lower = low_left * 256 + ((low >> 8) - low_left) * a;
-    const Numbers between = upper * 256 + (lower - upper) * b;
+    const Numbers between = (upper * 256 + (lower - upper) * b) & inside;
     const Lanes value = __builtin_convertvector(between, Lanes) * (1.0F / 65536.0F);
     std::memcpy(out + j, &value, sizeof value);
     u += ray.step_u * static_cast<std::int32_t>(lanes);

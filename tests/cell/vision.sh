@@ -8,7 +8,7 @@ folder=$(mktemp -d); pid=
 trap '[[ -z $pid ]] || kill "$pid" 2>/dev/null || true; rm -rf "$folder"' EXIT
 cp "$source"/tests/data/vision/* "$source/deployment/profiles.yaml" "$folder"; cd "$folder"
 domain=$((100 + RANDOM % 100)); echo "domain $domain"
-sed -i "s/^domain: .*/domain: $domain/" cell.yaml
+sed -i "s/^domain: .*/domain: $domain/; s/^profiles: .*/profiles: profiles.yaml/" cell.yaml
 
 for run in one two; do
   "$invar" run cell.yaml --duration 2 >/dev/null

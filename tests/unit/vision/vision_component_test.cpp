@@ -104,8 +104,8 @@ struct Bench final : Component {
       vision.step(tick);
     }
   }
-  void ask(std::uint64_t number, image::VisionTask task = image::VISION_MEASURE, const std::string& picture = "",
-           const std::vector<std::array<double, 2>>& targets = {}) {
+  void ask(std::uint64_t number, image::VisionTask task = image::VISION_MEASURE,
+           const std::string& picture = "", const std::vector<std::array<double, 2>>& targets = {}) {
     image::VisionCommand request;
     request.id(number);
     request.wanted(task);
