@@ -10,12 +10,12 @@ using namespace dispensing;
 
 namespace {
 
-/// An axis in machine coordinates, moved on from the instant of its sample to `now`.
+/// An axis in machine coordinates, moved on by the age of its sample.
 struct AxisMotion {
   double position, velocity, acceleration;
-  AxisMotion(const stage::AxisState& state, Instant now)
+  AxisMotion(const stage::AxisState& state, Duration age)
       : velocity{state.setpoint_velocity()}, acceleration{state.setpoint_acceleration()} {
-    const double since = static_cast<double>(now.ns - state.at().time_ns()) * 1e-9;
+    const double since = age.in_seconds();
     position = state.position() - state.correction() + since * (velocity + 0.5 * since * acceleration);
     velocity += since * acceleration;
   }
@@ -45,7 +45,7 @@ void Valve::publish(const Tick& tick) noexcept {
   changed_ = false;
   sample_.cell(cell);
   sample_.component_id(id);
-  sample_.at().time_ns(tick.now.ns);
+  sample_.at().time_ns(clock_ns_);
   sample_.at().cycle(tick.cycle);
   state_.write(sample_);
 }
@@ -54,7 +54,7 @@ void Valve::refuse(std::uint64_t droplet, const Refusal& why, const Tick& tick) 
   DropletRefused refused;
   refused.cell(cell);
   refused.component_id(id);
-  refused.at().time_ns(tick.now.ns);
+  refused.at().time_ns(clock_ns_);
   refused.at().cycle(tick.cycle);
   refused.droplet(droplet);
   refused.pattern_id(loaded_.id());
@@ -103,8 +103,8 @@ std::optional<Motion> Valve::motion(const Tick& tick) noexcept {
   const Duration patience = Duration::seconds(parameters_.stage_timeout);
   if (x == nullptr || y == nullptr || state_x_.age(tick.now) > patience || state_y_.age(tick.now) > patience)
     return {};
-  const AxisMotion along_x{*x, tick.now};
-  const AxisMotion along_y{*y, tick.now};
+  const AxisMotion along_x{*x, state_x_.age(tick.now)};
+  const AxisMotion along_y{*y, state_y_.age(tick.now)};
   return Motion{{along_x.position, along_y.position},
                 {along_x.velocity, along_y.velocity},
                 {along_x.acceleration, along_y.acceleration}};
@@ -147,7 +147,7 @@ void Valve::jet(const TriggerPoint& point, const Motion& at, std::int64_t open_n
   ValvePulse pulse;
   pulse.cell(cell);
   pulse.component_id(id);
-  pulse.at().time_ns(tick.now.ns);
+  pulse.at().time_ns(clock_ns_);
   pulse.at().cycle(tick.cycle);
   pulse.droplet(point.droplet());
   pulse.open_ns(open_ns);
@@ -188,12 +188,15 @@ void Valve::jet_now(std::int64_t pulse_ns, const Tick& tick) noexcept {
     refuse(0, {REFUSED_OUTSIDE_PATTERN, "the nozzle is not over the pattern"}, tick);
   } else {
     point.target({moving->position.x(), moving->position.y(), 0.0});
-    const std::int64_t open_ns = tick.now.ns + Duration::seconds(parameters_.ahead).ns;
+    const std::int64_t open_ns = clock_ns_ + Duration::seconds(parameters_.ahead).ns;
     jet(point, *moving, open_ns, Range{}, tick);
   }
 }
 
 void Valve::step(const Tick& tick) noexcept {
+  // Times are given on the clock of the stage's stamps, whichever that is: the droplet belongs to a place.
+  const auto* state = state_x_.latest();
+  clock_ns_ = state != nullptr ? state->at().time_ns() + state_x_.age(tick.now).ns : tick.now.ns;
   while (pattern_.take(loaded_)) {
     sample_.armed(false);
     const std::size_t count = std::min(loaded_.points().size(), most_points);
@@ -229,7 +232,7 @@ void Valve::step(const Tick& tick) noexcept {
       done_[i] = 1;
       const double time = std::max(passed->time, 0.0);
       jet(point, {moving->position_at(time), moving->velocity_at(time), moving->acceleration},
-          tick.now.ns + Duration::seconds(time).ns, parameters_.velocity, tick);
+          clock_ns_ + Duration::seconds(time).ns, parameters_.velocity, tick);
     }
   }
   publish(tick);

@@ -104,6 +104,7 @@ class Valve final : public Component {
   std::vector<char> done_;             // of each of its points
   std::array<Range, 2> box_{};         // around its targets
   dispensing::ValveState sample_;
+  std::int64_t clock_ns_ = 0;  // now, on the clock of the stage's stamps
   std::int64_t last_open_ns_ = 0;
   bool changed_ = false;
 };

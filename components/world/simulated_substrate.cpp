@@ -25,7 +25,6 @@ void SimulatedSubstrate::activate() {
   sample_ = {};
   sample_.number(1);
   sample_.height(2e-3);
-  begun_ = now();
   sample_.cell(cell);
   sample_.component_id(id);
   sample_.at().time_ns(now().ns);
@@ -34,6 +33,7 @@ void SimulatedSubstrate::activate() {
 
 void SimulatedSubstrate::remember(const sensing::ToolPosition& tool) noexcept {
   if (remembered_ > 0 && way_[(remembered_ - 1) % way_.size()].time_ns >= tool.at().time_ns()) return;
+  if (remembered_ == 0) begun_ = {tool.at().time_ns()};
   way_[remembered_++ % way_.size()] = {tool.at().time_ns(), {tool.position()[0], tool.position()[1]}};
 }
 
