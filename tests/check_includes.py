@@ -20,7 +20,7 @@ ROOMS = {
     "core/config": ["core/base", "yaml-cpp"],
     "core/numerics": ["core/base", "Eigen", "Ceres"],
     "core/metrology": ["core/base", "core/numerics", "Eigen", "Ceres"],
-    "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "yaml-cpp", "Eigen"],
+    "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "yaml-cpp", "Eigen"],
     "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],

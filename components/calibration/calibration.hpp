@@ -5,64 +5,30 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "components/calibration/job_host.hpp"
+#include "components/calibration/job_specs.hpp"
 #include "components/calibration/printing.hpp"
 #include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/metrology/heat_trace.hpp"
 #include "core/recording/table.hpp"
 #include "idl/compensation.h"
 #include "idl/job.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
+#include "idl/thermal.h"
 
 namespace invar::calibration {
 
-/// A displacement line to measure.
-struct LineSpec {
-  std::string name;
-  std::vector<double> from;
-  std::vector<double> to;
-  void describe(auto& p) {
-    p(name, "name", "of the line, in the files");
-    p(from, "from", "m", "commanded start, one number an axis");
-    p(to, "to", "m", "commanded end");
-    if constexpr (requires { p.node(); }) {
-      if (from.size() != to.size() || from.empty() || from.size() > 3)
-        p.node().fault("`from` and `to` need one number an axis each", "write from: [0, 0] and to: [0.2, 0]");
-    }
-  }
-};
-
-/// One geometric calibration as a transaction: lines to fit, lines to verify before and after.
-struct GeometricJob {
-  std::string name;
-  std::filesystem::path machine;
-  std::vector<LineSpec> lines;
-  std::vector<LineSpec> verify;
-  double interval = 0.01;
-  double verify_interval = 0.005;
-  std::int64_t cycles = 1;
-  std::int64_t readings = 4;
-  std::string out = "out";
-  void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
-    p(machine, "machine", "machine.yaml: chain and travel");
-    p(lines, "lines", "displacement lines to identify the error from");
-    p(verify, "verify", "lines not fitted, measured before and after");
-    p(interval, "interval", "m", Range{1e-4, 1.0}, "between the points of a line");
-    p(verify_interval, "verify_interval", "m", Range{1e-4, 1.0}, "between the points of a verification line");
-    p(cycles, "cycles", 1, 100, "each line forth and back so often");
-    p(readings, "readings", 1, 10'000, "averaged at each point");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
-  }
-};
-
+/// A job is a transaction on the compensation: what it measures, fits and validates is put to use on trial, watched, and kept
+/// only if it makes the error smaller; a job that fails, is cancelled or dies leaves the models as they were.
 class Calibration final : public Component, private JobHost {
  public:
   struct Parameters {
@@ -70,13 +36,16 @@ class Calibration final : public Component, private JobHost {
     double settle_timeout = 2.0;
     double velocity = 0.0;
     std::vector<GeometricJob> jobs;
+    std::vector<ThermalJob> thermal_jobs;
     std::vector<PrintJob> prints;
+    std::vector<std::string> zones;
     void describe(auto& p) {
       p(axes, "axes", 1, 3, "how many axes the machine has");
       p(settle_timeout, "settle_timeout", "s", Range{0.01, 600.0},
         "the job fails when an axis needs longer to settle");
       p(velocity, "velocity", "m/s", Range{0.0, 10.0}, "of the moves; 0: the stage's own");
       p(jobs, "jobs", "geometric calibrations that can be run");
+      p(thermal_jobs, "thermal_jobs", "calibrations over position and temperature");
       p(prints, "prints", "print jobs that can be run");
       if constexpr (requires { p.node(); })
         for (const PrintJob& print : prints)
@@ -84,6 +53,7 @@ class Calibration final : public Component, private JobHost {
                                                    [&](const auto& job) { return job.name == print.first; }))
             p.node()["prints"].fault("`" + print.first + "` is no job of `jobs`",
                                      "name one of them, or leave `first` out");
+      p(zones, "zones", "further temperatures to record: each makes a port temperature_<zone>");
     }
   };
   explicit Calibration(const Parameters& parameters);
@@ -93,27 +63,60 @@ class Calibration final : public Component, private JobHost {
 
  private:
   using Point = Eigen::Vector3d;
-  struct Verification {
-    double maximum = 0.0;  // m
-    double rms = 0.0;      // m
+  struct Axis {
+    Axis(Calibration& owner, std::size_t number)
+        : state{owner, std::string{"state_"} + "xyz"[number]},
+          command{owner, std::string{"command_"} + "xyz"[number], "command"} {}
+    Input<stage::AxisState> state;
+    Output<stage::AxisCommand> command;
+    std::uint64_t last_command = 0;
   };
 
+  // calibration.cpp: jobs, and what all of them are made of.
   void start(const job::JobCommand& command);
-  Task run(const GeometricJob& job);
-  Task run(const PrintJob& job);
-  Task calibrate(const GeometricJob& job);
-  Task enable_axes() override;
-  Task move_to(Point target, Pace pace) override;
-  void tell(const std::string& text, double progress) override;
-  std::uint64_t next_id() override { return static_cast<std::uint64_t>(id) << 32U | next_command_++; }
-  void stop();
-  Task average_reading(std::int64_t count, double& mean);
-  Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
-               double share, recording::Table& table);
-  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
-  Verification evaluate(const recording::Table& table) const;
+  void end(job::JobPhase phase, const std::string& text);
   void report(job::JobPhase phase, const std::string& text);
   void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const Pace& pace = {});
+  Task run(const PrintJob& job);
+  void tell(const std::string& text, double progress) override;
+  std::uint64_t next_id() override { return static_cast<std::uint64_t>(id) << 32U | next_command_++; }
+  Task enable_axes() override;
+  Task move_to(Point target, Pace pace) override;
+  Task wait(double seconds);
+  Task align(Point from, Point to);
+  Task average_reading(std::int64_t count, double& mean);
+
+  // transaction.cpp: the compensation's models.
+  Task clear_models(const std::string& layers);
+  Task use_model(const std::filesystem::path& model);
+  Task keep_models();
+  Task roll_back(const std::string& why);
+  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
+  std::uint64_t send_model(compensation::ModelCommandKind kind, const std::string& path);
+  void watch_transaction();
+  void abandon_transaction();
+
+  // geometric_job.cpp
+  Task run(const GeometricJob& job);
+  Task calibrate(const GeometricJob& job);
+  Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
+               double share, recording::Table& table);
+
+  // thermal_job.cpp
+  struct Pass {
+    const ThermalJob& job;
+    bool between = false;  // at points in the middle between those that are fitted
+    double number = 0.0;
+    std::string model;  // in use meanwhile; empty: none
+  };
+  Task run(const ThermalJob& job);
+  Task reach(const ThermalJob& job, double temperature);
+  Task pass(const Pass& what, recording::Table& table);  // `what` outlives it
+  Task compare(const ThermalJob& job, const TraceSpec* trace,
+               const std::array<std::filesystem::path, 2>& files, recording::Table& table);
+  [[nodiscard]] recording::Table heat_table(bool with_models) const;
+  void set_heater(double setpoint);
+  void follow_heat();
 
   const Parameters& parameters_;
   Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
@@ -123,7 +126,9 @@ class Calibration final : public Component, private JobHost {
   Output<compensation::ModelCommand> model_{*this, "model", "command"};
   Input<compensation::ModelStatus> model_status_{
       *this, "model_status", {.optional = true, .profile = "state"}};
-  struct Axis;
+  Input<thermal::NodeTemperature> temperature_{*this, "temperature", {.optional = true, .profile = "state"}};
+  Output<thermal::ThermalCommand> heater_{*this, "heater", "command"};
+  std::vector<std::unique_ptr<Input<thermal::NodeTemperature>>> zones_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::unique_ptr<Printing> printing_;  // only where there are print jobs: its ports must be connected
 
@@ -132,6 +137,16 @@ class Calibration final : public Component, private JobHost {
   double progress_ = 0.0;
   std::uint64_t next_command_ = 1;
   std::uint64_t cycle_ = 0;
+
+  std::uint64_t transaction_ = 0;   // ours on the compensation; 0: none
+  bool transaction_known_ = false;  // the compensation has confirmed it
+  Instant kept_at_;
+
+  metrology::HeatTrace heat_;
+  const TraceSpec* trace_ = nullptr;  // that the heater follows
+  Instant trace_start_;
+  Instant set_at_;
+  std::optional<double> setpoint_before_;  // of the heater, before the job
 
  public:
   ~Calibration() override;

@@ -32,9 +32,11 @@ class Task {
   };
 
   Task() = default;
-  Task(Task&& other) noexcept : handle_{std::exchange(other.handle_, {})} {}
+  Task(Task&& other) noexcept
+      : handle_{std::exchange(other.handle_, {})}, innermost_{std::exchange(other.innermost_, {})} {}
   Task& operator=(Task&& other) noexcept {
     std::swap(handle_, other.handle_);
+    std::swap(innermost_, other.innermost_);
     return *this;
   }
   ~Task() {

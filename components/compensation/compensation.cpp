@@ -1,133 +1,250 @@
 #include "components/compensation/compensation.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
+#include <utility>
 
-#include "core/compensation/geometric_file.hpp"
+#include "core/machine/machine_file.hpp"
 
 namespace invar::compensation {
 
 namespace {
 
-/// The checksum that seals the file, as a number for the wire.
-std::uint32_t file_checksum(const std::filesystem::path& file) {
-  const std::string seal = config::Yaml::load(file).root().text("checksum");
-  std::uint32_t number = 0;
-  (void)std::from_chars(seal.data(), seal.data() + seal.size(), number, 16);
-  return number;
-}
+constexpr const char* no_transaction =
+    "there is no such transaction: the compensation was restarted, or rolled it back";
 
 }  // namespace
 
-struct Compensation::Axis {
-  Axis(Compensation& owner, std::size_t number)
-      : state{owner, std::string{"state_"} + "xyz"[number]},
-        correction{owner, std::string{"correction_"} + "xyz"[number]} {}
-  Input<stage::AxisState> state;
-  Output<AxisCorrection> correction;
-};
+bool Compensation::Stack::empty() const noexcept {
+  return geometric == nullptr && std::all_of(thermal.begin(), thermal.end(), [](auto* m) { return !m; });
+}
 
 Compensation::Compensation(const Parameters& parameters)
     : parameters_{parameters},
-      model_{*this,
-             [this](const std::filesystem::path& file, Staged::Model& model) {
-               model.content = load_geometric(file);
-               model.checksum = file_checksum(file);
-               return refusal(model.content);
-             },
-             "model", "status"} {
+      temperatures_{*this, parameters.zones, parameters.rate_filter},
+      loader_{*this, [this](const std::filesystem::path& file, LiveModel& model) {
+                load_live_model(file, limits_, model);
+              }} {
+  if (parameters.zones.size() > 31) throw InputError{"zones", "there are too many", "name those in use"};
   for (std::size_t i = 0; i < static_cast<std::size_t>(parameters.axes); ++i)
     axes_.push_back(std::make_unique<Axis>(*this, i));
+  if (!parameters.machine.empty()) limits_.machine = machine::load_machine(parameters.machine, 1);
+  limits_.axes = static_cast<int>(parameters.axes);
+  limits_.bound = parameters.bound;
+  limits_.steepest = parameters.steepest;
+  limits_.largest_sigma = parameters.largest_sigma;
+  limits_.zones = parameters.zones;
 }
 
 Compensation::~Compensation() = default;
 
+void Compensation::configure() {
+  active_ = before_ = transaction_start_ = {};
+  staged_ = nullptr;
+  transaction_ = 0;
+  for (const auto* file : {&parameters_.model, &parameters_.thermal_model}) {
+    if (file->empty()) continue;
+    LiveModel* model = loader_.load(*file);
+    if (const char* why = model->refusal.empty() ? why_not_above(*model) : model->refusal.c_str();
+        why != nullptr)
+      throw InputError{file->string(), why, "calibrate again"};
+    if (model->geometric)
+      active_.geometric = model;
+    else
+      active_.thermal[model->axis] = model;
+  }
+  loader_.open();
+}
+
+void Compensation::cleanup() noexcept {
+  active_ = before_ = transaction_start_ = {};
+  staged_ = nullptr;
+  transaction_ = 0;
+  loader_.close();
+}
+
 void Compensation::activate() {
-  applied_.setZero();
-  easing_ = true;  // from no correction to the model's, at the rate limit
-  model_.announce();
+  if (transaction_ != 0) active_ = transaction_start_;  // its owner is told by the status
+  transaction_ = 0;
+  temperatures_.forget();
+  condition_ = TEMPERATURE_UNUSED;
+  outside_at_ = {INT64_MIN};
+  started_ = now();
+  easing_.setZero();
+  blind_ = true;
+  answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
 }
 
-/// Why this model must not move the stage; empty: nothing. Looks at a grid over the travels.
-std::string Compensation::refusal(const metrology::GeometricModel& model) const {
-  if (model.chain.axes != static_cast<int>(axes_.size()))
-    return "the model is of a machine with " + std::to_string(model.chain.axes) + " axes, this one has " +
-           std::to_string(axes_.size());
-  constexpr int steps = 20;
-  Eigen::Vector3d middle;
-  for (int i = 0; i < 3; ++i)
-    middle[i] =
-        (model.travel[static_cast<std::size_t>(i)].lower + model.travel[static_cast<std::size_t>(i)].upper) /
-        2;
-  for (int i = 0; i <= steps; ++i)
-    for (int k = 0; k <= steps; ++k) {
-      Eigen::Vector3d at = middle;
-      at.x() = model.travel[0].lower + model.travel[0].width() * i / steps;
-      at.y() = model.travel[1].lower + model.travel[1].width() * k / steps;
-      const Eigen::Vector3d error = model.error(at, model.tool);
-      if (!error.allFinite() || error.cwiseAbs().maxCoeff() > parameters_.bound)
-        return "its correction is beyond the bound of " + std::to_string(parameters_.bound * 1e6) + " um";
+void Compensation::notify(event::Severity level, const char* text) noexcept {
+  event::Notice notice;
+  notice.cell(cell);
+  notice.component_id(id);
+  notice.at().time_ns(now().ns);
+  notice.level(level);
+  notice.source(name.c_str());
+  notice.text(text);
+  notices_.write(notice);
+}
+
+void Compensation::publish_status() noexcept {
+  reply_.cell(cell);
+  reply_.component_id(id);
+  reply_.at().time_ns(now().ns);
+  reply_.transaction(transaction_);
+  reply_.geometric_checksum(active_.geometric != nullptr ? active_.geometric->checksum : 0);
+  for (std::size_t i = 0; i < 3; ++i)
+    reply_.thermal_checksum()[i] = active_.thermal[i] != nullptr ? active_.thermal[i]->checksum : 0;
+  reply_.condition(condition_);
+  status_.write(reply_);
+}
+
+void Compensation::answer(std::uint64_t command, ModelState state, const LiveModel* model,
+                          const char* text) noexcept {
+  reply_.command_id(command);
+  reply_.state(state);
+  reply_.model_id(model != nullptr ? model->id : 0);
+  reply_.model_checksum(model != nullptr ? model->checksum : 0);
+  reply_.text(text);
+  if (state == MODEL_REFUSED) notify(event::SEVERITY_FAULT, text);
+  publish_status();
+}
+
+/// Why a thermal model may not stand above the geometric model in use; nullptr: it may.
+const char* Compensation::why_not_above(const LiveModel& model) const noexcept {
+  if (model.geometric) return nullptr;
+  const std::uint32_t below = active_.geometric != nullptr ? active_.geometric->checksum : 0;
+  if (model.above == below) return nullptr;
+  if (model.above == 0)
+    return "it describes the whole error of its axis, which the geometric model in use would count twice: "
+           "calibrate it above that one";
+  return "it was measured above another geometric model than the one in use: calibrate it again";
+}
+
+void Compensation::use(const Stack& stack) noexcept {
+  ease([&] {
+    active_ = stack;
+    for (LiveModel* model : active_.thermal)
+      if (model != nullptr && model->lag > 0.0) model->lagged = temperatures_.trace().lagged(model->lag);
+    set_temperatures();
+    condition_ = judge(now());
+  });
+}
+
+void Compensation::take_loaded() noexcept {
+  ModelLoader<LiveModel>::Loaded loaded;
+  while (loader_.take(loaded)) {
+    const LiveModel& model = *loaded.model;
+    const char* why = model.refusal.empty() ? why_not_above(model) : model.refusal.c_str();
+    if (why == nullptr) staged_ = loaded.model;
+    answer(loaded.command, why != nullptr ? MODEL_REFUSED : MODEL_STAGED, loaded.model,
+           why != nullptr ? why : "");
+  }
+}
+
+void Compensation::end_transaction() noexcept { transaction_ = 0; }
+
+void Compensation::obey(const ModelCommand& command) noexcept {
+  if (transaction_ != 0 && command.transaction() != transaction_) {
+    answer(command.id(), MODEL_REFUSED, nullptr, "another calibration is under way; wait, or cancel it");
+    return;
+  }
+  heard_ = now();
+  if (command.kind() == MODEL_KEEP) {
+    if (transaction_ == 0) answer(command.id(), MODEL_REFUSED, nullptr, no_transaction);
+    return;
+  }
+  const bool changes = command.kind() == MODEL_ACTIVATE || command.kind() == MODEL_CLEAR;
+  if (changes && command.transaction() != 0 && transaction_ == 0) {
+    transaction_ = command.transaction();
+    transaction_start_ = active_;
+  }
+  switch (command.kind()) {
+    case MODEL_STAGE:
+      reply_.path(command.path());
+      if (!loader_.request(command.id(), {command.path().c_str(), command.path().size()}))
+        answer(command.id(), MODEL_REFUSED, nullptr, "too many models at once; try again");
+      take_loaded();
+      return;
+    case MODEL_ACTIVATE: {
+      const char* why =
+          staged_ == nullptr ? "nothing is staged; stage a model first" : why_not_above(*staged_);
+      if (why != nullptr) {
+        answer(command.id(), MODEL_REFUSED, staged_, why);
+        return;
+      }
+      Stack next = active_;
+      LiveModel* model = std::exchange(staged_, nullptr);
+      if (model->geometric) {
+        next.geometric = model;
+        for (LiveModel*& thermal : next.thermal) {
+          if (thermal == nullptr || thermal->above == model->checksum) continue;
+          thermal = nullptr;
+          notify(event::SEVERITY_WARNING,
+                 "the model of position and temperature was taken out: it was measured above another "
+                 "geometric model");
+        }
+      } else {
+        next.thermal[model->axis] = model;
+      }
+      before_ = active_;
+      use(next);
+      answer(command.id(), MODEL_ACTIVE, model, "");
+      return;
     }
-  if (const Eigen::Vector3d sigma = model.sigma_at(middle, model.tool);
-      !(sigma.head(model.chain.axes).maxCoeff() <= parameters_.largest_sigma))
-    return "it is not certain enough at mid travel";
-  return {};
+    case MODEL_CLEAR: {
+      Stack next = active_;
+      next.thermal = {};
+      if (command.path().size() == 0) next.geometric = nullptr;
+      before_ = active_;
+      use(next);
+      break;
+    }
+    case MODEL_ROLLBACK:
+      if (command.transaction() != 0 && transaction_ == 0) {
+        answer(command.id(), MODEL_REFUSED, nullptr, no_transaction);
+        return;
+      }
+      use(transaction_ != 0 ? transaction_start_ : std::exchange(before_, {}));
+      end_transaction();
+      break;
+    case MODEL_COMMIT:
+      if (transaction_ == 0) {
+        answer(command.id(), MODEL_REFUSED, nullptr, no_transaction);
+        return;
+      }
+      before_ = transaction_start_;
+      end_transaction();
+      break;
+    case MODEL_KEEP:
+      break;
+  }
+  answer(command.id(), active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
 }
 
-void Compensation::correct(const Tick& tick) noexcept {
-  Eigen::Vector3d wanted = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sigma = Eigen::Vector3d::Zero();
-  bool stale = false;
-  for (std::size_t i = 0; i < axes_.size(); ++i) {
-    const auto* state = axes_[i]->state.latest();
-    stale =
-        stale || state == nullptr || axes_[i]->state.age(tick.now) > Duration::seconds(20.0 * tick.period);
-    if (state != nullptr) setpoint_[static_cast<Eigen::Index>(i)] = state->setpoint_position();
-  }
-  const auto* active = model_.active();
-  if (active != nullptr && !stale) {
-    const auto& model = active->content;
-    // Second step of the fixed point: the error where the machine is really sent (metrology.md section 5).
-    const Eigen::Vector3d first = model.error(setpoint_, model.tool);
-    wanted = -model.error(setpoint_ - first, model.tool);
-    sigma = model.sigma_at(setpoint_, model.tool);
-  } else if (active != nullptr) {
-    wanted = applied_;  // no position to correct for: the last correction holds
-  }
-  const Eigen::Vector3d before = applied_;
-  const double most = parameters_.rate_limit * tick.period;
-  if (easing_) {
-    const Eigen::Vector3d rest = wanted - applied_;
-    applied_ += rest.cwiseMax(-most).cwiseMin(most);
-    easing_ = rest.cwiseAbs().maxCoeff() > most;
-  } else {
-    applied_ = wanted;
-  }
-  for (std::size_t i = 0; i < axes_.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    AxisCorrection sample;
-    sample.cell(cell);
-    sample.axis(static_cast<std::uint32_t>(i));
-    sample.at().time_ns(tick.now.ns);
-    sample.at().cycle(tick.cycle);
-    sample.correction(applied_[k]);
-    sample.rate((applied_[k] - before[k]) / tick.period);
-    sample.sigma(sigma[k]);
-    sample.layer_count(1);
-    sample.contribution()[0] = applied_[k];
-    sample.layer_sigma()[0] = sigma[k];
-    sample.model_id(active != nullptr ? active->id : 0);
-    sample.model_checksum(active != nullptr ? active->checksum : 0);
-    sample.stale(stale);
-    sample.limited(easing_);
-    axes_[i]->correction.write(sample);
-  }
+/// A transaction whose owner fell silent, or whose models go beyond the bound, is taken back.
+void Compensation::watch_transaction(const Tick& tick) noexcept {
+  if (transaction_ == 0) return;
+  const char* why = nullptr;
+  if (tick.now - heard_ > Duration::seconds(parameters_.transaction_timeout))
+    why = "a calibration fell silent in the middle; its models were rolled back";
+  else if (clamped_)
+    why = "the correction went beyond the bound during a calibration; its models were rolled back";
+  if (why == nullptr) return;
+  use(transaction_start_);
+  end_transaction();
+  clamped_ = false;
+  reply_.text(why);
+  notify(event::SEVERITY_FAULT, why);
+  publish_status();
 }
 
 void Compensation::step(const Tick& tick) noexcept {
-  if (model_.update()) easing_ = true;
+  take_loaded();
+  ModelCommand command;
+  while (command_.take(command)) obey(command);
+  follow_temperature(tick);
   correct(tick);
+  watch_transaction(tick);
 }
 
 }  // namespace invar::compensation

@@ -1,68 +1,163 @@
-// Compensation: corrects the setpoints of the axes by the identified error, live, layer by layer.
+// Compensation: corrects the setpoints of the axes by the identified errors, live, layer by layer.
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "components/compensation/live_model.hpp"
+#include "components/compensation/temperatures.hpp"
 #include "core/component/component.hpp"
+#include "core/component/model_loader.hpp"
 #include "core/component/parameters.hpp"
-#include "core/component/staged_model.hpp"
-#include "core/metrology/geometric_model.hpp"
 #include "idl/compensation.h"
+#include "idl/event.h"
 #include "idl/stage.h"
-#include "idl/thermal.h"
 
 namespace invar::compensation {
 
-/// correction = -e(P - e(P)) at the axes' setpoints P, e of the active model. A model is staged (loaded and checked by a
-/// thread of its own, never by the loop), activated and rolled back by command; the correction then moves to its new value
-/// at no more than `rate_limit`, so nothing jumps. A model that is corrupt, of another machine or beyond the
-/// bounds is refused and the last good one holds. Real-time.
+/// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, and for each axis a model
+/// over position and temperature of what the geometric one leaves.
+///
+/// A model is staged (loaded, checked and compiled by a thread of its own, never by the loop), activated and rolled back by
+/// command. What a change would make the correction jump is eased in at `rate_limit`. Changes made in a transaction are
+/// taken back when their owner falls silent. A model that is corrupt, of another machine or beyond the bounds is refused and
+/// the last good one holds. Temperatures outside what was calibrated hold the end value; when they are stale the last one
+/// holds, and after `temperature_hold` the layer is taken out. All of it shows in the status and as notices. Real-time.
 class Compensation final : public Component {
  public:
   struct Parameters {
     std::int64_t axes = 2;
+    std::filesystem::path machine;
     std::filesystem::path model;
+    std::filesystem::path thermal_model;
+    std::vector<std::string> zones;
     double bound = 2e-3;
     double rate_limit = 1e-3;
+    double steepest = 1e-2;
     double largest_sigma = 1e-4;
-    void describe(auto& p) {
-      p(axes, "axes", 1, 3, "how many axes are corrected");
-      p(model, "model", "compensation.yaml that is active from the start; none: nothing is corrected");
-      p(bound, "bound", "m", Range{0.0, 0.1},
-        "a model that corrects more anywhere in the travels is refused");
-      p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0},
-        "how fast a correction may change beside the motion itself", while_running);
-      p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1},
-        "a model less certain than this at mid travel is refused");
-    }
+    double transaction_timeout = 60.0;
+    double rate_filter = 20.0;
+    double temperature_timeout = 2.0;
+    double temperature_hold = 60.0;
+    double most_outside = 2.0;
+    void describe(auto& p);
   };
   explicit Compensation(const Parameters& parameters);
   ~Compensation() override;
-  void configure() override { model_.open(parameters_.model, "calibrate again"); }
+  void configure() override;
   void activate() override;
-  void cleanup() noexcept override { model_.close(); }
+  void cleanup() noexcept override;
   void step(const Tick& tick) noexcept override;
 
  private:
-  struct Axis;
-  using Staged = StagedModel<metrology::GeometricModel>;
+  struct Axis {
+    Axis(Compensation& owner, std::size_t number)
+        : state{owner, std::string{"state_"} + "xyz"[number]},
+          correction{owner, std::string{"correction_"} + "xyz"[number]} {}
+    Input<stage::AxisState> state;
+    Output<AxisCorrection> correction;
+  };
+  /// The models in use, by layer.
+  struct Stack {
+    LiveModel* geometric = nullptr;
+    std::array<LiveModel*, 3> thermal{};
+    [[nodiscard]] bool empty() const noexcept;
+  };
+  struct Layers {
+    Eigen::Vector3d geometric = Eigen::Vector3d::Zero();  // m, each layer's correction
+    Eigen::Vector3d thermal = Eigen::Vector3d::Zero();
+    [[nodiscard]] Eigen::Vector3d sum() const noexcept { return geometric + thermal; }
+  };
+  // Models and transactions.
+  void obey(const ModelCommand& command) noexcept;
+  void take_loaded() noexcept;
+  [[nodiscard]] const char* why_not_above(const LiveModel& model) const noexcept;
+  void use(const Stack& stack) noexcept;
+  void end_transaction() noexcept;
+  void watch_transaction(const Tick& tick) noexcept;
+  void answer(std::uint64_t command, ModelState state, const LiveModel* model, const char* text) noexcept;
+  void publish_status() noexcept;
+  void notify(event::Severity level, const char* text) noexcept;
 
-  [[nodiscard]] std::string refusal(const metrology::GeometricModel& model) const;
+  // The loop: correction.cpp.
+  void follow_temperature(const Tick& tick) noexcept;
+  [[nodiscard]] TemperatureCondition judge(Instant at) noexcept;
+  [[nodiscard]] double kelvin_outside(const LiveModel& model) const noexcept;
+  void set_temperatures() noexcept;
+  [[nodiscard]] bool is_used(const LiveModel* thermal) const noexcept {
+    return thermal != nullptr && (!thermal->by_temperature ||
+                                  (condition_ != TEMPERATURE_UNUSED && condition_ != TEMPERATURE_REFUSED));
+  }
+  /// Changes what the layers give without a step in the correction: the difference is eased in.
+  template <class Change>
+  void ease(Change change) noexcept {
+    const Eigen::Vector3d was = wanted(setpoint_).sum();
+    change();
+    easing_ += was - wanted(setpoint_).sum();
+  }
+  [[nodiscard]] Layers corrections(const Eigen::Vector3d& at) const noexcept;
+  [[nodiscard]] Layers wanted(const Eigen::Vector3d& setpoint) const noexcept;
+  [[nodiscard]] double thermal_sigma(const LiveModel& model, double x, Instant at) const noexcept;
   void correct(const Tick& tick) noexcept;
+  void publish(const Tick& tick, const Layers& layers, const Eigen::Vector3d& before) noexcept;
 
   const Parameters& parameters_;
+  ModelLimits limits_;
   std::vector<std::unique_ptr<Axis>> axes_;
-  Input<thermal::NodeTemperature> temperature_{*this, "temperature", {.optional = true, .profile = "state"}};
-  Staged model_;
+  Temperatures temperatures_;
+  Inbox<ModelCommand> command_{*this, "model"};
+  Output<ModelStatus> status_{*this, "status", "state"};
+  Output<event::Notice> notices_{*this, "notices", "event"};
 
-  Eigen::Vector3d applied_ = Eigen::Vector3d::Zero();
+  Stack active_;
+  Stack before_;  // what a rollback without a transaction goes back to
+  LiveModel* staged_ = nullptr;
+  std::uint64_t transaction_ = 0;
+  Stack transaction_start_;
+  Instant heard_;  // of the transaction's owner
+  ModelStatus reply_;
+
   Eigen::Vector3d setpoint_ = Eigen::Vector3d::Zero();
-  bool easing_ = false;  // on the way to another model's correction
+  Eigen::Vector3d applied_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d easing_ = Eigen::Vector3d::Zero();  // what a change still has to go, on top of the layers
+  bool blind_ = true;                                 // no setpoints: the last correction holds
+  bool clamped_ = false;
+  TemperatureCondition condition_ = TEMPERATURE_UNUSED;
+  Instant outside_at_{INT64_MIN};
+  Instant started_;
+  double temperature_before_ = 0.0;  // at the last step of the lags
+  Instant lags_at_;
+
+  ModelLoader<LiveModel> loader_;
 };
+
+void Compensation::Parameters::describe(auto& p) {
+  p(axes, "axes", 1, 3, "how many axes are corrected");
+  p(machine, "machine", "machine.yaml: a model of another chain or travel is refused");
+  p(model, "model", "geometric compensation.yaml that is active from the start; none: nothing is corrected");
+  p(thermal_model, "thermal_model", "compensation.yaml of kind thermal, likewise");
+  p(zones, "zones", "further temperatures: each makes a port temperature_<zone>");
+  p(bound, "bound", "m", Range{0.0, 0.1}, "a model that corrects more anywhere in the travels is refused");
+  p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0},
+    "how fast a correction may change beside the motion itself", while_running);
+  p(steepest, "steepest", "m/m", Range{1e-6, 1.0},
+    "a model whose correction changes faster along the way is refused");
+  p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1},
+    "a model less certain than this at mid travel is refused");
+  p(transaction_timeout, "transaction_timeout", "s", Range{1.0, 3600.0},
+    "without a sign of life from its owner a transaction is rolled back after this");
+  p(rate_filter, "rate_filter", "s", Range{0.1, 3600.0}, "time constant of the heating rate's filter");
+  p(temperature_timeout, "temperature_timeout", "s", Range{0.01, 3600.0},
+    "an older temperature is stale: the last one holds");
+  p(temperature_hold, "temperature_hold", "s", Range{0.0, 36000.0},
+    "after this long the layer of position and temperature is taken out");
+  p(most_outside, "most_outside", "K", Range{0.0, 100.0},
+    "so far outside the calibrated temperatures the end value holds; further out the layer is taken out");
+}
 
 }  // namespace invar::compensation

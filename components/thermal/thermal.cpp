@@ -6,10 +6,16 @@
 
 namespace invar::thermal {
 
+namespace {
+
+metrology::Thermistor equation_of(const Thermal::Thermistor& parameters) {
+  return {parameters.resistance, parameters.base_temperature, parameters.coefficient_percent};
+}
+
+}  // namespace
+
 Thermal::Thermal(const Parameters& parameters)
-    : parameters_{parameters},
-      thermistor_{parameters.thermistor.resistance, parameters.thermistor.base_temperature,
-                  parameters.thermistor.coefficient_percent} {
+    : parameters_{parameters}, thermistor_{equation_of(parameters.thermistor)} {
   if (parameters.modbus.map.empty())
     throw InputError{"modbus.map", "missing", "name the heater's register map"};
   const auto map = modbus::load_map(parameters.modbus.map);
@@ -17,6 +23,14 @@ Thermal::Thermal(const Parameters& parameters)
     if (!map.find(needed))
       throw InputError{"modbus.map", std::string{"has no register `"} + needed + "`",
                        "name a heater's register map"};
+  for (const Zone& zone : parameters.zones) {
+    if (!map.find(zone.name + "_resistance"))
+      throw InputError{"zones", "the map has no register `" + zone.name + "_resistance`",
+                       "name the zone as its register does"};
+    zones_.push_back({zone.name + "_resistance", equation_of(zone.thermistor),
+                      std::make_unique<Output<NodeTemperature>>(*this, "temperature_" + zone.name, "state"),
+                      0.0});
+  }
 }
 
 void Thermal::configure() {
@@ -103,6 +117,21 @@ void Thermal::step(const Tick& tick) noexcept {
   sample.watchdog_tripped(!lost.stale && lost.value != 0.0);
   sample.stale(!sound);
   state_.write(sample);
+  for (ZoneSensor& zone : zones_) publish_zone(zone, tick);
+}
+
+void Thermal::publish_zone(ZoneSensor& zone, const Tick& tick) noexcept {
+  const modbus::Reading resistance = device_->value(zone.resistance);
+  const bool sound = !resistance.stale && resistance.value > 1.0;
+  if (sound) zone.temperature = zone.thermistor.temperature(resistance.value);
+  NodeTemperature sample;
+  sample.cell(cell);
+  sample.node(id);
+  sample.at().time_ns(tick.now.ns);
+  sample.at().cycle(tick.cycle);
+  sample.temperature(zone.temperature);
+  sample.stale(!sound);
+  zone.output->write(sample);
 }
 
 }  // namespace invar::thermal

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
@@ -52,10 +53,20 @@ class Thermal final : public Component {
       p(coefficient_percent, "coefficient", "%/K", Range{1e-3, 20.0}, "loss of resistance per kelvin there");
     }
   };
+  /// A further thermistor of the controller: register <name>_resistance.
+  struct Zone {
+    std::string name;
+    Thermistor thermistor;
+    void describe(auto& p) {
+      p(name, "name", "makes the port temperature_<name>");
+      p(thermistor, "thermistor", "of this zone");
+    }
+  };
   struct Parameters {
     Modbus modbus;
     Pid pid;
     Thermistor thermistor;
+    std::vector<Zone> zones;
     double setpoint = 30.0;
     double power_limit = 60.0;
     double over_temperature = 60.0;
@@ -63,6 +74,7 @@ class Thermal final : public Component {
       p(modbus, "modbus", "the heater's controller");
       p(pid, "pid", "control law");
       p(thermistor, "thermistor", "of the slide");
+      p(zones, "zones", "further thermistors, read and published but not controlled");
       p(setpoint, "setpoint", "degC", Range{-20.0, 150.0}, "wanted at the start; a command changes it",
         while_running);
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
@@ -89,6 +101,14 @@ class Thermal final : public Component {
   Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Output<NodeTemperature> state_{*this, "state", "state"};
   metrology::Thermistor thermistor_;
+  struct ZoneSensor {
+    std::string resistance;  // name of its register
+    metrology::Thermistor thermistor;
+    std::unique_ptr<Output<NodeTemperature>> output;
+    double temperature = 0.0;
+  };
+  void publish_zone(ZoneSensor& zone, const Tick& tick) noexcept;
+  std::vector<ZoneSensor> zones_;
   std::unique_ptr<modbus::Bus> bus_;
   modbus::Device* device_ = nullptr;
   double setpoint_ = 0.0;

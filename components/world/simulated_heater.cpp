@@ -12,7 +12,8 @@ SimulatedHeater::SimulatedHeater(const Parameters& parameters) : parameters_{par
 
 void SimulatedHeater::configure() {
   auto map = modbus::load_map(parameters_.map);
-  modbus::ServerOptions options{.host = parameters_.host, .port = static_cast<std::uint16_t>(parameters_.port)};
+  modbus::ServerOptions options{.host = parameters_.host,
+                                .port = static_cast<std::uint16_t>(parameters_.port)};
   if (!parameters_.faults.empty()) options.faults = modbus::load_faults(parameters_.faults, map);
   server_ = std::make_unique<modbus::Server>(std::move(map), std::move(options));
   const Parameters& p = parameters_;
@@ -34,6 +35,17 @@ void SimulatedHeater::activate() {
   normal_.reset();
   over_temperature_ = false;
   for (const Node node : {pad, slide, base}) plant_->set_temperature(node, parameters_.ambient);
+}
+
+void SimulatedHeater::publish(Output<thermal::NodeTemperature>& output, Node node,
+                              const Tick& tick) noexcept {
+  thermal::NodeTemperature sample;
+  sample.cell(cell);
+  sample.node(id);
+  sample.at().time_ns(tick.now.ns);
+  sample.at().cycle(tick.cycle);
+  sample.temperature(plant_->temperature(node));
+  output.write(sample);
 }
 
 void SimulatedHeater::step(const Tick& tick) noexcept {
@@ -62,6 +74,8 @@ void SimulatedHeater::step(const Tick& tick) noexcept {
   registers.set("heating", power > 0.0 ? 1.0 : 0.0);
   registers.set("over_temperature", over_temperature_ ? 1.0 : 0.0);
   registers.set("ready", over_temperature_ ? 0.0 : 1.0);
+  publish(slide_, slide, tick);
+  publish(base_, base, tick);
 }
 
 }  // namespace invar::world

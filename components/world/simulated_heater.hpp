@@ -14,6 +14,7 @@
 #include "core/metrology/thermistor.hpp"
 #include "core/modbus/server.hpp"
 #include "core/physics/thermal_plant.hpp"
+#include "idl/thermal.h"
 
 namespace invar::world {
 
@@ -61,7 +62,12 @@ class SimulatedHeater final : public Component {
 
  private:
   enum Node : std::size_t { pad, slide, base };
+  void publish(Output<thermal::NodeTemperature>& output, Node node, const Tick& tick) noexcept;
+
   const Parameters& parameters_;
+  // The truth: for the simulated stage and for tests, for no controller.
+  Output<thermal::NodeTemperature> slide_{*this, "slide", "state"};
+  Output<thermal::NodeTemperature> base_{*this, "base", "state"};
   metrology::Thermistor thermistor_;
   std::unique_ptr<modbus::Server> server_;
   std::optional<physics::ThermalPlant> plant_;

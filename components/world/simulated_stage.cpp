@@ -2,8 +2,10 @@
 
 #include <cmath>
 
+#include "core/machine/heat_growth.hpp"
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/components.hpp"
+#include "core/metrology/thermal_error.hpp"
 #include "core/model/model_file.hpp"
 
 namespace invar::world {
@@ -50,7 +52,7 @@ struct SimulatedStage::Device {
 SimulatedStage::SimulatedStage(const Parameters& parameters)
     : parameters_{parameters}, random_{static_cast<std::uint64_t>(parameters.seed)} {
   if (parameters.machine.empty()) throw InputError{"machine", "missing", "name a machine.yaml"};
-  machine_ = machine::load_machine(parameters.machine);
+  machine_ = machine::load_machine(parameters.machine, 1);
   if (!machine_.errors) machine_.errors.emplace();
   directions_ = metrology::axis_directions(machine_.chain, machine_.errors->squareness);
   const Axis* axes[] = {&parameters.x, &parameters.y, &parameters.z};
@@ -64,12 +66,20 @@ void SimulatedStage::activate() {
   random_.seed(static_cast<std::uint64_t>(parameters_.seed));
   normal_.reset();
   moving_.setZero();
+  warm_ = false;
   for (auto& device : devices_) device->plant.rest_at(device->parameters.start, now().in_seconds());
 }
 
 void SimulatedStage::step(const Tick& tick) noexcept {
   const auto* slide = slide_.latest();
+  const auto* base = base_.latest();
   const double temperature = slide != nullptr ? slide->temperature() : parameters_.temperature;
+  const double lag = machine_.errors->scale_lag;
+  scale_temperature_ = warm_ && lag > 0.0 ? metrology::lag_step(scale_temperature_, slide_temperature_,
+                                                                temperature, tick.period, lag)
+                                          : temperature;
+  slide_temperature_ = temperature;
+  warm_ = slide != nullptr;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   for (auto& device : devices_) {
     const auto* command = device->motor.latest();
@@ -107,8 +117,11 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     device->truth.write(truth);
     position[device->axis] = device->plant.position();
   }
-  const Eigen::Vector3d tool = position + metrology::simulated_error(machine_, directions_, position,
-                                                                     machine_.tool, moving_, temperature);
+  const Eigen::Vector3d growth =
+      machine::heat_growth(machine_, position, scale_temperature_,
+                           base != nullptr ? base->temperature() : parameters_.temperature);
+  const Eigen::Vector3d tool =
+      position + metrology::simulated_error(machine_, directions_, position, machine_.tool, moving_, growth);
   sensing::ToolPosition sample;
   sample.cell(cell);
   sample.sensor(id);

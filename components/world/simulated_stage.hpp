@@ -19,8 +19,8 @@
 namespace invar::world {
 
 /// Integrates one physics::AxisPlant an axis of the machine file's chain, and carries the carriages' positions to the tool by
-/// the machine's hidden geometric errors (exact transforms). Every axis `a` has the ports `motor_a` and `feedback_a`, and
-/// `truth_a` for simulated sensors.
+/// the machine's hidden geometric errors (exact transforms) and by what the heat of slide and base does to it. Every axis `a`
+/// has the ports `motor_a` and `feedback_a`, and `truth_a` for simulated sensors.
 /// The drive lets go of the motor when its command is older than the watchdog, as real drives do.
 class SimulatedStage final : public Component {
  public:
@@ -59,6 +59,10 @@ class SimulatedStage final : public Component {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   Input<thermal::NodeTemperature> slide_{*this, "slide", {.optional = true, .profile = "state"}};
+  Input<thermal::NodeTemperature> base_{*this, "base", {.optional = true, .profile = "state"}};
+  double scale_temperature_ = 0.0;  // follows the slide with the machine's lag
+  double slide_temperature_ = 0.0;
+  bool warm_ = false;  // the slide's temperature has arrived
   Output<sensing::ToolPosition> tool_{*this, "tool"};
 };
 
@@ -80,8 +84,8 @@ void SimulatedStage::Parameters::describe(auto& p) {
   p(y, "y", "the Y axis");
   p(z, "z", "the Z axis");
   p(watchdog, "watchdog", "s", Range{1e-3, 10.0}, "the drive lets go when its command is older");
-  p(temperature, "temperature", "degC", Range{-50.0, 150.0}, "of the machine, where `slide` is not connected",
-    while_running);
+  p(temperature, "temperature", "degC", Range{-50.0, 150.0},
+    "of the machine, where `slide` and `base` are not connected", while_running);
   p(seed, "seed", 0, 1'000'000'000, "of the noise");
 }
 

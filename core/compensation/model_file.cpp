@@ -144,15 +144,20 @@ std::string checksum(const std::string& text) {
   return buffer.data();
 }
 
-void check_seal(const config::Yaml& model) {
-  if (!model.root().has("checksum")) return;
+std::uint32_t check_seal(const config::Yaml& model) {
+  if (!model.root().has("checksum")) return 0;
   const std::string said = model.root().text("checksum");
-  const std::string text = all_of(model.file());
-  const auto at = text.rfind("\nchecksum:");
-  if (at == std::string::npos) return;  // parsed from memory
-  if (checksum(text.substr(0, at + 1)) != said)
+  const auto at = model.text().rfind("\nchecksum:");
+  if (at == std::string::npos || checksum(model.text().substr(0, at + 1)) != said)
     throw InputError{model.file().string(), "its checksum does not fit its text: it is damaged or was edited",
                      "calibrate again, or remove the line `checksum` if the edit was meant"};
+  return checksum_number(said);
+}
+
+std::uint32_t checksum_number(const std::string& text) {
+  std::uint32_t number = 0;
+  (void)std::from_chars(text.data(), text.data() + text.size(), number, 16);
+  return number;
 }
 
 std::vector<double> exactly(const config::Node& node, std::size_t count, const char* unit) {

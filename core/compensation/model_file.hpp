@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -47,8 +48,12 @@ class ModelText {
 std::string checksum(const std::string& text);
 
 /// Refuses a model file whose checksum does not fit its text: it was cut off or edited by hand. (Remove the
-/// line `checksum` from a file edited on purpose.) Marks the key as known. Throws InputError.
-void check_seal(const config::Yaml& model);
+/// line `checksum` from a file edited on purpose.) Marks the key as known. Throws InputError. Returns the checksum, 0
+/// for a file without.
+std::uint32_t check_seal(const config::Yaml& model);
+
+/// Eight hex digits as the number that they are; 0 where they are none.
+std::uint32_t checksum_number(const std::string& digits);
 
 /// Exactly `count` numbers below `node`; a fault and zeros otherwise.
 std::vector<double> exactly(const config::Node& node, std::size_t count, const char* unit);

@@ -1,9 +1,34 @@
 #include "core/compensation/thermal_file.hpp"
 
+#include <array>
+#include <cstdio>
+
+#include "core/metrology/components.hpp"
+
 namespace invar::compensation {
 
 using metrology::ThermalError;
 using metrology::ThermalTerm;
+
+void write_place(ModelText& text, const ThermalPlace& place) {
+  if (place.axis)
+    text.text("axis", std::string(1, metrology::axis_letters[static_cast<std::size_t>(*place.axis)]));
+  if (place.above == 0) return;
+  std::array<char, 16> digits{};
+  std::snprintf(digits.data(), digits.size(), "%08x", place.above);
+  text.comment("measured while the geometric model of this checksum was active: what that one leaves")
+      .text("above", digits.data());
+}
+
+ThermalPlace read_place(const config::Node& root) {
+  ThermalPlace place;
+  if (root.has("axis")) {
+    place.axis = metrology::axis_named(root.text("axis"));
+    if (!place.axis) root["axis"].fault("is no axis", "write x, y or z");
+  }
+  if (root.has("above")) place.above = checksum_number(root.text("above"));
+  return place;
+}
 
 void write_thermal(ModelText& text, const ThermalError& model) {
   text.comment("lengths m, temperatures degC, rates K/s; error = actual minus commanded position")
@@ -19,15 +44,22 @@ void write_thermal(ModelText& text, const ThermalError& model) {
       .number("x", model.slope_x)
       .number("temperature", model.slope_temperature)
       .number("heating_rate", model.slope_rate)
-      .close()
-      .open_list("terms");
-  for (const ThermalTerm& term : model.terms)
-    text.item()
-        .text("factor", name_of(term.factor))
-        .number("first", term.first)
+      .close();
+  if (!model.zones.empty()) {
+    text.comment("further thermistors; slope in m/K").open_list("zones");
+    for (const auto& zone : model.zones)
+      text.item().text("name", zone.name).range("range", zone.range).number("slope", zone.slope);
+    text.close();
+  }
+  text.open_list("terms");
+  for (const ThermalTerm& term : model.terms) {
+    text.item().text("factor", name_of(term.factor));
+    if (term.factor == metrology::ThermalFactor::zone) text.text("zone", model.zones[term.zone].name);
+    text.number("first", term.first)
         .number("spacing", term.spacing)
         .integer("centres", term.weights.rows())
         .numbers("weights", Eigen::VectorXd{term.weights.reshaped()});
+  }
   text.close().open("sigma");
   const auto& axes = model.sigma_table.axes();
   text.numbers("counts",
@@ -60,6 +92,10 @@ ThermalError read_thermal(const config::Node& root) {
   model.slope_x = slope.number("x", "1", Range::not_negative());
   model.slope_temperature = slope.number("temperature", "1", Range::not_negative());
   model.slope_rate = slope.number("heating_rate", "1", Range::not_negative());
+  for (const auto& node : root["zones"].children())
+    model.zones.push_back({node.text("name"), range_of(node.required("range")),
+                           node.number("slope", "1", Range::not_negative())});
+  if (model.zones.size() > metrology::most_zones) root["zones"].fault("there are more than 4");
   for (const auto& node : root.required("terms").children()) {
     ThermalTerm term;
     const auto factor = metrology::thermal_factor(node.text("factor"));
@@ -68,6 +104,14 @@ ThermalError read_thermal(const config::Node& root) {
       continue;
     }
     term.factor = *factor;
+    if (term.factor == metrology::ThermalFactor::zone) {
+      const std::string zone = node.text("zone");
+      while (term.zone < model.zones.size() && model.zones[term.zone].name != zone) ++term.zone;
+      if (term.zone == model.zones.size()) {
+        node["zone"].fault("`" + zone + "` is no zone of this model");
+        continue;
+      }
+    }
     term.first = node.number("first", "m");
     term.spacing = node.number("spacing", "m", Range::positive());
     const auto centres = node.integer("centres", 1, 10'000);

@@ -123,6 +123,7 @@ Cell read_cell(const Yaml& yaml) {
   cell.id = static_cast<std::uint32_t>(root.integer("id", 1, 65535, 1));
   cell.domain = static_cast<int>(root.integer("domain", 0, 232, 0));
   cell.simulated_time = root.choice("time", {"real", "simulated"}, "real") == "simulated";
+  cell.window = Duration::seconds(root.number("window", "s", Range{1e-3, 1.0}, 0.02));
   cell.shared_memory = root.flag("shared_memory", true);
   const auto beside = [&](const Node& node) {
     std::filesystem::path path = node.as_text();
@@ -142,7 +143,8 @@ Cell read_cell(const Yaml& yaml) {
   for (const Node& job : root["jobs"].children()) {
     cell.jobs[job.key()] = job.as_text();
     if (cell.find(job.as_text()) == nullptr)
-      job.fault("`" + job.as_text() + "` is no component of this cell", "name the component that runs the job");
+      job.fault("`" + job.as_text() + "` is no component of this cell",
+                "name the component that runs the job");
   }
   return cell;
 }

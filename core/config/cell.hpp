@@ -59,6 +59,7 @@ struct Cell {
   std::uint32_t id = 0;
   int domain = 0;
   bool simulated_time = false;
+  Duration window = Duration::milliseconds(20);  // of simulated time: how late another process sees a sample
   bool shared_memory = true;
   std::filesystem::path profiles;
   std::vector<std::filesystem::path> plugins;  // shared libraries with further component types

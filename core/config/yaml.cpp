@@ -27,6 +27,7 @@ struct Place {
 
 struct Document {
   std::filesystem::path file;
+  std::string text;
   std::shared_ptr<Place> root;
   std::vector<Fault> faults;
 };
@@ -332,6 +333,7 @@ Yaml Yaml::parse(const std::string& text, const std::string& name) {
   Yaml result;
   result.document_ = std::make_shared<Document>();
   result.document_->file = name;
+  result.document_->text = text;
   result.document_->root = std::make_shared<Place>();
   if (text.find('\0') != std::string::npos) return fail(name, "is not a text file", "name a YAML file");
   try {
@@ -348,6 +350,7 @@ Yaml Yaml::parse(const std::string& text, const std::string& name) {
 
 Node Yaml::root() const { return {document_, document_->root}; }
 const std::filesystem::path& Yaml::file() const { return document_->file; }
+const std::string& Yaml::text() const { return document_->text; }
 
 std::vector<Fault> Yaml::faults() const {
   auto faults = document_->faults;

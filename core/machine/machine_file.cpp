@@ -18,12 +18,13 @@ std::string letter(int axis) {
   return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
 }
 
-metrology::Chain read_chain(const Node& node) {
+metrology::Chain read_chain(const Node& node, int least_axes) {
   metrology::Chain chain;
   const auto names = node.as_texts();
   if (!node.exists()) return chain;
-  if (names.size() < 2 || names.size() > 3) {
-    node.fault("a chain has two or three axes, this one has " + std::to_string(names.size()),
+  if (names.size() < static_cast<std::size_t>(least_axes) || names.size() > 3) {
+    node.fault(std::string{"a chain has "} + (least_axes < 2 ? "one, " : "") +
+                   "two or three axes, this one has " + std::to_string(names.size()),
                "write [y, x, z] or [y, x]");
     return chain;
   }
@@ -94,16 +95,19 @@ metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& c
   }
   read_each_axis(node["reversal"], chain, "m", {-1e-3, 1e-3}, errors.reversal);
   read_each_axis(node["expansion"], chain, "1/K", {-1e-3, 1e-3}, errors.expansion);
+  read_each_axis(node["bending"], chain, "m/K", {-1e-3, 1e-3}, errors.bending);
+  read_each_axis(node["base_expansion"], chain, "1/K", {-1e-3, 1e-3}, errors.base_expansion);
+  errors.scale_lag = node.number("scale_lag", "s", {0.0, 1e5}, 0.0);
   errors.reference_temperature = node.number("reference_temperature", "degC", {-50.0, 200.0}, 20.0);
   return errors;
 }
 
 }  // namespace
 
-metrology::Machine read_machine(const config::Node& root) {
+metrology::Machine read_machine(const config::Node& root, int least_axes) {
   (void)root.integer("invar_machine", 1, 1);
   metrology::Machine machine;
-  machine.chain = read_chain(root.required("chain"));
+  machine.chain = read_chain(root.required("chain"), least_axes);
   const Node travel = root.required("travel");
   for (int axis = 0; axis < metrology::axis_count; ++axis) {
     if (!machine.chain.has(axis)) {
@@ -133,9 +137,9 @@ metrology::Machine read_machine(const config::Node& root) {
   return machine;
 }
 
-metrology::Machine load_machine(const std::filesystem::path& file) {
+metrology::Machine load_machine(const std::filesystem::path& file, int least_axes) {
   const auto yaml = config::Yaml::load(file);
-  const auto machine = read_machine(yaml.root());
+  const auto machine = read_machine(yaml.root(), least_axes);
   yaml.finish();
   return machine;
 }

@@ -19,16 +19,14 @@ ErrorMotions MachineErrors::motions(const Chain& chain, const Eigen::Vector3d& p
 
 Eigen::Vector3d simulated_error(const Machine& machine, const Eigen::Matrix3d& directions,
                                 const Eigen::Vector3d& position, const Eigen::Vector3d& tool,
-                                const Eigen::Vector3d& moving, double temperature) noexcept {
+                                const Eigen::Vector3d& moving, const Eigen::Vector3d& growth) noexcept {
   if (!machine.errors) return Eigen::Vector3d::Zero();
   const MachineErrors& errors = *machine.errors;
   ErrorMotions motions = errors.motions(machine.chain, position);
   for (int axis = 0; axis < 3; ++axis) {
     if (!machine.chain.has(axis)) continue;
     const auto a = static_cast<std::size_t>(axis);
-    motions[a].translation[axis] +=
-        errors.expansion[a] * (temperature - errors.reference_temperature) * position[axis] +
-        0.5 * errors.reversal[a] * moving[axis];
+    motions[a].translation[axis] += growth[axis] + 0.5 * errors.reversal[a] * moving[axis];
   }
   return exact_error(machine.chain, directions, position, motions, tool);
 }

@@ -22,6 +22,7 @@ constexpr std::pair<ThermalFactor, const char*> names[] = {
     {ThermalFactor::rate_temperature, "rate_temperature"},
     {ThermalFactor::rate_curve, "rate_curve"},
     {ThermalFactor::hysteresis, "hysteresis"},
+    {ThermalFactor::zone, "zone"},
     {ThermalFactor::direction, "direction"}};
 
 double curve(double scaled, int k) noexcept {
@@ -29,8 +30,9 @@ double curve(double scaled, int k) noexcept {
   return std::exp(-0.5 * z * z);
 }
 
-/// The value of one factor; `tau` and `rho` are held to their ranges already.
-double factor_value(ThermalFactor factor, int k, double tau, double rho, double direction) noexcept {
+/// The value of one factor; `tau`, `rho` and `zone` are held to their ranges already.
+double factor_value(ThermalFactor factor, int k, double tau, double rho, double zone,
+                    double direction) noexcept {
   switch (factor) {
     case ThermalFactor::geometry:
       return 1.0;
@@ -46,6 +48,8 @@ double factor_value(ThermalFactor factor, int k, double tau, double rho, double 
       return curve(rho, k);
     case ThermalFactor::hysteresis:
       return std::tanh(rho / 0.05);
+    case ThermalFactor::zone:
+      return zone;
     case ThermalFactor::direction:
       return direction;
   }
@@ -94,6 +98,9 @@ Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model
                               double direction) {
   const double tau = scaled_temperature(model.temperature, at.temperature);
   const double rho = scaled_rate(model.heating_rate, at.heating_rate);
+  const double zone = term.factor == ThermalFactor::zone
+                          ? scaled_temperature(model.zones[term.zone].range, at.zones[term.zone])
+                          : 0.0;
   const double x = model.x.clamp(at.x);
   const Eigen::Index centres = term.weights.rows();
   const int factors = factor_count(term.factor);
@@ -102,9 +109,16 @@ Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model
     const double z = (x - term.first) / term.spacing - static_cast<double>(k);
     const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
     for (int f = 0; f < factors; ++f)
-      columns(f * centres + k) = phi * factor_value(term.factor, f, tau, rho, direction);
+      columns(f * centres + k) = phi * factor_value(term.factor, f, tau, rho, zone, direction);
   }
   return columns;
+}
+
+ThermalState ThermalError::typical(double at_x, double at_temperature, double at_rate) const {
+  ThermalState at{at_x, at_temperature, at_rate, {}};
+  for (std::size_t z = 0; z < zones.size(); ++z)
+    at.zones[z] = 0.5 * (zones[z].range.lower + zones[z].range.upper);
+  return at;
 }
 
 double ThermalError::value(const ThermalState& at) const {
@@ -117,14 +131,20 @@ double ThermalError::value(const ThermalState& at) const {
 
 double ThermalError::sigma(const ThermalState& at) const {
   const double within = sigma_table({at.x, at.temperature, at.heating_rate});
-  return std::hypot(std::hypot(within, slope_x * (at.x - x.clamp(at.x))),
-                    std::hypot(slope_temperature * (at.temperature - temperature.clamp(at.temperature)),
-                               slope_rate * (at.heating_rate - heating_rate.clamp(at.heating_rate))));
+  double sum = std::hypot(std::hypot(within, slope_x * (at.x - x.clamp(at.x))),
+                          std::hypot(slope_temperature * (at.temperature - temperature.clamp(at.temperature)),
+                                     slope_rate * (at.heating_rate - heating_rate.clamp(at.heating_rate))));
+  for (std::size_t z = 0; z < zones.size(); ++z)
+    sum = std::hypot(sum, zones[z].slope * (at.zones[z] - zones[z].range.clamp(at.zones[z])));
+  return sum;
 }
 
 bool ThermalError::inside(const ThermalState& at) const {
   const bool rate_known = heating_rate.width() > 0.0;
-  return x.contains(at.x) && temperature.contains(at.temperature) &&
+  bool zones_inside = true;
+  for (std::size_t z = 0; z < zones.size(); ++z)
+    zones_inside = zones_inside && zones[z].range.contains(at.zones[z]);
+  return x.contains(at.x) && temperature.contains(at.temperature) && zones_inside &&
          (!rate_known || heating_rate.contains(at.heating_rate));
 }
 
@@ -132,6 +152,7 @@ CompiledThermalError::CompiledThermalError(const ThermalError& model, double mos
     : x_{model.x},
       temperature_{model.temperature},
       heating_rate_{model.heating_rate},
+      zones_{model.zones},
       slope_x_{model.slope_x},
       slope_temperature_{model.slope_temperature},
       slope_rate_{model.slope_rate},
@@ -151,22 +172,26 @@ CompiledThermalError::CompiledThermalError(const ThermalError& model, double mos
   for (const ThermalTerm& term : model.terms) {
     if (term.factor == ThermalFactor::direction) continue;
     for (int f = 0; f < factor_count(term.factor); ++f) {
-      layout_.push_back({term.factor, f, columns_.size()});
+      layout_.push_back({term.factor, f, term.zone, columns_.size()});
       for (std::size_t i = 0; i < nodes_; ++i)
         columns_.push_back(network(term, x_.lower + step * static_cast<double>(i), f));
     }
   }
   values_.assign(nodes_, 0.0);
   sigmas_.assign(nodes_, 0.0);
-  set(0.5 * (temperature_.lower + temperature_.upper), 0.0);
+  set(0.5 * (temperature_.lower + temperature_.upper), 0.0, model.typical(0.0, 0.0).zones);
 }
 
-void CompiledThermalError::set(double temperature, double heating_rate) noexcept {
+void CompiledThermalError::set(double temperature, double heating_rate,
+                               const std::array<double, most_zones>& zones) noexcept {
   const double tau = scaled_temperature(temperature_, temperature);
   const double rho = scaled_rate(heating_rate_, heating_rate);
   std::fill(values_.begin(), values_.end(), 0.0);
   for (const Column& column : layout_) {
-    const double factor = factor_value(column.factor, column.index, tau, rho, 0.0);
+    const double zone = column.factor == ThermalFactor::zone
+                            ? scaled_temperature(zones_[column.zone].range, zones[column.zone])
+                            : 0.0;
+    const double factor = factor_value(column.factor, column.index, tau, rho, zone, 0.0);
     for (std::size_t i = 0; i < nodes_; ++i) values_[i] += factor * columns_[column.begin + i];
   }
   const double beyond_t = slope_temperature_ * (temperature - temperature_.clamp(temperature));
@@ -174,6 +199,11 @@ void CompiledThermalError::set(double temperature, double heating_rate) noexcept
   outside_squared_ = beyond_t * beyond_t + beyond_r * beyond_r;
   const bool rate_known = heating_rate_.width() > 0.0;
   inside_ = temperature_.contains(temperature) && (!rate_known || heating_rate_.contains(heating_rate));
+  for (std::size_t z = 0; z < zones_.size(); ++z) {
+    const double beyond = zones_[z].slope * (zones[z] - zones_[z].range.clamp(zones[z]));
+    outside_squared_ += beyond * beyond;
+    inside_ = inside_ && zones_[z].range.contains(zones[z]);
+  }
   for (std::size_t i = 0; i < nodes_; ++i) {
     const double x = x_.lower + x_.width() * static_cast<double>(i) / static_cast<double>(nodes_ - 1);
     sigmas_[i] = sigma_table_({x, temperature, heating_rate});
@@ -200,23 +230,21 @@ double CompiledThermalError::sigma(double x) const noexcept {
   return std::sqrt(within * within + beyond * beyond + outside_squared_);
 }
 
+double lag_step(double lagged, double from, double to, double dt, double tau) noexcept {
+  if (!(dt > 0.0)) return lagged;
+  // T(t) = T0 + s t over the step: Tm = T0 + s (t - tau) + (Tm0 - T0 + s tau) exp(-t / tau).
+  const double slope = (to - from) / dt;
+  return to - slope * tau + (lagged - from + slope * tau) * std::exp(-dt / tau);
+}
+
 Eigen::VectorXd lagged_temperature(const Eigen::Ref<const Eigen::VectorXd>& time,
                                    const Eigen::Ref<const Eigen::VectorXd>& temperature, double tau) {
   INVAR_EXPECTS(time.size() == temperature.size() && tau > 0.0, time.size(), temperature.size(), tau);
   Eigen::VectorXd lagged(time.size());
   if (time.size() == 0) return lagged;
   lagged(0) = temperature(0);
-  for (Eigen::Index i = 1; i < time.size(); ++i) {
-    const double dt = time(i) - time(i - 1);
-    if (dt <= 0.0) {
-      lagged(i) = lagged(i - 1);
-      continue;
-    }
-    // T(t) = T0 + s t over the step: Tm = T0 + s (t - tau) + (Tm0 - T0 + s tau) exp(-t / tau).
-    const double slope = (temperature(i) - temperature(i - 1)) / dt;
-    lagged(i) = temperature(i) - slope * tau +
-                (lagged(i - 1) - temperature(i - 1) + slope * tau) * std::exp(-dt / tau);
-  }
+  for (Eigen::Index i = 1; i < time.size(); ++i)
+    lagged(i) = lag_step(lagged(i - 1), temperature(i - 1), temperature(i), time(i) - time(i - 1), tau);
   return lagged;
 }
 

@@ -12,11 +12,21 @@
 
 namespace invar::metrology {
 
+inline constexpr std::size_t most_zones = 4;
+
 /// Where the error is asked for. SI; temperature in degC, rate in K/s.
 struct ThermalState {
   double x = 0.0;
   double temperature = 0.0;
   double heating_rate = 0.0;
+  std::array<double, most_zones> zones{};  // degC, of further thermistors in the order of the model's zones
+};
+
+/// A further thermistor on another part of the machine, and the temperatures it was calibrated over.
+struct ThermalZone {
+  std::string name;
+  Range range;         // [degC]
+  double slope = 0.0;  // how fast the value may leave its end outside [m/K]
 };
 
 /// The factor by which a term's network over x is multiplied; tau is the temperature scaled to [-1, 1] over
@@ -29,6 +39,7 @@ enum class ThermalFactor {
   rate_temperature,   // rho tau
   rate_curve,         // Gaussians of rho
   hysteresis,         // tanh(rho / 0.05): heating against cooling, whatever the rate
+  zone,               // the temperature of a zone, scaled to [-1, 1] over its range
   direction,          // direction of travel; its mean is zero, so it is never predicted
 };
 std::string name_of(ThermalFactor factor);
@@ -41,6 +52,7 @@ struct ThermalTerm {
   double first = 0.0;       // centre [m]
   double spacing = 1.0;     // [m], also the width of the Gaussians
   Eigen::MatrixXd weights;  // centres x factors [m]
+  std::size_t zone = 0;     // of factor `zone`: which
 };
 
 /// The identified error of one axis: actual minus commanded position. Set-up and offline use; the loop
@@ -48,17 +60,21 @@ struct ThermalTerm {
 /// slopes.
 struct ThermalError {
   std::vector<ThermalTerm> terms;
-  Range x;             // [m]
-  Range temperature;   // [degC]
-  Range heating_rate;  // [K/s]; empty width: rate unknown or constant
-  double lag = 0.0;    // time constant of the body behind the sensor [s]; 0: no lag state
-  double noise = 0.0;  // of one reading [m]
+  Range x;                         // [m]
+  Range temperature;               // [degC]
+  Range heating_rate;              // [K/s]; empty width: rate unknown or constant
+  std::vector<ThermalZone> zones;  // at most most_zones
+  double lag = 0.0;                // time constant of the body behind the sensor [s]; 0: no lag state
+  double noise = 0.0;              // of one reading [m]
   // How fast the value may leave its end outside: [m/m], [m/K], [m/(K/s)].
   double slope_x = 0.0;
   double slope_temperature = 0.0;
   double slope_rate = 0.0;
-  numerics::LookupTable<3> sigma_table;  // standard deviation inside: x, temperature, rate -> [m]
+  /// Standard deviation inside: x, temperature, rate -> [m], the largest over the zones' temperatures.
+  numerics::LookupTable<3> sigma_table;
 
+  /// The state with every zone in the middle of its range, for looking at the rest.
+  [[nodiscard]] ThermalState typical(double at_x, double at_temperature, double at_rate = 0.0) const;
   /// With `lag`, `at.temperature` is the lagged one, T - lag * rate in a steady ramp.
   [[nodiscard]] double value(const ThermalState& at) const;
   [[nodiscard]] double sigma(const ThermalState& at) const;
@@ -78,22 +94,25 @@ class CompiledThermalError {
   /// `most_difference` [m] bounds the difference from the model between the nodes in x.
   CompiledThermalError(const ThermalError& model, double most_difference);
 
-  void set(double temperature, double heating_rate) noexcept;
+  void set(double temperature, double heating_rate,
+           const std::array<double, most_zones>& zones = {}) noexcept;
   [[nodiscard]] double value(double x) const noexcept;
   [[nodiscard]] double sigma(double x) const noexcept;
-  /// False where temperature or rate as set lie outside what was calibrated.
+  /// False where temperature, rate or a zone's temperature as set lie outside what was calibrated.
   [[nodiscard]] bool inside() const noexcept { return inside_; }
   [[nodiscard]] double bound() const noexcept { return bound_; }
 
  private:
   struct Column {
     ThermalFactor factor;
-    int index;          // of the factor
+    int index;  // of the factor
+    std::size_t zone;
     std::size_t begin;  // in columns_
   };
   Range x_;
   Range temperature_;
   Range heating_rate_;
+  std::vector<ThermalZone> zones_;
   double slope_x_, slope_temperature_, slope_rate_;
   double bound_ = 0.0;
   std::size_t nodes_ = 2;
@@ -106,6 +125,10 @@ class CompiledThermalError {
   double outside_squared_ = 0.0;
   bool inside_ = false;
 };
+
+/// One step of the lagged temperature: from `lagged` on, while the temperature goes straight from `from` to `to` in
+/// `dt` [s]; `tau` [s] > 0. Exact. Real-time.
+[[nodiscard]] double lag_step(double lagged, double from, double to, double dt, double tau) noexcept;
 
 /// The lagged temperature Tm of tau dTm/dt = T - Tm, T linear between readings (exact). Starts in
 /// equilibrium. `time` [s] ascending; `tau` [s] > 0.

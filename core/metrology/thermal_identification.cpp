@@ -16,7 +16,13 @@ namespace invar::metrology {
 
 namespace {
 
-using Factors = std::vector<ThermalFactor>;
+/// A term that is wanted: its factor and, for a zone's, which zone.
+struct Wanted {
+  Wanted(ThermalFactor f, std::size_t z = 0) : factor{f}, zone{z} {}  // NOLINT: a factor alone is meant
+  ThermalFactor factor;
+  std::size_t zone;
+};
+using Factors = std::vector<Wanted>;
 using numerics::NormalEquations;
 using numerics::Posterior;
 
@@ -53,6 +59,8 @@ class Identifier {
       shape_.heating_rate = {readings.heating_rate->minCoeff(), readings.heating_rate->maxCoeff()};
     else
       shape_.heating_rate = {0.0, 0.0};
+    for (const auto& zone : readings.zones)
+      shape_.zones.push_back({zone.name, {zone.temperature.minCoeff(), zone.temperature.maxCoeff()}, 0.0});
     shape_.lag = lag;
     temperature_ = temperature;
     scale_ = std::max(robust_size(readings.error), 1e-12);
@@ -64,12 +72,14 @@ class Identifier {
   void use(const Factors& factors) {
     terms_.clear();
     Eigen::Index columns = 0;
-    for (const ThermalFactor factor : factors) {
-      const int intervals = factor == ThermalFactor::geometry      ? positions_ - 1
-                            : factor == ThermalFactor::temperature ? std::min(positions_ - 1, 20)
-                                                                   : std::min(positions_ - 1, 10);
+    for (const auto& [factor, zone] : factors) {
+      const int intervals = factor == ThermalFactor::geometry ? positions_ - 1
+                            : factor == ThermalFactor::temperature || factor == ThermalFactor::zone
+                                ? std::min(positions_ - 1, 20)
+                                : std::min(positions_ - 1, 10);
       ThermalTerm term;
       term.factor = factor;
+      term.zone = zone;
       term.spacing = shape_.x.width() / intervals;
       term.first = shape_.x.lower - term.spacing;  // one centre beyond either end
       term.weights = Eigen::MatrixXd::Zero(intervals + 3, factor_count(factor));
@@ -182,11 +192,15 @@ class Identifier {
         numerics::GridAxis{result.x, static_cast<std::size_t>(positions_)},
         numerics::GridAxis{result.temperature, temperature ? 9U : 1U},
         numerics::GridAxis{result.heating_rate, rate ? 5U : 1U}};
-    result.sigma_table =
-        numerics::LookupTable<3>{axes, [&](const std::array<double, 3>& node) {
-                                   const Eigen::VectorXd columns = basis({node[0], node[1], node[2]}, 0.0);
-                                   return std::sqrt(std::max(0.0, columns.dot(p.covariance * columns)));
-                                 }};
+    result.sigma_table = numerics::LookupTable<3>{
+        axes, [&](const std::array<double, 3>& node) {
+          double most = 0.0;
+          for (const ThermalState& state : with_zones({node[0], node[1], node[2], {}})) {
+            const Eigen::VectorXd columns = basis(state, 0.0);
+            most = std::max(most, columns.dot(p.covariance * columns));
+          }
+          return std::sqrt(most);
+        }};
     return result;
   }
 
@@ -214,9 +228,20 @@ class Identifier {
   }
 
   [[nodiscard]] Eigen::VectorXd basis(Eigen::Index i) const {
-    return basis(
-        {readings_.x(i), temperature_(i), readings_.heating_rate ? (*readings_.heating_rate)(i) : 0.0},
-        readings_.direction ? (*readings_.direction)(i) : 0.0);
+    ThermalState at{
+        readings_.x(i), temperature_(i), readings_.heating_rate ? (*readings_.heating_rate)(i) : 0.0, {}};
+    for (std::size_t z = 0; z < readings_.zones.size(); ++z) at.zones[z] = readings_.zones[z].temperature(i);
+    return basis(at, readings_.direction ? (*readings_.direction)(i) : 0.0);
+  }
+
+  /// The state with all zones cold and with all warm.
+  [[nodiscard]] std::array<ThermalState, 2> with_zones(const ThermalState& at) const {
+    std::array<ThermalState, 2> both{at, at};
+    for (std::size_t z = 0; z < shape_.zones.size(); ++z) {
+      both[0].zones[z] = shape_.zones[z].range.lower;
+      both[1].zones[z] = shape_.zones[z].range.upper;
+    }
+    return both;
   }
 
   [[nodiscard]] std::vector<std::string> needed() const {
@@ -240,7 +265,8 @@ class Identifier {
       const bool geometry = term.factor == ThermalFactor::geometry;
       // Offset and slope of the geometry and of the linear expansion are free; elsewhere they are like the
       // rest.
-      const bool free = geometry || term.factor == ThermalFactor::temperature;
+      const bool free =
+          geometry || term.factor == ThermalFactor::temperature || term.factor == ThermalFactor::zone;
       const Eigen::MatrixXd over_x = covariance_factor(
           term.weights.rows(), term.spacing, std::exp(hyper.at(geometry ? "length" : "thermal_length")),
           free ? std::pow(10.0 * scale_ / size, 2) : 1.0);
@@ -330,6 +356,20 @@ void set_slopes(ThermalError& model, bool temperature_varies) {
   if (!temperature_varies) model.slope_temperature = 20e-6 * std::max(model.x.width(), 0.1);  // 20 ppm/K
 }
 
+/// Zones that no term asks for are no inputs of the model; those that stay get the slope of their term over x.
+void keep_zones_in_use(ThermalError& model) {
+  std::vector<ThermalZone> used;
+  for (ThermalTerm& term : model.terms) {
+    if (term.factor != ThermalFactor::zone) continue;
+    ThermalZone zone = model.zones[term.zone];
+    term.zone = used.size();
+    zone.slope =
+        2.0 * term.weights.norm() / std::sqrt(static_cast<double>(term.weights.size())) / zone.range.width();
+    used.push_back(std::move(zone));
+  }
+  model.zones = std::move(used);
+}
+
 /// Heating against cooling: what the model leaves on either branch.
 std::optional<std::string> compare_branches(const ThermalReadings& readings, const Eigen::VectorXd& residual,
                                             const Eigen::VectorXd& kept) {
@@ -393,6 +433,15 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
     all.push_back(std::move(tried));
     if (better) chosen = all.size() - 1;
   };
+  for (std::size_t z = 0; z < readings.zones.size(); ++z) {
+    if (identifier.shape().zones[z].range.width() < 0.2) continue;
+    Factors with_zone = all[chosen].factors;
+    with_zone.emplace_back(ThermalFactor::zone, z);
+    consider(attempt(identifier, "and temperature of " + readings.zones[z].name, with_zone, all[chosen].hyper,
+                     0.8));
+  }
+  const Factors slow = all[chosen].factors;  // what a lag is tried with
+  const Hyper slow_hyper = all[chosen].hyper;
   if (rate_varies) {
     Factors with_rate = all[chosen].factors;
     with_rate.push_back(ThermalFactor::rate);
@@ -412,11 +461,11 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
     const auto evidence = [&](double lag) {
       Identifier lagged{readings, lag};
       if (lagged.shape().temperature.width() < 0.2) return -std::numeric_limits<double>::infinity();
-      lagged.use(base);
+      lagged.use(slow);
       lagged.reweigh(identifier.weights());
       double most = -std::numeric_limits<double>::infinity();
       for (const double less_noise : {0.0, 0.7, 1.4, 2.1}) {
-        Hyper hyper = best.hyper;
+        Hyper hyper = slow_hyper;
         hyper["noise"] -= less_noise;
         most = std::max(most, lagged.fit(hyper, false).log_evidence);
       }
@@ -435,9 +484,9 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
         }
     if (best_lag > 0.0) {
       Identifier lagged{readings, best_lag};
-      lagged.use(base);
+      lagged.use(slow);
       lagged.reweigh(identifier.weights());
-      Tried tried = attempt(lagged, "lagged temperature", base, best.hyper, 0.8);
+      Tried tried = attempt(lagged, "lagged temperature", slow, slow_hyper, 0.8);
       tried.candidate.lag = best_lag;
       consider(std::move(tried));
     }
@@ -452,6 +501,7 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
   fit.predicted = last.predicted(final.posterior);
   fit.kept = last.judged(readings.error - fit.predicted).cwiseProduct(identifier.weights());
   set_slopes(fit.model, temperature_varies);
+  keep_zones_in_use(fit.model);
 
   final.candidate.chosen = true;
   if (final.candidate.verdict.empty()) final.candidate.verdict = "taken";

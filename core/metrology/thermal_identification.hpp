@@ -19,6 +19,12 @@ struct ThermalReadings {
   std::optional<Eigen::VectorXd> heating_rate;
   std::optional<Eigen::VectorXd> direction;
   std::optional<Eigen::VectorXd> time;
+  /// Temperatures of further thermistors [degC], at most most_zones.
+  struct Zone {
+    std::string name;
+    Eigen::VectorXd temperature;
+  };
+  std::vector<Zone> zones;
 };
 
 /// A model that was tried, in the order of trial.
@@ -42,9 +48,9 @@ struct ThermalFit {
 };
 
 /// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
-/// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of the
-/// heating rate, hysteresis and a lagged temperature are tried in turn and kept where the log evidence rises
-/// by more than three. Outliers (4.5 standard deviations) are rejected. At least four readings at two
+/// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of further
+/// zones' temperatures, of the heating rate, hysteresis and a lagged temperature are tried in turn and kept where the log
+/// evidence rises by more than three. Outliers (4.5 standard deviations) are rejected. At least four readings at two
 /// positions.
 ThermalFit identify_thermal(const ThermalReadings& readings);
 

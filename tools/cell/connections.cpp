@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "core/component/port.hpp"
+#include "core/dds/cell_client.hpp"
+#include "idl/event.h"
 #include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
@@ -82,6 +84,9 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
   if (port.direction() != Port::Direction::input)
     port.topic = loaded.cell->topic(member.file->name, port.name());
   if (found == connections.end()) {
+    if (port.type() == typeid(event::Notice) && port.direction() == Port::Direction::output)
+      port.topic =
+          dds::ServiceTopics{loaded.cell->name}.notices;  // what a component has to say, the cell says
     if (port.direction() == Port::Direction::input && !static_cast<InputPort&>(port).options().optional)
       member.file->node["connect"].fault(
           "input `" + port.name() + "` of `" + member.file->name + "` is not connected",

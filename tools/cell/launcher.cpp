@@ -173,7 +173,7 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const auto& process : cell.processes) names.push_back(process.name);
-  dds::SimulatedClockMaster master{node, names, Duration::milliseconds(20)};
+  dds::SimulatedClockMaster master{node, names, cell.window};
   node.start();
   const auto given_up = [&] { return stop.load() || any_ended(children); };
   // Somebody may have to start the other PCs by hand.

@@ -4,9 +4,11 @@
 #include <iomanip>
 #include <nlohmann/json.hpp>
 
+#include "core/metrology/line_errors.hpp"
 #include "core/recording/export.hpp"
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/table.hpp"
+#include "tools/cell/heat_summary.hpp"
 #include "tools/cell/print_summary.hpp"
 #include "tools/report/page.hpp"
 
@@ -19,41 +21,10 @@ using report::Plot;
 using report::Series;
 using report::si;
 
-/// Error of displacement along each verification line.
-struct Verification {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> way;    // m, from the line's start
-  std::vector<std::vector<double>> error;  // m
-  double rms = 0.0;
-  double maximum = 0.0;
-};
-
-Verification read_verification(const std::filesystem::path& file) {
-  Verification result;
+metrology::LineErrors read_verification(const std::filesystem::path& file) {
   const auto table = recording::Table::read(file, {"line"});
-  const auto& names = table.find("line")->texts;
-  const auto x = table.in("x", "m");
-  const auto y = table.in("y", "m");
-  const auto z = table.in("z", "m");
-  const auto displacement = table.in("displacement", "m");
-  std::size_t start = 0;
-  double squares = 0.0;
-  for (std::size_t i = 0; i < table.rows(); ++i) {
-    if (result.names.empty() || result.names.back() != names[i]) {
-      result.names.push_back(names[i]);
-      result.way.emplace_back();
-      result.error.emplace_back();
-      start = i;
-    }
-    const double way = std::hypot(x[i] - x[start], y[i] - y[start], z[i] - z[start]);
-    const double error = displacement[i] - way;
-    result.way.back().push_back(way);
-    result.error.back().push_back(error);
-    squares += error * error;
-    result.maximum = std::max(result.maximum, std::abs(error));
-  }
-  result.rms = std::sqrt(squares / static_cast<double>(table.rows()));
-  return result;
+  return metrology::line_errors({table.find("line")->texts, table.in("x", "m"), table.in("y", "m"),
+                                 table.in("z", "m"), table.in("displacement", "m")});
 }
 
 Series line_of(const std::vector<double>& x, const std::vector<double>& y, double x_factor, double y_factor,
@@ -68,16 +39,17 @@ Series line_of(const std::vector<double>& x, const std::vector<double>& y, doubl
   return series;
 }
 
-void add_verification(report::Page& page, const Verification& before, const Verification& after) {
+void add_verification(report::Page& page, const metrology::LineErrors& before,
+                      const metrology::LineErrors& after) {
   page.heading("Lines that were not used to identify the error");
   std::vector<Plot> plots;
-  for (std::size_t k = 0; k < before.names.size() && k < after.names.size(); ++k) {
+  for (std::size_t k = 0; k < before.lines.size() && k < after.lines.size(); ++k) {
     Plot plot;
-    plot.title = before.names[k];
+    plot.title = before.lines[k].name;
     plot.x_label = "way along the line [mm]";
     plot.y_label = "error of displacement [um]";
-    plot.series = {line_of(before.way[k], before.error[k], 1e3, 1e6, "before"),
-                   line_of(after.way[k], after.error[k], 1e3, 1e6, "after")};
+    plot.series = {line_of(before.lines[k].way, before.lines[k].error, 1e3, 1e6, "before"),
+                   line_of(after.lines[k].way, after.lines[k].error, 1e3, 1e6, "after")};
     plots.push_back(plot);
   }
   page.plots(plots,
@@ -143,6 +115,7 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
     add_verification(page, before, after);
   }
   summarise_print(folder, page, out);
+  summarise_heat(folder, page, out);
   add_heater(page, folder, out);
 }
 

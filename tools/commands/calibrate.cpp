@@ -14,6 +14,7 @@ void add_calibrate(CLI::App& program) {
   add_calibrate_dispenser(*group);
   add_calibrate_fusion(*group);
   add_calibrate_thermal(*group);
+  add_calibrate_thermistor(*group);
   add_calibrate_geometric(*group);
   add_calibrate_plan(*group);
   add_calibrate_controller(*group);

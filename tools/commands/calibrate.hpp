@@ -21,6 +21,8 @@ void add_calibrate_fusion(CLI::App& group);
 recording::Table predict_fusion(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_thermal(CLI::App& group);
 recording::Table predict_thermal(const config::Yaml& model, const recording::Table& inputs);
+void add_calibrate_thermistor(CLI::App& group);
+recording::Table predict_thermistor(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_geometric(CLI::App& group);
 void add_calibrate_plan(CLI::App& group);
 void add_calibrate_controller(CLI::App& group);

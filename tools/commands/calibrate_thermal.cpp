@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/compensation/thermal_file.hpp"
+#include "core/metrology/components.hpp"
 #include "core/metrology/thermal_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
@@ -54,6 +55,20 @@ ThermalReadings read_readings(const recording::Table& table) {
       throw InputError{table.file.string() + ": column `" + wanted[k].name + "`",
                        "every value is empty or nan", "record the values"};
   }
+  // Further thermistors: any column temperature_<zone>.
+  std::vector<std::string> zones;
+  std::vector<std::vector<double>> zone_columns;
+  for (const auto& column : table.columns) {
+    constexpr std::string_view prefix = "temperature_";
+    if (!column.name.starts_with(prefix)) continue;
+    zones.push_back(column.name.substr(prefix.size()));
+    zone_columns.push_back(table.in(column.name, "degC"));
+    expect_finite(table.file, column.name, zone_columns.back(), 1e4);
+  }
+  if (zones.size() > metrology::most_zones)
+    throw InputError{table.file.string(),
+                     "has " + std::to_string(zones.size()) + " columns temperature_<zone>; 4 at most",
+                     "leave out those that matter least"};
   const auto kept = Eigen::Index{std::count(complete.begin(), complete.end(), true)};
   std::vector<Eigen::VectorXd> vectors;
   for (std::size_t k = 0; k < columns.size(); ++k) {
@@ -68,7 +83,14 @@ ThermalReadings read_readings(const recording::Table& table) {
       vectors[k](next++) = columns[k][i];
     }
   }
-  ThermalReadings readings{vectors[0], vectors[1], vectors[2], std::nullopt, std::nullopt, std::nullopt};
+  ThermalReadings readings{vectors[0], vectors[1], vectors[2], std::nullopt, std::nullopt, std::nullopt, {}};
+  for (std::size_t z = 0; z < zones.size(); ++z) {
+    Eigen::VectorXd values(kept);
+    Eigen::Index next = 0;
+    for (std::size_t i = 0; i < zone_columns[z].size(); ++i)
+      if (complete[i]) values(next++) = zone_columns[z][i];
+    readings.zones.push_back({zones[z], std::move(values)});
+  }
   if (!columns[3].empty()) readings.heating_rate = vectors[3];
   if (!columns[4].empty()) readings.direction = vectors[4];
   if (!columns[5].empty()) readings.time = vectors[5];
@@ -108,7 +130,7 @@ report::Plot surface_plot(const ThermalFit& fit) {
       const double t = fit.model.temperature.lower + fit.model.temperature.width() * j / 30.0;
       heat.x.push_back(1e3 * x);
       heat.y.push_back(t);
-      heat.u.push_back(1e6 * fit.model.value({x, t, 0.0}));
+      heat.u.push_back(1e6 * fit.model.value(fit.model.typical(x, t)));
     }
   plot.series.push_back(std::move(heat));
   return plot;
@@ -139,8 +161,8 @@ report::Plot levels_plot(const ThermalReadings& readings, const ThermalFit& fit)
     band.colour = colours[level];
     for (int k = 0; k <= 200; ++k) {
       const double x = fit.model.x.lower + fit.model.x.width() * k / 200.0;
-      const double value = fit.model.value({x, t, 0.0});
-      const double sigma = fit.model.sigma({x, t, 0.0});
+      const double value = fit.model.value(fit.model.typical(x, t));
+      const double sigma = fit.model.sigma(fit.model.typical(x, t));
       line.x.push_back(1e3 * x);
       line.y.push_back(1e6 * value);
       band.x.push_back(1e3 * x);
@@ -212,7 +234,7 @@ Figures figures_of(const ThermalReadings& readings, const ThermalFit& fit) {
     }
     before.push_back(readings.error(i) - fit.model.value({readings.x(i), fit.model.temperature.lower, 0.0}));
     after.push_back(readings.error(i) - fit.predicted(i));
-    figures.sigma += fit.model.sigma({readings.x(i), readings.temperature(i), 0.0});
+    figures.sigma += fit.model.sigma(fit.model.typical(readings.x(i), readings.temperature(i)));
   }
   figures.sigma /= static_cast<double>(std::max<std::size_t>(after.size(), 1));
   figures.before = rms(vector_of(before));
@@ -255,7 +277,8 @@ report::Page page_of(const std::filesystem::path& file, const ThermalReadings& r
   for (int k = 0; k <= 200; ++k) {
     const double t = range.lower - margin + (range.width() + 2.0 * margin) * k / 200.0;
     line.x.push_back(t);
-    line.y.push_back(1e6 * fit.model.sigma({fit.model.x.lower + 0.5 * fit.model.x.width(), t, 0.0}));
+    line.y.push_back(1e6 *
+                     fit.model.sigma(fit.model.typical(fit.model.x.lower + 0.5 * fit.model.x.width(), t)));
   }
   growth.series = {std::move(line)};
   report::Plot histogram;
@@ -278,7 +301,29 @@ report::Page page_of(const std::filesystem::path& file, const ThermalReadings& r
   return page;
 }
 
-void calibrate(const std::filesystem::path& file, const std::filesystem::path& folder) {
+struct Options {
+  std::filesystem::path recording;
+  std::filesystem::path out;
+  std::string axis;
+  std::filesystem::path above;
+};
+
+compensation::ThermalPlace place_of(const Options& options) {
+  compensation::ThermalPlace place;
+  if (!options.axis.empty()) place.axis = metrology::axis_named(options.axis);
+  if (options.above.empty()) return place;
+  const auto below = config::Yaml::load(options.above);
+  place.above = compensation::check_seal(below);
+  if (place.above == 0 || below.root().text("kind") != "geometric")
+    throw InputError{options.above.string(), "is no sealed geometric model",
+                     "name the compensation.yaml that was active while the recording was made"};
+  return place;
+}
+
+void calibrate(const Options& options) {
+  const std::filesystem::path& file = options.recording;
+  const std::filesystem::path& folder = options.out;
+  const compensation::ThermalPlace place = place_of(options);
   const auto table = recording::Table::read(file);
   const ThermalReadings readings = read_readings(table);
   const ThermalFit fit = [&] {
@@ -288,6 +333,7 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
   const Figures figures = figures_of(readings, fit);
 
   compensation::ModelText text{"thermal", {file}};
+  compensation::write_place(text, place);
   compensation::write_thermal(text, fit.model);
   nlohmann::json report;
   report["kind"] = "thermal";
@@ -324,30 +370,38 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
 }  // namespace
 
 void add_calibrate_thermal(CLI::App& group) {
-  struct Options {
-    std::filesystem::path recording;
-    std::filesystem::path out;
-  };
   auto* command = group.add_subcommand("thermal", "Error over position, temperature and heating rate");
   command->footer("Example: invar calibrate thermal --recording thermal.csv --out result");
   auto options = std::make_shared<Options>();
   command
       ->add_option("--recording", options->recording,
-                   "x [m], temperature [degC], error [m]; optional heating_rate [K/s], direction, t [s]")
+                   "x [m], temperature [degC], error [m]; optional heating_rate [K/s], direction, t [s], and "
+                   "for further "
+                   "thermistors temperature_<zone> [degC]")
       ->required();
   command->add_option("--out", options->out, "folder for compensation.yaml, report.json, report.html")
       ->required();
-  command->callback([options] { calibrate(options->recording, options->out); });
+  command->add_option("--axis", options->axis, "x, y or z: for a machine that loads the model into its loop")
+      ->check(CLI::IsMember({"x", "y", "z"}));
+  command->add_option("--above", options->above,
+                      "the geometric compensation.yaml that was active while the recording was made");
+  command->callback([options] { calibrate(*options); });
 }
 
 recording::Table predict_thermal(const config::Yaml& file, const recording::Table& inputs) {
   compensation::check_seal(file);
   file.root()["identified_from"].accept_all();
+  (void)compensation::read_place(file.root());
   const metrology::ThermalError model = compensation::read_thermal(file.root());
   file.finish();
   const auto x = inputs.in("x", "m");
   auto temperature = inputs.in("temperature", "degC");
   const auto rate = inputs.optionally_in("heating_rate", "K/s");
+  std::vector<std::vector<double>> zones;
+  for (const auto& zone : model.zones) {
+    zones.push_back(inputs.in("temperature_" + zone.name, "degC"));
+    expect_finite(inputs.file, "temperature_" + zone.name, zones.back(), 1e6);
+  }
   expect_finite(inputs.file, "x", x, 1e6);
   expect_finite(inputs.file, "temperature", temperature, 1e6);
   if (rate) expect_finite(inputs.file, "heating_rate", *rate, 1e6);
@@ -365,7 +419,8 @@ recording::Table predict_thermal(const config::Yaml& file, const recording::Tabl
   std::vector<double> sigma;
   std::size_t outside = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
-    const metrology::ThermalState at{x[i], temperature[i], rate ? (*rate)[i] : 0.0};
+    metrology::ThermalState at{x[i], temperature[i], rate ? (*rate)[i] : 0.0, {}};
+    for (std::size_t z = 0; z < zones.size(); ++z) at.zones[z] = zones[z][i];
     error.push_back(model.value(at));
     sigma.push_back(model.sigma(at));
     outside += model.inside(at) ? 0U : 1U;

@@ -1,4 +1,5 @@
 #include "core/machine/machine_file.hpp"
+#include "core/machine/heat_growth.hpp"
 
 #include <gmock/gmock.h>
 
@@ -48,6 +49,28 @@ errors:
   const auto directions = metrology::axis_directions(machine.chain, errors.squareness);
   const auto e = metrology::simulated_error(machine, directions, {0.03, 0.0, 0.0}, {0, 0, 0}, {1, 0, 0});
   EXPECT_NEAR(e.x(), errors.functions[0](0.03) + 1e-6 - 0.03 * (1 - directions(0, 0)), 1e-12);
+}
+
+TEST(MachineFile, HeatStretchesAndBowsTheScaleAndStretchesTheBase) {
+  const auto yaml = config::Yaml::parse(R"(
+invar_machine: 1
+chain: [x]
+travel: {x: [0, 0.2]}
+errors:
+  reference_temperature: 26.8
+  expansion: {x: {value: -19, unit: um/(m*K)}}
+  bending: {x: 4e-7}
+  base_expansion: {x: 5e-6}
+  scale_lag: 90
+)",
+                                        "m.yaml");
+  const auto machine = read_machine(yaml.root(), 1);
+  yaml.finish();
+  EXPECT_EQ(machine.errors->scale_lag, 90.0);
+  // At a quarter of the travel the bow is three quarters of its depth.
+  const Eigen::Vector3d growth = heat_growth(machine, {0.05, 0.0, 0.0}, 28.8, 27.8);
+  EXPECT_NEAR(growth.x(), 2.0 * (-19e-6 * 0.05 + 0.75 * 4e-7) + 1.0 * 5e-6 * 0.05, 1e-18);
+  EXPECT_EQ(growth.y(), 0.0);
 }
 
 TEST(MachineFile, NamesEachFault) {

@@ -151,7 +151,8 @@ TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {
     Eigen::MatrixXd modes(2 * static_cast<long>(grid.size()), 3);
     Eigen::VectorXd field(modes.rows());
     for (std::size_t g = 0; g < grid.size(); ++g) {
-      const Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool, {0, 0, 0}, 21.5) -
+      const Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool, {0, 0, 0},
+                                                testing::grown(machine, grid[g], 21.5)) -
                                 any.error(grid[g], machine.tool) - any.expansion_at(grid[g], 21.5);
       field.segment<2>(2 * static_cast<long>(g)) = e.head<2>();
       modes.middleRows<2>(2 * static_cast<long>(g)) << 1, 0, -grid[g].y(), 0, 1, grid[g].x();

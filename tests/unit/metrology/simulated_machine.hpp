@@ -102,6 +102,14 @@ struct Laser {
   double warming = 0.0;                          // K, over the line
 };
 
+/// What the machine's scales have grown at a temperature [m].
+inline Eigen::Vector3d grown(const Machine& machine, const Eigen::Vector3d& position, double temperature) {
+  const MachineErrors& errors = *machine.errors;
+  return (temperature - errors.reference_temperature) *
+         Eigen::Vector3d{errors.expansion[0], errors.expansion[1], errors.expansion[2]}.cwiseProduct(
+             position);
+}
+
 /// A line of `points` readings from `from` to `to` (m), measured as a laser zeroed at the first one would.
 inline DisplacementLine measure(const Machine& machine, const std::string& name, const Eigen::Vector3d& from,
                                 const Eigen::Vector3d& to, int points, const Eigen::Vector3d& tool,
@@ -124,7 +132,8 @@ inline DisplacementLine measure(const Machine& machine, const std::string& name,
     const double warmth =
         std::isnan(laser.temperature) ? machine.errors->reference_temperature : reading.temperature;
     const Eigen::Vector3d actual =
-        reading.position + simulated_error(machine, directions, reading.position, tool, {0, 0, 0}, warmth);
+        reading.position + simulated_error(machine, directions, reading.position, tool, {0, 0, 0},
+                                           grown(machine, reading.position, warmth));
     double value = beam.dot(actual) + laser.noise * normal(random) + laser.repeatability * normal(random) +
                    0.5 * laser.reversal * reading.direction + laser.drift * row / rows;
     if (row > 0 && uniform(random) < laser.outliers) value += 20e-6;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/metrology/heat_trace.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/metrology/thermal_identification.hpp"
 #include "core/metrology/thermistor.hpp"
@@ -77,7 +78,7 @@ ThermalReadings record(const Stage& stage, unsigned seed, const std::vector<doub
   const auto vector = [](const std::vector<double>& v) -> Eigen::VectorXd {
     return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
   };
-  ThermalReadings readings{vector(x), vector(t), vector(e), std::nullopt, vector(d), std::nullopt};
+  ThermalReadings readings{vector(x), vector(t), vector(e), std::nullopt, vector(d), std::nullopt, {}};
   if (rates.front() != rates.back()) readings.heating_rate = vector(r);
   return readings;
 }
@@ -164,14 +165,70 @@ TEST(ThermalIdentification, FindsTheTimeConstantOfABodyThatLags) {
   const Eigen::VectorXd body = lagged_temperature(t, measured, 600.0);
   std::mt19937 random{9};
   std::normal_distribution<double> normal;
-  ThermalReadings readings{Eigen::VectorXd(n), measured,     Eigen::VectorXd(n),
-                           std::nullopt,       std::nullopt, Eigen::VectorXd(t)};
+  ThermalReadings readings{Eigen::VectorXd(n), measured, Eigen::VectorXd(n), std::nullopt, std::nullopt,
+                           Eigen::VectorXd(t), {}};
   for (Eigen::Index i = 0; i < n; ++i) {
     readings.x(i) = 0.005 * static_cast<double>(i % 82 < 41 ? i % 82 : 81 - i % 82);
     readings.error(i) = stage.error(readings.x(i), body(i), 0.0) + 0.2e-6 * normal(random);
   }
   const ThermalFit fit = identify_thermal(readings);
   EXPECT_NEAR(fit.model.lag, 600.0, 60.0);
+}
+
+TEST(ThermalIdentification, TakesAZoneThatMattersAndLeavesOutOneThatDoesNot) {
+  ThermalReadings readings = record(Stage{6}, 6, {0.0, 0.0}, 0.2e-6);
+  const Eigen::Index n = readings.x.size();
+  std::mt19937 random{3};
+  std::uniform_real_distribution<double> uniform;
+  Eigen::VectorXd base(n);
+  Eigen::VectorXd cabinet(n);
+  const auto by_base = [](double x, double t) { return 6e-6 * x * (t - 23.0); };
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto pass = static_cast<double>(i / 41);
+    base(i) = 22.0 + 2.0 * std::sin(0.7 * pass);
+    cabinet(i) = 25.0 + 3.0 * uniform(random);
+    readings.error(i) += by_base(readings.x(i), base(i));
+  }
+  readings.zones = {{"cabinet", cabinet}, {"base", base}};
+  const ThermalFit fit = identify_thermal(readings);
+  ASSERT_EQ(fit.model.zones.size(), 1U);
+  EXPECT_EQ(fit.model.zones[0].name, "base");
+  for (const double x : {0.02, 0.1, 0.19})
+    for (const double t : {20.5, 23.5}) {
+      const ThermalState at{x, 28.5, 0.0, {t}};
+      const double apart = fit.model.value(at) - Stage{6}.error(x, 28.5, 0.0) - by_base(x, t);
+      EXPECT_LT(std::abs(apart), 0.2e-6);
+      EXPECT_LT(std::abs(apart), 4.0 * fit.model.sigma(at));
+    }
+  CompiledThermalError compiled{fit.model, 5e-9};
+  compiled.set(28.2, 0.0, {24.5});
+  const ThermalState outside{0.15, 28.2, 0.0, {24.5}};
+  EXPECT_NEAR(compiled.value(0.15), fit.model.value(outside), 5e-9);
+  EXPECT_FALSE(compiled.inside());
+  EXPECT_GT(fit.model.sigma(outside), fit.model.sigma({0.15, 28.2, 0.0, {23.0}}));
+}
+
+TEST(HeatTrace, KnowsTheRateAndTheLaggedTemperatureOfWhatItWasGiven) {
+  HeatTrace trace{10.0, 1000.0, 2.0};
+  std::vector<double> time;
+  std::vector<double> temperature;
+  for (double t = 0.0; t < 600.0; t += 0.5) {
+    time.push_back(t);
+    temperature.push_back(25.0 + (t < 300.0 ? 4e-3 * t : 1.2 - 2e-3 * (t - 300.0)));
+    trace.add(t, temperature.back());
+    if (t == 250.0) {
+      EXPECT_NEAR(trace.rate(), 4e-3, 1e-8);
+    }
+  }
+  EXPECT_NEAR(trace.rate(), -2e-3, 1e-8);
+  const auto n = static_cast<Eigen::Index>(time.size());
+  const Eigen::VectorXd lagged = lagged_temperature(
+      Eigen::Map<Eigen::VectorXd>(time.data(), n), Eigen::Map<Eigen::VectorXd>(temperature.data(), n), 120.0);
+  EXPECT_NEAR(trace.lagged(120.0), lagged(n - 1), 1e-9);
+  EXPECT_NEAR(trace.known(), 599.5, 1e-9);
+  for (double t = 600.0; t < 2000.0; t += 0.5) trace.add(t, 26.0);  // the ring goes round
+  EXPECT_NEAR(trace.lagged(120.0), 26.0, 1e-3);
+  EXPECT_LE(trace.known(), 1002.0);
 }
 
 TEST(LaggedTemperature, IsExactForARamp) {

@@ -18,6 +18,8 @@ namespace fs = std::filesystem;
 struct Bench final : Component {
   Output<ThermalCommand> command{*this, "command"};
   Input<NodeTemperature> state{*this, "state"};
+  Input<NodeTemperature> base{*this, "base"};
+  Input<NodeTemperature> true_base{*this, "true_base"};
 
   world::SimulatedHeater::Parameters heater_parameters;
   Thermal::Parameters thermal_parameters;
@@ -37,6 +39,7 @@ struct Bench final : Component {
     thermal_parameters.power_limit = 120.0;
     thermal_parameters.pid.kp = 60.0;
     thermal_parameters.pid.ki = 0.4;
+    thermal_parameters.zones = {{"base", {}}};
   }
   void bring_up() {
     heater = std::make_unique<world::SimulatedHeater>(heater_parameters);
@@ -47,6 +50,8 @@ struct Bench final : Component {
       component->configure();
     }
     static_cast<OutputPort*>(thermal->find_port("state"))->connect(state);
+    static_cast<OutputPort*>(thermal->find_port("temperature_base"))->connect(base);
+    static_cast<OutputPort*>(heater->find_port("base"))->connect(true_base);
     command.connect(*static_cast<InputPort*>(thermal->find_port("command")));
     heater->activate();
     thermal->activate();
@@ -104,6 +109,16 @@ TEST(Thermal, BringsTheSlideToItsSetpointAndHoldsIt) {
   for (int i = 0; i < 12'000; ++i) highest = std::max(highest, bench.cycle_once().heater_power());
   EXPECT_LE(highest, 120.0);
   for (int i = 0; i < 3'000; ++i) ASSERT_NEAR(bench.cycle_once().temperature(), 30.0, 0.02);
+}
+
+TEST(Thermal, PublishesFurtherZonesFromTheirThermistors) {
+  Bench bench;
+  bench.bring_up();
+  const NodeTemperature slide = bench.run_for(600.0);
+  EXPECT_FALSE(bench.base.latest()->stale());
+  EXPECT_NEAR(bench.base.latest()->temperature(), bench.true_base.latest()->temperature(), 2e-3);
+  EXPECT_GT(bench.base.latest()->temperature(), 23.2);
+  EXPECT_LT(bench.base.latest()->temperature(), slide.temperature() - 1.0);
 }
 
 TEST(Thermal, TwoRunsAgreeBitForBit) {

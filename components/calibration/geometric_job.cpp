@@ -1,0 +1,111 @@
+// The geometric calibration: lines, the fit, and whether it helps on lines that were not fitted.
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "components/calibration/calibration.hpp"
+#include "components/calibration/identify.hpp"
+
+namespace invar::calibration {
+
+namespace {
+
+recording::Table lines_table() {
+  recording::Table table;
+  table.add_texts("line", {});
+  for (const char* name : {"x", "y", "z"}) table.add(name, "m", {});
+  table.add("displacement", "m", {});
+  table.add("cycle", "", {});
+  table.add("direction", "", {});
+  return table;
+}
+
+void append(recording::Table& table, const std::string& line, const Eigen::Vector3d& point,
+            double displacement, double cycle, double direction) {
+  table.columns[0].texts.push_back(line);
+  const double row[] = {std::numeric_limits<double>::quiet_NaN(),
+                        point.x(),
+                        point.y(),
+                        point.z(),
+                        displacement,
+                        cycle,
+                        direction};
+  for (std::size_t i = 0; i < table.columns.size(); ++i) table.columns[i].values.push_back(row[i]);
+}
+
+}  // namespace
+
+Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
+                          double share, recording::Table& table) {
+  const Point from = line.start();
+  const Point to = line.end();
+  const double length = (to - from).norm();
+  const auto intervals = std::max<std::int64_t>(1, std::llround(length / interval));
+  co_await move_to(from, {});
+  co_await align(from, to);
+  const double begin = progress_;
+  for (std::int64_t cycle = 0; cycle < cycles; ++cycle) {
+    for (std::int64_t k = 0; k <= 2 * intervals + 1; ++k) {
+      const bool forth = k <= intervals;
+      const auto index = forth ? k : 2 * intervals + 1 - k;
+      const Point target = from + (to - from) * (static_cast<double>(index) / static_cast<double>(intervals));
+      co_await move_to(target, {});
+      double mean = 0.0;
+      co_await average_reading(readings, mean);
+      append(table, line.name, target, mean, static_cast<double>(cycle + 1), forth ? 1.0 : -1.0);
+      progress_ = begin + share *
+                              (static_cast<double>(cycle) +
+                               static_cast<double>(k) / static_cast<double>(2 * intervals + 2)) /
+                              static_cast<double>(cycles);
+    }
+  }
+  progress_ = begin + share;
+  report(job::JOB_RUNNING, "measured line " + line.name);
+}
+
+Task Calibration::run(const GeometricJob& job) {
+  co_await calibrate(job);
+  progress_ = 1.0;
+  report(job::JOB_DONE, "done");
+}
+
+Task Calibration::calibrate(const GeometricJob& job) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  std::filesystem::create_directories(folder);
+  const double share = 1.0 / static_cast<double>(job.lines.size() + 2 * job.verify.size() + 1);
+  co_await enable_axes();
+  co_await clear_models("");
+
+  recording::Table before = lines_table();
+  for (const LineSpec& line : job.verify)
+    co_await measure(line, job.verify_interval, 1, job.readings, share, before);
+  if (before.rows() > 0) before.write(folder / "verify_before.csv");
+  const double was = metrology::line_errors(readings_of(before)).rms;
+
+  recording::Table lines = lines_table();
+  for (const LineSpec& line : job.lines)
+    co_await measure(line, job.interval, job.cycles, job.readings, share, lines);
+  lines.write(folder / "lines.csv");
+
+  report(job::JOB_RUNNING, "identifying the error");
+  const IdentifiedGeometry found = identify_geometric(job.machine, lines, folder);
+  if (metrology::line_errors(readings_of(before), found.model).rms > was)
+    throw std::runtime_error{
+        "the model would make the error larger on lines that were not fitted; it was not activated"};
+  co_await use_model(found.file);
+  progress_ += share;
+  report(job::JOB_RUNNING, "compensation active; verifying");
+
+  recording::Table after = lines_table();
+  for (const LineSpec& line : job.verify)
+    co_await measure(line, job.verify_interval, 1, job.readings, share, after);
+  if (after.rows() > 0) {
+    after.write(folder / "verify_after.csv");
+    if (metrology::line_errors(readings_of(after)).rms > was)
+      co_await roll_back(
+          "the compensation makes the error larger on lines that were not fitted; rolled back");
+  }
+  co_await keep_models();
+}
+
+}  // namespace invar::calibration

@@ -1,0 +1,176 @@
+#include "components/compensation/live_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <functional>
+
+#include "core/compensation/geometric_file.hpp"
+#include "core/compensation/thermal_file.hpp"
+
+namespace invar::compensation {
+
+namespace {
+
+constexpr int steps = 20;  // of the grids on which a model is looked at
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+std::string in_um(double metres) {
+  std::array<char, 40> text{};
+  std::snprintf(text.data(), text.size(), "%.3g um", 1e6 * metres);
+  return text.data();
+}
+
+bool covers(const Range& range, const Range& travel) {
+  const double margin = 0.1 * travel.width();
+  return range.lower <= travel.lower + margin && range.upper >= travel.upper - margin;
+}
+
+std::string refusal_of_values(double largest, double steepest, double sigma, const ModelLimits& limits) {
+  if (!(largest <= limits.bound))
+    return "it corrects " + in_um(largest) + ", beyond the bound of " + in_um(limits.bound);
+  if (!(steepest <= limits.steepest)) {
+    return "its correction changes by " + in_um(steepest * 1e-3) + " in a millimetre, more than " +
+           in_um(limits.steepest * 1e-3);
+  }
+  if (!(sigma <= limits.largest_sigma))
+    return "it is not certain enough at mid travel: " + in_um(sigma) + " where " +
+           in_um(limits.largest_sigma) + " are allowed";
+  return {};
+}
+
+std::string refusal_of(const metrology::GeometricModel& model, const metrology::VolumetricTable& table,
+                       const ModelLimits& limits) {
+  if (model.chain.axes != limits.axes)
+    return "it is of another machine: one with " + std::to_string(model.chain.axes) + " axes, this one has " +
+           std::to_string(limits.axes);
+  if (limits.machine) {
+    const metrology::Machine& machine = *limits.machine;
+    for (int place = 0; place < model.chain.axes; ++place) {
+      if (model.chain.order[index(place)] != machine.chain.order[index(place)])
+        return "it is of another machine: its axes stand in another order";
+      const auto axis = index(model.chain.order[index(place)]);
+      const Range travel = machine.travel[axis];
+      if (!covers(model.travel[axis], travel) || !covers(travel, model.travel[axis]))
+        return std::string{"it is of another machine: its axis "} + metrology::axis_letters[axis] +
+               " has another travel";
+    }
+  }
+  // On a grid over the travels: the largest correction of an axis, and the steepest along any axis.
+  double largest = 0.0;
+  double steepest = 0.0;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  std::array<int, 3> count{1, 1, 1};
+  for (int k = 0; k < 3; ++k) {
+    if (!model.chain.has(k)) continue;
+    count[index(k)] = steps + 1;
+    middle[k] = 0.5 * (model.travel[index(k)].lower + model.travel[index(k)].upper);
+  }
+  const auto at = [&](const std::array<int, 3>& node) {
+    Eigen::Vector3d point = middle;
+    for (int k = 0; k < 3; ++k)
+      if (model.chain.has(k))
+        point[k] = model.travel[index(k)].lower + model.travel[index(k)].width() * node[index(k)] / steps;
+    return point;
+  };
+  std::array<int, 3> node{};
+  for (node[2] = 0; node[2] < count[2]; ++node[2])
+    for (node[1] = 0; node[1] < count[1]; ++node[1])
+      for (node[0] = 0; node[0] < count[0]; ++node[0]) {
+        const Eigen::Vector3d error = table.error(at(node));
+        if (!error.allFinite()) return "it gives no number at a point of the travels";
+        largest = std::max(largest, error.cwiseAbs().maxCoeff());
+        for (int k = 0; k < 3; ++k) {
+          if (node[index(k)] + 1 >= count[index(k)]) continue;
+          std::array<int, 3> next = node;
+          ++next[index(k)];
+          const double change = (table.error(at(next)) - error).cwiseAbs().maxCoeff();
+          steepest = std::max(steepest, change * steps / model.travel[index(k)].width());
+        }
+      }
+  Eigen::Vector3d sigma = table.sigma(middle);
+  for (int k = 0; k < 3; ++k)
+    if (!model.chain.has(k)) sigma[k] = 0.0;
+  return refusal_of_values(largest, steepest, sigma.maxCoeff(), limits);
+}
+
+std::string refusal_of(const metrology::ThermalError& model, std::size_t axis, const ModelLimits& limits) {
+  if (axis >= index(limits.axes)) return "it is of an axis that this machine lacks";
+  if (limits.machine && !covers(model.x, limits.machine->travel[axis]))
+    return "it is out of range: it was calibrated over a part of the travel only";
+  double largest = 0.0;
+  double steepest = 0.0;
+  for (int t = 0; t <= 4; ++t)
+    for (int r = 0; r <= 2; ++r) {
+      double before = 0.0;
+      for (int i = 0; i <= steps; ++i) {
+        const double value =
+            model.value(model.typical(model.x.lower + model.x.width() * i / steps,
+                                      model.temperature.lower + model.temperature.width() * t / 4.0,
+                                      model.heating_rate.lower + model.heating_rate.width() * r / 2.0));
+        if (!std::isfinite(value)) return "it gives no number at a point of its range";
+        largest = std::max(largest, std::abs(value));
+        if (i > 0) steepest = std::max(steepest, std::abs(value - before) * steps / model.x.width());
+        before = value;
+      }
+    }
+  const double sigma = model.sigma(model.typical(0.5 * (model.x.lower + model.x.upper),
+                                                 0.5 * (model.temperature.lower + model.temperature.upper)));
+  return refusal_of_values(largest, steepest, sigma, limits);
+}
+
+void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
+  const ThermalPlace place = read_place(yaml.root());
+  const metrology::ThermalError model = read_thermal(yaml.root());
+  yaml.finish();
+  if (!place.axis && limits.axes > 1) {
+    live.refusal = "it does not say which axis it is of: calibrate with --axis";
+    return;
+  }
+  live.axis = index(place.axis.value_or(0));
+  live.above = place.above;
+  live.temperature = model.temperature;
+  live.slope_temperature = model.slope_temperature;
+  live.by_temperature = std::any_of(model.terms.begin(), model.terms.end(), [](const auto& term) {
+    return term.factor != metrology::ThermalFactor::geometry &&
+           term.factor != metrology::ThermalFactor::direction;
+  });
+  live.lag = model.lag;
+  for (std::size_t z = 0; z < model.zones.size(); ++z) {
+    const auto found = std::find(limits.zones.begin(), limits.zones.end(), model.zones[z].name);
+    if (found == limits.zones.end()) {
+      live.refusal =
+          "it needs the temperature of `" + model.zones[z].name + "`: name it below `zones` and connect it";
+      return;
+    }
+    live.zones[z] = static_cast<std::size_t>(found - limits.zones.begin());
+    live.zone_ranges.push_back(model.zones[z].range);
+  }
+  live.refusal = refusal_of(model, live.axis, limits);
+  if (live.refusal.empty()) live.thermal.emplace(model, 5e-9);
+}
+
+}  // namespace
+
+void load_live_model(const std::filesystem::path& file, const ModelLimits& limits, LiveModel& live) {
+  const auto yaml = config::Yaml::load(file);
+  live.checksum = check_seal(yaml);
+  (void)yaml.root().integer("invar_compensation", 1, 1);
+  yaml.root()["identified_from"].accept_all();
+  const std::string kind = yaml.root().text("kind");
+  if (live.checksum == 0) {
+    live.refusal = "it carries no checksum: only a file as a calibration wrote it may move the machine";
+  } else if (kind == "thermal") {
+    read_thermal_into(live, yaml, limits);
+  } else if (kind == "geometric") {
+    const auto model = read_geometric(yaml.root());
+    yaml.finish();
+    live.geometric.emplace(model);
+    live.refusal = refusal_of(model, *live.geometric, limits);
+  } else {
+    live.refusal = "a model of kind `" + kind + "` corrects no axis";
+  }
+}
+
+}  // namespace invar::compensation

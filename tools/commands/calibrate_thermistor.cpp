@@ -1,0 +1,152 @@
+// `invar calibrate thermistor`: the equation of a thermistor from its resistance at known temperatures.
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <memory>
+
+#include "core/metrology/thermistor.hpp"
+#include "tools/commands/calibrate.hpp"
+#include "tools/commands/calibration_result.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::Thermistor;
+using metrology::ThermistorFit;
+using report::number;
+using report::si;
+
+struct Options {
+  std::filesystem::path readings;
+  std::filesystem::path out;
+  double base_temperature = 25.0;
+};
+
+Eigen::VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+ThermistorFit fit_of(const Options& options, const std::vector<double>& temperature,
+                     const std::vector<double>& resistance) {
+  const std::string file = options.readings.string();
+  expect_finite(options.readings, "temperature", temperature, 1e3);
+  expect_finite(options.readings, "resistance", resistance, 1e9);
+  for (std::size_t i = 0; i < resistance.size(); ++i)
+    if (resistance[i] <= 0.0 || temperature[i] <= -273.0)
+      throw InputError{file + ": row " + std::to_string(i + 1), "is no reading of a thermistor",
+                       "resistances are above 0 ohm, temperatures above -273 degC"};
+  const auto [low, high] = std::minmax_element(temperature.begin(), temperature.end());
+  if (*high - *low < 1.0)
+    throw InputError{file + ": column `temperature`", "varies by less than 1 K",
+                     "read the thermistor at temperatures some kelvins apart"};
+  return metrology::fit_thermistor(vector_of(temperature), vector_of(resistance), options.base_temperature);
+}
+
+report::Page page_of(const Options& options, const std::vector<double>& temperature,
+                     const std::vector<double>& resistance, const ThermistorFit& fit) {
+  report::Page page{"Thermistor", options.readings.filename().string()};
+  page.callout(number(fit.thermistor.resistance_at_base, 6) + " ohm at " +
+                   number(options.base_temperature, 4) + " degC, " +
+                   number(fit.thermistor.coefficient_percent, 4) + " %/K; the readings are met to " +
+                   si(fit.rms, "K") + " RMS",
+               "good");
+  report::Plot curve;
+  curve.title = "Resistance";
+  curve.x_label = "temperature [degC]";
+  curve.y_label = "resistance [ohm]";
+  report::Series points;
+  points.style = report::Series::Style::points;
+  points.label = "readings";
+  points.x = temperature;
+  points.y = resistance;
+  report::Series line;
+  line.label = "equation";
+  const auto [low, high] = std::minmax_element(temperature.begin(), temperature.end());
+  report::Plot left = curve;
+  left.title = "Residual";
+  left.y_label = "equation minus reading [K]";
+  report::Series residual = points;
+  residual.label = "";
+  for (int i = 0; i <= 200; ++i) {
+    line.x.push_back(*low + (*high - *low) * i / 200.0);
+    line.y.push_back(fit.thermistor.resistance(line.x.back()));
+  }
+  for (std::size_t i = 0; i < resistance.size(); ++i)
+    residual.y[i] = fit.thermistor.temperature(resistance[i]) - temperature[i];
+  curve.series = {std::move(line), std::move(points)};
+  left.series = {std::move(residual)};
+  page.plots({std::move(curve), std::move(left)});
+  return page;
+}
+
+void calibrate(const Options& options) {
+  const auto table = recording::Table::read(options.readings);
+  const auto temperature = table.in("temperature", "degC");
+  const auto resistance = table.in("resistance", "ohm");
+  if (table.rows() < 2)
+    throw InputError{options.readings.string(), "has one row",
+                     "two readings are needed at least, better five"};
+  const ThermistorFit fit = fit_of(options, temperature, resistance);
+  const Thermistor& found = fit.thermistor;
+  compensation::ModelText text{"thermistor", {options.readings}};
+  text.comment("R = resistance exp((coefficient / 100) T_B^2 (1/T - 1/T_B)), T in kelvin")
+      .number("resistance", found.resistance_at_base)
+      .number("base_temperature", found.base_temperature)
+      .number("coefficient", found.coefficient_percent)
+      .number("sigma", fit.rms);
+  const bool known = std::isfinite(fit.sigma_coefficient);
+  nlohmann::json report{{"kind", "thermistor"},
+                        {"readings", table.rows()},
+                        {"resistance_ohm", found.resistance_at_base},
+                        {"base_temperature_degC", found.base_temperature},
+                        {"coefficient_percent_per_K", found.coefficient_percent},
+                        {"rms_K", fit.rms},
+                        {"unidentified", nlohmann::json::array()}};
+  if (known) report["sigma_coefficient_percent_per_K"] = fit.sigma_coefficient;
+  write_calibration(options.out, text, report, page_of(options, temperature, resistance, fit));
+  std::cout << "thermistor from " << table.rows() << " readings, met to " << si(fit.rms, "K") << " RMS\n"
+            << "in the cell file: thermistor: {resistance: " << number(found.resistance_at_base, 7)
+            << ", base_temperature: " << number(found.base_temperature, 5)
+            << ", coefficient: " << number(found.coefficient_percent, 6) << "}\n";
+  if (!known) std::cout << "note: two readings leave nothing to check the equation with\n";
+  std::cout << "wrote " << (options.out / "compensation.yaml").string() << ", report.json, report.html\n";
+}
+
+}  // namespace
+
+void add_calibrate_thermistor(CLI::App& group) {
+  auto* command = group.add_subcommand("thermistor", "Equation of a thermistor from readings");
+  command->footer("Example: invar calibrate thermistor --readings thermistor.csv --out result");
+  auto options = std::make_shared<Options>();
+  command->add_option("--readings", options->readings, "temperature [degC], resistance [ohm]")->required();
+  command->add_option("--base", options->base_temperature, "where the resistance is stated [degC]")
+      ->check(CLI::Range(-50.0, 150.0));
+  command->add_option("--out", options->out, "folder for compensation.yaml, report.json, report.html")
+      ->required();
+  command->callback([options] { calibrate(*options); });
+}
+
+recording::Table predict_thermistor(const config::Yaml& file, const recording::Table& inputs) {
+  (void)compensation::check_seal(file);
+  file.root()["identified_from"].accept_all();
+  const Thermistor found{file.root().number("resistance", "ohm", Range::positive()),
+                         file.root().number("base_temperature", "degC", Range{-200.0, 500.0}),
+                         file.root().number("coefficient", "1", Range::positive())};
+  const double rms = file.root().number("sigma", "K", Range::not_negative());
+  file.finish();
+  std::vector<double> temperature = inputs.in("resistance", "ohm");
+  expect_finite(inputs.file, "resistance", temperature, 1e9);
+  for (double& value : temperature) {
+    if (value <= 0.0)
+      throw InputError{inputs.file.string(), "a resistance is not above 0", "check the readings"};
+    value = found.temperature(value);
+  }
+  recording::Table output;
+  output.add("sigma", "K", std::vector<double>(temperature.size(), rms));
+  output.add("temperature", "degC", std::move(temperature));
+  return output;
+}
+
+}  // namespace invar::tools
