@@ -180,7 +180,6 @@ Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
   // What the readings tell about the unknowns once the prior is known: G = Q - Q H^-1 Q. In the coefficients of the splines,
   // W = K^-1 N Q^-1 G Q^-1 N' K^-1 = K^-1 N (Q^-1 - H^-1) N' K^-1, the precision of the coefficients' marginal data. Then
   //   dL/dh = 1/2 [ u' dK u - tr(dK W_kk) ],  u = K^-1 N theta_k,   F_hg = 1/2 sum_ab tr(W_ba dK_h,a W_ab dK_g,b).
-  const Eigen::MatrixXd inverse = system.factor.solve(Eigen::MatrixXd::Identity(basis.size, basis.size));
   struct Part {
     std::size_t block;
     std::vector<int> strengths;
@@ -193,12 +192,21 @@ Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
     all += block.coefficients.rows();
   }
   Eigen::MatrixXd w = Eigen::MatrixXd::Zero(all, all);
+  // Block by block, L^-1 has nothing above the diagonal: a third of the work of a plain inverse.
+  std::vector<Eigen::MatrixXd> inverse_l;  // columns of a block, from its first row down
+  for (const auto& block : basis.blocks) {
+    const Eigen::Index below = basis.size - block.first;
+    inverse_l.emplace_back(Eigen::MatrixXd::Identity(below, block.size()));
+    system.factor.matrixLLT()
+        .bottomRightCorner(below, below)
+        .triangularView<Eigen::Lower>()
+        .solveInPlace(inverse_l.back());
+  }
   for (std::size_t b = 0; b < basis.blocks.size(); ++b) {
     const auto& own = basis.blocks[b];
     const Eigen::MatrixXd& right = system.blocks[b].solved;
     for (std::size_t a = 0; a <= b; ++a) {
-      const auto& other = basis.blocks[a];
-      Eigen::MatrixXd middle = -inverse.block(other.first, own.first, other.size(), own.size());
+      Eigen::MatrixXd middle = -inverse_l[a].bottomRows(inverse_l[b].rows()).transpose() * inverse_l[b];
       if (a == b)
         middle += system.blocks[b].precision.llt().solve(Eigen::MatrixXd::Identity(own.size(), own.size()));
       const Eigen::MatrixXd product = system.blocks[a].solved * middle * right.transpose();

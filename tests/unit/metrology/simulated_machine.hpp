@@ -21,7 +21,7 @@ struct MachineSpread {
   double squareness = 30e-6;   // rad, one sigma
 };
 
-/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as 1/h^2, sampled at 81
+/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as h^-1.5, sampled at 81
 /// places; `rms` about its best straight line, which is taken away (a slope is squareness, scale or a turned frame).
 inline std::vector<double> random_curve(double travel, double rms, std::mt19937_64& random,
                                         std::vector<double>& places) {
@@ -31,8 +31,8 @@ inline std::vector<double> random_curve(double travel, double rms, std::mt19937_
   places.clear();
   for (int i = 0; i < count; ++i) places.push_back(travel * i / (count - 1));
   for (int h = 1; h <= 6; ++h) {
-    const double in = normal(random) / (h * h);
-    const double out = normal(random) / (h * h);
+    const double in = normal(random) / std::pow(h, 1.5);
+    const double out = normal(random) / std::pow(h, 1.5);
     for (std::size_t i = 0; i < count; ++i) {
       const double angle = 3.141592653589793 * h * places[i] / travel;
       values[i] += in * std::sin(angle) + out * std::cos(angle);
