@@ -23,11 +23,17 @@ bool is_there(const std::filesystem::path& folder) {
   return false;
 }
 
+/// As it lies there: NAME.csv or NAME.csv.gz.
+std::filesystem::path csv(const std::filesystem::path& folder, const std::string& name) {
+  const auto plain = folder / (name + ".csv");
+  return std::filesystem::exists(plain) ? plain : folder / (name + ".csv.gz");
+}
+
 /// RMSE of one output of a model on the test run beside the recording.
 double test_error(const physics::Model& model, const std::filesystem::path& folder, std::size_t output) {
-  const auto inputs = model::to_record(recording::Table::read(folder / "test_inputs.csv"), model, false);
+  const auto inputs = model::to_record(recording::Table::read(csv(folder, "test_inputs")), model, false);
   const auto& signal = *model.signal(model.outputs()[output]);
-  const auto measured = recording::Table::read(folder / "test_outputs.csv").in(signal.column, signal.unit);
+  const auto measured = recording::Table::read(csv(folder, "test_outputs")).in(signal.column, signal.unit);
   physics::Outputs out;
   physics::prepare(model, inputs.record)->run(model, out);
   double sum = 0.0, n = 0.0;
@@ -48,6 +54,19 @@ TEST(RealRecordings, TwoHeatersWarmEachOtherAndTheirSensorsLag) {
   EXPECT_THAT(names, ::testing::Contains("sensor_lag"));
   for (std::size_t o = 0; o < 2; ++o)
     EXPECT_LT(test_error(d.best.model, folder, o), 0.8 * test_error(d.retuned.model, folder, o)) << o;
+}
+
+TEST(RealRecordings, APendulumIsBrakedByItsBearingAndByTheAir) {
+  const auto folder = shared() / "data" / "pendulum-arm";
+  if (!is_there(folder)) return;
+  auto data = load_case(model::load(folder / "model.yaml"), {csv(folder, "recording")});
+  const auto d = search(data, [](double, const std::string&) {});
+  std::vector<std::string> names;
+  for (const auto& finding : d.findings) names.emplace_back(finding.term.info->name);
+  EXPECT_THAT(names, ::testing::Contains("dry_friction"));
+  EXPECT_THAT(names, ::testing::Contains(::testing::AnyOf("quadratic", "cubic")));
+  for (const auto& finding : d.findings) EXPECT_EQ(finding.term.on, "w");
+  EXPECT_LT(test_error(d.best.model, folder, 0), 0.5 * test_error(d.retuned.model, folder, 0));
 }
 
 TEST(RealRecordings, AWhiffleBallIsBrakedByTheAirAndAGolfBallHardly) {
