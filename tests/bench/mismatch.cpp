@@ -1,5 +1,7 @@
 // How far the diagnosis can be trusted: made machines of all plants, effects large and small, noise of all colours.
 #include <CLI/CLI.hpp>
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 
@@ -12,13 +14,22 @@ struct Row {
   Machine machine;
   double win = 0.0;
   Marks marks;
-  std::string verdict, findings;
+  std::string verdict, findings, rejected;
+  std::vector<std::pair<double, double>> claims;  // probability, credit
 };
 
 Row run(const std::string& plant, const std::string& effect, double size, unsigned seed,
-        const Trouble& trouble, const diagnose::Options& options) {
+        const Trouble& trouble, bool leave_out) {
+  diagnose::Options options;
   Row row;
   row.machine = make(plant, effect, size, seed, trouble);
+  if (leave_out)
+    for (auto& missing : row.machine.missing) {
+      for (const auto& [name, credit] : missing.names)
+        if (credit == 1.0) options.without.insert(name);
+      missing.names["unmodelled"] = 1.0;
+      row.machine.verdicts = {{"unknown_physics", 1.0}, {"ambiguous", 1.0}, {"partly_explained", 1.0}};
+    }
   row.win = row.machine.missing.empty() ? 0.0 : to_be_won(row.machine);
   const std::clock_t begin = std::clock();  // of all threads: what it costs, however busy the host
   auto data = case_of(row.machine);
@@ -27,19 +38,43 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
   row.marks = mark(row.machine, data, d, row.win);
   row.marks.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   row.verdict = diagnose::name_of(d.verdict);
+  for (const auto& r : d.rejected)
+    row.rejected += "    " + r.term + " " + std::to_string(r.gain) + ": " + r.why + "\n";
   for (const auto& finding : d.findings) {
+    if (finding.term.curve.knots.empty())
+      row.claims.emplace_back(finding.probability, credit(row.machine, std::string{finding.term.info->name}));
     char text[200];
     std::snprintf(text, sizeof text, "%s%s%s %.2f", row.findings.empty() ? "" : ", ",
                   std::string{finding.term.info->name}.c_str(),
                   finding.term.curve.over.empty() ? "" : ("(" + finding.term.curve.over + ")").c_str(),
                   finding.probability);
     row.findings += text;
+    for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)
+      row.rejected += "    " + std::string{finding.term.info->name} + "." +
+                      std::string{finding.term.info->parameters[i].name} + " = " +
+                      std::to_string(finding.term.values[i]) + "\n";
     for (const auto& a : finding.alternatives) {
       std::snprintf(text, sizeof text, " [%s %.1f]", std::string{a.term.info->name}.c_str(), a.log_odds);
       row.findings += text;
     }
   }
   return row;
+}
+
+/// Clopper and Pearson's upper 95 % bound of a rate of which `hits` of `n` were seen: the p at which so few would come in
+/// one of twenty.
+double upper_bound(int hits, int n) {
+  double low = 0.0, high = 1.0;
+  for (int i = 0; i < 60; ++i) {
+    const double p = 0.5 * (low + high);
+    double sum = 0.0, term = std::pow(1.0 - p, n);
+    for (int k = 0; k <= hits; ++k) {
+      sum += term;
+      term *= p / (1.0 - p) * (n - k) / (k + 1.0);
+    }
+    (sum > 0.05 ? low : high) = p;
+  }
+  return high;
 }
 
 struct Sum {
@@ -73,35 +108,58 @@ int main(int argc, char** argv) {
   program.add_option("--effects", only, "these effects alone, pairs joined by +");
   program.add_option("--seed", seed, "of the first machine")->capture_default_str();
   program.add_option("--each", each, "machines of each effect")->capture_default_str();
-  program.add_option("--size", size, "of the effect against the usual one; 0: drawn from 0.05 to 3");
+  program.add_option("--size", size, "of the effect against the usual one; 0: drawn from 0.01 to 2");
   unsigned pairs = 0;
+  bool why = false;
+  program.add_flag("--why", why, "also what was turned down");
+  bool leave_out = false;
+  program.add_flag("--leave-out", leave_out,
+                   "the right names are taken out of the library: any other is false");
+  unsigned machine = 0;
+  program.add_option("--machine", machine, "the one of this seed alone");
   program.add_option("--pairs", pairs, "machines of each plant with two effects");
   CLI11_PARSE(program, argc, argv);
   std::map<std::string, Sum> sums;
+  std::map<std::string, std::pair<int, int>> nulls;  // by plant: how many, with a claim
+  struct Bin {
+    int count = 0;
+    double said = 0.0, held = 0.0;
+  };
+  std::array<Bin, 10> reliability;
+  double brier = 0.0;
   std::vector<double> seconds;
   const auto one = [&](const std::string& plant, const std::string& effect, unsigned number, double least) {
+    if (machine > 0 && number != machine) return;
     Draw draw{number};
     Trouble trouble;
     trouble.coloured = draw.once_in(3.0), trouble.faults = draw.once_in(3.0),
     trouble.renamed = draw.once_in(4.0);
-    const double drawn = draw.log_between(least, 3.0);
-    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, {});
+    const double drawn = draw.log_between(least, 2.0);
+    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out);
     std::printf(
         "%-9s %-34s seed %5u size %.2f%s%s win %9.1f  v %.1f l %.1f n %.1f false %d fit %5.2f %5.1f s  %s: "
         "%s\n",
         plant.c_str(), effect.c_str(), number, row.machine.size, trouble.coloured ? " coloured" : "",
         trouble.faults ? " faults" : "", row.win, row.marks.verdict, row.marks.located, row.marks.named,
         row.marks.false_claims, row.marks.fit, row.marks.seconds, row.verdict.c_str(), row.findings.c_str());
+    if (why) std::printf("%s%s", row.rejected.c_str(), row.machine.yaml.c_str());
     std::fflush(stdout);
     sums[plant].add(row);
     sums["all"].add(row);
+    if (row.machine.missing.empty())
+      ++nulls[plant].first, nulls[plant].second += row.marks.false_claims > 0 ? 1 : 0;
+    for (const auto& [probability, credit] : row.claims) {
+      auto& bin = reliability[static_cast<std::size_t>(std::min(9.0, 10.0 * probability))];
+      ++bin.count, bin.said += probability, bin.held += credit > 0.9 ? 1.0 : 0.0;
+      brier += std::pow(probability - (credit > 0.9 ? 1.0 : 0.0), 2);
+    }
     seconds.push_back(row.marks.seconds);
   };
   for (const auto& plant : of) {
     unsigned number = 1000 * seed;
     const auto list = only.empty() ? effects(plant) : only;
     for (const auto& effect : list)
-      for (unsigned i = 0; i < each; ++i) one(plant, effect, ++number, 0.05);
+      for (unsigned i = 0; i < each; ++i) one(plant, effect, ++number, 0.01);
     Draw draw{seed + 77U};
     const auto known = effects(plant);
     for (unsigned i = 0; i < pairs; ++i) {
@@ -110,13 +168,23 @@ int main(int argc, char** argv) {
         a = known[draw.index(known.size())], b = known[draw.index(known.size())];
       } while (a == b || a == "none" || b == "none" || a == "parameter" || b == "parameter" ||
                a.rfind("unknown", 0) == 0 || b.rfind("unknown", 0) == 0);
-      one(plant, a + "+" + b, ++number, 0.7);
+      one(plant, a + "+" + b, ++number, 0.2);
     }
   }
   std::printf(
       "\n| plant      | cases | verdict | located | named | false claims a case | fit |\n| --- | --- | --- | "
       "--- | --- | --- | --- |\n");
   for (const auto& [name, sum] : sums) sum.print(name);
+  for (const auto& [plant, count] : nulls)
+    std::printf("%s: %d nulls, %d with a claim; the rate is below %.3f (95 %%)\n", plant.c_str(), count.first,
+                count.second, upper_bound(count.second, count.first));
+  int claims = 0;
+  for (const auto& bin : reliability) {
+    claims += bin.count;
+    if (bin.count > 0)
+      std::printf("said %.3f held %.3f of %d\n", bin.said / bin.count, bin.held / bin.count, bin.count);
+  }
+  if (claims > 0) std::printf("Brier %.4f over %d claims\n", brier / claims, claims);
   std::nth_element(seconds.begin(), seconds.begin() + static_cast<std::ptrdiff_t>(seconds.size() / 2),
                    seconds.end());
   if (!seconds.empty()) std::printf("median %.2f s of CPU\n", seconds[seconds.size() / 2]);

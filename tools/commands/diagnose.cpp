@@ -3,13 +3,16 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <memory>
 
 #include "core/model/model_file.hpp"
 #include "tools/command.hpp"
 #include "tools/diagnose/report.hpp"
+#include "tools/live/interrupt.hpp"
 
 namespace invar::tools {
 
@@ -33,16 +36,29 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   std::filesystem::rename(temporary, file);
 }
 
-void run(const Options& options) {
+/// `[######--------------]  31 %  fitting the short list`
+void show_progress(double share, const std::string& what) {
+  constexpr int width = 24;
+  std::string bar(width, '-');
+  std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(share * width), '#');
+  std::cerr << "\r\033[K[" << bar << "] " << std::setw(3) << static_cast<int>(100.0 * share) << " %  " << what
+            << std::flush;
+}
+
+int run(const Options& options) {
   const auto yaml = config::Yaml::load(options.model);
   const auto model = model::read(yaml);
   yaml.finish();
   auto data = diagnose::load_case(model, options.recordings);
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const auto progress = [&](double share, const std::string& what) {
-    if (terminal) std::cerr << "\r\033[K" << static_cast<int>(100.0 * share) << " %  " << what << std::flush;
+    if (terminal) show_progress(share, what);
   };
-  const auto diagnosis = diagnose::search(data, progress);
+  // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
+  diagnose::Options how;
+  how.stopped = interrupted;
+  (void)interrupted();
+  const auto diagnosis = diagnose::search(data, progress, how);
   if (terminal) std::cerr << "\r\033[K";
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
@@ -59,6 +75,7 @@ void run(const Options& options) {
     std::cout << json << '\n';
   else
     std::cout << diagnose::summary(data, diagnosis) << "  " << (options.out / "report.html").string() << '\n';
+  return diagnosis.is_partial ? 130 : 0;
 }
 
 }  // namespace
@@ -66,7 +83,11 @@ void run(const Options& options) {
 void add_diagnose(CLI::App& program) {
   auto* command =
       program.add_subcommand("diagnose", "Find the physics that a model leaves out, and prove it");
-  command->footer("Example: invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis");
+  command->footer(
+      "Example: invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis\n"
+      "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C: the report holds what "
+      "was known by "
+      "then and says so");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "model.yaml: what you believe")->required();
   command
@@ -78,7 +99,9 @@ void add_diagnose(CLI::App& program) {
   command->add_flag("--json", options->json, "print report.json instead of the summary");
   command->add_option("--seed", options->seed, "accepted for scripts; the search draws no random numbers")
       ->capture_default_str();
-  command->callback([options] { run(*options); });
+  command->callback([options] {
+    if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);
+  });
 }
 
 }  // namespace invar::tools

@@ -170,8 +170,12 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       }
       const double scale = robust_sigma(off);
       const double limit = (data.is_time_series ? 6.0 : 5.0) * scale;
+      // A neighbour that is off to the same side makes it a narrow effect, not a lone value.
+      const auto beside = [&](std::size_t i, std::size_t j) {
+        return data.is_time_series && j < off.size() && off[j] * std::copysign(1.0, off[i]) > 0.5 * limit;
+      };
       for (std::size_t i = 0; i < off.size(); ++i)
-        if (scale > 0.0 && std::abs(off[i]) > limit) {
+        if (scale > 0.0 && std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) {
           measured[rows[i]] = nothing;
           ++data.count.outliers;
         }

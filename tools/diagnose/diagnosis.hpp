@@ -51,6 +51,7 @@ struct Diagnosis {
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
   bool is_unnamed = false;  // the finding is a curve alone
+  bool is_partial = false;  // stopped before all was tried
   bool has_rest = false;    // the last finding is a curve beside named ones
 
   /// Remembers the best showing of a term that is not claimed.

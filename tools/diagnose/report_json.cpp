@@ -86,6 +86,11 @@ std::string separating_experiment(const std::string& one, const std::string& oth
 }
 
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
+  if (d.is_partial) {
+    auto whole = d;
+    whole.is_partial = false;
+    return "Stopped before all was tried; so far: " + verdict_sentence(data, whole);
+  }
   std::string names;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
@@ -121,6 +126,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   json report;
   report["invar_report"] = 1;
   report["verdict"] = name_of(d.verdict);
+  if (d.is_partial) report["partial"] = true;
   double over = 0.0;
   for (const auto& row : d.train)
     over = std::max(over, row.noise_floor > 0.0 ? row.before / row.noise_floor : 1.0);

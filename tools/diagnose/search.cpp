@@ -87,10 +87,12 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   std::vector<Fit> fits;
   double leader = -1e300;
   for (const auto* s : shortlist) {
+    if (stopped()) break;
     fits.push_back(fit_with(data_, weighing, base, *s, 3));
     leader = std::max(leader, fits.back().evidence);
   }
   for (auto& f : fits) {
+    if (stopped()) break;
     const double gained = std::max(1.0, leader - base.evidence);
     if (f.evidence > leader - std::max(15.0, 0.5 * gained))
       f = fit(data_, weighing, f.model, data_.model, 8, &f);
@@ -115,7 +117,7 @@ bool Search::add_named(double round) {
     Weighing own_weighing;
     Fit own_fit, own_base;
     std::set<std::string> tried;
-    for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {
+    for (std::size_t i = 0; i < fits.size() && tried.size() < 3 && !stopped(); ++i) {
       if (fits[i].evidence < base.evidence + 2.0) break;
       if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
       if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
@@ -213,6 +215,7 @@ void Search::weigh_alternatives() {
       Finding finding;
       std::vector<Term> kept;
       for (const auto& rival : rivals_[i]) {
+        if (stopped()) break;
         Model model = d_.best.model;
         model.terms[place] = rival;
         auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
@@ -252,13 +255,14 @@ bool Search::add_pair() {
 Diagnosis Search::run() {
   prepare();
   const bool paired = add_pair();
-  for (int round = paired ? 2 : 0; round < 3; ++round)
+  for (int round = paired ? 2 : 0; round < 3 && !stopped(); ++round)
     if (!add_named(round)) break;
-  prune();
+  if (!stopped()) prune();
   weigh_alternatives();
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   progress_(0.78, "looking for physics without a name");
-  add_unnamed(data_, d_);
+  if (!stopped()) add_unnamed(data_, d_);
+  d_.is_partial = stopped();
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
   hold_out(data_, d_);

@@ -12,7 +12,6 @@ namespace invar::diagnose {
 /// How a search is to go.
 struct Options {
   std::set<std::string, std::less<>> without;  // names of terms that are not tried
-  bool refuses = true;                         // false: the best term is claimed whatever it gains
   std::function<bool()> stopped;  // asked between fits; once true, what is known so far is concluded
 };
 

@@ -14,12 +14,14 @@ using physics::Model;
 struct Curved {
   Fit fit;
   Weighing weighing;
-  double gain = -1e300;  // over what it was added to, under its own filters
+  double gain = -1e300;   // over what it was added to, under its own filters
+  double plain = -1e300;  // evidence with every row alike: comparable between curves
 };
 
 /// A dent or a step is narrow: the knots are gathered where the curve is not flat.
 void sharpen(const Case& data, Curved& found) {
-  auto& [curved, weighing, gain] = found;
+  auto& curved = found.fit;
+  auto& weighing = found.weighing;
   const auto& curve = curved.model.terms.back().curve;
   const double level = median(curve.values);
   double top = 0.0;
@@ -43,7 +45,7 @@ void sharpen(const Case& data, Curved& found) {
   auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
   const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
   if (sharp.evidence < blunt.evidence) return;
-  gain += sharp.evidence - blunt.evidence;
+  found.gain += sharp.evidence - blunt.evidence;
   curved = std::move(sharp);
   weighing = own;
 }
@@ -68,7 +70,9 @@ void add_unnamed(const Case& data, Diagnosis& d) {
       auto curved = fit(data, own, rough.model, data.model, 3, &rough);
       const auto without = fit(data, own, base.model, data.model, 4, &base);
       const double gain = curved.evidence - without.evidence;
-      if (gain > best.gain) best = {std::move(curved), own, gain};
+      // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
+      if (gain > claim_margin && rough.evidence > best.plain)
+        best = {std::move(curved), own, gain, rough.evidence};
     }
     if (best.gain > claim_margin) sharpen(data, best);
     return best;
