@@ -32,7 +32,8 @@ processes:
         following_error: 0.05
         limits: {velocity: 0.02}
         control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
-        connect: {feedback: world.feedback_x}
+        connect: {feedback: world.feedback_x, correction: compensation.correction_x}
+      compensation: {type: compensation, axes: 1, connect: {state_x: stage_x.state}}
   calibration:
     host: pc
     rate: 50
@@ -40,12 +41,11 @@ processes:
       calibration:
         type: calibration
         axes: 1
-        connect: {state_x: stage_x.state, command_x: stage_x.command, reading: laser.reading, beam: laser.beam, model: stage_x.command_of_nobody}
+        connect: {state_x: stage_x.state, command_x: stage_x.command, reading: laser.reading, beam: laser.beam, model: compensation.model, model_status: compensation.status}
         jobs: [{name: move, machine: machine.yaml, interval: 0.2, lines: [{name: X, from: [0.19], to: [0.0]}]}]
   recorder: {host: pc, rate: 50, components: {recorder: {type: recorder, topics: [stage_x]}}}
 jobs: {move: calibration}
 C
-sed -i 's/, model: stage_x.command_of_nobody//' "$folder/cell.yaml"
 cd "$folder"
 pids=()
 trap 'kill -9 "${pids[@]}" 2>/dev/null || true; rm -rf "$folder"' EXIT

@@ -250,6 +250,7 @@ TEST(Vision, CalibratesByARulerOnTheTable) {
   SimulatedCamera camera{seeing};
   Vision vision{measuring};
   Bench bench{camera, vision};
+  bench.run(1);
   EXPECT_EQ(bench.status.latest()->text(), "not calibrated");
   bench.ask(1);
   EXPECT_EQ(bench.status.latest()->phase(), job::JOB_FAILED);
