@@ -240,14 +240,21 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
 
 Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const Screened& added,
              int iterations) {
-  physics::Model best = with(base, {&added});
+  const physics::Model whole = with(base, {&added});
+  const auto from_whole = [&] { return fit(data, weighing, whole, data.model, iterations, &base); };
+  physics::Model best = whole;
   double least = residual(data, weighing, best).squaredNorm();
+  bool is_whole = true;
   for (double share = 0.4; share > 0.02 && least > base.residual.squaredNorm(); share *= 0.4) {
     auto tried = with(base, {&added}, share);
     const double square = residual(data, weighing, tried).squaredNorm();
-    if (square < least) least = square, best = std::move(tried);
+    if (square < least) least = square, best = std::move(tried), is_whole = false;
   }
-  return fit(data, weighing, best, data.model, iterations, &base);
+  if (is_whole) return from_whole();
+  // The whole strength may be right once the other numbers give way, which they have not here.
+  auto near = fit(data, weighing, best, data.model, iterations, &base);
+  auto far = from_whole();
+  return far.evidence > near.evidence ? far : near;
 }
 
 Fit with_columns(const Case& data, const Fit& base, const Screened& added) {
