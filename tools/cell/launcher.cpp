@@ -228,6 +228,8 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
     outcome.processes.push_back({child.name, child.status, folder.text(child.name + ".json")});
     if (by_itself && child.status != 0 && outcome.failure.empty())
       outcome.failure = "process `" + child.name + "` ended with status " + std::to_string(child.status);
+    if (!by_itself && child.status == 128 + SIGKILL && outcome.failure.empty())
+      outcome.failure = "process `" + child.name + "` did not end within 10 s and was killed";
   }
   outcome.wall_seconds = seconds_since(begin);
   return outcome;
