@@ -240,6 +240,9 @@ fdds::DataReader& Participant::create_reader(const std::string& name, fdds::Topi
 }
 
 void Participant::remove(fdds::DataWriter& writer) {
+  // Emptied first: Fast DDS 2.9 may send a heartbeat while it takes the history apart, and never leave its search for holes.
+  std::size_t removed = 0;
+  writer.clear_history(&removed);
   const std::lock_guard lock{mutex_};
   discovery_.remove_endpoint(as_text(writer.guid()));
   const_cast<fdds::Publisher*>(writer.get_publisher())->delete_datawriter(&writer);  // NOLINT
