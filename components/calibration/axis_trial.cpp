@@ -79,10 +79,8 @@ void AxisTrial::deactivate() noexcept {
 }
 
 void AxisTrial::report(job::JobPhase phase, const std::string& text) {
-  sample_.cell(cell);
+  stamp(sample_);
   sample_.component_id(id);
-  sample_.at().time_ns(now().ns);
-  sample_.at().cycle(cycle_);
   sample_.phase(phase);
   sample_.progress(progress_);
   sample_.text(text);
@@ -117,6 +115,7 @@ void AxisTrial::start(const job::JobCommand& command) {
   const auto begin = [&](const auto& job) {
     const auto folder = std::filesystem::absolute(job.out);
     std::filesystem::create_directories(folder);
+    began_ = now();
     sample_.result_path(folder.string());
     task_ = run(job);
     report(job::JOB_RUNNING, "started");
@@ -130,8 +129,7 @@ void AxisTrial::start(const job::JobCommand& command) {
   }
 }
 
-void AxisTrial::step(const Tick& tick) noexcept {
-  cycle_ = tick.cycle;
+void AxisTrial::step(const Tick&) noexcept {
   try {
     job::JobCommand command;
     while (job_.take(command)) start(command);
@@ -156,7 +154,7 @@ void AxisTrial::take_down(recording::Table& record) {
   }
   if (state == nullptr || state->at().time_ns() == taken_) return;
   taken_ = state->at().time_ns();
-  const double row[] = {static_cast<double>(taken_) * 1e-9,
+  const double row[] = {(Instant{taken_} - began_).in_seconds(),
                         state->setpoint_position(),
                         state->position(),
                         state->current(),
@@ -172,10 +170,8 @@ Task AxisTrial::wait(double seconds) {
 
 /// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
 Task AxisTrial::command_axis(stage::AxisCommand command, recording::Table* record) {
-  command.cell(cell);
+  stamp(command);
   command.axis(static_cast<std::uint32_t>(parameters_.axis));
-  command.at().time_ns(now().ns);
-  command.at().cycle(cycle_);
   command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
   command_.write(command);
   const Instant started = now();
@@ -219,8 +215,7 @@ Task AxisTrial::move(double target, double velocity, recording::Table* record) {
 
 Task AxisTrial::align(double from) {
   sensing::BeamCommand beam;
-  beam.cell(cell);
-  beam.at().time_ns(now().ns);
+  stamp(beam);
   beam.id(next_command_++);
   beam.beam_start()[static_cast<std::size_t>(parameters_.axis)] = from;
   beam.beam_direction()[static_cast<std::size_t>(parameters_.axis)] = 1.0;
@@ -242,8 +237,7 @@ Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64
 
 Task AxisTrial::command_model(compensation::ModelCommandKind kind, const std::string& path) {
   compensation::ModelCommand command;
-  command.cell(cell);
-  command.at().time_ns(now().ns);
+  stamp(command);
   command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
   command.kind(kind);
   command.path(path);

@@ -107,7 +107,7 @@ class AxisTrial final : public Component {
   double progress_ = 0.0;
   double beam_from_ = 0.0;  // where the laser was zeroed [m]
   std::uint64_t next_command_ = 1;
-  std::uint64_t cycle_ = 0;
+  Instant began_;           // the job; times in records count from here
   std::int64_t taken_ = 0;  // stamp of the last state in a record
 };
 

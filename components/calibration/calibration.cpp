@@ -48,10 +48,8 @@ void Calibration::end(job::JobPhase phase, const std::string& text) {
 }
 
 void Calibration::report(job::JobPhase phase, const std::string& text) {
-  sample_.cell(cell);
+  stamp(sample_);
   sample_.component_id(id);
-  sample_.at().time_ns(now().ns);
-  sample_.at().cycle(cycle_);
   sample_.phase(phase);
   sample_.progress(progress_);
   sample_.text(text);
@@ -92,8 +90,7 @@ void Calibration::start(const job::JobCommand& command) {
   report(job::JOB_RUNNING, "started");
 }
 
-void Calibration::step(const Tick& tick) noexcept {
-  cycle_ = tick.cycle;
+void Calibration::step(const Tick&) noexcept {
   try {
     job::JobCommand command;
     while (job_.take(command)) start(command);
@@ -129,10 +126,8 @@ Task Calibration::run(const PrintJob& job) {
 
 void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double position, const Pace& pace) {
   stage::AxisCommand command;
-  command.cell(cell);
+  stamp(command);
   command.axis(static_cast<std::uint32_t>(axis));
-  command.at().time_ns(now().ns);
-  command.at().cycle(cycle_);
   command.id(next_id());
   command.kind(kind);
   command.position(position);
@@ -211,8 +206,7 @@ Task Calibration::wait(double seconds) {
 Task Calibration::align(Point from, Point to) {
   const Point direction = (to - from).normalized();
   sensing::BeamCommand beam;
-  beam.cell(cell);
-  beam.at().time_ns(now().ns);
+  stamp(beam);
   beam.id(next_command_++);
   beam.beam_start({from.x(), from.y(), from.z()});
   beam.beam_direction({direction.x(), direction.y(), direction.z()});

@@ -136,7 +136,6 @@ class Calibration final : public Component, private JobHost {
   job::JobStatus sample_;
   double progress_ = 0.0;
   std::uint64_t next_command_ = 1;
-  std::uint64_t cycle_ = 0;
 
   std::uint64_t transaction_ = 0;   // ours on the compensation; 0: none
   bool transaction_known_ = false;  // the compensation has confirmed it
@@ -145,6 +144,7 @@ class Calibration final : public Component, private JobHost {
   metrology::HeatTrace heat_;
   const TraceSpec* trace_ = nullptr;  // that the heater follows
   Instant trace_start_;
+  Instant began_;  // the thermal job; times in its files count from here
   Instant set_at_;
   std::optional<double> setpoint_before_;  // of the heater, before the job
 

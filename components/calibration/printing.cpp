@@ -79,8 +79,7 @@ Printing::Printing(Component& owner, JobHost& host)
 template <class Sample>
 Sample Printing::stamped() const {
   Sample sample;
-  sample.cell(owner_.cell);
-  sample.at().time_ns(owner_.now().ns);
+  owner_.stamp(sample);
   return sample;
 }
 

@@ -47,8 +47,7 @@ recording::Table Calibration::heat_table(bool with_models) const {
 
 void Calibration::set_heater(double setpoint) {
   thermal::ThermalCommand command;
-  command.cell(cell);
-  command.at().time_ns(now().ns);
+  stamp(command);
   command.id(next_id());
   command.setpoint(setpoint);
   command.enabled(true);
@@ -96,7 +95,7 @@ Task Calibration::pass(const Pass& what, recording::Table& table) {
     co_await average_reading(what.job.readings, displacement);
     const auto* heat = temperature_.latest();
     if (heat == nullptr || heat->stale()) throw std::runtime_error{"no sound temperature arrives"};
-    std::vector<double> row{now().in_seconds(), target[static_cast<Eigen::Index>(what.job.axis())],
+    std::vector<double> row{(now() - began_).in_seconds(), target[static_cast<Eigen::Index>(what.job.axis())],
                             heat->temperature(), heat_.rate()};
     for (auto& zone : zones_) {
       const auto* sample = zone->latest();
@@ -132,6 +131,7 @@ Task Calibration::compare(const ThermalJob& job, const TraceSpec* trace,
 }
 
 Task Calibration::run(const ThermalJob& job) {
+  began_ = now();
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   std::filesystem::create_directories(folder);
   if (const auto* heat = temperature_.latest(); heat == nullptr) co_await wait(5.0);  // the cell is coming up

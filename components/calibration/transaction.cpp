@@ -7,8 +7,7 @@ namespace invar::calibration {
 
 std::uint64_t Calibration::send_model(compensation::ModelCommandKind kind, const std::string& path) {
   compensation::ModelCommand command;
-  command.cell(cell);
-  command.at().time_ns(now().ns);
+  stamp(command);
   command.id(next_id());
   command.transaction(transaction_);
   command.kind(kind);

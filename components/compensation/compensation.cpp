@@ -77,9 +77,8 @@ void Compensation::activate() {
 
 void Compensation::notify(event::Severity level, const char* text) noexcept {
   event::Notice notice;
-  notice.cell(cell);
+  stamp(notice);
   notice.component_id(id);
-  notice.at().time_ns(now().ns);
   notice.level(level);
   notice.source(name.c_str());
   notice.text(text);
@@ -87,9 +86,8 @@ void Compensation::notify(event::Severity level, const char* text) noexcept {
 }
 
 void Compensation::publish_status() noexcept {
-  reply_.cell(cell);
+  stamp(reply_);
   reply_.component_id(id);
-  reply_.at().time_ns(now().ns);
   reply_.transaction(transaction_);
   reply_.geometric_checksum(active_.geometric != nullptr ? active_.geometric->checksum : 0);
   for (std::size_t i = 0; i < 3; ++i)

@@ -173,10 +173,8 @@ void Compensation::publish(const Tick& tick, const Layers& layers, const Eigen::
     const auto k = static_cast<Eigen::Index>(i);
     const LiveModel* thermal = active_.thermal[i];
     AxisCorrection sample;
-    sample.cell(cell);
+    stamp(sample);
     sample.axis(static_cast<std::uint32_t>(i));
-    sample.at().time_ns(tick.now.ns);
-    sample.at().cycle(tick.cycle);
     sample.correction(applied_[k]);
     sample.rate((applied_[k] - before[k]) / tick.period);
     sample.layer_count(3);

@@ -99,9 +99,8 @@ Dispenser::Model Dispenser::load(const std::filesystem::path& file) const {
 
 void Dispenser::obey(const compensation::ModelCommand& command) {
   compensation::ModelStatus reply;
-  reply.cell(cell);
+  stamp(reply);
   reply.component_id(id);
-  reply.at().time_ns(now().ns);
   reply.command_id(command.id());
   reply.path(command.path());
   const Model* about = &active_;
@@ -162,12 +161,10 @@ std::string Dispenser::fill(const PatternCommand& command, TriggerPattern& patte
   return {};
 }
 
-void Dispenser::answer(const PatternCommand& command, const Tick& tick) {
+void Dispenser::answer(const PatternCommand& command) {
   TriggerPattern pattern;
-  pattern.cell(cell);
+  stamp(pattern);
   pattern.component_id(id);
-  pattern.at().time_ns(tick.now.ns);
-  pattern.at().cycle(tick.cycle);
   pattern.id(command.id());
   pattern.model_checksum(active_.checksum);
   pattern.refusal(fill(command, pattern));
@@ -175,14 +172,12 @@ void Dispenser::answer(const PatternCommand& command, const Tick& tick) {
   pattern_.write(pattern);
 }
 
-void Dispenser::publish(const Tick& tick) noexcept {
+void Dispenser::publish() noexcept {
   const modbus::Reading actual = device_->value("actual_pressure");
   const modbus::Reading enabled = device_->value("enable");
   PressureState state;
-  state.cell(cell);
+  stamp(state);
   state.node(id);
-  state.at().time_ns(tick.now.ns);
-  state.at().cycle(tick.cycle);
   state.pressure(actual.value);
   state.setpoint(setpoint_);
   state.purge_pressure(device_->value("actual_purge_pressure").value);
@@ -205,7 +200,7 @@ void Dispenser::step(const Tick& tick) noexcept {
   compensation::ModelCommand model;
   while (model_.take(model)) obey(model);
   PatternCommand pattern;
-  while (wanted_pattern_.take(pattern)) answer(pattern, tick);
+  while (wanted_pattern_.take(pattern)) answer(pattern);
 
   if (simulated_time) bus_->exchange(tick.now);
   device_->refresh();
@@ -214,7 +209,7 @@ void Dispenser::step(const Tick& tick) noexcept {
   if ((flag("over_pressure") || flag("sensor_fault")) && tick.now - reset_at_ > grace) latched_ = true;
   drive(wanted_ && !latched_);
   if (simulated_time) bus_->send(tick.now);
-  publish(tick);
+  publish();
 }
 
 }  // namespace invar::dispenser

@@ -76,11 +76,11 @@ class Dispenser final : public Component {
   [[nodiscard]] Model load(const std::filesystem::path& file) const;
   void obey(const compensation::ModelCommand& command);
   void obey(const dispensing::PressureCommand& command) noexcept;
-  void answer(const dispensing::PatternCommand& command, const Tick& tick);
+  void answer(const dispensing::PatternCommand& command);
   [[nodiscard]] std::string fill(const dispensing::PatternCommand& command,
                                  dispensing::TriggerPattern& pattern) const;
   void drive(bool enable) noexcept;
-  void publish(const Tick& tick) noexcept;
+  void publish() noexcept;
   [[nodiscard]] bool flag(const char* reg) const;
 
   const Parameters& parameters_;

@@ -40,22 +40,18 @@ void Valve::activate() {
 
 void Valve::deactivate() noexcept { sample_.armed(false); }
 
-void Valve::publish(const Tick& tick) noexcept {
+void Valve::publish() noexcept {
   if (!changed_) return;
   changed_ = false;
-  sample_.cell(cell);
+  stamp(sample_, {clock_ns_});
   sample_.component_id(id);
-  sample_.at().time_ns(clock_ns_);
-  sample_.at().cycle(tick.cycle);
   state_.write(sample_);
 }
 
-void Valve::refuse(std::uint64_t droplet, const Refusal& why, const Tick& tick) noexcept {
+void Valve::refuse(std::uint64_t droplet, const Refusal& why) noexcept {
   DropletRefused refused;
-  refused.cell(cell);
+  stamp(refused, {clock_ns_});
   refused.component_id(id);
-  refused.at().time_ns(clock_ns_);
-  refused.at().cycle(tick.cycle);
   refused.droplet(droplet);
   refused.pattern_id(loaded_.id());
   refused.reason(why.reason);
@@ -66,11 +62,11 @@ void Valve::refuse(std::uint64_t droplet, const Refusal& why, const Tick& tick) 
 }
 
 /// Points that the nozzle never passed are refused now, so that nothing is lost without a word.
-void Valve::disarm(const Tick& tick) noexcept {
+void Valve::disarm() noexcept {
   if (!sample_.armed()) return;
   for (std::size_t i = 0; i < done_.size(); ++i)
     if (done_[i] == 0)
-      refuse(loaded_.points()[i].droplet(), {REFUSED_NOT_PASSED, "the nozzle did not pass its point"}, tick);
+      refuse(loaded_.points()[i].droplet(), {REFUSED_NOT_PASSED, "the nozzle did not pass its point"});
   std::fill(done_.begin(), done_.end(), 1);
   sample_.armed(false);
   changed_ = true;
@@ -79,14 +75,14 @@ void Valve::disarm(const Tick& tick) noexcept {
 void Valve::obey(const TriggerCommand& command, const Tick& tick) noexcept {
   switch (command.kind()) {
     case TRIGGER_ARM:
-      disarm(tick);
+      disarm();
       sample_.armed(command.pattern_id() == loaded_.id() && !done_.empty());
       std::fill(done_.begin(), done_.end(), 0);
       sample_.jetted(0);
       sample_.refused(0);
       break;
     case TRIGGER_DISARM:
-      disarm(tick);
+      disarm();
       break;
     case TRIGGER_JET_NOW:
       jet_now(command.pulse_ns(), tick);
@@ -137,18 +133,16 @@ void Valve::jet(const TriggerPoint& point, const Motion& at, std::int64_t open_n
   const std::int64_t pulse_ns =
       point.pulse_ns() > 0 ? point.pulse_ns() : Duration::seconds(parameters_.pulse).ns;
   if (const auto why = refusal(pulse_ns, open_ns, tick)) {
-    refuse(point.droplet(), *why, tick);
+    refuse(point.droplet(), *why);
     return;
   }
   if (!velocity.contains(at.velocity.norm())) {
-    refuse(point.droplet(), {REFUSED_VELOCITY, "the stage's velocity is outside its window"}, tick);
+    refuse(point.droplet(), {REFUSED_VELOCITY, "the stage's velocity is outside its window"});
     return;
   }
   ValvePulse pulse;
-  pulse.cell(cell);
+  stamp(pulse, {clock_ns_});
   pulse.component_id(id);
-  pulse.at().time_ns(clock_ns_);
-  pulse.at().cycle(tick.cycle);
   pulse.droplet(point.droplet());
   pulse.open_ns(open_ns);
   pulse.pulse_ns(pulse_ns);
@@ -159,10 +153,8 @@ void Valve::jet(const TriggerPoint& point, const Motion& at, std::int64_t open_n
   last_open_ns_ = open_ns;
 
   DropletJetted jetted;
-  jetted.cell(cell);
+  stamp(jetted, {open_ns});
   jetted.component_id(id);
-  jetted.at().time_ns(open_ns);
-  jetted.at().cycle(tick.cycle);
   jetted.droplet(point.droplet());
   jetted.pattern_id(loaded_.id());
   jetted.position({at.position.x(), at.position.y(), point.position()[2]});
@@ -181,11 +173,11 @@ void Valve::jet_now(std::int64_t pulse_ns, const Tick& tick) noexcept {
   TriggerPoint point;
   point.pulse_ns(pulse_ns);
   if (!sample_.armed()) {
-    refuse(0, {REFUSED_NOT_ARMED, "no pattern is armed"}, tick);
+    refuse(0, {REFUSED_NOT_ARMED, "no pattern is armed"});
   } else if (!moving) {
-    refuse(0, {REFUSED_STAGE_NOT_READY, "the stage's state is stale"}, tick);
+    refuse(0, {REFUSED_STAGE_NOT_READY, "the stage's state is stale"});
   } else if (!box_[0].contains(moving->position.x()) || !box_[1].contains(moving->position.y())) {
-    refuse(0, {REFUSED_OUTSIDE_PATTERN, "the nozzle is not over the pattern"}, tick);
+    refuse(0, {REFUSED_OUTSIDE_PATTERN, "the nozzle is not over the pattern"});
   } else {
     point.target({moving->position.x(), moving->position.y(), 0.0});
     const std::int64_t open_ns = clock_ns_ + Duration::seconds(parameters_.ahead).ns;
@@ -235,7 +227,7 @@ void Valve::step(const Tick& tick) noexcept {
           clock_ns_ + Duration::seconds(time).ns, parameters_.velocity, tick);
     }
   }
-  publish(tick);
+  publish();
 }
 
 }  // namespace invar::dispenser

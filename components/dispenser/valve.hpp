@@ -83,10 +83,10 @@ class Valve final : public Component {
                                                const Tick& tick) noexcept;
   void jet(const dispensing::TriggerPoint& point, const Motion& at, std::int64_t open_ns, Range velocity,
            const Tick& tick) noexcept;
-  void refuse(std::uint64_t droplet, const Refusal& why, const Tick& tick) noexcept;
+  void refuse(std::uint64_t droplet, const Refusal& why) noexcept;
   void jet_now(std::int64_t pulse_ns, const Tick& tick) noexcept;
-  void disarm(const Tick& tick) noexcept;
-  void publish(const Tick& tick) noexcept;
+  void disarm() noexcept;
+  void publish() noexcept;
 
   const Parameters& parameters_;
   Input<stage::AxisState> state_x_{*this, "state_x"};

@@ -183,10 +183,8 @@ void Fusion::step(const Tick& tick) noexcept {
   resting_ = rest_.update(found, tick.period);
 
   sensing::FusedPosition fused;
-  fused.cell(cell);
+  stamp(fused);
   fused.axis(static_cast<std::uint32_t>(parameters_.axis));
-  fused.at().time_ns(tick.now.ns);
-  fused.at().cycle(tick.cycle);
   fused.position(step_free_(found, sample.period));
   fused.velocity(found.velocity);
   fused.sigma(found.sigma);

@@ -17,7 +17,7 @@ double Interferometer::length(const sensing::ToolPosition& tool) noexcept {
   return along;
 }
 
-void Interferometer::step(const Tick& tick) noexcept {
+void Interferometer::step(const Tick&) noexcept {
   const auto* tool = tool_.latest();
   sensing::BeamCommand command;
   while (beam_.take(command)) {
@@ -32,10 +32,8 @@ void Interferometer::step(const Tick& tick) noexcept {
   }
   if (tool == nullptr) return;
   sensing::DisplacementReading reading;
-  reading.cell(cell);
+  stamp(reading);
   reading.sensor(id);
-  reading.at().time_ns(tick.now.ns);
-  reading.at().cycle(tick.cycle);
   reading.displacement(length(*tool) - zero_);
   reading.valid(zeroed_);
   reading.beam_start(start_);

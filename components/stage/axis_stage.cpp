@@ -304,21 +304,17 @@ void Stage::step(const Tick& tick) noexcept {
   track_settling(tick, at);
 
   MotorCommand motor;
-  motor.cell(cell);
+  stamp(motor);
   motor.axis(static_cast<std::uint32_t>(parameters_.axis));
-  motor.at().time_ns(tick.now.ns);
-  motor.at().cycle(tick.cycle);
   motor.current(current_);
   motor.enabled(enabled);
   motor_.write(motor);
-  publish(tick, at);
+  publish(at);
 }
 
-void Stage::publish(const Tick& tick, const MotionPoint& at) noexcept {
-  sample_.cell(cell);
+void Stage::publish(const MotionPoint& at) noexcept {
+  stamp(sample_);
   sample_.axis(static_cast<std::uint32_t>(parameters_.axis));
-  sample_.at().time_ns(tick.now.ns);
-  sample_.at().cycle(tick.cycle);
   sample_.setpoint_position(at.position);
   sample_.setpoint_velocity(at.velocity);
   sample_.setpoint_acceleration(at.acceleration);

@@ -117,7 +117,7 @@ class Stage final : public Component {
   void stop_blindly(const Tick& tick) noexcept;
   void supervise(const Tick& tick) noexcept;
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
-  void publish(const Tick& tick, const MotionPoint& setpoint) noexcept;
+  void publish(const MotionPoint& setpoint) noexcept;
   [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
   [[nodiscard]] double feedforward(const Tick& tick) noexcept;
 

@@ -104,10 +104,8 @@ void Thermal::step(const Tick& tick) noexcept {
   if (simulated_time) bus_->send(tick.now);
 
   NodeTemperature sample;
-  sample.cell(cell);
+  stamp(sample);
   sample.node(id);
-  sample.at().time_ns(tick.now.ns);
-  sample.at().cycle(tick.cycle);
   sample.temperature(temperature_);
   sample.setpoint(setpoint_);
   sample.heater_power(power_);
@@ -117,18 +115,16 @@ void Thermal::step(const Tick& tick) noexcept {
   sample.watchdog_tripped(!lost.stale && lost.value != 0.0);
   sample.stale(!sound);
   state_.write(sample);
-  for (ZoneSensor& zone : zones_) publish_zone(zone, tick);
+  for (ZoneSensor& zone : zones_) publish_zone(zone);
 }
 
-void Thermal::publish_zone(ZoneSensor& zone, const Tick& tick) noexcept {
+void Thermal::publish_zone(ZoneSensor& zone) noexcept {
   const modbus::Reading resistance = device_->value(zone.resistance);
   const bool sound = !resistance.stale && resistance.value > 1.0;
   if (sound) zone.temperature = zone.thermistor.temperature(resistance.value);
   NodeTemperature sample;
-  sample.cell(cell);
+  stamp(sample);
   sample.node(id);
-  sample.at().time_ns(tick.now.ns);
-  sample.at().cycle(tick.cycle);
   sample.temperature(zone.temperature);
   sample.stale(!sound);
   zone.output->write(sample);

@@ -107,7 +107,7 @@ class Thermal final : public Component {
     std::unique_ptr<Output<NodeTemperature>> output;
     double temperature = 0.0;
   };
-  void publish_zone(ZoneSensor& zone, const Tick& tick) noexcept;
+  void publish_zone(ZoneSensor& zone) noexcept;
   std::vector<ZoneSensor> zones_;
   std::unique_ptr<modbus::Bus> bus_;
   modbus::Device* device_ = nullptr;

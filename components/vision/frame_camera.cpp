@@ -54,7 +54,7 @@ FrameCamera::Position FrameCamera::position_at(Instant time) const {
   return between;
 }
 
-void FrameCamera::publish(const Picture& picture, std::uint64_t request, const Tick& tick) {
+void FrameCamera::publish(const Picture& picture, std::uint64_t request) {
   const cv::Mat& image = picture.image;
   const std::size_t bytes = image.total() * image.elemSize();
   if ((image.type() != CV_8UC1 && image.type() != CV_16UC1) || bytes == 0)
@@ -62,10 +62,8 @@ void FrameCamera::publish(const Picture& picture, std::uint64_t request, const T
   if (bytes > most_pixels)
     throw std::runtime_error{"a picture of " + std::to_string(bytes) +
                              " bytes; a frame holds 2 MiB: choose a smaller format"};
-  sample_.cell(cell);
+  stamp(sample_, picture.at);
   sample_.sensor(id);
-  sample_.at().time_ns(picture.at.ns);
-  sample_.at().cycle(tick.cycle);
   sample_.number(number_);
   sample_.request(request);
   sample_.width(static_cast<std::uint32_t>(image.cols));
@@ -108,7 +106,7 @@ void FrameCamera::step(const Tick& tick) noexcept {
     const bool answers = request_ != 0 && picture.at >= requested_;
     if (!due && !answers) return;
     ++number_;
-    publish(picture, answers ? request_ : 0, tick);
+    publish(picture, answers ? request_ : 0);
     if (answers) request_ = 0;
   } catch (const std::exception& error) {
     failure_ = error.what();

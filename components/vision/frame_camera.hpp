@@ -48,7 +48,7 @@ class FrameCamera : public Component {
   [[nodiscard]] bool is_due(const Tick& tick);
   void follow_stage(const Tick& tick);
   [[nodiscard]] Position position_at(Instant time) const;
-  void publish(const Picture& picture, std::uint64_t request, const Tick& tick);
+  void publish(const Picture& picture, std::uint64_t request);
 
   const CameraParameters& parameters_;
   Inbox<image::ExposeCommand> expose_{*this, "expose", {.optional = true, .profile = "command"}};

@@ -1,6 +1,5 @@
 // V4lCamera, a plugin: frames of a camera of this PC (Video4Linux), read by a thread of its own so that no step waits.
 #include <atomic>
-#include <chrono>
 #include <exception>
 #include <mutex>
 #include <opencv2/core/utils/logger.hpp>
@@ -10,6 +9,7 @@
 
 #include "components/vision/droplets.hpp"
 #include "components/vision/frame_camera.hpp"
+#include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
 #include "core/component/plugin.hpp"
 
@@ -67,8 +67,7 @@ class V4lCamera final : public FrameCamera {
       } catch (const std::exception&) {
         good = false;
       }
-      const auto clock = std::chrono::steady_clock::now().time_since_epoch();
-      const Instant at{std::chrono::duration_cast<std::chrono::nanoseconds>(clock).count()};
+      const Instant at = utc_now();
       const std::lock_guard lock{mutex_};
       if (!good) {
         lost_ = true;
@@ -79,12 +78,11 @@ class V4lCamera final : public FrameCamera {
     }
   }
 
-  bool take_picture(const Tick& tick, std::uint64_t, Picture& picture) override {
+  bool take_picture(const Tick&, std::uint64_t, Picture& picture) override {
     const std::lock_guard lock{mutex_};
     if (lost_) throw std::runtime_error{"the camera gives no more frames: is it still plugged in?"};
     // Only what was exposed since the last one was taken.
     if (newest_.image.empty() || newest_.at <= taken_) return false;
-    (void)tick;
     picture = newest_;
     taken_ = newest_.at;
     return true;

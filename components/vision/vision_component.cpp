@@ -1,7 +1,6 @@
 #include "components/vision/vision_component.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <stdexcept>
@@ -10,6 +9,7 @@
 #include "components/vision/camera_file.hpp"
 #include "components/vision/ruler.hpp"
 #include "components/vision/ruler_file.hpp"
+#include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
 
 namespace invar::vision {
@@ -86,10 +86,8 @@ void Vision::show_view(int width, int height) {
 
 void Vision::report(job::JobPhase phase, const std::string& text) {
   reported_ = true;
-  sample_.cell(cell);
+  stamp(sample_);
   sample_.component_id(id);
-  sample_.at().time_ns(now().ns);
-  sample_.at().cycle(cycle_);
   sample_.phase(phase);
   sample_.text(text.substr(0, 511));
   sample_.scale(camera_ ? camera_->scale : 0.0);
@@ -117,10 +115,8 @@ void Vision::start(const image::VisionCommand& command) {
 
 void Vision::ask() {
   image::ExposeCommand command;
-  command.cell(cell);
+  stamp(command);
   command.component_id(id);
-  command.at().time_ns(now().ns);
-  command.at().cycle(cycle_);
   command.id(running_->id());
   expose_.write(command);
   asked_ = now();
@@ -128,17 +124,14 @@ void Vision::ask() {
 }
 
 Duration Vision::since(const image::Frame& frame) const {
-  if (simulated_time) return now() - Instant{frame.at().time_ns()};
-  const auto clock = std::chrono::steady_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(clock).count() - frame.at().time_ns()};
+  return (simulated_time ? now() : utc_now()) - Instant{frame.at().time_ns()};
 }
 
 Eigen::Vector2d Vision::middle(const cv::Mat& picture) const {
   return camera_->to_metres({0.5 * (picture.cols - 1), 0.5 * (picture.rows - 1)});
 }
 
-void Vision::step(const Tick& tick) noexcept {
-  cycle_ = tick.cycle;
+void Vision::step(const Tick&) noexcept {
   try {
     // Not in `activate`: what is written before the first step reaches nobody in simulated time.
     if (!reported_) report(job::JOB_IDLE, camera_ ? "ready" : "not calibrated");

@@ -79,7 +79,6 @@ class Vision final : public Component {
   image::DropletsMeasured measured_;
   std::uint64_t last_number_ = 0;
   std::uint64_t taken_ = 0;  // samples of the input when the newest frame was taken
-  std::uint64_t cycle_ = 0;
 };
 
 }  // namespace invar::vision

@@ -37,13 +37,10 @@ void SimulatedHeater::activate() {
   for (const Node node : {pad, slide, base}) plant_->set_temperature(node, parameters_.ambient);
 }
 
-void SimulatedHeater::publish(Output<thermal::NodeTemperature>& output, Node node,
-                              const Tick& tick) noexcept {
+void SimulatedHeater::publish(Output<thermal::NodeTemperature>& output, Node node) noexcept {
   thermal::NodeTemperature sample;
-  sample.cell(cell);
+  stamp(sample);
   sample.node(id);
-  sample.at().time_ns(tick.now.ns);
-  sample.at().cycle(tick.cycle);
   sample.temperature(plant_->temperature(node));
   output.write(sample);
 }
@@ -74,8 +71,8 @@ void SimulatedHeater::step(const Tick& tick) noexcept {
   registers.set("heating", power > 0.0 ? 1.0 : 0.0);
   registers.set("over_temperature", over_temperature_ ? 1.0 : 0.0);
   registers.set("ready", over_temperature_ ? 0.0 : 1.0);
-  publish(slide_, slide, tick);
-  publish(base_, base, tick);
+  publish(slide_, slide);
+  publish(base_, base);
 }
 
 }  // namespace invar::world

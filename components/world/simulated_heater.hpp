@@ -62,7 +62,7 @@ class SimulatedHeater final : public Component {
 
  private:
   enum Node : std::size_t { pad, slide, base };
-  void publish(Output<thermal::NodeTemperature>& output, Node node, const Tick& tick) noexcept;
+  void publish(Output<thermal::NodeTemperature>& output, Node node) noexcept;
 
   const Parameters& parameters_;
   // The truth: for the simulated stage and for tests, for no controller.

@@ -65,10 +65,8 @@ void SimulatedPneumatics::step(const Tick& tick) noexcept {
   registers.set("ready", over_pressure_ ? 0.0 : 1.0);
 
   dispensing::PressureState sample;
-  sample.cell(cell);
+  stamp(sample);
   sample.node(id);
-  sample.at().time_ns(tick.now.ns);
-  sample.at().cycle(tick.cycle);
   sample.pressure(pressure_);
   sample.setpoint(setpoint);
   sample.purge_pressure(purge_pressure_);

@@ -61,10 +61,8 @@ void SimulatedSensor::step(const Tick& tick) noexcept {
   if (const double count = parameters_.resolution; count > 0.0) value = count * std::round(value / count);
 
   sensing::AxisReading reading;
-  reading.cell(cell);
+  stamp(reading);
   reading.sensor(id);
-  reading.at().time_ns(tick.now.ns);
-  reading.at().cycle(tick.cycle);
   constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
   reading.position(is_position_ ? value : nothing);
   reading.velocity(is_position_ ? nothing : value);

@@ -67,7 +67,11 @@ void SimulatedStage::activate() {
   normal_.reset();
   moving_.setZero();
   warm_ = false;
-  for (auto& device : devices_) device->plant.rest_at(device->parameters.start, now().in_seconds());
+  // What drifts or repeats in time goes on where it was; a plant counts its time from the first start, since a double
+  // cannot tell two steps apart that are counted from 1970.
+  if (!began_) began_ = simulated_time ? Instant{} : now();
+  for (auto& device : devices_)
+    device->plant.rest_at(device->parameters.start, (now() - *began_).in_seconds());
 }
 
 void SimulatedStage::step(const Tick& tick) noexcept {
@@ -96,10 +100,8 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     const Range travel = machine_.travel[static_cast<std::size_t>(device->axis)];
 
     stage::AxisFeedback feedback;
-    feedback.cell(cell);
+    stamp(feedback);
     feedback.axis(static_cast<std::uint32_t>(device->axis));
-    feedback.at().time_ns(tick.now.ns);
-    feedback.at().cycle(tick.cycle);
     feedback.position(reading);
     feedback.velocity(velocity + device->parameters.velocity_noise * normal_(random_));
     feedback.current(device->plant.motor_current());
@@ -123,10 +125,8 @@ void SimulatedStage::step(const Tick& tick) noexcept {
   const Eigen::Vector3d tool =
       position + metrology::simulated_error(machine_, directions_, position, machine_.tool, moving_, growth);
   sensing::ToolPosition sample;
-  sample.cell(cell);
+  stamp(sample);
   sample.sensor(id);
-  sample.at().time_ns(tick.now.ns);
-  sample.at().cycle(tick.cycle);
   sample.position({tool.x(), tool.y(), tool.z()});
   tool_.write(sample);
 }

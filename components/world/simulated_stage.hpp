@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -62,7 +63,8 @@ class SimulatedStage final : public Component {
   Input<thermal::NodeTemperature> base_{*this, "base", {.optional = true, .profile = "state"}};
   double scale_temperature_ = 0.0;  // follows the slide with the machine's lag
   double slide_temperature_ = 0.0;
-  bool warm_ = false;  // the slide's temperature has arrived
+  std::optional<Instant> began_;  // when it was active first
+  bool warm_ = false;             // the slide's temperature has arrived
   Output<sensing::ToolPosition> tool_{*this, "tool"};
 };
 

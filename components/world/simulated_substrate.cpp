@@ -25,9 +25,8 @@ void SimulatedSubstrate::activate() {
   sample_ = {};
   sample_.number(1);
   sample_.height(2e-3);
-  sample_.cell(cell);
+  stamp(sample_);
   sample_.component_id(id);
-  sample_.at().time_ns(now().ns);
   state_.write(sample_);
 }
 
@@ -61,12 +60,10 @@ bool SimulatedSubstrate::tool_at(std::int64_t time_ns, Eigen::Vector2d& position
 }
 
 void SimulatedSubstrate::land(const ValvePulse& pulse, const Eigen::Vector2d& at, double diameter,
-                              double after, bool satellite, const Tick& tick) noexcept {
+                              double after, bool satellite) noexcept {
   LandedDroplet landed;
-  landed.cell(cell);
+  stamp(landed, Instant{pulse.open_ns()} + Duration::seconds(after));
   landed.component_id(id);
-  landed.at().time_ns(pulse.open_ns() + Duration::seconds(after).ns);
-  landed.at().cycle(tick.cycle);
   landed.substrate(sample_.number());
   landed.droplet(pulse.droplet());
   landed.satellite(satellite);
@@ -75,7 +72,7 @@ void SimulatedSubstrate::land(const ValvePulse& pulse, const Eigen::Vector2d& at
   landed_.write(landed);
 }
 
-void SimulatedSubstrate::fly(const ValvePulse& pulse, const Tick& tick) noexcept {
+void SimulatedSubstrate::fly(const ValvePulse& pulse) noexcept {
   const Parameters& p = parameters_;
   const auto* air = pressure_.latest();
   const double pressure = air != nullptr ? air->pressure() : 0.0;
@@ -108,7 +105,7 @@ void SimulatedSubstrate::fly(const ValvePulse& pulse, const Tick& tick) noexcept
       std::cbrt(open / (p.nominal_pulse - p.dead_time) * std::sqrt(pressure / p.nominal_pressure));
   const double diameter = std::max(p.diameter * nominal + p.diameter_scatter * normal_(random_), 1e-6);
   const double time = p.delay + drop.height / (drop.speed * drop.speed_factor);
-  land(pulse, at, diameter, time, false, tick);
+  land(pulse, at, diameter, time, false);
   sample_.droplets(sample_.droplets() + 1);
   if (std::uniform_real_distribution<double>{}(random_) >= p.satellites) return;
   // A third of the size and slower: it lands behind, where the air takes it.
@@ -118,10 +115,10 @@ void SimulatedSubstrate::fly(const ValvePulse& pulse, const Tick& tick) noexcept
       velocity.norm() > 1e-6 ? Eigen::Vector2d{-velocity.normalized()} : Eigen::Vector2d{1.0, 0.0};
   const Eigen::Vector2d where{std::cos(angle) * back.x() - std::sin(angle) * back.y(),
                               std::sin(angle) * back.x() + std::cos(angle) * back.y()};
-  land(pulse, at + away * where, 0.3 * diameter, 1.5 * time, true, tick);
+  land(pulse, at + away * where, 0.3 * diameter, 1.5 * time, true);
 }
 
-void SimulatedSubstrate::step(const Tick& tick) noexcept {
+void SimulatedSubstrate::step(const Tick&) noexcept {
   if (const auto* tool = tool_.latest()) remember(*tool);
   bool changed = false;
   SubstrateCommand command;
@@ -139,7 +136,7 @@ void SimulatedSubstrate::step(const Tick& tick) noexcept {
   std::size_t kept = 0;
   for (const ValvePulse& due : waiting_) {
     if (due.open_ns() <= newest) {
-      fly(due, tick);
+      fly(due);
       changed = true;
     } else {
       waiting_[kept++] = due;
@@ -147,8 +144,7 @@ void SimulatedSubstrate::step(const Tick& tick) noexcept {
   }
   waiting_.resize(kept);
   if (!changed) return;
-  sample_.at().time_ns(tick.now.ns);
-  sample_.at().cycle(tick.cycle);
+  stamp(sample_);
   state_.write(sample_);
 }
 

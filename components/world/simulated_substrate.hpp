@@ -82,9 +82,9 @@ class SimulatedSubstrate final : public Component {
   void remember(const sensing::ToolPosition& tool) noexcept;
   [[nodiscard]] bool tool_at(std::int64_t time_ns, Eigen::Vector2d& position,
                              Eigen::Vector2d& velocity) const noexcept;
-  void fly(const dispensing::ValvePulse& pulse, const Tick& tick) noexcept;
+  void fly(const dispensing::ValvePulse& pulse) noexcept;
   void land(const dispensing::ValvePulse& pulse, const Eigen::Vector2d& at, double diameter, double after,
-            bool satellite, const Tick& tick) noexcept;
+            bool satellite) noexcept;
 
   const Parameters& parameters_;
   Input<sensing::ToolPosition> tool_{*this, "tool"};

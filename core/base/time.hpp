@@ -26,8 +26,8 @@ struct Duration {
   constexpr Duration& operator+=(Duration other) { return ns += other.ns, *this; }
 };
 
-/// A point in time: nanoseconds since the clock's own zero (CLOCK_MONOTONIC, CLOCK_REALTIME for records, or
-/// the start of simulated time).
+/// A point in time: nanoseconds since the clock's own zero (1970 for UTC, the start of simulated time, or that of
+/// CLOCK_MONOTONIC).
 struct Instant {
   std::int64_t ns = 0;
 

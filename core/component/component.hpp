@@ -17,8 +17,8 @@ class InputPort;
 
 /// One call of a component's step.
 struct Tick {
-  Instant now;  // of the executor's clock (monotonic or simulated), at the nominal start of this cycle
-  double period = 0.0;      // s, nominal
+  Instant now;          // the nominal start of this cycle: UTC, or simulated time; the clock of all stamps
+  double period = 0.0;  // s, nominal
   std::uint64_t cycle = 0;  // counts every period since the executor started, skipped ones too
 };
 
@@ -87,16 +87,31 @@ class Component {
   [[nodiscard]] const std::vector<Port*>& ports() const { return ports_; }
   /// nullptr when there is none of that name.
   [[nodiscard]] Port* find_port(std::string_view port_name) const;
-  /// The time of the current step.
+  /// The time of the current step, on the clock that all stamps carry.
   [[nodiscard]] Instant now() const noexcept { return now_; }
+  /// Fills what every sample carries: the cell, and when it was made - now, unless something else is known. Real-time.
+  template <class Sample>
+  void stamp(Sample& sample) const noexcept {
+    stamp(sample, now_);
+  }
+  template <class Sample>
+  void stamp(Sample& sample, Instant made) const noexcept {
+    sample.cell(cell);
+    sample.at().time_ns(made.ns);
+    sample.at().cycle(cycle_);
+  }
   /// By the executor, before each step and transition.
-  void set_now(Instant now) noexcept { now_ = now; }
+  void set_now(Instant now, std::uint64_t cycle = 0) noexcept {
+    now_ = now;
+    cycle_ = cycle;
+  }
 
  private:
   friend class Port;
   std::vector<Port*> ports_;
   std::vector<Bumpless> bumpless_;
   Instant now_;
+  std::uint64_t cycle_ = 0;
   const char* failure_ = nullptr;
 };
 

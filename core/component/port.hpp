@@ -69,13 +69,18 @@ class InputPort : public Port {
   /// When the newest sample arrived, in the clock of the owner's executor; Instant{INT64_MIN} before the
   /// first. Any thread.
   [[nodiscard]] Instant arrived() const noexcept { return {arrived_ns_.load(std::memory_order_acquire)}; }
+  /// When the newest sample was made, by its stamp; Instant{INT64_MIN} before the first, and for types without a stamp.
+  [[nodiscard]] Instant made() const noexcept { return {made_ns_.load(std::memory_order_relaxed)}; }
   [[nodiscard]] std::uint64_t received() const noexcept { return received_.load(std::memory_order_relaxed); }
   /// The outputs of this process that feed it. Set-up only.
   [[nodiscard]] const std::vector<const Port*>& sources() const { return sources_; }
   void add_source(const Port& output) { sources_.push_back(&output); }
 
  protected:
-  void mark(Instant now) noexcept {
+  template <class T>
+  void mark(const T& sample, Instant now) noexcept {
+    if constexpr (requires { sample.at().time_ns(); })
+      made_ns_.store(sample.at().time_ns(), std::memory_order_relaxed);
     arrived_ns_.store(now.ns, std::memory_order_release);
     received_.fetch_add(1, std::memory_order_relaxed);
   }
@@ -84,6 +89,7 @@ class InputPort : public Port {
   InputOptions options_;
   std::vector<const Port*> sources_;
   std::atomic<std::int64_t> arrived_ns_{INT64_MIN};
+  std::atomic<std::int64_t> made_ns_{INT64_MIN};
   std::atomic<std::uint64_t> received_{0};
 };
 
@@ -110,7 +116,7 @@ class Input final : public InputPort {
   /// From the one thread that feeds this input.
   void accept(const T& sample, Instant now) noexcept {
     channel_.write(sample);
-    mark(now);
+    mark(sample, now);
   }
 
  private:
@@ -145,7 +151,7 @@ class Inbox final : public InputPort {
     Ring<T>* lane = lanes_.back().get();
     return [this, lane](const T& sample, Instant now) {
       lane->push(sample);
-      mark(now);
+      mark(sample, now);
     };
   }
 

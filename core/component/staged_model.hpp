@@ -73,9 +73,8 @@ class StagedModel {
  private:
   void answer(std::uint64_t command, compensation::ModelState state, const Model* model,
               const char* text) noexcept {
-    reply_.cell(owner_.cell);
+    owner_.stamp(reply_);
     reply_.component_id(owner_.id);
-    reply_.at().time_ns(owner_.now().ns);
     reply_.command_id(command);
     reply_.state(state);
     reply_.model_id(model != nullptr ? model->id : 0);

@@ -1,7 +1,6 @@
 #include "core/dds/node.hpp"
 
 #include <chrono>
-#include <ctime>
 #include <mutex>
 #include <thread>
 
@@ -14,12 +13,6 @@
 #include "core/dds/shared_memory.hpp"
 
 namespace invar::dds {
-
-Instant monotonic_now() {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return {now.tv_sec * 1'000'000'000 + now.tv_nsec};
-}
 
 std::string topic_name(const std::string& cell, const std::string& component, const std::string& port) {
   return "cell/" + cell + "/" + component + "/" + port;
@@ -181,7 +174,7 @@ std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::typ
       wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, is_kept(profile));
   return std::make_unique<ReaderConnection>(
       parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,
-      [inlet](fdds::DataReader& reader) { inlet->receive(reader, monotonic_now()); });
+      [inlet](fdds::DataReader& reader) { inlet->receive(reader, utc_now()); });
 }
 
 }  // namespace invar::dds

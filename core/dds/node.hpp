@@ -12,6 +12,7 @@
 #include <typeindex>
 #include <vector>
 
+#include "core/base/clock.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/discovery.hpp"
 #include "core/dds/profile.hpp"
@@ -54,8 +55,6 @@ struct RawSample {
 };
 
 using Clock = std::function<Instant()>;
-/// CLOCK_MONOTONIC.
-[[nodiscard]] Instant monotonic_now();
 
 [[nodiscard]] std::string topic_name(const std::string& cell, const std::string& component,
                                      const std::string& port);
@@ -102,7 +101,7 @@ class Node {
   /// in use with another type or nobody registered the port's type.
   void bind(OutputPort& port, OutputBinding binding);
   void bind(OutputPort& port, OutputBinding binding, const Profile& profile);
-  void bind(InputPort& port, Clock clock = monotonic_now);
+  void bind(InputPort& port, Clock clock = utc_now);
   /// Starts the publishing threads of ports bound with a period. Discovery and receiving begin with `bind`.
   /// `ended` gives the nominal start of the loop's newest finished cycle, wait-free; with it the threads never look
   /// in the middle of a cycle: [&] { return executor.counters().now; }

@@ -4,9 +4,9 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <ctime>
 #include <sstream>
 
+#include "core/base/clock.hpp"
 #include "core/dds/simulated_clock.hpp"
 
 namespace invar::dds {
@@ -128,6 +128,7 @@ void ProcessService::run() {
     for (const auto& request : requests) std::visit([this](const auto& r) { serve(r); }, request);
     publish_news();
     if (std::chrono::steady_clock::now() >= next || !requests.empty()) {
+      follow_clock();
       publish_status();
       next = std::chrono::steady_clock::now() + std::chrono::nanoseconds{options_.interval.ns};
     }
@@ -138,14 +139,22 @@ base::Stamp ProcessService::stamp() const {
   base::Stamp at;
   const LoopCounters counters = control_.executor().counters();
   at.cycle(counters.cycle);
-  if (control_.executor().options().simulated) {
-    at.time_ns(control_.executor().now().ns);
-  } else {
-    timespec now{};
-    clock_gettime(CLOCK_REALTIME, &now);
-    at.time_ns(now.tv_sec * 1'000'000'000 + now.tv_nsec);
-  }
+  at.time_ns(control_.executor().now().ns);
   return at;
+}
+
+/// The samples' clock follows the host's, and whoever compares stamps of two hosts hears when it is not there yet.
+void ProcessService::follow_clock() {
+  if (control_.executor().options().simulated) return;
+  const Duration ahead = follow_utc();
+  const bool apart = ahead > Duration::milliseconds(1) || ahead < Duration::milliseconds(-1);
+  if (apart && !told_apart_) {
+    std::ostringstream text;
+    text << "somebody set the clock of this host by " << ahead.in_seconds()
+         << " s; the stamps follow by 0.5 ms a second: restart the process to have them right at once";
+    publish(event::SEVERITY_WARNING, node_.options().process, text.str());
+  }
+  told_apart_ = apart;
 }
 
 void ProcessService::publish(event::Severity level, const std::string& source, const std::string& text) {

@@ -43,6 +43,7 @@ class ProcessService {
   void enqueue(Request request);
   void run();
   void publish_news();
+  void follow_clock();
   void serve(const lifecycle::LifecycleRequest& request);
   void serve(const lifecycle::ParameterRequest& request);
   [[nodiscard]] lifecycle::ParameterReply answer(const lifecycle::ParameterRequest& request);
@@ -61,6 +62,7 @@ class ProcessService {
   std::condition_variable news_;
   std::deque<Request> requests_;
   bool stopping_ = false;
+  bool told_apart_ = false;  // the host's clock was set, and the stamps are not there yet
   std::deque<lifecycle::ParameterReply> answered_;  // repeated requests get the same answer
   std::vector<std::unique_ptr<Connection>> readers_;
   std::thread thread_;

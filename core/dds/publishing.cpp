@@ -7,7 +7,7 @@
 #include <cerrno>
 #include <ctime>
 
-#include "core/dds/node.hpp"
+#include "core/base/clock.hpp"
 
 namespace invar::dds {
 
@@ -90,11 +90,12 @@ void Publishing::run() {
     lag = std::clamp(lag, Duration{}, period_ * 3 / 4);
     naps = 0;
     last = told ? ended : newest();
-    Instant next = last + period_ + lag;
+    const Instant next = last + period_ + lag;
     // The loop's clock may not be ours (simulated time), or a cycle came late: then do not trust the phase.
     const Instant after = monotonic_now();
-    if (next < after - period_ || next > after + period_ * 2) next = after + nap;
-    sleep_until(next);
+    Duration pause = next - utc_at(after);
+    if (pause < -period_ || pause > period_ * 2) pause = nap;
+    sleep_until(after + pause);
   }
 }
 

@@ -1,23 +1,16 @@
 // The part of the executor that steps. Everything here but the constructor runs in the loop.
 #include "core/executor/executor.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <exception>
 
+#include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
 #include "core/executor/slot.hpp"
 
 namespace invar {
 
 namespace {
-
-Instant monotonic() noexcept {
-  timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return {std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec};
-}
 
 std::string lost_text(const InputPort& input) {
   const double ms = input.options().deadline.in_seconds() * 1e3;
@@ -63,7 +56,7 @@ std::size_t Executor::add(std::unique_ptr<Component> component, Placement placem
 }
 
 Instant Executor::now() const noexcept {
-  return options_.simulated ? Instant{now_ns_.load(std::memory_order_acquire)} : monotonic();
+  return options_.simulated ? Instant{now_ns_.load(std::memory_order_acquire)} : utc_now();
 }
 
 void Executor::advance_to(Instant until) {
@@ -100,11 +93,11 @@ void Executor::step(Slot& slot, Instant now, std::uint64_t cycle, std::uint32_t 
   slot.next_due = (cycle / every + 1) * every;
   const Tick tick{now, (options_.period * static_cast<std::int64_t>(every)).in_seconds(), cycle};
   Component& component = *slot.component;
-  component.set_now(now);
+  component.set_now(now, cycle);
   if (!inputs_alive(slot, tick)) return;
-  const Instant begin = options_.simulated ? Instant{} : monotonic();
+  const Instant begin = options_.simulated ? Instant{} : monotonic_now();
   component.step(tick);
-  if (!options_.simulated) slot.compute.add(monotonic() - begin);
+  if (!options_.simulated) slot.compute.add(monotonic_now() - begin);
   slot.steps.store(slot.steps.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if (component.failure() != nullptr) {
     go_to_error(slot, component.failure(), now);
@@ -186,7 +179,7 @@ void Executor::obey(Instant now) noexcept {
     slot->parameters_dirty = false;
     const LifecycleState state = slot->state.load(std::memory_order_relaxed);
     if (state != LifecycleState::active && state != LifecycleState::inactive) continue;
-    slot->component->set_now(now);
+    slot->component->set_now(now, count_.cycle);
     slot->component->parameters_changed();
   }
   counters_.write(count_);
@@ -196,7 +189,7 @@ void Executor::obey(Instant now) noexcept {
 void Executor::activate(Slot& slot, Instant now) noexcept {
   if (count_.tripped || slot.state.load(std::memory_order_relaxed) != LifecycleState::inactive) return;
   Component& component = *slot.component;
-  component.set_now(now);
+  component.set_now(now, count_.cycle);
   component.clear_failure();
   slot.active_since = now;
   slot.next_due = (next_cycle_ + slot.every - 1) / slot.every * slot.every;
@@ -217,7 +210,7 @@ void Executor::activate(Slot& slot, Instant now) noexcept {
 
 void Executor::deactivate(Slot& slot, Instant now) noexcept {
   if (slot.state.load(std::memory_order_relaxed) != LifecycleState::active) return;
-  slot.component->set_now(now);
+  slot.component->set_now(now, count_.cycle);
   slot.component->deactivate();
   for (OutputPort* output : slot.outputs) output->write_safe_value();
   change_state(loop_changes_, slot, LifecycleState::inactive, now);

@@ -38,7 +38,7 @@ struct Placement {
 /// What the loop counted, of one moment.
 struct LoopCounters {
   std::uint64_t cycle = 0;     // of the newest one; skipped ones count
-  Instant now;                 // its nominal start
+  Instant now;                 // its nominal start, on the executor's clock
   std::uint64_t executed = 0;  // cycles that ran
   std::uint64_t overruns = 0;  // times at least one period was lost
   std::uint64_t skipped = 0;   // periods in which nothing ran
@@ -127,6 +127,7 @@ class Executor {
   /// Freezes the black box without stopping anything. Does not wait.
   void freeze_black_box() noexcept { freeze_requested_.store(true, std::memory_order_release); }
 
+  /// Of the clock that stamps carry: UTC (core/base/clock.hpp), or simulated time.
   [[nodiscard]] Instant now() const noexcept;
   [[nodiscard]] LifecycleState state(std::size_t index) const;
   [[nodiscard]] std::string failure(std::size_t index) const;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 
+#include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
 #include "core/executor/executor.hpp"
@@ -46,7 +47,7 @@ bool Executor::sleep_until(Instant due) noexcept {
   // A slow loop looks up now and then, so that it obeys and stops without waiting for its next cycle.
   constexpr Duration longest = Duration::milliseconds(100);
   for (;;) {
-    const Instant current = now();
+    const Instant current = monotonic_now();
     const bool last = due - current <= longest;
     const Instant until = last ? due : current + longest;
     const timespec t{until.ns / 1'000'000'000, until.ns % 1'000'000'000};
@@ -54,7 +55,7 @@ bool Executor::sleep_until(Instant due) noexcept {
     }
     if (stop_requested_.load(std::memory_order_acquire)) return false;
     if (last) return true;
-    obey(until);
+    obey(utc_at(until));
   }
 }
 
@@ -74,10 +75,10 @@ void Executor::loop(std::promise<bool>& ready) {
   next_cycle_ = 0;
   count_.tripped = counters_.read().tripped;
   const std::int64_t period = options_.period.ns;
-  const Instant first{(now().ns / period + 2) * period};
+  const Instant first{(monotonic_now().ns / period + 2) * period};
   for (const auto& slot : slots_) {
     slot->next_due = 0;
-    slot->active_since = std::max(slot->active_since, first);
+    slot->active_since = std::max(slot->active_since, utc_at(first));
   }
   Pacer pacer{options_.period, options_.overrun, options_.tolerated, first};
   running_.store(true, std::memory_order_release);
@@ -85,24 +86,24 @@ void Executor::loop(std::promise<bool>& ready) {
 
   constexpr std::string_view too_late = "the loop lost a period, and its overrun policy is safe_stop";
   while (sleep_until(pacer.due())) {
-    const Instant woke = now();
+    const Instant woke = monotonic_now();
     const Duration late = woke - pacer.due();
     if (const std::uint64_t gone = pacer.wake(woke); gone > 0) {
-      stall_end_ = pacer.due();
+      stall_end_ = utc_at(pacer.due());
       stall_ = options_.period * static_cast<std::int64_t>(gone * pacer.stretch());
     }
-    const Instant due = pacer.due();
-    if (pacer.take_stop()) stop_safely(too_late, due);
-    run_cycle(due, pacer.cycle(), pacer.stretch());
-    const Instant done = now();
+    const Instant start = utc_at(pacer.due());
+    if (pacer.take_stop()) stop_safely(too_late, start);
+    run_cycle(start, pacer.cycle(), pacer.stretch());
+    const Instant done = monotonic_now();
     pacer.finish(done);
-    if (pacer.take_stop()) stop_safely(too_late, due);
+    if (pacer.take_stop()) stop_safely(too_late, start);
     wake_up_.add(late);
     compute_.add(done - woke);
     count_.overruns = pacer.overruns();
     count_.skipped = pacer.skipped();
     count_.stretch = pacer.stretch();
-    close_cycle(due, late, done - woke);
+    close_cycle(start, late, done - woke);
   }
   deactivate_all(now());
   running_.store(false, std::memory_order_release);

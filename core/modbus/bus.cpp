@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <system_error>
 
+#include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
-#include "core/modbus/clock.hpp"
 #include "core/modbus/device_io.hpp"
 
 namespace invar::modbus {

@@ -6,8 +6,8 @@
 #include <ctime>
 #include <limits>
 
+#include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
-#include "core/modbus/clock.hpp"
 
 namespace invar::modbus {
 

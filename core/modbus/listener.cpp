@@ -15,8 +15,8 @@
 #include <cstring>
 #include <memory>
 
+#include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
-#include "core/modbus/clock.hpp"
 
 namespace invar::modbus {
 

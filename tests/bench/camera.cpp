@@ -27,8 +27,6 @@ extern char** environ;
 namespace invar {
 namespace {
 
-using dds::monotonic_now;
-
 struct Settings {
   double seconds = 40.0;
   double rate = 30.0;  // frames a second
@@ -66,9 +64,9 @@ class StillCamera final : public vision::FrameCamera {
 
  private:
   bool take_picture(const Tick&, std::uint64_t, Picture& picture) override {
-    picture.at = monotonic_now();
+    picture.at = utc_now();
     picture.image = picture_;
-    return frames_flow(settings_, picture.at.ns);
+    return frames_flow(settings_, monotonic_now().ns);
   }
   const Settings& settings_;
   cv::Mat picture_;
@@ -176,7 +174,7 @@ int be_loop(Settings s) {
   dds::Node node{options(s, "loop"), dds::standard_profiles()};
   const auto reader = node.reader<image::DropletsMeasured>(
       "cell/bench/droplets", "event", [&](const image::DropletsMeasured& frame) {
-        const std::int64_t took = monotonic_now().ns - frame.at().time_ns();
+        const std::int64_t took = utc_now().ns - frame.at().time_ns();
         const std::lock_guard lock{mutex};
         measured.push_back(frame.latency_ns());
         received.push_back(took);

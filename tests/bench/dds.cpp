@@ -28,8 +28,6 @@
 namespace invar {
 namespace {
 
-using dds::monotonic_now;
-
 struct Settings {
   double seconds = 30.0;
   double rate = 1000.0;
@@ -103,7 +101,7 @@ class Sender final : public Component {
   Output<stage::AxisState> out{*this, "out"};
   Output<stage::AxisState> mixed{*this, "mixed"};
   void step(const Tick& tick) noexcept override {
-    const auto kind = kind_at(settings_, tick.now);
+    const auto kind = kind_at(settings_, monotonic_now());
     if (!kind) return;
     stage::AxisState sample;
     sample.at().cycle(tick.cycle);

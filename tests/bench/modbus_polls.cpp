@@ -20,8 +20,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/base/clock.hpp"
 #include "core/modbus/bus.hpp"
-#include "core/modbus/clock.hpp"
 #include "core/modbus/grouping.hpp"
 
 namespace {

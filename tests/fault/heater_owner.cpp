@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "components/thermal/thermal.hpp"
-#include "core/modbus/clock.hpp"
+#include "core/base/clock.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   std::puts("running");
   std::fflush(stdout);
   for (std::uint64_t cycle = 0;; ++cycle) {
-    const invar::Tick tick{invar::modbus::monotonic_now(), 0.05, cycle};
+    const invar::Tick tick{invar::monotonic_now(), 0.05, cycle};
     thermal.set_now(tick.now);
     thermal.step(tick);
     std::this_thread::sleep_for(std::chrono::milliseconds{50});

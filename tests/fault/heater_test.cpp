@@ -4,7 +4,7 @@
 #include <functional>
 #include <thread>
 
-#include "core/modbus/clock.hpp"
+#include "core/base/clock.hpp"
 #include "core/modbus/server.hpp"
 #include "tests/support/process.hpp"
 
@@ -14,12 +14,12 @@ namespace {
 TEST(HeaterFault, HeaterGoesOffWhenItsOwnersProcessIsKilledAndOnAgainWithANewOne) {
   modbus::Server device{modbus::load_map(INVAR_SOURCE_DIR "/deployment/maps/heater.yaml"), {}};
   const auto comes_true = [&](const std::function<bool()>& fact) {
-    const Instant watchdog = modbus::monotonic_now() + Duration::seconds(90);
+    const Instant watchdog = monotonic_now() + Duration::seconds(90);
     while (!fact()) {
-      if (modbus::monotonic_now() > watchdog) return false;
+      if (monotonic_now() > watchdog) return false;
       device.set("slide_resistance", 1000.0);  // 25 degC: the loop wants power
       device.set("ready", 1.0);
-      device.exchange(modbus::monotonic_now());
+      device.exchange(monotonic_now());
       std::this_thread::sleep_for(std::chrono::milliseconds{5});
     }
     return true;
@@ -32,12 +32,12 @@ TEST(HeaterFault, HeaterGoesOffWhenItsOwnersProcessIsKilledAndOnAgainWithANewOne
     ASSERT_EQ(owner.line(), "running");
     ASSERT_TRUE(comes_true(heats)) << "life " << life;
     owner.kill();
-    const Instant killed = modbus::monotonic_now();
+    const Instant killed = monotonic_now();
     ASSERT_TRUE(comes_true([&] { return device.comm_lost(); })) << "life " << life;
     EXPECT_EQ(device.value("power"), 0.0);
     EXPECT_EQ(device.value("enable"), 0.0);
     // Not at once either: it was the watchdog, after the map's second since the last heartbeat.
-    EXPECT_GT((modbus::monotonic_now() - killed).in_seconds(), 0.5);
+    EXPECT_GT((monotonic_now() - killed).in_seconds(), 0.5);
   }
 }
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/base/clock.hpp"
 #include "core/modbus/bus.hpp"
-#include "core/modbus/clock.hpp"
 #include "core/modbus/server.hpp"
 #include "tests/support/process.hpp"
 

@@ -203,6 +203,11 @@ ReplayReport replay_process(const std::filesystem::path& cell, const std::string
     throw InputError{cell.string(), "`" + process + "` is no process of this cell",
                      "use one of the names below `processes`"};
   const auto file = recording::Recording::open(recording);
+  // Simulated time begins at 0; what is years away was stamped by UTC.
+  if (file.statistics().start > Instant{} + Duration::seconds(1e8))
+    throw InputError{recording.string(),
+                     "was recorded in real time; only a run in simulated time can be run again",
+                     "record the cell with `time: simulated`, or replay without --into"};
   return Replayed{*found}.run(file, stop);
 }
 

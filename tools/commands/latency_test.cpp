@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "core/base/clock.hpp"
 #include "core/executor/histogram.hpp"
 #include "core/executor/pacer.hpp"
 #include "core/executor/real_time.hpp"
@@ -29,12 +30,6 @@ struct Options {
   bool json = false;
 };
 
-Instant now() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return {time.tv_sec * 1'000'000'000 + time.tv_nsec};
-}
-
 struct Measured {
   std::vector<Grant> grants;
   Histogram lateness;
@@ -50,7 +45,7 @@ void measure(const Options& options, Measured& measured) {
   measured.grants = claim_real_time(request);
   touch_stack();
   const Duration period = Duration::seconds(1.0 / options.rate);
-  const Instant start = now() + Duration::milliseconds(10);
+  const Instant start = monotonic_now() + Duration::milliseconds(10);
   const Instant end = start + Duration::seconds(options.duration);
   Pacer pacer{period, OverrunPolicy::skip, 0, start};
   while (pacer.due() < end && !interrupted()) {
@@ -58,11 +53,11 @@ void measure(const Options& options, Measured& measured) {
     const timespec until{due.ns / 1'000'000'000, due.ns % 1'000'000'000};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0 && !interrupted()) {
     }
-    const Instant woken = now();
+    const Instant woken = monotonic_now();
     measured.lateness.add(woken - due);
     ++measured.cycles;
     pacer.wake(woken);
-    pacer.finish(now());
+    pacer.finish(monotonic_now());
   }
   measured.overruns = pacer.overruns();
 }

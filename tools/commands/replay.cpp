@@ -6,6 +6,7 @@
 #include <memory>
 #include <set>
 
+#include "core/base/clock.hpp"
 #include "core/recording/replayer.hpp"
 #include "tools/cell/replay_process.hpp"
 #include "tools/live/commands.hpp"
@@ -122,13 +123,13 @@ int replay(Options& options) {
   sleep_for(Duration::seconds(1.0));  // readers that are there connect
 
   const double speed = options.fast ? recording::Replayer::as_fast_as_possible : options.rate;
-  recording::Replayer player{file.messages(selection), dds::monotonic_now(), speed};
+  recording::Replayer player{file.messages(selection), monotonic_now(), speed};
   std::uint64_t published = 0;
   while (const auto due = player.due()) {
-    const Duration early = *due - dds::monotonic_now();
+    const Duration early = *due - monotonic_now();
     if (early.ns > 0 && !sleep_for(early)) break;
     if (interrupted()) break;
-    while (const auto message = player.next(dds::monotonic_now())) {
+    while (const auto message = player.next(monotonic_now())) {
       const std::span bytes{reinterpret_cast<const std::byte*>(message->data.data()), message->data.size()};
       auto& channel = channels.at(message->channel->topic);
       if (channel.writer->write(&bytes)) {

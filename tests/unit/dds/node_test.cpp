@@ -69,7 +69,7 @@ TEST_P(Pair, SamplesGoFromPortToPortAcrossParticipants) {
     state.at().cycle(++cycle);
     state.position(1e-3 * static_cast<double>(cycle));
     state.mode(stage::AXIS_MODE_MOVING);
-    source.set_now(monotonic_now());
+    source.set_now(utc_now());
     source.state.write(state);
     return destination.state.latest() != nullptr;
   }));

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <thread>
 
+#include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
 #include "core/executor/process_control.hpp"
 #include "tests/unit/executor/toys.hpp"
@@ -48,7 +49,7 @@ TEST(Loop, RunsOnWholeMultiplesOfItsPeriodAndCountsEveryOne) {
   EXPECT_FALSE(executor.is_running());
   EXPECT_EQ(executor.state(0), LifecycleState::inactive);
   for (std::size_t i = 1; i < ticks.size(); ++i) {
-    EXPECT_EQ(ticks[i].now.ns % 1'000'000, 0);
+    EXPECT_EQ((ticks[i].now - utc_at({0})).ns % 1'000'000, 0);  // of the monotonic clock
     EXPECT_GT(ticks[i].cycle, ticks[i - 1].cycle);
     EXPECT_EQ((ticks[i].now - ticks[i - 1].now).ns,
               static_cast<std::int64_t>(ticks[i].cycle - ticks[i - 1].cycle) * 1'000'000);
@@ -57,6 +58,47 @@ TEST(Loop, RunsOnWholeMultiplesOfItsPeriodAndCountsEveryOne) {
   EXPECT_EQ(counters.executed + counters.skipped, counters.cycle + 1);
   EXPECT_EQ(executor.wake_up().count(), counters.executed);
   EXPECT_EQ(executor.compute().count(), counters.executed);
+}
+
+TEST(Loop, TellsTheTimeInUtcAndStampsSamplesWithIt) {
+  struct Stamped {
+    std::uint32_t number = 0;
+    void cell(std::uint32_t value) { number = value; }
+    struct {
+      std::int64_t ns = 0;
+      std::uint64_t count = 0;
+      void time_ns(std::int64_t value) { ns = value; }
+      void cycle(std::uint64_t value) { count = value; }
+    } stamp;
+    auto& at() { return stamp; }
+  } sample;
+  const auto utc = [] {
+    return Instant{std::chrono::nanoseconds{std::chrono::system_clock::now().time_since_epoch()}.count()};
+  };
+  constexpr Duration set_meanwhile =
+      Duration::milliseconds(5);  // the host's clock may be steered while we look
+  const Instant before = utc() - set_meanwhile;
+  Executor executor{by_the_clock()};
+  Tick last;
+  Call* component = nullptr;
+  auto owned = std::make_unique<Call>([&](const Tick& t) {
+    last = t;
+    component->stamp(sample);
+  });
+  component = owned.get();
+  component->cell = 7;
+  executor.add(std::move(owned));
+  executor.start();
+  EXPECT_TRUE(executor.transition(0, Transition::configure).ok());
+  EXPECT_TRUE(executor.transition(0, Transition::activate).ok());
+  ASSERT_TRUE(eventually([&] { return executor.steps(0) >= 3; }));
+  EXPECT_LE(executor.counters().now, executor.now());
+  executor.stop();
+  EXPECT_GE(last.now, before);
+  EXPECT_LE(last.now, utc() + set_meanwhile);
+  EXPECT_EQ(sample.stamp.ns, last.now.ns);
+  EXPECT_EQ(sample.stamp.count, last.cycle);
+  EXPECT_EQ(sample.number, 7U);
 }
 
 TEST(Loop, ASlowProcessStopsAndObeysWithoutWaitingForItsNextCycle) {

@@ -6,8 +6,8 @@
 #include <functional>
 #include <thread>
 
+#include "core/base/clock.hpp"
 #include "core/modbus/bus.hpp"
-#include "core/modbus/clock.hpp"
 #include "core/modbus/server.hpp"
 
 namespace invar::modbus {

@@ -103,5 +103,20 @@ TEST_F(RecordingCommands, FaultsAreOneLineAndStatusTwo) {
   expect_fault("export " + file.string() + " --from soon --out " + (folder / "o").string(), "--from");
 }
 
+TEST_F(RecordingCommands, ARealTimeRecordingIsNotRunAgainInSimulatedTime) {
+  const auto real = folder / "real.mcap";
+  {
+    RecordingWriter writer{real};
+    writer.attach("cell.yaml", "application/yaml", Bytes{'x'}, {});
+    const auto channel = writer.add_channel(channel_info("t"));
+    writer.write(channel, 1, Instant{1'790'000'000'000'000'000}, {}, payload(1, 1, 8));
+    EXPECT_TRUE(writer.close());
+  }
+  const Outcome run =
+      invar("replay " INVAR_SOURCE_DIR "/deployment/xy-table.yaml " + real.string() + " --into motion");
+  EXPECT_EQ(run.status, 2);
+  EXPECT_THAT(run.text, HasSubstr("real.mcap: was recorded in real time"));
+}
+
 }  // namespace
 }  // namespace invar::recording
