@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <set>
+#include <sstream>
 
 namespace invar::config {
 
@@ -18,6 +19,12 @@ void check_name(const Node& node, const std::string& name) {
   if (!good) node.fault("`" + name + "` is no name", "use 1 to 31 letters, digits, _ or -");
 }
 
+std::string milliseconds(Duration time) {
+  std::ostringstream text;
+  text << time.in_seconds() * 1e3 << " ms";
+  return text.str();
+}
+
 CellHost read_host(const Node& node) {
   CellHost host{node.key(), node.text("address")};
   in_addr address{};
@@ -28,13 +35,15 @@ CellHost read_host(const Node& node) {
 }
 
 CellComponent read_component(const Node& node, std::uint32_t id) {
-  CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, node};
+  CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, {}, node};
   check_name(node, component.name);
   component.every = node.integer("every", 1, 1'000'000, 1);
   for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();
   for (const Node& port : node["qos"].children()) component.profiles[port.key()] = port.as_text();
   for (const Node& port : node["publish"].children())
     component.publish_rates[port.key()] = port.as_number("Hz", {0.01, 20'000.0});
+  for (const Node& port : node["latency"].children())
+    component.latencies[port.key()] = Duration::seconds(port.as_number("s", {1e-5, 3600.0}));
   return component;
 }
 
@@ -44,6 +53,7 @@ RealtimeRequest read_realtime(const Node& node) {
   if (node.has("cpu")) request.cpu = static_cast<int>(node["cpu"].as_integer(0, 1023));
   request.lock_memory = node.flag("lock_memory", false);
   request.require = node.flag("require", false);
+  if (node.has("latency")) request.latency = Duration::seconds(node["latency"].as_number("s", {1e-6, 10.0}));
   return request;
 }
 
@@ -70,6 +80,14 @@ CellProcess read_process(const Node& node, std::uint32_t& next_id) {
                                              : OverrunPolicy::skip;
   process.tolerate =
       node.integer("tolerate", 0, 1'000'000, process.overrun == OverrunPolicy::degrade ? 3 : 0);
+  if (process.realtime && process.realtime->latency > process.period)
+    node["realtime"]["latency"].fault("is above the loop's period of " + milliseconds(process.period) +
+                                          ": a cycle that ends so late is an overrun already",
+                                      "lower it to the period or less");
+  const std::string late = node.choice("late", {"mark", "event", "safe_stop"}, "event");
+  process.late = late == "mark"    ? LatePolicy::mark
+                 : late == "event" ? LatePolicy::event
+                                   : LatePolicy::safe_stop;
   const Node components = node.required("components");
   for (const Node& child : components.children())
     process.components.push_back(read_component(child, next_id++));

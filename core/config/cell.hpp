@@ -14,7 +14,7 @@
 namespace invar::config {
 
 /// One component of the cell file. Its own parameters stand beside `type`, `every`, `connect`,
-/// `qos` and `publish`.
+/// `qos`, `publish` and `latency`.
 struct CellComponent {
   std::string name;
   std::string type;
@@ -24,7 +24,8 @@ struct CellComponent {
   std::map<std::string, std::string> profiles;     // port -> QoS profile, where not the component's own
   std::map<std::string, double>
       publish_rates;  // output -> highest rate on the wire [Hz]; in the process it is full
-  Node node;          // for its parameters and for faults
+  std::map<std::string, Duration> latencies;  // input -> how old its sample may be when a step reads it
+  Node node;                                  // for its parameters and for faults
 };
 
 /// What a process asks of the system for its loop.
@@ -33,9 +34,12 @@ struct RealtimeRequest {
   std::optional<int> cpu;    // pin to it
   bool lock_memory = false;  // mlockall
   bool require = false;      // refuse to run where not granted; otherwise run and say so in every status
+  std::optional<Duration> latency{};  // from when a cycle is due to the end of its work
 };
 
 enum class OverrunPolicy { skip, degrade, safe_stop };
+/// What happens when a declared latency is not kept; the status always says so.
+enum class LatePolicy { mark, event, safe_stop };
 
 struct CellProcess {
   std::string name;
@@ -43,7 +47,8 @@ struct CellProcess {
   Duration period;
   std::optional<RealtimeRequest> realtime;
   OverrunPolicy overrun = OverrunPolicy::skip;
-  std::int64_t tolerate = 0;              // lost periods within a second before `degrade` or `safe_stop` acts
+  std::int64_t tolerate = 0;  // lost periods within a second before `degrade` or `safe_stop` acts
+  LatePolicy late = LatePolicy::event;
   std::vector<CellComponent> components;  // in the order they are stepped
   std::string where;                      // "cell.yaml:12: processes.motion"
 };

@@ -2,9 +2,11 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <sstream>
+#include <utility>
 
 #include "core/base/clock.hpp"
 #include "core/dds/simulated_clock.hpp"
@@ -65,6 +67,19 @@ lifecycle::Parameter on_wire(const std::string& component, const ParameterStatus
   out.description(status.info.description);
   out.changeable(status.info.changeable);
   return out;
+}
+
+std::uint32_t own_endpoints(const Node& node) {
+  const Snapshot snapshot = node.snapshot();
+  return static_cast<std::uint32_t>(std::count_if(snapshot.endpoints.begin(), snapshot.endpoints.end(),
+                                                  [](const Endpoint& end) { return end.is_local; }));
+}
+
+std::string milliseconds(Duration time) {
+  std::ostringstream text;
+  text.precision(3);
+  text << time.in_seconds() * 1e3 << " ms";
+  return text.str();
 }
 
 std::string joined(const std::vector<std::string>& lines) {
@@ -129,6 +144,7 @@ void ProcessService::run() {
     publish_news();
     if (std::chrono::steady_clock::now() >= next || !requests.empty()) {
       follow_clock();
+      publish_late(control_.status());
       publish_status();
       next = std::chrono::steady_clock::now() + std::chrono::nanoseconds{options_.interval.ns};
     }
@@ -180,6 +196,25 @@ void ProcessService::publish_news() {
   }
 }
 
+/// What of the declared latencies was not kept since the last look, one notice each.
+void ProcessService::publish_late(const ProcessStatus& status) {
+  const auto say = [&](const std::string& source, const std::string& key, std::uint64_t count,
+                       const std::string& what) {
+    const std::uint64_t before = std::exchange(told_late_[key], count);
+    if (count > before && control_.executor().options().late != LatePolicy::mark)
+      publish(event::SEVERITY_WARNING, source, std::to_string(count - before) + what);
+  };
+  if (status.latency_limit)
+    say(node_.options().process, "", status.counters.late,
+        " cycles ended later than the declared latency of " + milliseconds(*status.latency_limit) +
+            " allows; the latest so far after " + milliseconds(status.latency.max));
+  for (const ComponentStatus& component : status.components)
+    for (const InputAge& input : component.ages)
+      say(component.name, component.name + "." + input.port, input.late,
+          " steps read a sample of `" + input.port + "` older than the declared latency of " +
+              milliseconds(input.limit) + "; the oldest so far was of " + milliseconds(input.age.max));
+}
+
 void ProcessService::publish_status() {
   const ProcessStatus status = control_.status();
   lifecycle::ProcessStatus process;
@@ -200,7 +235,11 @@ void ProcessService::publish_status() {
   process.trip_reason(status.trip_reason);
   process.wake_up(on_wire(status.wake_up));
   process.compute(on_wire(status.compute));
+  process.latency(on_wire(status.latency));
+  process.latency_limit_ns(status.latency_limit ? status.latency_limit->ns : 0);
+  process.late(status.counters.late);
   process.lost(node_.lost());
+  process.endpoints(own_endpoints(node_));
   process_.write(process);
 
   for (std::size_t i = 0; i < status.components.size(); ++i) {
@@ -217,6 +256,14 @@ void ProcessService::publish_status() {
     out.steps(from.steps);
     out.every(from.every);
     out.compute(on_wire(from.compute));
+    for (const InputAge& input : from.ages) {
+      lifecycle::InputAge age;
+      age.port(input.port);
+      age.limit_ns(input.limit.ns);
+      age.late(input.late);
+      age.age(on_wire(input.age));
+      out.inputs().push_back(age);
+    }
     component_.write(out);
   }
 }

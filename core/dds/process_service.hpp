@@ -44,6 +44,7 @@ class ProcessService {
   void run();
   void publish_news();
   void follow_clock();
+  void publish_late(const ProcessStatus& status);
   void serve(const lifecycle::LifecycleRequest& request);
   void serve(const lifecycle::ParameterRequest& request);
   [[nodiscard]] lifecycle::ParameterReply answer(const lifecycle::ParameterRequest& request);
@@ -62,6 +63,7 @@ class ProcessService {
   std::condition_variable news_;
   std::deque<Request> requests_;
   bool stopping_ = false;
+  std::map<std::string, std::uint64_t> told_late_;  // declared latencies not kept, as told so far
   bool told_apart_ = false;  // the host's clock was set, and the stamps are not there yet
   std::deque<lifecycle::ParameterReply> answered_;  // repeated requests get the same answer
   std::vector<std::unique_ptr<Connection>> readers_;

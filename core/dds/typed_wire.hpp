@@ -128,6 +128,9 @@ class TypedWire final : public WireType {
  public:
   [[nodiscard]] std::string name() const override { return Type<B>{}.getName(); }
   [[nodiscard]] std::type_index index() const override { return typeid(T); }
+  [[nodiscard]] bool is_stamped() const override {
+    return requires(const T& sample) { sample.at().time_ns(); };
+  }
   [[nodiscard]] fdds::TopicDataType* make_support() const override {
     auto* type = new Type<B>;            // NOLINT: Fast DDS takes it over
     type->auto_fill_type_object(false);  // Cyclone DDS would refuse the endpoint

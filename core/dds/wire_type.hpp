@@ -54,6 +54,8 @@ class WireType {
   virtual ~WireType() = default;
   [[nodiscard]] virtual std::string name() const = 0;
   [[nodiscard]] virtual std::type_index index() const = 0;
+  /// Its samples say when they were made: `at`, an invar::base::Stamp.
+  [[nodiscard]] virtual bool is_stamped() const = 0;
   /// A type support to register; the caller owns it.
   [[nodiscard]] virtual eprosima::fastdds::dds::TopicDataType* make_support() const = 0;
 

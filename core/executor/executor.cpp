@@ -50,6 +50,11 @@ std::size_t Executor::add(std::unique_ptr<Component> component, Placement placem
     }
     const auto* input = static_cast<const InputPort*>(port);
     if (input->options().deadline.ns > 0) slot->deadlines.push_back({input, lost_text(*input)});
+    if (const auto limit = placement.latencies.find(input->name()); limit != placement.latencies.end()) {
+      Slot::Age& age = slot->ages.emplace_back();
+      age.input = input;
+      age.limit = limit->second;
+    }
   }
   slots_.push_back(std::move(slot));
   return slots_.size() - 1;
@@ -96,6 +101,7 @@ void Executor::step(Slot& slot, Instant now, std::uint64_t cycle, std::uint32_t 
   component.set_now(now, cycle);
   if (!inputs_alive(slot, tick)) return;
   const Instant begin = options_.simulated ? Instant{} : monotonic_now();
+  if (!options_.simulated) watch_ages(slot, utc_at(begin));
   component.step(tick);
   if (!options_.simulated) slot.compute.add(monotonic_now() - begin);
   slot.steps.store(slot.steps.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
@@ -124,6 +130,18 @@ bool Executor::inputs_alive(Slot& slot, const Tick& tick) noexcept {
     return false;
   }
   return true;
+}
+
+void Executor::watch_ages(Slot& slot, Instant now) noexcept {
+  for (Slot::Age& watched : slot.ages) {
+    const Instant made = watched.input->made();
+    if (made.ns == INT64_MIN) continue;  // nothing arrived yet
+    const Duration age = now - made;
+    watched.age.add(age);
+    if (age <= watched.limit) continue;
+    watched.late.store(watched.late.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    late_input_ = true;
+  }
 }
 
 void Executor::check_bump(Slot& slot, Instant now) noexcept {
@@ -164,7 +182,11 @@ void Executor::obey(Instant now) noexcept {
       case Command::Kind::clear_histograms:
         wake_up_.clear();
         compute_.clear();
-        for (const auto& each : slots_) each->compute.clear();
+        latency_.clear();
+        for (const auto& each : slots_) {
+          each->compute.clear();
+          for (Slot::Age& watched : each->ages) watched.age.clear();
+        }
         break;
       case Command::Kind::clear_trip:
         count_.tripped = false;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdint>
 #include <future>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -29,10 +30,19 @@ struct Slot;
 
 /// How a component stands in its process.
 struct Placement {
-  std::string type;                       // as registered
-  std::vector<ParameterInfo> parameters;  // with handles into `storage`
-  std::shared_ptr<void> storage;          // kept alive as long as the component
-  std::uint32_t every = 1;                // stepped each `every`-th period
+  std::string type;                             // as registered
+  std::vector<ParameterInfo> parameters;        // with handles into `storage`
+  std::shared_ptr<void> storage;                // kept alive as long as the component
+  std::uint32_t every = 1;                      // stepped each `every`-th period
+  std::map<std::string, Duration> latencies{};  // input -> how old its sample may be when a step reads it
+};
+
+/// How old the samples of an input were when its component was stepped, by their stamps. Only in real time.
+struct InputAge {
+  std::string port;
+  Duration limit;          // as declared
+  std::uint64_t late = 0;  // steps that read an older sample
+  Percentiles age;
 };
 
 /// What the loop counted, of one moment.
@@ -43,6 +53,7 @@ struct LoopCounters {
   std::uint64_t overruns = 0;  // times at least one period was lost
   std::uint64_t skipped = 0;   // periods in which nothing ran
   std::uint32_t stretch = 1;   // periods from one cycle to the next; above 1: degraded
+  std::uint64_t late = 0;      // cycles that ended later than the declared latency allows
   bool tripped = false;        // stopped safely; see trip_reason()
 };
 
@@ -136,6 +147,10 @@ class Executor {
   [[nodiscard]] HistogramCopy wake_up() const noexcept { return wake_up_.copy(); }
   [[nodiscard]] HistogramCopy compute() const noexcept { return compute_.copy(); }
   [[nodiscard]] HistogramCopy compute(std::size_t index) const;
+  /// From when a cycle was due to the end of its work.
+  [[nodiscard]] HistogramCopy latency() const noexcept { return latency_.copy(); }
+  /// Of the inputs whose latency is declared.
+  [[nodiscard]] std::vector<InputAge> ages(std::size_t index) const;
   /// Empties the histograms (the counters go on). Waits for the loop.
   void clear_histograms();
   /// The next change of state, oldest first; false: none. One reader.
@@ -158,6 +173,7 @@ class Executor {
   void deactivate(Slot& slot, Instant now) noexcept;
   void go_to_error(Slot& slot, std::string_view why, Instant now) noexcept;
   bool inputs_alive(Slot& slot, const Tick& tick) noexcept;
+  void watch_ages(Slot& slot, Instant now) noexcept;
   void check_bump(Slot& slot, Instant now) noexcept;
   void stop_safely(std::string_view why, Instant now) noexcept;
   void change_state(Ring<StateChange>& ring, Slot& slot, LifecycleState to, Instant now,
@@ -187,7 +203,8 @@ class Executor {
   Snapshot<LoopCounters> counters_;
   LoopCounters count_;
   std::uint64_t next_cycle_ = 0;
-  Histogram wake_up_, compute_;
+  Histogram wake_up_, compute_, latency_;
+  bool late_input_ = false;  // in the current cycle
   Instant stall_end_{INT64_MIN};
   Duration stall_;
   std::optional<StateChange> next_loop_change_, next_manager_change_;  // the reader's

@@ -84,6 +84,8 @@ void Executor::loop(std::promise<bool>& ready) {
   running_.store(true, std::memory_order_release);
   ready.set_value(true);
 
+  constexpr Duration never{INT64_MAX};
+  const Duration limit = options_.real_time ? options_.real_time->latency.value_or(never) : never;
   constexpr std::string_view too_late = "the loop lost a period, and its overrun policy is safe_stop";
   while (sleep_until(pacer.due())) {
     const Instant woke = monotonic_now();
@@ -100,6 +102,14 @@ void Executor::loop(std::promise<bool>& ready) {
     if (pacer.take_stop()) stop_safely(too_late, start);
     wake_up_.add(late);
     compute_.add(done - woke);
+    latency_.add(late + (done - woke));
+    const bool is_late = late + (done - woke) > limit;
+    if (is_late) ++count_.late;
+    if (options_.late == LatePolicy::safe_stop && (is_late || late_input_))
+      stop_safely(is_late ? "a cycle ended later than its declared latency"
+                          : "an input's sample is older than its declared latency",
+                  start);
+    late_input_ = false;
     count_.overruns = pacer.overruns();
     count_.skipped = pacer.skipped();
     count_.stretch = pacer.stretch();

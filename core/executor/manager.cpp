@@ -52,6 +52,13 @@ LifecycleState Executor::state(std::size_t index) const {
 std::string Executor::failure(std::size_t index) const { return slots_.at(index)->failure.read().data(); }
 std::string Executor::trip_reason() const { return trip_reason_.read().data(); }
 HistogramCopy Executor::compute(std::size_t index) const { return slots_.at(index)->compute.copy(); }
+std::vector<InputAge> Executor::ages(std::size_t index) const {
+  std::vector<InputAge> out;
+  for (const Slot::Age& watched : slots_.at(index)->ages)
+    out.push_back({watched.input->name(), watched.limit, watched.late.load(std::memory_order_relaxed),
+                   watched.age.copy().percentiles()});
+  return out;
+}
 const std::vector<ParameterInfo>& Executor::parameters(std::size_t index) const {
   return slots_.at(index)->infos;
 }

@@ -21,6 +21,7 @@ ExecutorOptions executor_options(const config::CellProcess& process, bool simula
   options.overrun = process.overrun;
   options.tolerated = static_cast<std::uint32_t>(process.tolerate);
   options.real_time = process.realtime;
+  options.late = process.late;
   options.simulated = simulated;
   return options;
 }

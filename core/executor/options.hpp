@@ -17,6 +17,9 @@ namespace invar {
 ///   degrade    halve the rate (down to an eighth) until there is room again; steps are told their longer period
 ///   safe_stop  deactivate all components, downstream first, outputs to their safe values
 using config::OverrunPolicy;
+/// What happens when a cycle ends later than `latency`, or an input's sample is older than it may be: always counted and
+/// shown by the status; `event` says so besides, `safe_stop` stops as an overrun may.
+using config::LatePolicy;
 /// What a process asks of the operating system.
 using RealTimeRequest = config::RealtimeRequest;
 
@@ -28,8 +31,9 @@ struct ExecutorOptions {
   OverrunPolicy overrun = OverrunPolicy::skip;
   std::uint32_t tolerated = 0;  // lost periods within a second that degrade and safe_stop put up with
   std::optional<RealTimeRequest> real_time;  // absent: nothing (a worker process)
-  bool simulated = false;                    // driven by advance_to instead of a clock
-  std::uint32_t black_box = 1024;            // cycles kept
+  LatePolicy late = LatePolicy::event;
+  bool simulated = false;          // driven by advance_to instead of a clock
+  std::uint32_t black_box = 1024;  // cycles kept
 };
 
 /// As the cell file declares the process.

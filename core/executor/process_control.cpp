@@ -38,7 +38,8 @@ ComponentStatus ProcessControl::component(std::size_t index) const {
           executor.failure(index),
           executor.every(index),
           executor.steps(index),
-          executor.compute(index).percentiles()};
+          executor.compute(index).percentiles(),
+          executor.ages(index)};
 }
 
 ProcessStatus ProcessControl::status() const {
@@ -51,6 +52,8 @@ ProcessStatus ProcessControl::status() const {
   status.counters = executor_.counters();
   status.wake_up = executor_.wake_up().percentiles();
   status.compute = executor_.compute().percentiles();
+  if (const auto& asked = executor_.options().real_time) status.latency_limit = asked->latency;
+  status.latency = executor_.latency().percentiles();
   status.trip_reason = executor_.trip_reason();
   if (status.running) status.not_granted = refusals(executor_.grants());
   for (std::size_t i = 0; i < executor_.size(); ++i) status.components.push_back(component(i));

@@ -22,6 +22,7 @@ struct ComponentStatus {
   std::uint32_t every = 1;
   std::uint64_t steps = 0;
   Percentiles compute;  // of its step; empty in simulated time
+  std::vector<InputAge> ages;
 };
 
 struct ProcessStatus {
@@ -31,10 +32,12 @@ struct ProcessStatus {
   Duration period;
   OverrunPolicy overrun = OverrunPolicy::skip;
   LoopCounters counters;
-  Percentiles wake_up;                   // lateness of waking
-  Percentiles compute;                   // from waking to the end of the work
-  std::string trip_reason;               // empty: not tripped
-  std::vector<std::string> not_granted;  // real-time requests that the system refused, one line each
+  Percentiles wake_up;                    // lateness of waking
+  Percentiles compute;                    // from waking to the end of the work
+  std::optional<Duration> latency_limit;  // as declared
+  Percentiles latency;                    // from when a cycle is due to the end of its work
+  std::string trip_reason;                // empty: not tripped
+  std::vector<std::string> not_granted;   // real-time requests that the system refused, one line each
   std::vector<ComponentStatus> components;
 };
 

@@ -39,6 +39,13 @@ struct Slot {
     std::string failure;  // "input `raw` lost: ..."
   };
   std::vector<Deadline> deadlines;
+  struct Age {
+    const InputPort* input;
+    Duration limit;
+    Histogram age;
+    std::atomic<std::uint64_t> late{0};
+  };
+  std::deque<Age> ages;  // inputs whose latency is declared
   std::vector<OutputPort*> outputs;
   std::string error_prefix;  // "stage: ", for the black box
 

@@ -1,11 +1,15 @@
 #include "tools/cell/connections.hpp"
 
+#include <algorithm>
 #include <map>
+#include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "core/component/port.hpp"
 #include "core/dds/cell_client.hpp"
+#include "core/dds/wire_type.hpp"
 #include "idl/event.h"
 #include "tools/cell/loaded_cell.hpp"
 
@@ -29,23 +33,27 @@ std::string mend_name(const std::string& word, const std::vector<std::string>& n
   return text;
 }
 
-/// Every key of `connect`, `qos` and `publish` must be a port of the component.
+/// Every key of `connect`, `qos`, `publish` and `latency` must be a port of the component.
 void check_port_keys(const LoadedComponent& member) {
   const auto names = port_names(*member.component);
-  const auto check = [&](const char* section, bool outputs_only) {
+  const auto check = [&](const char* section, std::optional<Port::Direction> only) {
     for (const Node& entry : member.file->node[section].children()) {
       const Port* found = member.component->find_port(entry.key());
       if (found == nullptr) {
         entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`",
                     mend_name(entry.key(), names));
-      } else if (outputs_only && found->direction() != Port::Direction::output) {
+      } else if (only == Port::Direction::output && found->direction() != only) {
         entry.fault("`" + entry.key() + "` is an input", "only outputs are published");
+      } else if (only == Port::Direction::input && found->direction() != only) {
+        entry.fault("`" + entry.key() + "` is no input whose latest sample counts",
+                    "only such inputs have a latency");
       }
     }
   };
-  check("connect", false);
-  check("qos", false);
-  check("publish", true);
+  check("connect", std::nullopt);
+  check("qos", std::nullopt);
+  check("publish", Port::Direction::output);
+  check("latency", Port::Direction::input);
 }
 
 /// The port that "component.port" names; a fault at `at` when there is none.
@@ -133,6 +141,56 @@ void check_owners(const LoadedCell& loaded) {
       }
 }
 
+std::string milliseconds(Duration time) {
+  std::ostringstream text;
+  text << time.in_seconds() * 1e3 << " ms";
+  return text.str();
+}
+
+/// How long it takes until the next sample of an output comes to another process.
+Duration between_samples(const config::CellProcess& writer, const config::CellComponent& component,
+                         const std::string& port) {
+  const Duration step = writer.period * component.every;
+  const auto rate = component.publish_rates.find(port);
+  if (rate == component.publish_rates.end()) return step;
+  return std::max(step, Duration::seconds(1.0 / rate->second));
+}
+
+/// A latency that is declared must be one that can be told, and kept.
+void check_latencies(const LoadedCell& loaded) {
+  for (const LoadedProcess& reader : loaded.processes)
+    for (const LoadedComponent& member : reader.components)
+      for (const auto& [name, latency] : member.file->latencies) {
+        const Port* input = member.component ? member.component->find_port(name) : nullptr;
+        if (input == nullptr || input->direction() != Port::Direction::input) continue;
+        const Node at = member.file->node["latency"][name];
+        if (const auto* type = dds::WireTypes::all().find(input->type());
+            type == nullptr || !type->is_stamped()) {
+          at.fault("`" + name + "` carries samples without a stamp, so that nobody can tell their age",
+                   "leave the latency out, or add `at` to the type");
+          continue;
+        }
+        const auto connection = member.file->connections.find(name);
+        if (connection == member.file->connections.end()) {
+          at.fault("`" + name + "` is not connected", "connect it, or leave its latency out");
+          continue;
+        }
+        for (const LoadedProcess& writer : loaded.processes)
+          for (const LoadedComponent& other : writer.components) {
+            const std::string prefix = other.file->name + ".";
+            // Within a process a sample may be of the very cycle that reads it.
+            if (&writer == &reader || !connection->second.starts_with(prefix)) continue;
+            const Duration period =
+                between_samples(*writer.file, *other.file, connection->second.substr(prefix.size()));
+            if (latency < period)
+              at.fault("`" + connection->second + "` comes every " + milliseconds(period) +
+                           " only, so that its sample gets older than " + milliseconds(latency) +
+                           " before the next is there",
+                       "raise the latency, or have it written or published more often");
+          }
+      }
+}
+
 }  // namespace
 
 void connect_ports(LoadedCell& loaded) {
@@ -143,6 +201,7 @@ void connect_ports(LoadedCell& loaded) {
       for (Port* port : member.component->ports()) connect_port(loaded, member, *port);
     }
   check_owners(loaded);
+  check_latencies(loaded);
 }
 
 }  // namespace invar::tools

@@ -59,7 +59,8 @@ class RunningProcess {
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
-                                                  .every = static_cast<std::uint32_t>(member.file->every)});
+                                                  .every = static_cast<std::uint32_t>(member.file->every),
+                                                  .latencies = member.file->latencies});
     }
     join_directly();
     fill_black_box();

@@ -44,14 +44,16 @@ std::string state_text(lifecycle::ComponentState state) {
 
 void print(const CellStatus& status, std::ostream& out) {
   TextTable processes{{"process", "host", "pid>", "rate [Hz]>", "real time", "cycles>", "overruns>",
-                       "skipped>", "wake-up p50/p99/p99.9 [us]>", "compute p50/p99/p99.9 [us]>", "lost>"}};
+                       "skipped>", "late>", "wake-up p50/p99/p99.9 [us]>", "compute p50/p99/p99.9 [us]>",
+                       "lost>"}};
   for (const auto& p : status.processes)
     processes.add({p.process_name().c_str(), p.host().c_str(), std::to_string(p.pid()), number_text(p.rate()),
                    status.silent.contains(p.process_name().c_str()) ? "silent" : clock_text(p),
                    std::to_string(p.cycles()), std::to_string(p.overruns()), std::to_string(p.skipped()),
-                   three(p.wake_up()), three(p.compute()), std::to_string(p.lost())});
+                   p.latency_limit_ns() > 0 ? std::to_string(p.late()) : "-", three(p.wake_up()),
+                   three(p.compute()), std::to_string(p.lost())});
   for (const auto& name : status.missing)
-    processes.add({name, "", "-", "-", "no answer", "-", "-", "-", "-", "-", "-"});
+    processes.add({name, "", "-", "-", "no answer", "-", "-", "-", "-", "-", "-", "-"});
   processes.print(out);
 
   TextTable components{
@@ -62,6 +64,20 @@ void print(const CellStatus& status, std::ostream& out) {
                     std::to_string(c.lost()), c.failure().c_str()});
   out << '\n';
   components.print(out);
+
+  TextTable latencies{{"latency of", "declared [us]>", "late>", "p50/p99/p99.9 [us]>"}};
+  for (const auto& p : status.processes)
+    if (p.latency_limit_ns() > 0)
+      latencies.add({p.process_name().c_str(), microseconds_text(p.latency_limit_ns()),
+                     std::to_string(p.late()), three(p.latency())});
+  for (const auto& c : status.components)
+    for (const auto& input : c.inputs())
+      latencies.add({std::string{c.component_name().c_str()} + "." + input.port().c_str(),
+                     microseconds_text(input.limit_ns()), std::to_string(input.late()), three(input.age())});
+  if (!latencies.empty()) {
+    out << '\n';
+    latencies.print(out);
+  }
 
   for (const auto& p : status.processes) {
     if (!p.trip_reason().to_string().empty())
@@ -94,8 +110,17 @@ nlohmann::ordered_json to_json(const CellStatus& status) {
                                  {"trip_reason", p.trip_reason().c_str()},
                                  {"wake_up", json_of(p.wake_up())},
                                  {"compute", json_of(p.compute())},
+                                 {"latency", json_of(p.latency())},
+                                 {"latency_limit_ns", p.latency_limit_ns()},
+                                 {"late", p.late()},
                                  {"lost", p.lost()}});
-  for (const auto& c : status.components)
+  for (const auto& c : status.components) {
+    auto inputs = nlohmann::ordered_json::array();
+    for (const auto& input : c.inputs())
+      inputs.push_back({{"port", input.port().c_str()},
+                        {"limit_ns", input.limit_ns()},
+                        {"late", input.late()},
+                        {"age", json_of(input.age())}});
     json["components"].push_back({{"name", c.component_name().c_str()},
                                   {"process", c.process_name().c_str()},
                                   {"type", c.component_type().c_str()},
@@ -104,7 +129,9 @@ nlohmann::ordered_json to_json(const CellStatus& status) {
                                   {"every", c.every()},
                                   {"steps", c.steps()},
                                   {"lost", c.lost()},
-                                  {"compute", json_of(c.compute())}});
+                                  {"compute", json_of(c.compute())},
+                                  {"inputs", std::move(inputs)}});
+  }
   return json;
 }
 

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include "core/base/clock.hpp"
 #include "core/component/registry.hpp"
 #include "domain.hpp"
+#include "idl/stage.h"
 
 namespace invar::dds {
 namespace {
@@ -123,6 +125,87 @@ TEST_F(Service, StatusTransitionsAndParametersGoOverTheWire) {
     return false;
   }));
 }
+
+/// Takes three milliseconds a step, on a sample that nobody renews.
+struct Slow final : Component {
+  Input<stage::AxisState> state{*this, "state"};
+  void step(const Tick&) noexcept override {
+    const Instant end = monotonic_now() + Duration::milliseconds(3);
+    while (monotonic_now() < end) {
+    }
+  }
+};
+
+class LateService : public ::testing::TestWithParam<LatePolicy> {};
+
+TEST_P(LateService, SaysWhatLatencyIsNotKeptInItsStatusAndByNoticesAsDeclared) {
+  ExecutorOptions options;
+  options.process = "motion";
+  options.period = Duration::milliseconds(20);
+  options.late = GetParam();
+  options.real_time = RealTimeRequest{};
+  options.real_time->latency = Duration::milliseconds(2);
+  Executor executor{options};
+  auto owned = std::make_unique<Slow>();
+  Slow& slow = *owned;
+  slow.name = "slow";
+  slow.id = 1;
+  executor.add(std::move(owned), {.type = "slow", .latencies = {{"state", Duration::seconds(10.0)}}});
+  executor.start();
+  ProcessControl control{executor};
+  stage::AxisState old;
+  old.at().time_ns((utc_now() - Duration::seconds(60.0)).ns);
+  slow.state.accept(old, utc_now());
+  Node node{local("motion"), standard_profiles()};
+  ProcessService::Options service_options;
+  service_options.cell = 1;
+  service_options.interval = Duration::milliseconds(50);
+  ProcessService service{node, control, service_options};
+  Node tool{local("tool"), standard_profiles()};
+  CellClient client{tool};
+  EXPECT_TRUE(control.request("", Transition::configure).ok());
+  EXPECT_TRUE(control.request("", Transition::activate).ok());
+
+  ASSERT_TRUE(eventually([&] {
+    return client.processes().size() == 1 && client.processes()[0].late() > 0 &&
+           client.components().size() == 1 && client.components()[0].inputs().size() == 1 &&
+           client.components()[0].inputs()[0].late() > 0;
+  }));
+  const auto process = client.processes()[0];
+  EXPECT_EQ(process.latency_limit_ns(), 2'000'000);
+  EXPECT_GE(process.latency().max_ns(), 3'000'000);
+  const auto input = client.components()[0].inputs()[0];
+  EXPECT_STREQ(input.port().c_str(), "state");
+  EXPECT_EQ(input.limit_ns(), 10'000'000'000);
+  EXPECT_GE(input.age().max_ns(), 60'000'000'000);
+
+  bool cycle = false;
+  bool sample = false;
+  bool activated = false;
+  const auto look = [&] {
+    for (const auto& notice : client.take_notices()) {
+      const std::string text = notice.text().c_str();
+      cycle = cycle || text.find("cycles ended later than the declared latency of 2 ms") != std::string::npos;
+      sample = sample ||
+               text.find("read a sample of `state` older than the declared latency") != std::string::npos;
+      activated = activated || text.find("inactive -> active") != std::string::npos;
+    }
+  };
+  if (GetParam() == LatePolicy::event) {
+    EXPECT_TRUE(eventually([&] { return look(), cycle && sample; }));
+  } else {
+    const auto late =
+        process.late();  // two more looks of the service, and the notices that it did write have come
+    EXPECT_TRUE(eventually([&] { return look(), activated && client.processes()[0].late() > late + 10; }));
+    EXPECT_FALSE(cycle || sample);
+  }
+  executor.stop();
+}
+
+INSTANTIATE_TEST_SUITE_P(Policies, LateService, ::testing::Values(LatePolicy::event, LatePolicy::mark),
+                         [](const auto& policy) {
+                           return policy.param == LatePolicy::event ? "Event" : "Mark";
+                         });
 
 TEST(CellClient, NobodyAnswersForAnAbsentProcess) {
   Node tool{local("tool"), standard_profiles()};
