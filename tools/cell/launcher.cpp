@@ -47,6 +47,11 @@ struct Child {
   }
 };
 
+/// What a process leaves when its components are down.
+std::filesystem::path outcome_of(const std::string& process, const std::filesystem::path& folder) {
+  return folder / (process + ".json");
+}
+
 Child spawn(const LaunchOptions& options, const std::string& process, bool simulated,
             const std::filesystem::path& folder) {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
@@ -57,7 +62,8 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
                                  process,
                                  simulated ? "--simulated" : "--real-time",
                                  "--outcome",
-                                 (folder / (process + ".json")).string()};
+                                 outcome_of(process, folder).string()};
+  std::filesystem::remove(outcome_of(process, folder));  // of an earlier life
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -74,18 +80,28 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   return child;
 }
 
-/// SIGTERM, patience, SIGKILL.
-void stop_child(Child& child) {
-  if (!child.running) return;
-  kill(child.pid, SIGTERM);
+/// Waits for its end or for `condition`.
+template <class Condition>
+void wait_for(Child& child, Condition condition) {
   const auto begin = Clock::now();
-  while (child.running && seconds_since(begin) < 10.0) {
-    child.poll(false);
-    if (child.running) sleep_a_little();
+  for (child.poll(false); child.running && !condition() && seconds_since(begin) < 10.0; child.poll(false))
+    sleep_a_little();
+}
+
+/// SIGTERM, patience, SIGKILL. Components come down process by process, in the order of the file; what the processes have to
+/// do after that needs no order and goes on at the same time.
+void stop_in_order(std::vector<Child>& children, const std::filesystem::path& folder) {
+  for (Child& child : children) {
+    if (!child.running) continue;
+    kill(child.pid, SIGTERM);
+    wait_for(child, [&] { return std::filesystem::exists(outcome_of(child.name, folder)); });
   }
-  if (!child.running) return;
-  kill(child.pid, SIGKILL);
-  child.poll(true);
+  for (Child& child : children) {
+    wait_for(child, [] { return false; });
+    if (!child.running) continue;
+    kill(child.pid, SIGKILL);
+    child.poll(true);
+  }
 }
 
 /// Starts a process again that was killed or failed: at most `most_restarts` times, so that one that cannot live does
@@ -222,13 +238,15 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
            (options.job.empty() ? keep_alive(children, options, folder.path()) : !any_ended(children)))
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
-  for (Child& child : children) {
-    const bool by_itself = !child.running;
-    stop_child(child);
+  std::vector<bool> by_itself;
+  for (const Child& child : children) by_itself.push_back(!child.running);
+  stop_in_order(children, folder.path());
+  for (std::size_t i = 0; i < children.size(); ++i) {
+    const Child& child = children[i];
     outcome.processes.push_back({child.name, child.status, folder.text(child.name + ".json")});
-    if (by_itself && child.status != 0 && outcome.failure.empty())
+    if (by_itself[i] && child.status != 0 && outcome.failure.empty())
       outcome.failure = "process `" + child.name + "` ended with status " + std::to_string(child.status);
-    if (!by_itself && child.status == 128 + SIGKILL && outcome.failure.empty())
+    if (!by_itself[i] && child.status == 128 + SIGKILL && outcome.failure.empty())
       outcome.failure = "process `" + child.name + "` did not end within 10 s and was killed";
   }
   outcome.wall_seconds = seconds_since(begin);

@@ -75,7 +75,6 @@ class RunningProcess {
   int run(const std::atomic<bool>& stop) {
     if (supervisor_ != nullptr) client_ = std::make_unique<dds::CellClient>(node_);
     const int status = options_.simulated ? run_simulated(stop) : run_by_the_clock(stop);
-    write_outcome();
     return status;
   }
 
@@ -195,6 +194,7 @@ class RunningProcess {
     node_.start([this] { return executor_.counters().now; });
     executor_.start();
     const bool up = bring_up();
+    service_->publish_status();  // who waits for the cell need not wait for the next regular one
     while (up && !stop.load() && !asked_to_stop_ && executor_.is_running() && !job_ended_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       for (const dds::Alarm& alarm : node_.take_alarms()) {
@@ -205,6 +205,7 @@ class RunningProcess {
     say_how_the_job_ended();
     status_ = control_.status();
     control_.stop();
+    write_outcome();
     service_.reset();
     topics_.clear();
     node_.stop();
@@ -238,6 +239,7 @@ class RunningProcess {
     say_how_the_job_ended();
     status_ = control_.status();
     control_.stop();
+    write_outcome();
     service_.reset();
     node_.stop();
     return up && outcome.failure.empty() && job_succeeded() ? 0 : 1;
@@ -339,6 +341,7 @@ class RunningProcess {
         }));
   }
 
+  /// The components are down by then: the launcher goes on to the next process when it sees the file.
   void write_outcome() {
     if (options_.outcome.empty()) return;
     nlohmann::json outcome{{"process", file_.name},
@@ -359,7 +362,10 @@ class RunningProcess {
                         {"result", job_.result_path().c_str()},
                         {"seconds", static_cast<double>(job_.at().time_ns() - job_began_ns_) * 1e-9}};
     }
-    std::ofstream{options_.outcome} << outcome.dump(2) << '\n';
+    std::filesystem::path whole = options_.outcome;
+    whole += ".part";
+    std::ofstream{whole} << outcome.dump(2) << '\n';
+    std::filesystem::rename(whole, options_.outcome);
   }
 
   const ProcessOptions& options_;

@@ -1,6 +1,7 @@
 // `invar job run|list|cancel`: the jobs of a running cell - started, followed, stopped.
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
+#include <set>
 
 #include "idl/job.h"
 #include "tools/commands/job.hpp"
@@ -64,13 +66,23 @@ class Jobs {
  public:
   explicit Jobs(LiveCell& cell) : cell_{cell} {}
 
-  /// Finds the topics by which jobs are commanded; waits for one of `component`, or for any.
+  /// Finds the topics by which jobs are commanded; waits for one of `component`, or else for all that the cell file names,
+  /// without a file for any.
   bool find(const std::string& component) {
+    std::set<std::string> wanted{component};
+    if (component.empty()) {
+      wanted.clear();
+      if (cell_.file() != nullptr)
+        for (const auto& [job, owner] : cell_.file()->jobs) wanted.insert(owner);
+    }
+    const auto found = [&] {
+      return !components_.empty() && std::all_of(wanted.begin(), wanted.end(),
+                                                 [&](const auto& one) { return components_.contains(one); });
+    };
     const auto end = Clock::now() + std::chrono::nanoseconds{cell_.patience().ns};
     while (Clock::now() < end) {
       look();
-      if (component.empty() ? !components_.empty() : components_.contains(component)) break;
-      if (!sleep_for(Duration::milliseconds(50))) break;
+      if (found() || !sleep_for(Duration::milliseconds(20))) break;
     }
     return component.empty() ? !components_.empty() : components_.contains(component);
   }

@@ -13,7 +13,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
-constexpr Duration look = Duration::milliseconds(50);
+constexpr Duration look = Duration::milliseconds(20);
+constexpr auto quiet =
+    std::chrono::milliseconds{200};  // nobody new for so long: all that are there have been seen
 
 /// Waits until `condition`, Ctrl-C or the end of patience.
 template <class Condition>
@@ -50,6 +52,18 @@ std::set<std::string> cells_in(const dds::Snapshot& snapshot) {
   for (const auto& participant : snapshot.participants)
     if (const auto cell = cell_of_participant(participant.name); !cell.empty()) cells.insert(cell);
   return cells;
+}
+
+/// The processes of a cell that take part; the one that keeps simulated time says no status.
+std::set<std::string> processes_in(const dds::Snapshot& snapshot, const std::string& cell) {
+  const std::string prefix = "invar/" + cell + "/";
+  std::set<std::string> processes;
+  for (const auto& participant : snapshot.participants) {
+    if (!participant.name.starts_with(prefix)) continue;
+    const std::string process = participant.name.substr(prefix.size());
+    if (process != "launcher") processes.insert(process.substr(0, process.find('/')));
+  }
+  return processes;
 }
 
 }  // namespace
@@ -122,8 +136,12 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
     name_ = call.cell;
   } else {
     if (!wait_until(patience_, [&] { return !cells_in(node_->snapshot()).empty(); })) return;
-    settle();
-    const auto cells = cells_in(node_->snapshot());
+    auto cells = cells_in(node_->snapshot());
+    for (auto since = Clock::now(); Clock::now() - since < 2 * quiet && sleep_for(look);)
+      if (const auto now = cells_in(node_->snapshot()); now != cells) {
+        cells = now;
+        since = Clock::now();
+      }
     if (cells.size() > 1) {
       std::string list;
       for (const auto& cell : cells) list += (list.empty() ? "" : ", ") + cell;
@@ -149,15 +167,40 @@ std::vector<std::string> LiveCell::wait_for_processes() {
     wait_until(patience_, all_heard);
     return missing;
   }
-  std::size_t known = 0;
+  // Who takes part announces itself several times a second; its status is there when it is connected.
+  std::set<std::string> known;
   auto since = Clock::now();
   wait_until(patience_, [&] {
-    const std::size_t now = client_->processes().size();
+    const auto now = processes_in(node_->snapshot(), name_);
     if (now != known) since = Clock::now();
     known = now;
-    return known > 0 && Clock::now() - since > std::chrono::seconds{1};
+    missing.assign(known.begin(), known.end());
+    for (const auto& status : client_->processes()) std::erase(missing, status.process_name().c_str());
+    return !known.empty() && missing.empty() && Clock::now() - since > quiet;
   });
   return missing;
+}
+
+bool LiveCell::knows_all(const dds::Snapshot& snapshot) const {
+  if (!client_) return false;
+  const auto statuses = client_->processes();
+  if (cell_ && statuses.size() < cell_->processes.size()) return false;
+  std::set<std::string> accounted;
+  for (const auto& status : statuses) {
+    const std::string name = "invar/" + name_ + "/" + status.process_name().c_str();
+    const auto found =
+        std::count_if(snapshot.endpoints.begin(), snapshot.endpoints.end(), [&](const dds::Endpoint& end) {
+          return !end.is_local && (end.participant == name || end.participant == name + "/realtime");
+        });
+    if (found < status.endpoints()) return false;
+    accounted.insert({name, name + "/realtime"});
+  }
+  return !statuses.empty() &&
+         std::all_of(snapshot.participants.begin(), snapshot.participants.end(),
+                     [&](const auto& participant) {
+                       return accounted.contains(participant.name) ||
+                              participant.name.starts_with(std::string{"invar/"} + tools_name + "/");
+                     });
 }
 
 void LiveCell::settle() {
@@ -168,7 +211,8 @@ void LiveCell::settle() {
     const std::size_t now = snapshot.participants.size() + snapshot.endpoints.size();
     if (now != known) since = Clock::now();
     known = now;
-    return Clock::now() - since > std::chrono::seconds{1};
+    return Clock::now() - since > std::chrono::seconds{1} ||
+           (knows_all(snapshot) && Clock::now() - since > quiet);
   });
 }
 

@@ -65,10 +65,11 @@ class LiveCell {
   [[nodiscard]] const config::Cell* file() const { return cell_.get(); }
   [[nodiscard]] Duration patience() const { return patience_; }
 
-  /// Waits until every process of the file has said how it is; without a file until nobody new has for a second.
-  /// Returns the processes of the file that did not.
+  /// Waits until every process of the file has said how it is; without a file, every one that takes part in the domain.
+  /// Returns the processes that did not.
   std::vector<std::string> wait_for_processes();
-  /// Waits until nothing new has been discovered for a second.
+  /// Waits until all writers and readers of the cell's processes have been discovered; where others take part, whom nobody
+  /// can ask how many they have, until nothing new has been for a second.
   void settle();
   /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.
   std::vector<dds::Endpoint> wait_for_writers(const std::string& text);
@@ -80,6 +81,7 @@ class LiveCell {
   void say_not_found(const std::string& command) const;
 
  private:
+  [[nodiscard]] bool knows_all(const dds::Snapshot& snapshot) const;
   std::unique_ptr<config::Cell> cell_;
   std::unique_ptr<dds::Node> node_;
   std::string name_;
