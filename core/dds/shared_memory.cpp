@@ -73,9 +73,8 @@ std::size_t remove_shared_memory_leftovers(const std::filesystem::path& folder, 
   for (const auto& name : unlocked) remove(folder, name);
   std::size_t removed = unlocked.size();
   for (const auto& lock : locks) {
-    if (!is_abandoned(lock, age)) continue;
+    if (!is_abandoned(lock, age) || !has_rested(lock, rest)) continue;
     const std::string name = lock.filename().string();
-    if (name.starts_with("fastrtps_port") && !has_rested(lock, rest)) continue;
     remove(folder, name.substr(0, name.size() - 3));
     ++removed;
   }

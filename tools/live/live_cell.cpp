@@ -108,11 +108,13 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
   options.process = call.command;
   std::replace(options.process.begin(), options.process.end(), ' ', '-');
   options.addresses = call.addresses;
+  // Commands come and go. Over shared memory, a process that did not get to run would find their last message with its memory
+  // gone, and Fast DDS 2.9 never gets past such a message: nothing would reach that process any more.
+  options.shared_memory = false;
   dds::Profiles profiles = dds::standard_profiles();
   if (!call.file.empty()) {
     cell_ = read_structure(call.file);
     options.domain = static_cast<std::uint32_t>(cell_->domain);
-    options.shared_memory = cell_->shared_memory;
     if (options.addresses.empty()) {
       const auto add = [&](const std::string& address) {
         if (std::find(options.addresses.begin(), options.addresses.end(), address) == options.addresses.end())

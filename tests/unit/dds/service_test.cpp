@@ -150,7 +150,11 @@ TEST_P(LateService, SaysWhatLatencyIsNotKeptInItsStatusAndByNoticesAsDeclared) {
   Slow& slow = *owned;
   slow.name = "slow";
   slow.id = 1;
-  executor.add(std::move(owned), {.type = "slow", .latencies = {{"state", Duration::seconds(10.0)}}});
+  executor.add(std::move(owned), {.type = "slow",
+                                  .parameters = {},
+                                  .storage = nullptr,
+                                  .every = 1,
+                                  .latencies = {{"state", Duration::seconds(10.0)}}});
   executor.start();
   ProcessControl control{executor};
   stage::AxisState old;

@@ -105,7 +105,11 @@ struct Fed {
     auto owned = std::make_unique<Reader>();
     reader = owned.get();
     reader->name = "reader";
-    executor.add(std::move(owned), {.type = "reader", .latencies = {{"signal", limit}}});
+    executor.add(std::move(owned), {.type = "reader",
+                                    .parameters = {},
+                                    .storage = nullptr,
+                                    .every = 1,
+                                    .latencies = {{"signal", limit}}});
     executor.start();
   }
   Executor executor;
