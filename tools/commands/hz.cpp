@@ -68,7 +68,12 @@ int hz(Options& options) {
   }
   TopicWatch watch{cell.node(), [&](const std::string& name) { return name == topic; }};
   watch.look();
-  const auto begin = Clock::now();
+  const auto asked = Clock::now();
+  while (watch.flows().at(topic).empty() &&
+         Clock::now() - asked < std::chrono::nanoseconds{cell.patience().ns} &&
+         sleep_for(Duration::milliseconds(20))) {
+  }
+  const auto begin = Clock::now();  // the duration counts from the first sample
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   while (sleep_for(Duration::seconds(options.duration > 0.0 ? options.duration - elapsed() : 2.0)) &&
          options.duration <= 0.0)

@@ -110,8 +110,8 @@ int top(Options& options) {
                      return !options.no_topics && topic.starts_with("cell/" + cell.name() + "/") &&
                             !is_service_topic(topic);
                    }};
+  if (!options.no_topics) cell.settle();  // so that the first look finds all of them
   watch.look();
-  if (options.once) sleep_for(Duration::seconds(1.0));  // readers connect
   Rates rates;
   Silence silence;
   const bool screen = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
