@@ -52,9 +52,11 @@ trap 'kill -9 "${pids[@]}" 2>/dev/null || true; rm -rf "$folder"' EXIT
 start() { "$invar" run cell.yaml --process "$@" >"$1.log" 2>&1 & pids+=($!); }
 start recorder; start plant; plant=${pids[1]}; start servo; sleep 3
 start calibration --job move
-sleep 4  # the first move, 190 mm at 20 mm/s, is under way
+is_in() { [[ $("$invar" echo cell.yaml stage_x.state --count 1 --json --wait 20) == *"\"AXIS_MODE_$1\""* ]]; }
+wait_for() { for _ in $(seq 100); do is_in "$1" && return; done; echo "the axis does not get to $1"; cat ./*.log; exit 1; }
+wait_for MOVING  # the first move, 190 mm at 20 mm/s
 kill -9 "$plant"
-sleep 3
+wait_for FAULT
 kill -TERM "${pids[2]}" "${pids[3]}" 2>/dev/null || true; sleep 1; kill -TERM "${pids[0]}"; wait "${pids[0]}" || true
 cat ./*.log
 "$invar" export out/recording.mcap --out tables >/dev/null
