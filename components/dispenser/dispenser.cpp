@@ -11,35 +11,19 @@ namespace invar::dispenser {
 using namespace dispensing;
 
 Dispenser::Dispenser(const Parameters& parameters) : parameters_{parameters} {
-  if (parameters.modbus.map.empty())
-    throw InputError{"modbus.map", "missing", "name the pneumatic controller's register map"};
-  const auto map = modbus::load_map(parameters.modbus.map);
-  for (const char* needed :
-       {"pressure", "purge_pressure", "band", "enable", "purge", "reset_alarms", "actual_pressure",
-        "actual_purge_pressure", "in_band", "supply_low", "over_pressure", "sensor_fault", "comm_lost"})
-    if (!map.find(needed))
-      throw InputError{"modbus.map", std::string{"has no register `"} + needed + "`",
-                       "name a pneumatic controller's register map"};
+  (void)modbus::load_map_of(
+      parameters.modbus.map, "modbus.map", "pneumatic controller",
+      {"pressure", "purge_pressure", "band", "enable", "purge", "reset_alarms", "actual_pressure",
+       "actual_purge_pressure", "in_band", "supply_low", "over_pressure", "sensor_fault", "comm_lost"});
   for (const Pattern& pattern : parameters.patterns) patterns_[pattern.name] = targets(pattern);
   if (patterns_.size() != parameters.patterns.size())
     throw InputError{"patterns", "two have one name", "rename one of them"};
   if (!parameters.model.empty()) active_ = load(parameters.model);
 }
 
-void Dispenser::configure() {
-  modbus::BusOptions options{.host = parameters_.modbus.host,
-                             .port = static_cast<std::uint16_t>(parameters_.modbus.port)};
-  // Waits are real also in simulated time, where a busy host must not look like a dead controller.
-  if (simulated_time) options.answer_timeout = Duration::seconds(20);
-  bus_ = std::make_unique<modbus::Bus>(std::move(options));
-  device_ = &bus_->add(modbus::load_map(parameters_.modbus.map));
-  if (!simulated_time) bus_->start();
-}
+void Dispenser::configure() { client_.open(parameters_.modbus, simulated_time); }
 
-void Dispenser::cleanup() noexcept {
-  bus_.reset();
-  device_ = nullptr;
-}
+void Dispenser::cleanup() noexcept { client_.close(); }
 
 void Dispenser::activate() {
   setpoint_ = parameters_.pressure;
@@ -50,24 +34,24 @@ void Dispenser::activate() {
 }
 
 void Dispenser::deactivate() noexcept {
-  if (device_ == nullptr) return;
+  if (!client_.is_open()) return;
   wanted_ = purge_ = false;
   drive(false);
-  if (simulated_time) bus_->send(now());
+  client_.send(now());
 }
 
 bool Dispenser::flag(const char* reg) const {
-  const modbus::Reading reading = device_->value(reg);
+  const modbus::Reading reading = client_.device().value(reg);
   return !reading.stale && reading.value != 0.0;
 }
 
 void Dispenser::drive(bool enable) noexcept {
   // Out of the map's range cannot be: parameters and commands were checked.
-  (void)device_->write("pressure", setpoint_);
-  (void)device_->write("purge_pressure", purge_setpoint_);
-  (void)device_->write("band", parameters_.band);
-  (void)device_->write("purge", enable && purge_ ? 1.0 : 0.0);
-  (void)device_->write("enable", enable ? 1.0 : 0.0);
+  (void)client_.device().write("pressure", setpoint_);
+  (void)client_.device().write("purge_pressure", purge_setpoint_);
+  (void)client_.device().write("band", parameters_.band);
+  (void)client_.device().write("purge", enable && purge_ ? 1.0 : 0.0);
+  (void)client_.device().write("enable", enable ? 1.0 : 0.0);
 }
 
 void Dispenser::obey(const PressureCommand& command) noexcept {
@@ -79,7 +63,7 @@ void Dispenser::obey(const PressureCommand& command) noexcept {
   if (!command.reset_alarms()) return;
   latched_ = false;
   reset_at_ = now();
-  (void)device_->write("reset_alarms", 1.0);
+  (void)client_.device().write("reset_alarms", 1.0);
 }
 
 Dispenser::Model Dispenser::load(const std::filesystem::path& file) const {
@@ -173,14 +157,14 @@ void Dispenser::answer(const PatternCommand& command) {
 }
 
 void Dispenser::publish() noexcept {
-  const modbus::Reading actual = device_->value("actual_pressure");
-  const modbus::Reading enabled = device_->value("enable");
+  const modbus::Reading actual = client_.device().value("actual_pressure");
+  const modbus::Reading enabled = client_.device().value("enable");
   PressureState state;
   stamp(state);
   state.node(id);
   state.pressure(actual.value);
   state.setpoint(setpoint_);
-  state.purge_pressure(device_->value("actual_purge_pressure").value);
+  state.purge_pressure(client_.device().value("actual_purge_pressure").value);
   state.enabled(flag("enable"));
   state.purging(flag("purge"));
   state.supply_low(flag("supply_low"));
@@ -202,13 +186,13 @@ void Dispenser::step(const Tick& tick) noexcept {
   PatternCommand pattern;
   while (wanted_pattern_.take(pattern)) answer(pattern);
 
-  if (simulated_time) bus_->exchange(tick.now);
-  device_->refresh();
+  client_.receive(tick.now);
+  client_.device().refresh();
   // A reset takes a few polls to show; the controller itself stays shut until it has accepted it.
   constexpr Duration grace = Duration::milliseconds(500);
   if ((flag("over_pressure") || flag("sensor_fault")) && tick.now - reset_at_ > grace) latched_ = true;
   drive(wanted_ && !latched_);
-  if (simulated_time) bus_->send(tick.now);
+  client_.send(tick.now);
   publish();
 }
 

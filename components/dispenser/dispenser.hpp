@@ -13,7 +13,7 @@
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/droplet_trajectory.hpp"
-#include "core/modbus/bus.hpp"
+#include "core/modbus/endpoint.hpp"
 #include "idl/compensation.h"
 #include "idl/dispensing.h"
 
@@ -25,18 +25,8 @@ namespace invar::dispenser {
 /// (compensation.yaml of kind dispenser; staged, activated and rolled back as the stage's is). Not real-time (Modbus).
 class Dispenser final : public Component {
  public:
-  struct Modbus {
-    std::string host = "127.0.0.1";
-    std::int64_t port = 502;
-    std::filesystem::path map;
-    void describe(auto& p) {
-      p(host, "host", "name or address of the pneumatic controller");
-      p(port, "port", 1, 65535, "TCP port");
-      p(map, "map", "register map");
-    }
-  };
   struct Parameters {
-    Modbus modbus;
+    modbus::Endpoint modbus;
     double pressure = 67.2e3;
     double purge_pressure = 20e3;
     double band = 500.0;
@@ -91,8 +81,7 @@ class Dispenser final : public Component {
   Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
   Output<compensation::ModelStatus> status_{*this, "status", "state"};
 
-  std::unique_ptr<modbus::Bus> bus_;
-  modbus::Device* device_ = nullptr;
+  modbus::Client client_;
   std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;
   Model active_, staged_, previous_;
   double setpoint_ = 0.0;

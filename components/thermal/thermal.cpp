@@ -16,13 +16,9 @@ metrology::Thermistor equation_of(const Thermal::Thermistor& parameters) {
 
 Thermal::Thermal(const Parameters& parameters)
     : parameters_{parameters}, thermistor_{equation_of(parameters.thermistor)} {
-  if (parameters.modbus.map.empty())
-    throw InputError{"modbus.map", "missing", "name the heater's register map"};
-  const auto map = modbus::load_map(parameters.modbus.map);
-  for (const char* needed : {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"})
-    if (!map.find(needed))
-      throw InputError{"modbus.map", std::string{"has no register `"} + needed + "`",
-                       "name a heater's register map"};
+  const auto map =
+      modbus::load_map_of(parameters.modbus.map, "modbus.map", "heater",
+                          {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"});
   for (const Zone& zone : parameters.zones) {
     if (!map.find(zone.name + "_resistance"))
       throw InputError{"zones", "the map has no register `" + zone.name + "_resistance`",
@@ -33,20 +29,9 @@ Thermal::Thermal(const Parameters& parameters)
   }
 }
 
-void Thermal::configure() {
-  modbus::BusOptions options{.host = parameters_.modbus.host,
-                             .port = static_cast<std::uint16_t>(parameters_.modbus.port)};
-  // Waits are real also in simulated time, where a busy host must not look like a dead heater.
-  if (simulated_time) options.answer_timeout = Duration::seconds(20);
-  bus_ = std::make_unique<modbus::Bus>(std::move(options));
-  device_ = &bus_->add(modbus::load_map(parameters_.modbus.map));
-  if (!simulated_time) bus_->start();
-}
+void Thermal::configure() { client_.open(parameters_.modbus, simulated_time); }
 
-void Thermal::cleanup() noexcept {
-  bus_.reset();
-  device_ = nullptr;
-}
+void Thermal::cleanup() noexcept { client_.close(); }
 
 void Thermal::activate() {
   setpoint_ = setpoint_parameter_ = parameters_.setpoint;
@@ -57,8 +42,9 @@ void Thermal::activate() {
 }
 
 void Thermal::deactivate() noexcept {
+  if (!client_.is_open()) return;
   drive(0.0, false);
-  if (simulated_time) bus_->send(now());
+  client_.send(now());
 }
 
 /// Power [W] for this temperature. The integral stops where the output is at its limit and would be driven further.
@@ -76,11 +62,10 @@ double Thermal::control(double temperature, double period) noexcept {
 }
 
 void Thermal::drive(double power, bool enable) noexcept {
-  if (device_ == nullptr) return;
   power_ = enable ? power : 0.0;
   // Out of the map's range cannot be: the limit was checked; a refusal would leave the last value and its watchdog.
-  (void)device_->write("enable", enable ? 1.0 : 0.0);
-  (void)device_->write("power", power_);
+  (void)client_.device().write("enable", enable ? 1.0 : 0.0);
+  (void)client_.device().write("power", power_);
 }
 
 void Thermal::step(const Tick& tick) noexcept {
@@ -91,17 +76,17 @@ void Thermal::step(const Tick& tick) noexcept {
     if (command.reset_latch()) latched_ = false;
   }
   if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
-  if (simulated_time) bus_->exchange(tick.now);
-  device_->refresh();
+  client_.receive(tick.now);
+  client_.device().refresh();
 
-  const modbus::Reading resistance = device_->value("slide_resistance");
+  const modbus::Reading resistance = client_.device().value("slide_resistance");
   const bool sound = !resistance.stale && resistance.value > 1.0;
   if (sound) temperature_ = thermistor_.temperature(resistance.value);
   if (sound && temperature_ > parameters_.over_temperature) latched_ = true;
   const bool enable = sound && wanted_ && !latched_;
   if (!enable) primed_ = false;
   drive(enable ? control(temperature_, tick.period) : 0.0, enable);
-  if (simulated_time) bus_->send(tick.now);
+  client_.send(tick.now);
 
   NodeTemperature sample;
   stamp(sample);
@@ -111,7 +96,7 @@ void Thermal::step(const Tick& tick) noexcept {
   sample.heater_power(power_);
   sample.enabled(enable);
   sample.over_temperature(latched_);
-  const modbus::Reading lost = device_->value("comm_lost");
+  const modbus::Reading lost = client_.device().value("comm_lost");
   sample.watchdog_tripped(!lost.stale && lost.value != 0.0);
   sample.stale(!sound);
   state_.write(sample);
@@ -119,7 +104,7 @@ void Thermal::step(const Tick& tick) noexcept {
 }
 
 void Thermal::publish_zone(ZoneSensor& zone) noexcept {
-  const modbus::Reading resistance = device_->value(zone.resistance);
+  const modbus::Reading resistance = client_.device().value(zone.resistance);
   const bool sound = !resistance.stale && resistance.value > 1.0;
   if (sound) zone.temperature = zone.thermistor.temperature(resistance.value);
   NodeTemperature sample;

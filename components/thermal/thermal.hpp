@@ -10,7 +10,7 @@
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/thermistor.hpp"
-#include "core/modbus/bus.hpp"
+#include "core/modbus/endpoint.hpp"
 #include "idl/thermal.h"
 
 namespace invar::thermal {
@@ -20,16 +20,6 @@ namespace invar::thermal {
 /// latch holds until a command resets it. Not real-time (Modbus).
 class Thermal final : public Component {
  public:
-  struct Modbus {
-    std::string host = "127.0.0.1";
-    std::int64_t port = 502;
-    std::filesystem::path map;
-    void describe(auto& p) {
-      p(host, "host", "name or address of the heater's controller");
-      p(port, "port", 1, 65535, "TCP port");
-      p(map, "map", "register map");
-    }
-  };
   struct Pid {
     double kp = 20.0;
     double ki = 0.2;
@@ -63,7 +53,7 @@ class Thermal final : public Component {
     }
   };
   struct Parameters {
-    Modbus modbus;
+    modbus::Endpoint modbus;
     Pid pid;
     Thermistor thermistor;
     std::vector<Zone> zones;
@@ -109,8 +99,7 @@ class Thermal final : public Component {
   };
   void publish_zone(ZoneSensor& zone) noexcept;
   std::vector<ZoneSensor> zones_;
-  std::unique_ptr<modbus::Bus> bus_;
-  modbus::Device* device_ = nullptr;
+  modbus::Client client_;
   double setpoint_ = 0.0;
   double setpoint_parameter_ = 0.0;
   double temperature_ = 0.0;

@@ -5,17 +5,12 @@
 namespace invar::world {
 
 SimulatedHeater::SimulatedHeater(const Parameters& parameters) : parameters_{parameters} {
-  if (parameters.map.empty()) throw InputError{"map", "missing", "name the heater's register map"};
-  const auto map = modbus::load_map(parameters.map);
-  if (!parameters.faults.empty()) (void)modbus::load_faults(parameters.faults, map);
+  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "heater", {});
+  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
 }
 
 void SimulatedHeater::configure() {
-  auto map = modbus::load_map(parameters_.map);
-  modbus::ServerOptions options{.host = parameters_.host,
-                                .port = static_cast<std::uint16_t>(parameters_.port)};
-  if (!parameters_.faults.empty()) options.faults = modbus::load_faults(parameters_.faults, map);
-  server_ = std::make_unique<modbus::Server>(std::move(map), std::move(options));
+  server_ = modbus::serve(parameters_.modbus);
   const Parameters& p = parameters_;
   plant_.emplace(
       std::vector<physics::ThermalNode>{

@@ -12,7 +12,7 @@
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/thermistor.hpp"
-#include "core/modbus/server.hpp"
+#include "core/modbus/endpoint.hpp"
 #include "core/physics/thermal_plant.hpp"
 #include "idl/thermal.h"
 
@@ -23,10 +23,7 @@ namespace invar::world {
 class SimulatedHeater final : public Component {
  public:
   struct Parameters {
-    std::filesystem::path map;
-    std::string host = "127.0.0.1";
-    std::int64_t port = 1502;
-    std::filesystem::path faults;
+    modbus::ServedEndpoint modbus;
     double ambient = 23.0;
     double pad_capacity = 60.0;
     double slide_capacity = 850.0;
@@ -38,10 +35,7 @@ class SimulatedHeater final : public Component {
     double noise = 0.003;
     std::int64_t seed = 3;
     void describe(auto& p) {
-      p(map, "map", "register map to serve");
-      p(host, "host", "address to listen on");
-      p(port, "port", 1, 65535, "TCP port to listen on");
-      p(faults, "faults", "fault script: when its Modbus side refuses, drops, delays or lies");
+      modbus.describe(p);
       p(ambient, "ambient", "degC", Range{-50.0, 100.0}, "of the room", while_running);
       p(pad_capacity, "pad_capacity", "J/K", Range{0.1, 1e6}, "heat capacity of the pad");
       p(slide_capacity, "slide_capacity", "J/K", Range{0.1, 1e6}, "of the slide");

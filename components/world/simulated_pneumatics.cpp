@@ -7,23 +7,12 @@
 namespace invar::world {
 
 SimulatedPneumatics::SimulatedPneumatics(const Parameters& parameters) : parameters_{parameters} {
-  if (parameters.map.empty())
-    throw InputError{"map", "missing", "name the pneumatic controller's register map"};
-  const auto map = modbus::load_map(parameters.map);
-  for (const char* needed : {"pressure", "enable", "actual_pressure", "in_band", "over_pressure"})
-    if (!map.find(needed))
-      throw InputError{"map", std::string{"has no register `"} + needed + "`",
-                       "name a pneumatic controller's register map"};
-  if (!parameters.faults.empty()) (void)modbus::load_faults(parameters.faults, map);
+  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "pneumatic controller",
+                                       {"pressure", "enable", "actual_pressure", "in_band", "over_pressure"});
+  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
 }
 
-void SimulatedPneumatics::configure() {
-  auto map = modbus::load_map(parameters_.map);
-  modbus::ServerOptions options{.host = parameters_.host,
-                                .port = static_cast<std::uint16_t>(parameters_.port)};
-  if (!parameters_.faults.empty()) options.faults = modbus::load_faults(parameters_.faults, map);
-  server_ = std::make_unique<modbus::Server>(std::move(map), std::move(options));
-}
+void SimulatedPneumatics::configure() { server_ = modbus::serve(parameters_.modbus); }
 
 void SimulatedPneumatics::cleanup() noexcept { server_.reset(); }
 

@@ -9,7 +9,7 @@
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
-#include "core/modbus/server.hpp"
+#include "core/modbus/endpoint.hpp"
 #include "idl/dispensing.h"
 
 namespace invar::world {
@@ -20,10 +20,7 @@ namespace invar::world {
 class SimulatedPneumatics final : public Component {
  public:
   struct Parameters {
-    std::filesystem::path map;
-    std::string host = "127.0.0.1";
-    std::int64_t port = 1503;
-    std::filesystem::path faults;
+    modbus::ServedEndpoint modbus{.port = 1503};
     double supply = 6e5;
     double lag = 0.15;
     double over_pressure = 3e5;
@@ -31,10 +28,7 @@ class SimulatedPneumatics final : public Component {
     double leak_through = 0.0;
     std::int64_t seed = 5;
     void describe(auto& p) {
-      p(map, "map", "register map to serve");
-      p(host, "host", "address to listen on");
-      p(port, "port", 1, 65535, "TCP port to listen on");
-      p(faults, "faults", "fault script: when its Modbus side refuses, drops, delays or lies");
+      modbus.describe(p);
       p(supply, "supply", "Pa", Range{0.0, 1.6e6}, "compressed air before the regulator", while_running);
       p(lag, "lag", "s", Range{1e-3, 60.0}, "time constant of reservoir and purge line");
       p(over_pressure, "over_pressure", "Pa", Range{1e3, 1.6e6},

@@ -4,11 +4,8 @@
 # heat_job.sh INVAR SOURCE_DIR
 set -euo pipefail
 invar=$1 source=$2
-folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
-cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
-echo "domain $domain, port $port"
-sed -i "s/^domain: .*/domain: $domain/; s/15021/$port/g" "$folder/deployment/thermal-stage.yaml"
+source "$(dirname "$0")/own_cell.sh"
+own_cell thermal-stage "$source" 15021
 cd "$folder"
 "$invar" run deployment/thermal-stage.yaml --job calibrate-thermal | tee summary
 cd out/thermal-stage

@@ -3,11 +3,8 @@
 # main_job.sh INVAR SOURCE_DIR
 set -euo pipefail
 invar=$1 source=$2
-folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
-cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
-echo "domain $domain, port $port"
-sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder/deployment/xy-table.yaml"
+source "$(dirname "$0")/own_cell.sh"
+own_cell xy-table "$source" 15020
 
 for run in one two; do
   mkdir "$folder/$run"; cd "$folder/$run"
@@ -21,11 +18,6 @@ for file in lines.csv verify_before.csv verify_after.csv; do
   cmp "one/out/xy-table/$file" "two/out/xy-table/$file" || { echo "two runs differ in $file"; exit 1; }
 done
 
-# RMS of (displacement - way), in um, straight from the files.
-rms() {
-  awk -F, 'NR > 1 { if ($1 != name) { name = $1; x = $2; y = $3 }
-    e = $5 - sqrt(($2 - x)^2 + ($3 - y)^2); sum += e * e; n++ } END { printf "%.4f\n", 1e6 * sqrt(sum / n) }' "$1"
-}
 before=$(rms one/out/xy-table/verify_before.csv); after=$(rms one/out/xy-table/verify_after.csv)
 echo "error on lines not fitted: $before um before, $after um after"
 awk -v b="$before" -v a="$after" 'BEGIN { exit !(b > 5 && a < 0.3) }' || { echo "the compensation did not do its work"; exit 1; }

@@ -3,12 +3,10 @@
 # print_job.sh INVAR SOURCE_DIR
 set -euo pipefail
 invar=$1 source=$2
-folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
-cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
-echo "domain $domain, port $port"
+source "$(dirname "$0")/own_cell.sh"
+own_cell print-cell "$source" 15030
 # The geometric calibration in front has a test of its own (main_job.sh).
-sed -i "s/^domain: .*/domain: $domain/; s/15030/$port/g; s/{prints: 5, pause: 5}/{prints: 1}/; /first: calibrate-geometry/d" "$folder/deployment/print-cell.yaml"
+sed -i "s/{prints: 5, pause: 5}/{prints: 1}/; /first: calibrate-geometry/d" "$folder/deployment/print-cell.yaml"
 
 for run in one two; do
   mkdir "$folder/$run"; cd "$folder/$run"

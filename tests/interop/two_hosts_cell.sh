@@ -2,32 +2,13 @@
 # One cell on two PCs, each a network namespace, joined by a cable (veth): the stage's PC with motion and heat, another one
 # with calibration, recorder and supervisor. Each side runs the same file with its own --host. In simulated time the job's
 # files are those of one PC, byte for byte; by the wall clock the job corrects the table as well.
-# two_hosts_cell.sh INVAR SOURCE_DIR [wall]; needs root or a kernel that lets users have namespaces.
+# two_hosts_cell.sh INVAR SOURCE_DIR [wall]
 set -euo pipefail
-if ((EUID != 0)); then exec unshare --map-root-user --net --mount bash -c 'mount -t tmpfs tmpfs /run && exec "$0" "$@"' "$0" "$@"; fi
+source "$(dirname "$0")/two_namespaces.sh"
+source "$(dirname "$0")/../cell/own_cell.sh"
+as_root "$@"
 invar=$1 source=$2
-a=invar-c-$$ b=invar-d-$$ folder=$(mktemp -d)
-pids=()
-clean() {
-  for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
-  wait
-  ip netns del "$a" 2>/dev/null || true
-  ip netns del "$b" 2>/dev/null || true
-  rm -rf "$folder"
-}
-trap clean EXIT
-
-ip netns add "$a"; ip netns add "$b"
-ip -n "$a" link add cable type veth peer name cable netns "$b"
-for end in "$a 10.78.0.11" "$b 10.78.0.12"; do
-  read -r name address <<<"$end"
-  ip -n "$name" address add "$address/24" dev cable
-  ip -n "$name" link set cable up
-  ip -n "$name" link set lo up
-done
-for _ in $(seq 100); do
-  ip -n "$a" link show cable | grep -q 'LOWER_UP' && ip -n "$b" link show cable | grep -q 'LOWER_UP' && break; sleep 0.1
-done
+two_namespaces 10.78.0.11 10.78.0.12
 sleep 2  # the kernel says "up" before the first packets pass
 
 # The shipped cell with a short job, on one PC and on two.
@@ -81,11 +62,6 @@ cat wall/summary
 kill -INT "$stage"; wait "$stage" || { cat wall-stage/summary; exit 1; }
 pids=()
 
-# RMS of (displacement - way), in um, straight from the files.
-rms() {
-  awk -F, 'NR > 1 { if ($1 != name) { name = $1; x = $2; y = $3 }
-    e = $5 - sqrt(($2 - x)^2 + ($3 - y)^2); sum += e * e; n++ } END { printf "%.4f\n", 1e6 * sqrt(sum / n) }' "$1"
-}
 for run in two wall; do
   before=$(rms "$run/out/xy-table/verify_before.csv"); after=$(rms "$run/out/xy-table/verify_after.csv")
   echo "$run: error on a line not fitted: $before um before, $after um after"

@@ -12,6 +12,7 @@
 #include "components/world/simulated_sensor.hpp"
 #include "components/world/simulated_stage.hpp"
 #include "core/model/model_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/support/wired.hpp"
 
 namespace invar::calibration {
@@ -24,13 +25,6 @@ struct Operator final : Component {
   Input<job::JobStatus> status{*this, "status", {.profile = "state"}};
   void step(const Tick&) noexcept override {}
 };
-
-std::filesystem::path folder(const std::string& name) {
-  const auto path =
-      std::filesystem::temp_directory_path() / ("invar-axis-trial-" + std::to_string(getpid())) / name;
-  std::filesystem::remove_all(path);
-  return path;
-}
 
 /// One axis of the world with its stage, a laser along it and the trial; the trial is stepped at 500 Hz.
 struct Cell {
@@ -108,7 +102,8 @@ TEST(AxisTrial, IdentifiesTheRippleAndLowersTheFollowingErrorOfRunsNotFitted) {
   of_stage.model = machines / "axis-nominal.yaml";
   AxisTrial::Parameters of_trial;
   of_trial.axis = 2;
-  const auto out = folder("ripple");
+  const invar::testing::TemporaryFolder folder;
+  const auto out = folder / "ripple";
   of_trial.ripple.resize(1);
   of_trial.ripple[0].name = "ripple";
   of_trial.ripple[0].model = machines / "axis-nominal.yaml";
@@ -137,7 +132,6 @@ TEST(AxisTrial, IdentifiesTheRippleAndLowersTheFollowingErrorOfRunsNotFitted) {
     return std::sqrt(sum / count);
   };
   EXPECT_LT(rms("ripple_after.csv"), 0.5 * rms("ripple_before.csv"));
-  std::filesystem::remove_all(out.parent_path());
 }
 
 TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
@@ -157,7 +151,8 @@ TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
     of_stage.limits = {0.65, 5.0, 100.0};
     of_stage.following_error = 0.05;
     AxisTrial::Parameters of_trial;
-    const auto out = folder("tracking");
+    const invar::testing::TemporaryFolder folder;
+    const auto out = folder / "tracking";
     of_trial.tracking.resize(1);
     of_trial.tracking[0].name = "track";
     of_trial.tracking[0].periods = {3.0};
@@ -200,7 +195,6 @@ TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
         count += 1.0;
       }
     rms[fused ? 1 : 0] = std::sqrt(sum / count - std::pow(mean / count, 2));
-    std::filesystem::remove_all(out.parent_path());
   }
   EXPECT_LT(rms[1], 0.5 * rms[0]);
 }
@@ -209,7 +203,8 @@ TEST(AxisTrial, SaysWhyAJobCannotRun) {
   AxisTrial::Parameters of_trial;
   of_trial.tracking.resize(1);
   of_trial.tracking[0].name = "track";
-  of_trial.tracking[0].out = folder("fails").string();
+  const invar::testing::TemporaryFolder folder;
+  of_trial.tracking[0].out = (folder / "fails").string();
   stage::Stage::Parameters of_stage;  // no more than 0.1 m/s
   Cell cell{'x', world_parameters(), of_stage, of_trial};
   cell.bring_up();

@@ -12,6 +12,7 @@
 
 #include "components/compensation/compensation.hpp"
 #include "core/metrology/line_errors.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::calibration {
 namespace {
@@ -40,7 +41,7 @@ struct Table final : Component {
   Input<job::JobStatus> job_status{*this, "job_status"};
   Input<compensation::ModelStatus> model_status{*this, "model_status"};
 
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
   compensation::Compensation::Parameters compensation_parameters;
   Calibration::Parameters calibration_parameters;
   std::unique_ptr<compensation::Compensation> compensation;
@@ -64,8 +65,6 @@ struct Table final : Component {
   }
 
   Table() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-calibration-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
     std::ofstream{folder / "machine.yaml"}
         << "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n";
     compensation_parameters.transaction_timeout = 10.0;
@@ -96,7 +95,6 @@ struct Table final : Component {
   ~Table() override {
     calibration.reset();
     compensation.reset();
-    std::filesystem::remove_all(folder);
   }
 
   template <class T>

@@ -19,6 +19,7 @@
 #include "components/world/simulated_substrate.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::calibration {
 namespace {
@@ -82,13 +83,10 @@ struct Cell final : Component {
   };
   std::map<std::string, Member> members;
   std::vector<std::string> order;
-  fs::path folder;
+  invar::testing::TemporaryFolder folder;
   std::uint64_t cycle = 0;
 
   Cell() {
-    std::string made = (fs::temp_directory_path() / "invar-print-XXXXXX").string();
-    if (mkdtemp(made.data()) == nullptr) throw std::runtime_error{"no temporary folder"};
-    folder = made;
     const fs::path deployment = fs::path{INVAR_SOURCE_DIR} / "deployment";
     world_parameters.machine = deployment / "machines/xy-table-nominal.yaml";
     for (int axis = 0; axis < 2; ++axis) {
@@ -116,7 +114,6 @@ struct Cell final : Component {
     print.ruler = {0.1, 0.1};
     print.out = (folder / "out").string();
   }
-  ~Cell() override { fs::remove_all(folder); }
 
   template <class Type, class Parameters>
   void add(const char* member, const Parameters& with, int every) {

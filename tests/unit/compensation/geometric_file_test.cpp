@@ -8,6 +8,7 @@
 
 #include "core/metrology/geometric_identification.hpp"
 #include "core/metrology/line_plan.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/metrology/simulated_machine.hpp"
 
 namespace invar::compensation {
@@ -16,8 +17,6 @@ namespace {
 class GeometricFileTest : public ::testing::Test {
  protected:
   GeometricFileTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-geometric-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
     std::mt19937_64 random{11};
     machine = metrology::testing::random_machine({{1, 0, 2}, 2}, {0.2, 0.2, 0.0}, random);
     std::vector<metrology::DisplacementLine> lines;
@@ -32,7 +31,6 @@ class GeometricFileTest : public ::testing::Test {
     write_geometric(text, model);
     text.write(folder / "compensation.yaml");
   }
-  ~GeometricFileTest() override { std::filesystem::remove_all(folder); }
   GeometricFileTest(const GeometricFileTest&) = delete;
   GeometricFileTest& operator=(const GeometricFileTest&) = delete;
 
@@ -41,7 +39,7 @@ class GeometricFileTest : public ::testing::Test {
     return {std::istreambuf_iterator<char>{stream}, {}};
   }
 
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
   metrology::Machine machine;
   metrology::GeometricModel model;
 };

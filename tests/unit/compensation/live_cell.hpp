@@ -12,22 +12,14 @@
 #include "components/compensation/compensation.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::compensation::testing {
 
-/// A folder that goes with the test.
-struct Folder {
-  Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-live-XXXXXX").string();
-    path = mkdtemp(pattern.data());
-    std::ofstream{machine()} << "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n";
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] std::filesystem::path machine() const { return path / "machine.yaml"; }
-
-  std::filesystem::path path;
+/// A folder that goes with the test, with the machine file in it.
+struct Folder : invar::testing::TemporaryFolder {
+  Folder() { write("machine.yaml", "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n"); }
+  [[nodiscard]] std::filesystem::path machine() const { return *this / "machine.yaml"; }
 };
 
 /// X too long by `stretch`, and a bow of `bow` [m] at mid travel.
@@ -73,8 +65,8 @@ inline std::filesystem::path write(const Folder& folder, const std::string& name
                                    const metrology::GeometricModel& model) {
   ModelText text{"geometric", {}};
   write_geometric(text, model);
-  text.write(folder.path / name);
-  return folder.path / name;
+  text.write(folder / name);
+  return folder / name;
 }
 
 inline std::filesystem::path write(const Folder& folder, const std::string& name,
@@ -82,8 +74,8 @@ inline std::filesystem::path write(const Folder& folder, const std::string& name
   ModelText text{"thermal", {}};
   write_place(text, place);
   write_thermal(text, model);
-  text.write(folder.path / name);
-  return folder.path / name;
+  text.write(folder / name);
+  return folder / name;
 }
 
 inline std::uint32_t checksum_of(const std::filesystem::path& file) {

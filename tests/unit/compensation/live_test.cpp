@@ -45,7 +45,7 @@ TEST(LiveCompensation, PutsAModelToUseWithoutAJumpAndGoesBackWithoutOne) {
   // x' (1 + 1e-4) = x: e(P - e(P)) to the second step.
   EXPECT_NEAR(last, -1e-4 * 0.1 * (1.0 - 1e-4), 2e-9);
   EXPECT_NEAR(cell.correction.latest()->sigma(), 1e-7, 1e-12);
-  EXPECT_EQ(cell.correction.latest()->layer_checksum()[0], testing::checksum_of(cell.folder.path / "a.yaml"));
+  EXPECT_EQ(cell.correction.latest()->layer_checksum()[0], testing::checksum_of(cell.folder / "a.yaml"));
 
   EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_NONE);
   EXPECT_NEAR(cell.cycle_once().correction(), last, 3e-7);
@@ -58,7 +58,7 @@ TEST(LiveCompensation, RefusesWhatMustNotMoveTheMachineAndTheLastGoodModelHolds)
   const auto good = write(cell.folder, "good.yaml", geometry(1e-4, 0.0));
   ASSERT_EQ(cell.use(good).state(), MODEL_ACTIVE);
   const double before = cell.run_for(1.0).correction();
-  const auto bad = cell.folder.path / "bad.yaml";
+  const auto bad = cell.folder / "bad.yaml";
   const auto refused = [&](const std::string& words) {
     const ModelStatus& status = cell.tell(MODEL_STAGE, bad);
     EXPECT_EQ(status.state(), MODEL_REFUSED) << words;
@@ -263,7 +263,7 @@ TEST(LiveCompensation, NeitherAllocatesNorLocksWhateverHappens) {
   cell.bring_up(false);
   const auto below = write(cell.folder, "geometry.yaml", geometry(5e-5, 1e-6));
   const auto above = write(cell.folder, "heat.yaml", heat(1e-5, 50.0), {0, testing::checksum_of(below)});
-  std::ofstream{cell.folder.path / "bad.yaml"} << "rubbish";
+  std::ofstream{cell.folder / "bad.yaml"} << "rubbish";
   std::vector<ModelCommand> commands(9);
   const auto set = [&](std::size_t i, ModelCommandKind kind, const std::filesystem::path& path,
                        std::uint64_t transaction) {
@@ -274,7 +274,7 @@ TEST(LiveCompensation, NeitherAllocatesNorLocksWhateverHappens) {
   };
   set(0, MODEL_STAGE, below, 0);
   set(1, MODEL_ACTIVATE, {}, 0);
-  set(2, MODEL_STAGE, cell.folder.path / "bad.yaml", 0);
+  set(2, MODEL_STAGE, cell.folder / "bad.yaml", 0);
   set(3, MODEL_STAGE, above, 0);
   set(4, MODEL_ACTIVATE, {}, 5);
   set(5, MODEL_KEEP, {}, 5);

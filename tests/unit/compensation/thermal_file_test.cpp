@@ -1,5 +1,7 @@
 // A model reads back as it was written, and a damaged one is refused.
 #include "core/compensation/thermal_file.hpp"
+#include "tests/support/fault_of.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -15,8 +17,6 @@ using ::testing::HasSubstr;
 class ThermalFile : public ::testing::Test {
  protected:
   ThermalFile() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-model-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
     model.x = {0.0, 0.2};
     model.temperature = {26.9, 30.1};
     model.heating_rate = {0.0, 0.0};
@@ -33,7 +33,6 @@ class ThermalFile : public ::testing::Test {
                           numerics::GridAxis{model.heating_rate, 1}},
                          std::vector<double>{1e-7, 2e-7, 3e-7, 4e-7}};
   }
-  ~ThermalFile() override { std::filesystem::remove_all(folder); }
   ThermalFile(const ThermalFile&) = delete;
   ThermalFile& operator=(const ThermalFile&) = delete;
 
@@ -53,15 +52,10 @@ class ThermalFile : public ::testing::Test {
     return result;
   }
   static std::string fault_of(const std::filesystem::path& file) {
-    try {
-      (void)read(file);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
+    return invar::testing::fault_of([&] { (void)read(file); });
   }
 
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
   metrology::ThermalError model;
 };
 

@@ -8,6 +8,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/search.hpp"
 
 namespace invar::diagnose {
@@ -65,14 +66,6 @@ constexpr Machine motor{
 
 class Equations : public ::testing::Test {
  protected:
-  Equations() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-equations-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~Equations() override { std::filesystem::remove_all(folder); }
-  Equations(const Equations&) = delete;
-  Equations& operator=(const Equations&) = delete;
-
   Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed) {
     const auto yaml = config::Yaml::parse(machine.yaml, "model.yaml");
     const auto model = model::read(yaml);
@@ -108,7 +101,7 @@ class Equations : public ::testing::Test {
     EXPECT_LT(d.heldout[0].after, 0.7 * d.heldout[0].retuned);
   }
 
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
 };
 
 TEST_F(Equations, NamesASpringThatHardens) {

@@ -11,6 +11,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/report.hpp"
 
 namespace invar::diagnose {
@@ -18,14 +19,6 @@ namespace {
 
 class DiagnosisTest : public ::testing::Test {
  protected:
-  DiagnosisTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-diagnosis-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~DiagnosisTest() override { std::filesystem::remove_all(folder); }
-  DiagnosisTest(const DiagnosisTest&) = delete;
-  DiagnosisTest& operator=(const DiagnosisTest&) = delete;
-
   Diagnosis diagnose_thermal(const std::vector<physics::Term>& truth_terms, double loss, unsigned seed,
                              const std::string& temperature = "T") {
     const auto yaml = config::Yaml::parse(
@@ -71,7 +64,7 @@ class DiagnosisTest : public ::testing::Test {
     return t;
   }
 
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
   Case data;
 };
 

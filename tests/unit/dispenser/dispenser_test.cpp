@@ -12,33 +12,13 @@
 #include "components/world/simulated_pneumatics.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::dispenser {
 namespace {
 
 namespace fs = std::filesystem;
 using namespace dispensing;
-
-/// A folder that goes with the test.
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "invar-dispenser-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"no temporary folder"};
-    path_ = name;
-  }
-  ~Folder() { fs::remove_all(path_); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  fs::path write(const std::string& file, const std::string& text) const {
-    std::ofstream{path_ / file} << text;
-    return path_ / file;
-  }
-  [[nodiscard]] fs::path operator/(const char* file) const { return path_ / file; }
-
- private:
-  fs::path path_;
-};
 
 struct Bench final : Component {
   Output<PressureCommand> command{*this, "command"};
@@ -65,10 +45,10 @@ struct Bench final : Component {
 
   explicit Bench(const fs::path& fault_script = {}) {
     const auto port = test::free_port();
-    device_parameters.map = INVAR_SOURCE_DIR "/deployment/maps/pneumatic.yaml";
-    device_parameters.port = port;
-    device_parameters.faults = fault_script;
-    parameters.modbus.map = device_parameters.map;
+    device_parameters.modbus.map = INVAR_SOURCE_DIR "/deployment/maps/pneumatic.yaml";
+    device_parameters.modbus.port = port;
+    device_parameters.modbus.faults = fault_script;
+    parameters.modbus.map = device_parameters.modbus.map;
     parameters.modbus.port = port;
     parameters.pressurise = true;
     Pattern& grid = parameters.patterns.emplace_back();
@@ -240,7 +220,7 @@ TEST(Dispenser, OverPressureLatchesAndVentsUntilItIsResetByHand) {
 }
 
 TEST(Dispenser, ControllerThatDoesNotAnswerIsStaleAndNothingIsJetted) {
-  Folder folder;
+  invar::testing::TemporaryFolder folder;
   Bench bench{
       folder.write("faults.yaml", "invar_modbus_faults: 1\nfaults:\n  - {at: 3, for: 4, do: refuse}\n")};
   bench.bring_up();
@@ -282,7 +262,7 @@ TEST(Dispenser, DeactivatedItShutsTheSupply) {
 }
 
 TEST(Dispenser, TwoRunsAgreeBitForBit) {
-  Folder folder;
+  invar::testing::TemporaryFolder folder;
   const auto script = folder.write(
       "faults.yaml",
       "invar_modbus_faults: 1\nfaults:\n  - {at: 2, for: 1, do: drop}\n  - {at: 4, for: 1, do: refuse}\n");
@@ -317,7 +297,8 @@ TEST(Dispenser, AnswersWithTargetsAsTheyAreWhereNoModelIsInUse) {
 }
 
 /// compensation.yaml of the seed's head with a delay of 0.3 ms and 2 m/s.
-fs::path write_model(const Folder& folder, double placement_y = 118.2e-6, double slope_sigma = 1e-4) {
+fs::path write_model(const invar::testing::TemporaryFolder& folder, double placement_y = 118.2e-6,
+                     double slope_sigma = 1e-4) {
   metrology::DropletTrajectory path;
   path.placement << 2.0e-6, placement_y;
   path.slope << 5.30508e-3, 9.01832e-5;
@@ -334,7 +315,7 @@ fs::path write_model(const Folder& folder, double placement_y = 118.2e-6, double
 }
 
 TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
-  Folder folder;
+  invar::testing::TemporaryFolder folder;
   Bench bench;
   bench.bring_up();
   EXPECT_EQ(bench.change(compensation::MODEL_STAGE, write_model(folder)).state(), compensation::MODEL_STAGED);
@@ -353,7 +334,7 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
 }
 
 TEST(Dispenser, RefusesModelsThatMustNotAim) {
-  Folder folder;
+  invar::testing::TemporaryFolder folder;
   Bench bench;
   bench.bring_up();
   EXPECT_EQ(bench.change(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_REFUSED);
@@ -377,7 +358,7 @@ TEST(Dispenser, RefusesModelsThatMustNotAim) {
 }
 
 TEST(Pattern, ReadsATableAndSaysWhichRowIsWrong) {
-  Folder folder;
+  invar::testing::TemporaryFolder folder;
   Pattern pattern;
   pattern.kind = "file";
   pattern.file = folder.write("logo.csv", "target_x [mm],target_y [mm]\n60,50\n61.5,50\n");

@@ -1,5 +1,6 @@
 #include "core/machine/machine_file.hpp"
 #include "core/machine/heat_growth.hpp"
+#include "tests/support/fault_of.hpp"
 
 #include <gmock/gmock.h>
 
@@ -12,14 +13,11 @@ namespace {
 using ::testing::HasSubstr;
 
 std::string fault_of(const std::string& text) {
-  try {
+  return invar::testing::fault_of([&] {
     const auto yaml = config::Yaml::parse(text, "m.yaml");
     (void)read_machine(yaml.root());
     yaml.finish();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "accepted";
+  });
 }
 
 TEST(MachineFile, ReadsTheHiddenErrorsOfASimulatedMachine) {

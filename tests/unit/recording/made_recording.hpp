@@ -11,24 +11,11 @@
 
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/recording_writer.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::recording {
 
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-recording-XXXXXX").string();
-    path_ = mkdtemp(pattern.data());
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
+using testing::TemporaryFolder;
 
 inline Bytes bytes_of(const std::filesystem::path& file) {
   std::ifstream in{file, std::ios::binary};

@@ -1,4 +1,6 @@
 #include "core/recording/table.hpp"
+#include "tests/support/fault_of.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -13,27 +15,14 @@ using ::testing::HasSubstr;
 
 class TableTest : public ::testing::Test {
  protected:
-  TableTest() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-table-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~TableTest() override { std::filesystem::remove_all(folder); }
-  TableTest(const TableTest&) = delete;
-  TableTest& operator=(const TableTest&) = delete;
-
   std::filesystem::path make(const std::string& text) const {
     std::ofstream{folder / "in.csv"} << text;
     return folder / "in.csv";
   }
   static std::string fault_of(const std::filesystem::path& file) {
-    try {
-      Table::read(file);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
+    return invar::testing::fault_of([&] { Table::read(file); });
   }
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
 };
 
 TEST_F(TableTest, ReadsUnitsEmptyCellsAndTextColumns) {

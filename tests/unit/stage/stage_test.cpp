@@ -1,4 +1,5 @@
 #include "components/stage/axis_stage.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -91,10 +92,7 @@ struct Bench : Component {
 struct Sprung final : Bench {
   Output<compensation::ModelCommand> order{*this, "order"};
   Input<compensation::ModelStatus> answer{*this, "answer"};
-  std::filesystem::path folder = [] {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-stage-XXXXXX").string();
-    return std::filesystem::path{mkdtemp(pattern.data())};
-  }();
+  invar::testing::TemporaryFolder folder;
   std::uint64_t orders = 0;
 
   Sprung() {
@@ -103,7 +101,6 @@ struct Sprung final : Bench {
     static_cast<OutputPort*>(stage.find_port("model_status"))->connect(answer);
     spring = 600.0;
   }
-  ~Sprung() override { std::filesystem::remove_all(folder); }
 
   std::string model(double stiffness, const std::string& plant = "axis") {
     const auto file = folder / "model.yaml";

@@ -9,6 +9,7 @@
 
 #include "components/world/simulated_heater.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::thermal {
 namespace {
@@ -30,11 +31,11 @@ struct Bench final : Component {
 
   explicit Bench(const fs::path& faults = {}) {
     const auto port = test::free_port();
-    heater_parameters.map = INVAR_SOURCE_DIR "/deployment/maps/heater.yaml";
-    heater_parameters.port = port;
-    heater_parameters.faults = faults;
+    heater_parameters.modbus.map = INVAR_SOURCE_DIR "/deployment/maps/heater.yaml";
+    heater_parameters.modbus.port = port;
+    heater_parameters.modbus.faults = faults;
     heater_parameters.noise = 0.0;
-    thermal_parameters.modbus.map = heater_parameters.map;
+    thermal_parameters.modbus.map = heater_parameters.modbus.map;
     thermal_parameters.modbus.port = port;
     thermal_parameters.power_limit = 120.0;
     thermal_parameters.pid.kp = 60.0;
@@ -72,8 +73,8 @@ struct Bench final : Component {
   }
   /// What the pad gets in fact, asked from the device by a master of its own.
   [[nodiscard]] double heater_power() const {
-    modbus::Bus bus{{.port = static_cast<std::uint16_t>(heater_parameters.port)}};
-    const modbus::Device& device = bus.add(modbus::load_map(heater_parameters.map));
+    modbus::Bus bus{{.port = static_cast<std::uint16_t>(heater_parameters.modbus.port)}};
+    const modbus::Device& device = bus.add(modbus::load_map(heater_parameters.modbus.map));
     EXPECT_TRUE(bus.exchange(at()));
     return device.value("delivered_power").value;
   }
@@ -82,24 +83,6 @@ struct Bench final : Component {
     for (const Instant end = at() + Duration::seconds(seconds); at() < end;) last = cycle_once();
     return last;
   }
-};
-
-/// A fault script in a folder that goes with the test.
-class Script {
- public:
-  explicit Script(const std::string& faults) {
-    std::string name = (fs::temp_directory_path() / "invar-thermal-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw std::runtime_error{"no temporary folder"};
-    folder_ = name;
-    std::ofstream{file()} << "invar_modbus_faults: 1\nfaults:\n" << faults;
-  }
-  ~Script() { fs::remove_all(folder_); }
-  Script(const Script&) = delete;
-  Script& operator=(const Script&) = delete;
-  [[nodiscard]] fs::path file() const { return folder_ / "faults.yaml"; }
-
- private:
-  fs::path folder_;
 };
 
 TEST(Thermal, BringsTheSlideToItsSetpointAndHoldsIt) {
@@ -122,9 +105,12 @@ TEST(Thermal, PublishesFurtherZonesFromTheirThermistors) {
 }
 
 TEST(Thermal, TwoRunsAgreeBitForBit) {
-  const Script script{"  - {at: 20, for: 5, do: drop}\n  - {at: 40, for: 3, do: refuse}\n"};
+  const invar::testing::TemporaryFolder folder;
+  const auto script = folder.write("faults.yaml",
+                                   "invar_modbus_faults: 1\nfaults:\n"
+                                   "  - {at: 20, for: 5, do: drop}\n  - {at: 40, for: 3, do: refuse}\n");
   const auto run = [&] {
-    Bench bench{script.file()};
+    Bench bench{script};
     bench.heater_parameters.noise = 0.003;
     bench.bring_up();
     std::vector<double> trace;
@@ -138,8 +124,11 @@ TEST(Thermal, TwoRunsAgreeBitForBit) {
 }
 
 TEST(Thermal, LetsGoOfTheHeaterWhileItsDeviceIsGoneAndGoesOnWhenItIsBack) {
-  const Script script{"  - {at: 60, for: 20, do: refuse}\n"};
-  Bench bench{script.file()};
+  const invar::testing::TemporaryFolder folder;
+  const auto script = folder.write("faults.yaml",
+                                   "invar_modbus_faults: 1\nfaults:\n"
+                                   "  - {at: 60, for: 20, do: refuse}\n");
+  Bench bench{script};
   bench.bring_up();
   EXPECT_TRUE(bench.run_for(60.0).enabled());
   const NodeTemperature gone = bench.run_for(10.0);

@@ -7,7 +7,8 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "components/vision/camera_file.hpp"
-#include "core/base/fault.hpp"
+#include "tests/support/fault_of.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::vision {
 namespace {
@@ -16,14 +17,6 @@ using ::testing::HasSubstr;
 
 class ImageFile : public ::testing::Test {
  protected:
-  ImageFile() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-image-XXXXXX").string();
-    folder = mkdtemp(pattern.data());
-  }
-  ~ImageFile() override { std::filesystem::remove_all(folder); }
-  ImageFile(const ImageFile&) = delete;
-  ImageFile& operator=(const ImageFile&) = delete;
-
   std::filesystem::path write(const std::string& name, const std::string& bytes) const {
     std::ofstream{folder / name, std::ios::binary} << bytes;
     return folder / name;
@@ -37,14 +30,9 @@ class ImageFile : public ::testing::Test {
     return {bytes.begin(), bytes.end()};
   }
   static std::string fault_of(const std::filesystem::path& file) {
-    try {
-      read_gray_image(file);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "accepted";
+    return invar::testing::fault_of([&] { read_gray_image(file); });
   }
-  std::filesystem::path folder;
+  invar::testing::TemporaryFolder folder;
 };
 
 TEST_F(ImageFile, PngJpegAndPgmAreRead) {
@@ -58,7 +46,7 @@ TEST_F(ImageFile, PngJpegAndPgmAreRead) {
 TEST_F(ImageFile, EachFaultIsSaidWithTheFilesName) {
   const std::string png = bytes_of(".png"), jpeg = bytes_of(".jpg");
   EXPECT_THAT(fault_of(folder / "none.png"), HasSubstr("none.png: no such image file"));
-  EXPECT_THAT(fault_of(folder), HasSubstr("is a folder"));
+  EXPECT_THAT(fault_of(folder.path()), HasSubstr("is a folder"));
   EXPECT_THAT(fault_of(write("empty.png", "")), HasSubstr("empty.png: the image is empty"));
   EXPECT_THAT(fault_of(write("text.png", "this is no image")), HasSubstr("text.png: is no image"));
   EXPECT_THAT(fault_of(write("cut.png", png.substr(0, png.size() / 2))), HasSubstr("cut.png: "));

@@ -5,34 +5,19 @@
 
 #include <cmath>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
 #include "components/vision/camera_file.hpp"
-#include "components/vision/folder_camera.hpp"
 #include "components/vision/simulated_camera.hpp"
-#include "core/base/fault.hpp"
+#include "tests/support/fault_of.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace invar::vision {
 namespace {
 
 using ::testing::HasSubstr;
-
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-vision-XXXXXX").string();
-    path = mkdtemp(pattern.data());
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] std::filesystem::path write(const std::string& name, const std::string& text) const {
-    std::ofstream{path / name, std::ios::binary} << text;
-    return path / name;
-  }
-  std::filesystem::path path;
-};
 
 /// A camera, vision and what stands about them, joined by their ports; steps of 10 ms.
 struct Bench final : Component {
@@ -129,38 +114,37 @@ SimulatedCamera::Parameters camera_parameters() {
 }
 
 /// A camera.yaml that fits camera_parameters().
-std::filesystem::path sound_camera(const Folder& folder, const CameraModel* other = nullptr) {
+std::filesystem::path sound_camera(const invar::testing::TemporaryFolder& folder) {
   CameraModel camera;
   camera.scale = 1.29e-5;
   camera.scale_sigma = 1e-9;
   camera.width = 600;
   camera.height = 400;
   camera.center = {299.5, 199.5};
-  return folder.write("camera.yaml", camera_yaml(other != nullptr ? *other : camera));
+  return folder.write("camera.yaml", camera_yaml(camera));
 }
 
-std::string fault_of(const std::function<void()>& what) {
-  try {
-    what();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+/// A simulated camera and vision in a bench; a calibrated camera unless the caller asks otherwise.
+struct Sight {
+  invar::testing::TemporaryFolder folder;
+  SimulatedCamera::Parameters seeing = camera_parameters();
+  Vision::Parameters measuring;
+  SimulatedCamera camera;
+  Vision vision;
+  Bench bench{camera, vision};
+  explicit Sight(const std::function<void(Sight&)>& change = [](Sight&) {})
+      : camera{(measuring.camera = sound_camera(folder), change(*this), seeing)}, vision{measuring} {}
+};
 
 TEST(Vision, FindsDropletsWhereTheyLieOnTheSubstrate) {
-  const Folder folder;
-  SimulatedCamera::Parameters seeing = camera_parameters();
-  seeing.mount.offset = {0.031, -0.012};
-  seeing.mount.rotation = 0.02;
-  seeing.dust = 10;
-  seeing.look.light_slope_x = 0.2;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  measuring.mount = seeing.mount;
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight{[](Sight& s) {
+    s.seeing.mount.offset = {0.031, -0.012};
+    s.seeing.mount.rotation = 0.02;
+    s.seeing.dust = 10;
+    s.seeing.look.light_slope_x = 0.2;
+    s.measuring.mount = s.seeing.mount;
+  }};
+  Bench& bench = sight.bench;
 
   const std::vector<std::array<double, 2>> truth{
       {0.131, 0.088}, {0.1325, 0.0895}, {0.129, 0.0868}, {0.1332, 0.0871}};
@@ -191,13 +175,8 @@ TEST(Vision, FindsDropletsWhereTheyLieOnTheSubstrate) {
 }
 
 TEST(Vision, AnUncorrectedEncoderShiftsWhatItSees) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  const auto seeing = camera_parameters();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight;
+  Bench& bench = sight.bench;
   bench.drop(0.05, 0.05, 6e-4);
   bench.stand(0.05, 0.05, 4e-6);
   bench.ask(1);
@@ -206,13 +185,8 @@ TEST(Vision, AnUncorrectedEncoderShiftsWhatItSees) {
 }
 
 TEST(Vision, AFreshSubstrateIsSeenEmpty) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  const auto seeing = camera_parameters();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight;
+  Bench& bench = sight.bench;
   bench.stand(0.05, 0.05);
   bench.drop(0.05, 0.05, 6e-4);
   bench.ask(1);
@@ -235,21 +209,20 @@ constexpr const char* ruler_text =
     "  - {radius: 7.5e-4, at: [0.3e-3, 0.9e-3]}\n  - {radius: 10.0e-4, at: [2.2e-3, -0.5e-3]}\n";
 
 TEST(Vision, CalibratesByARulerOnTheTable) {
-  const Folder folder;
-  SimulatedCamera::Parameters seeing = camera_parameters();
-  seeing.width = 1200;
-  seeing.height = 800;
-  seeing.scale = 1.1173e-5;
-  SimulatedCamera::Ruler ruler;
-  ruler.file = folder.write("ruler.yaml", ruler_text);
-  ruler.position = {0.18, 0.02};
-  seeing.ruler = ruler;
-  Vision::Parameters measuring;
-  measuring.ruler = ruler.file;
-  measuring.out = (folder.path / "out").string();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight{[](Sight& s) {
+    s.seeing.width = 1200;
+    s.seeing.height = 800;
+    s.seeing.scale = 1.1173e-5;
+    SimulatedCamera::Ruler ruler;
+    ruler.file = s.folder.write("ruler.yaml", ruler_text);
+    ruler.position = {0.18, 0.02};
+    s.seeing.ruler = ruler;
+    s.measuring.camera.clear();
+    s.measuring.ruler = ruler.file;
+    s.measuring.out = (s.folder / "out").string();
+  }};
+  Bench& bench = sight.bench;
+  const auto& folder = sight.folder;
   bench.run(1);
   EXPECT_EQ(bench.status.latest()->text(), "not calibrated");
   bench.ask(1);
@@ -260,14 +233,14 @@ TEST(Vision, CalibratesByARulerOnTheTable) {
   bench.ask(2, image::VISION_CALIBRATE);
   EXPECT_EQ(bench.status.latest()->phase(), job::JOB_FAILED);
   EXPECT_THAT(bench.said(), HasSubstr("0 circles, the ruler has 4"));
-  EXPECT_FALSE(std::filesystem::exists(folder.path / "out" / "camera.yaml"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "out" / "camera.yaml"));
 
   bench.stand(0.18, 0.02);
-  bench.ask(3, image::VISION_CALIBRATE, (folder.path / "ruler.png").string());
+  bench.ask(3, image::VISION_CALIBRATE, (folder / "ruler.png").string());
   ASSERT_EQ(bench.status.latest()->phase(), job::JOB_DONE) << bench.said();
-  EXPECT_NEAR(bench.status.latest()->scale(), seeing.scale, 2e-4 * seeing.scale);
-  EXPECT_NEAR(read_camera(folder.path / "out" / "camera.yaml").scale, bench.status.latest()->scale(), 1e-14);
-  EXPECT_EQ(cv::imread(folder.path / "ruler.png").cols, 1200);
+  EXPECT_NEAR(bench.status.latest()->scale(), sight.seeing.scale, 2e-4 * sight.seeing.scale);
+  EXPECT_NEAR(read_camera(folder / "out" / "camera.yaml").scale, bench.status.latest()->scale(), 1e-14);
+  EXPECT_EQ(cv::imread(folder / "ruler.png").cols, 1200);
 
   bench.stand(0.05, 0.05);
   bench.drop(0.0512, 0.0493, 6e-4);
@@ -278,16 +251,11 @@ TEST(Vision, CalibratesByARulerOnTheTable) {
 }
 
 TEST(Vision, DrawsOutlinesAndTargets) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  const auto seeing = camera_parameters();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight;
+  Bench& bench = sight.bench;
   bench.stand(0.05, 0.05);
   bench.drop(0.05, 0.05, 6e-4);
-  const auto file = folder.path / "pictures" / "seen.png";
+  const auto file = sight.folder / "pictures" / "seen.png";
   bench.ask(1, image::VISION_MEASURE, file.string(), {{0.0505, 0.05}});
   const cv::Mat picture = cv::imread(file, cv::IMREAD_UNCHANGED);
   ASSERT_EQ(picture.cols, 600);
@@ -302,18 +270,12 @@ TEST(Vision, DrawsOutlinesAndTargets) {
 }
 
 TEST(Vision, AsksAgainForAFrameThatWasLostAndGivesUpInTheEnd) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  measuring.patience = 0.1;
-  const auto seeing = camera_parameters();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight{[](Sight& s) { s.measuring.patience = 0.1; }};
+  Bench& bench = sight.bench;
   bench.camera_runs = false;
   bench.ask(1);
   image::ExposeCommand lost;  // what the camera was asked for first never arrives there
-  while (static_cast<Inbox<image::ExposeCommand>*>(camera.find_port("expose"))->take(lost)) {
+  while (static_cast<Inbox<image::ExposeCommand>*>(sight.camera.find_port("expose"))->take(lost)) {
   }
   bench.camera_runs = true;
   bench.run(20);
@@ -326,18 +288,12 @@ TEST(Vision, AsksAgainForAFrameThatWasLostAndGivesUpInTheEnd) {
 }
 
 TEST(Vision, CountsFramesThatAreMissing) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  auto seeing = camera_parameters();
-  seeing.camera.rate = 100.0;
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight{[](Sight& s) { s.seeing.camera.rate = 100.0; }};
+  Bench& bench = sight.bench;
   bench.run(3);
   for (int i = 0; i < 4; ++i) {  // vision is late: the newest of these is taken
     const Tick tick{Instant{static_cast<std::int64_t>(bench.cycle) * 10'000'000}, 0.01, bench.cycle};
-    camera.step(tick);
+    sight.camera.step(tick);
     ++bench.cycle;
   }
   bench.run(1);
@@ -348,13 +304,8 @@ TEST(Vision, CountsFramesThatAreMissing) {
 }
 
 TEST(Vision, RefusesFramesThatCannotBe) {
-  const Folder folder;
-  Vision::Parameters measuring;
-  measuring.camera = sound_camera(folder);
-  const auto seeing = camera_parameters();
-  SimulatedCamera camera{seeing};
-  Vision vision{measuring};
-  Bench bench{camera, vision};
+  Sight sight;
+  Bench& bench = sight.bench;
   image::Frame frame;
   frame.number(1);
   frame.width(600);
@@ -377,16 +328,12 @@ TEST(Vision, RefusesFramesThatCannotBe) {
 }
 
 TEST(Vision, TwoRunsAreEqualBitForBit) {
-  const Folder folder;
   const auto run = [&] {
-    Vision::Parameters measuring;
-    measuring.camera = sound_camera(folder);
-    auto seeing = camera_parameters();
-    seeing.dust = 20;
-    seeing.look.clutter = 3.0;
-    SimulatedCamera camera{seeing};
-    Vision vision{measuring};
-    Bench bench{camera, vision};
+    Sight sight{[](Sight& s) {
+      s.seeing.dust = 20;
+      s.seeing.look.clutter = 3.0;
+    }};
+    Bench& bench = sight.bench;
     bench.stand(0.05, 0.05);
     bench.drop(0.0503, 0.0501, 6e-4);
     bench.ask(1);
@@ -400,73 +347,21 @@ TEST(Vision, TwoRunsAreEqualBitForBit) {
 }
 
 TEST(Vision, KnowsItsInputsBeforeItRuns) {
-  const Folder folder;
+  const invar::testing::TemporaryFolder folder;
   Vision::Parameters p;
-  EXPECT_THAT(fault_of([&] { Vision{p}; }), HasSubstr("camera: missing, and no `ruler`"));
+  EXPECT_THAT(invar::testing::fault_of([&] { Vision{p}; }), HasSubstr("camera: missing, and no `ruler`"));
   p.camera = sound_camera(folder);
   p.polarity = "bright";
-  EXPECT_THAT(fault_of([&] { Vision{p}; }), HasSubstr("polarity: is `bright`"));
+  EXPECT_THAT(invar::testing::fault_of([&] { Vision{p}; }), HasSubstr("polarity: is `bright`"));
   p.polarity = "auto";
   std::ifstream in{p.camera};
   std::string text{std::istreambuf_iterator<char>{in}, {}};
   text.replace(text.find("1.29e-05"), 8, "1.30e-05");
   p.camera = folder.write("edited.yaml", text);
-  EXPECT_THAT(fault_of([&] { Vision{p}; }), HasSubstr("edited.yaml: its checksum does not fit its text"));
+  EXPECT_THAT(invar::testing::fault_of([&] { Vision{p}; }),
+              HasSubstr("edited.yaml: its checksum does not fit its text"));
   p.camera = folder.write("cut.yaml", text.substr(0, text.find("scale:") + 12));
-  EXPECT_THAT(fault_of([&] { Vision{p}; }), HasSubstr("cut.yaml"));
-}
-
-class FolderCameraTest : public ::testing::Test {
- protected:
-  void picture(const std::string& name, unsigned char grey) const {
-    cv::imwrite(folder.path / name, cv::Mat1b(40, 60, grey));
-  }
-  Folder folder;
-  FolderCamera::Parameters parameters;
-  /// The grey of each frame within some steps of 10 ms.
-  std::vector<int> run(int steps, std::string* failure = nullptr) {
-    FolderCamera camera{parameters};
-    struct Looker final : Component {
-      Inbox<image::Frame> frame{*this, "frame", {.profile = "image"}};
-      void step(const Tick&) noexcept override {}
-    } looker;
-    static_cast<OutputPort*>(camera.find_port("frame"))->connect(looker.frame);
-    camera.configure();
-    camera.activate();
-    std::vector<int> greys;
-    for (int i = 0; i < steps; ++i) {
-      camera.step({Instant{i * 10'000'000LL}, 0.01, static_cast<std::uint64_t>(i)});
-      for (image::Frame frame; looker.frame.take(frame);) greys.push_back(frame.pixels().at(0));
-    }
-    if (failure != nullptr && camera.failure() != nullptr) *failure = camera.failure();
-    return greys;
-  }
-};
-
-TEST_F(FolderCameraTest, ShowsPicturesByNameAtItsRate) {
-  picture("b.png", 20);
-  picture("a.jpg", 10);
-  picture("c.png", 30);
-  (void)folder.write("notes.txt", "no picture");
-  parameters.folder = folder.path;
-  parameters.camera.rate = 50.0;
-  EXPECT_THAT(run(3), ::testing::ElementsAre(10, 20));
-  EXPECT_THAT(run(20), ::testing::ElementsAre(10, 20, 30));
-  parameters.again = true;
-  EXPECT_THAT(run(7), ::testing::ElementsAre(10, 20, 30, 10));
-}
-
-TEST_F(FolderCameraTest, SaysWhatIsWrongWithItsFolder) {
-  parameters.folder = folder.path / "none";
-  EXPECT_THAT(fault_of([&] { FolderCamera{parameters}; }), HasSubstr("is no folder"));
-  parameters.folder = folder.path;
-  EXPECT_THAT(fault_of([&] { FolderCamera{parameters}; }), HasSubstr("holds no picture"));
-  picture("a.png", 10);
-  (void)folder.write("b.png", "this is no picture");
-  parameters.camera.rate = 100.0;
-  std::string failure;
-  EXPECT_THAT(run(5, &failure), ::testing::ElementsAre(10));
-  EXPECT_THAT(failure, HasSubstr("b.png: is no image"));
+  EXPECT_THAT(invar::testing::fault_of([&] { Vision{p}; }), HasSubstr("cut.yaml"));
 }
 
 }  // namespace

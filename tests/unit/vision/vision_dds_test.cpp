@@ -12,6 +12,7 @@
 #include "components/vision/vision_component.hpp"
 #include "core/executor/executor.hpp"
 #include "tests/support/process.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/unit/dds/domain.hpp"
 
 namespace invar::vision {
@@ -61,8 +62,7 @@ int serve(const std::filesystem::path& ruler, std::uint32_t domain) {
 }
 
 TEST(VisionOverDds, CalibratesAndMeasuresOnRequestFromAnotherProcess) {
-  std::string pattern = (std::filesystem::temp_directory_path() / "invar-vision-XXXXXX").string();
-  const std::filesystem::path folder = mkdtemp(pattern.data());
+  const invar::testing::TemporaryFolder folder;
   std::ofstream{folder / "ruler.yaml"} << "circles:\n  - {radius: 4.0e-4, at: [-2.0e-3, 1.0e-3]}\n"
                                           "  - {radius: 5.0e-4, at: [-1.2e-3, -1.0e-3]}\n"
                                           "  - {radius: 6.0e-4, at: [2.2e-3, -0.5e-3]}\n";
@@ -119,7 +119,6 @@ TEST(VisionOverDds, CalibratesAndMeasuresOnRequestFromAnotherProcess) {
                                       std::abs(0.5 * droplet.diameter() - radius));
     EXPECT_LT(nearest, 0.1 * 1.29e-5);
   }
-  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

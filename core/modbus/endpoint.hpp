@@ -1,0 +1,68 @@
+// How a component names its device on Modbus TCP, and keeps or plays it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <initializer_list>
+#include <memory>
+#include <string>
+
+#include "core/base/time.hpp"
+#include "core/modbus/bus.hpp"
+#include "core/modbus/server.hpp"
+
+namespace invar::modbus {
+
+/// Parameters of a component that keeps a device.
+struct Endpoint {
+  std::string host = "127.0.0.1";
+  std::int64_t port = 502;
+  std::filesystem::path map;
+  void describe(auto& p) {
+    p(host, "host", "name or address of the device's controller");
+    p(port, "port", 1, 65535, "TCP port");
+    p(map, "map", "register map");
+  }
+};
+
+/// Parameters of a component that plays a device.
+struct ServedEndpoint {
+  std::filesystem::path map;
+  std::string host = "127.0.0.1";
+  std::int64_t port = 1502;
+  std::filesystem::path faults;
+  void describe(auto& p) {
+    p(map, "map", "register map to serve");
+    p(host, "host", "address to listen on");
+    p(port, "port", 1, 65535, "TCP port to listen on");
+    p(faults, "faults", "fault script: when its Modbus side refuses, drops, delays or lies");
+  }
+};
+
+/// The map that the parameter `key` names. Throws InputError when it names none, when the file is wrong, and when a register in
+/// `needed` is missing; `device` is what the map is of, for the message.
+[[nodiscard]] RegisterMap load_map_of(const std::filesystem::path& file, const std::string& key,
+                                      const std::string& device, std::initializer_list<const char*> needed);
+
+/// The device that these parameters describe, listening from now on. Throws InputError as `load_map` and `Server` do.
+[[nodiscard]] std::unique_ptr<Server> serve(const ServedEndpoint& parameters);
+
+/// One device on a bus of its own. In simulated time the caller's step moves the bus (`receive` before it reads, `send` after it
+/// wrote); by the wall clock the bus's thread does, and both do nothing.
+class Client {
+ public:
+  void open(const Endpoint& endpoint, bool simulated_time);
+  void close() noexcept;
+  [[nodiscard]] bool is_open() const { return bus_ != nullptr; }
+  /// Precondition: open.
+  [[nodiscard]] Device& device() const { return *device_; }
+  void receive(Instant now);
+  void send(Instant now);
+
+ private:
+  std::unique_ptr<Bus> bus_;
+  Device* device_ = nullptr;
+  bool stepped_ = false;
+};
+
+}  // namespace invar::modbus
