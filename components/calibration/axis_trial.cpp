@@ -68,76 +68,33 @@ std::vector<double> following(const recording::Table& table) {
 
 }  // namespace
 
-void AxisTrial::activate() {
-  task_ = {};
-  report(job::JOB_IDLE, "ready");
-}
-
-void AxisTrial::deactivate() noexcept {
-  if (task_.running()) report(job::JOB_CANCELLED, "the component was deactivated");
-  task_ = {};
-}
-
-void AxisTrial::report(job::JobPhase phase, const std::string& text) {
-  stamp(sample_);
-  sample_.component_id(id);
-  sample_.phase(phase);
-  sample_.progress(progress_);
-  sample_.text(text);
-  status_.write(sample_);
-}
-
-void AxisTrial::start(const job::JobCommand& command) {
-  if (command.kind() == job::JOB_CANCEL) {
-    if (!task_.running()) return;
-    task_ = {};
-    stage::AxisCommand stop;
-    stop.kind(stage::AXIS_COMMAND_STOP);
-    stop.cell(cell);
-    stop.axis(static_cast<std::uint32_t>(parameters_.axis));
-    stop.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
-    command_.write(stop);
-    report(job::JOB_CANCELLED, "cancelled");
-    return;
-  }
-  if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
-  if (task_.running()) {
-    report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
-    return;
-  }
-  const std::string wanted{command.name().c_str()};
-  const auto find = [&](const auto& jobs) {
+std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
+  const auto named = [&](const auto& jobs) {
     return std::find_if(jobs.begin(), jobs.end(), [&](const auto& job) { return job.name == wanted; });
   };
-  sample_.id(command.id());
-  sample_.name(wanted);
-  progress_ = 0.0;
   const auto begin = [&](const auto& job) {
-    const auto folder = std::filesystem::absolute(job.out);
-    std::filesystem::create_directories(folder);
+    std::filesystem::create_directories(job.out);
     began_ = now();
-    sample_.result_path(folder.string());
-    task_ = run(job);
-    report(job::JOB_RUNNING, "started");
+    return Job{run(job), job.out};
   };
-  if (const auto ripple = find(parameters_.ripple); ripple != parameters_.ripple.end()) {
-    begin(*ripple);
-  } else if (const auto tracking = find(parameters_.tracking); tracking != parameters_.tracking.end()) {
-    begin(*tracking);
-  } else {
-    report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
-  }
+  if (const auto ripple = named(parameters_.ripple); ripple != parameters_.ripple.end())
+    return begin(*ripple);
+  if (const auto tracking = named(parameters_.tracking); tracking != parameters_.tracking.end())
+    return begin(*tracking);
+  return std::nullopt;
 }
 
-void AxisTrial::step(const Tick&) noexcept {
-  try {
-    job::JobCommand command;
-    while (job_.take(command)) start(command);
-    if (task_.running()) task_.resume();
-  } catch (const std::exception& error) {
-    task_ = {};
-    report(job::JOB_FAILED, error.what());
-  }
+void AxisTrial::make_safe() {
+  stage::AxisCommand stop;
+  stop.kind(stage::AXIS_COMMAND_STOP);
+  send(stop);
+}
+
+void AxisTrial::send(stage::AxisCommand& command) {
+  stamp(command);
+  command.axis(static_cast<std::uint32_t>(parameters_.axis));
+  command.id(next_command_id());
+  command_.write(command);
 }
 
 /// The newest state and what the laser says into the record; the setpoint of the laser's instant is known exactly.
@@ -170,10 +127,7 @@ Task AxisTrial::wait(double seconds) {
 
 /// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
 Task AxisTrial::command_axis(stage::AxisCommand command, recording::Table* record) {
-  stamp(command);
-  command.axis(static_cast<std::uint32_t>(parameters_.axis));
-  command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
-  command_.write(command);
+  send(command);
   const Instant started = now();
   for (;;) {
     co_await NextStep{};
@@ -194,11 +148,8 @@ Task AxisTrial::enable() {
   const Instant give_up = now() + Duration::seconds(10.0);
   while (state_.latest() == nullptr || !state_.latest()->enabled()) {  // processes come up in any order
     stage::AxisCommand command;
-    command.cell(cell);
-    command.axis(static_cast<std::uint32_t>(parameters_.axis));
     command.kind(stage::AXIS_COMMAND_ENABLE);
-    command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
-    command_.write(command);
+    send(command);
     co_await wait(0.5);
     if (now() > give_up)
       throw std::runtime_error{"the axis does not answer to `enable`: is its stage active?"};
@@ -216,7 +167,7 @@ Task AxisTrial::move(double target, double velocity, recording::Table* record) {
 Task AxisTrial::align(double from) {
   sensing::BeamCommand beam;
   stamp(beam);
-  beam.id(next_command_++);
+  beam.id(next_command_id());
   beam.beam_start()[static_cast<std::size_t>(parameters_.axis)] = from;
   beam.beam_direction()[static_cast<std::size_t>(parameters_.axis)] = 1.0;
   beam_.write(beam);
@@ -238,7 +189,7 @@ Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64
 Task AxisTrial::command_model(compensation::ModelCommandKind kind, const std::string& path) {
   compensation::ModelCommand command;
   stamp(command);
-  command.id(static_cast<std::uint64_t>(id) << 32U | next_command_++);
+  command.id(next_command_id());
   command.kind(kind);
   command.path(path);
   model_.write(command);

@@ -3,10 +3,11 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "components/calibration/task.hpp"
+#include "components/calibration/job_component.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/recording/table.hpp"
@@ -59,7 +60,7 @@ struct TrackingJob {
 };
 
 /// One axis: its stage on `state` and `command`, the stage's model on `model`, a laser along the axis on `reading` and `beam`.
-class AxisTrial final : public Component {
+class AxisTrial final : public JobComponent {
  public:
   struct Parameters {
     std::int64_t axis = 0;
@@ -72,13 +73,11 @@ class AxisTrial final : public Component {
     }
   };
   explicit AxisTrial(const Parameters& parameters) : parameters_{parameters} {}
-  void activate() override;
-  void step(const Tick& tick) noexcept override;
-  void deactivate() noexcept override;
 
  private:
-  void start(const job::JobCommand& command);
-  void report(job::JobPhase phase, const std::string& text);
+  std::optional<Job> find(const std::string& wanted) override;
+  void make_safe() override;
+  void send(stage::AxisCommand& command);
   Task run(const RippleJob& job);
   Task run(const TrackingJob& job);
   Task enable();
@@ -91,8 +90,6 @@ class AxisTrial final : public Component {
   void take_down(recording::Table& record);
 
   const Parameters& parameters_;
-  Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
-  Output<job::JobStatus> status_{*this, "status", "state"};
   Input<stage::AxisState> state_{*this, "state"};
   Output<stage::AxisCommand> command_{*this, "command", "command"};
   Inbox<sensing::DisplacementReading> reading_{
@@ -102,11 +99,7 @@ class AxisTrial final : public Component {
   Input<compensation::ModelStatus> model_status_{
       *this, "model_status", {.optional = true, .profile = "state"}};
 
-  Task task_;
-  job::JobStatus sample_;
-  double progress_ = 0.0;
   double beam_from_ = 0.0;  // where the laser was zeroed [m]
-  std::uint64_t next_command_ = 1;
   Instant began_;           // the job; times in records count from here
   std::int64_t taken_ = 0;  // stamp of the last state in a record
 };

@@ -25,86 +25,41 @@ Calibration::Calibration(const Parameters& parameters) : parameters_{parameters}
 Calibration::~Calibration() = default;
 
 void Calibration::activate() {
-  task_ = {};
   transaction_ = 0;
   heat_.forget();
-  report(job::JOB_IDLE, "ready");
+  JobComponent::activate();
 }
 
-void Calibration::deactivate() noexcept {
-  if (task_.running()) end(job::JOB_CANCELLED, "the component was deactivated");
-}
-
-/// Ends a job before its end: everything as it was before.
-void Calibration::end(job::JobPhase phase, const std::string& text) {
-  task_ = {};
+void Calibration::make_safe() {
   abandon_transaction();
   trace_ = nullptr;
   if (setpoint_before_) set_heater(*setpoint_before_);
   setpoint_before_.reset();
   for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_STOP);
   if (printing_) printing_->make_safe();
-  report(phase, text);
 }
 
-void Calibration::report(job::JobPhase phase, const std::string& text) {
-  stamp(sample_);
-  sample_.component_id(id);
-  sample_.phase(phase);
-  sample_.progress(progress_);
-  sample_.text(text);
-  status_.write(sample_);
+std::optional<JobComponent::Job> Calibration::find(const std::string& wanted) {
+  const auto named = [&](const auto& jobs) {
+    return std::find_if(jobs.begin(), jobs.end(), [&](const auto& job) { return job.name == wanted; });
+  };
+  if (const auto job = named(parameters_.jobs); job != parameters_.jobs.end())
+    return Job{run(*job), job->out};
+  if (const auto job = named(parameters_.thermal_jobs); job != parameters_.thermal_jobs.end())
+    return Job{run(*job), job->out};
+  if (const auto job = named(parameters_.prints); job != parameters_.prints.end())
+    return Job{run(*job), job->out};
+  return std::nullopt;
 }
 
-void Calibration::start(const job::JobCommand& command) {
-  if (command.kind() == job::JOB_CANCEL) {
-    if (task_.running()) end(job::JOB_CANCELLED, "cancelled");
+void Calibration::tend(bool job_runs) {
+  follow_heat();
+  if (job_runs) {
+    watch_transaction();
     return;
   }
-  if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
-  const std::string wanted{command.name().c_str()};
-  const auto named = [&](const auto& job) { return job.name == wanted; };
-  const auto geometric = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(), named);
-  const auto thermal = std::find_if(parameters_.thermal_jobs.begin(), parameters_.thermal_jobs.end(), named);
-  const auto print = std::find_if(parameters_.prints.begin(), parameters_.prints.end(), named);
-  if (task_.running()) {
-    report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
-    return;
-  }
-  sample_.id(command.id());
-  sample_.name(wanted);
-  progress_ = 0.0;
-  if (geometric != parameters_.jobs.end()) {
-    sample_.result_path(std::filesystem::absolute(geometric->out).string());
-    task_ = run(*geometric);
-  } else if (thermal != parameters_.thermal_jobs.end()) {
-    sample_.result_path(std::filesystem::absolute(thermal->out).string());
-    task_ = run(*thermal);
-  } else if (print != parameters_.prints.end()) {
-    sample_.result_path(std::filesystem::absolute(print->out).string());
-    task_ = run(*print);
-  } else {
-    report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
-    return;
-  }
-  report(job::JOB_RUNNING, "started");
-}
-
-void Calibration::step(const Tick&) noexcept {
-  try {
-    job::JobCommand command;
-    while (job_.take(command)) start(command);
-    follow_heat();
-    if (task_.running()) {
-      watch_transaction();
-      task_.resume();
-    } else {
-      sensing::DisplacementReading unused;
-      while (reading_.take(unused)) {
-      }
-    }
-  } catch (const std::exception& error) {
-    end(job::JOB_FAILED, error.what());
+  sensing::DisplacementReading unused;
+  while (reading_.take(unused)) {
   }
 }
 
@@ -207,7 +162,7 @@ Task Calibration::align(Point from, Point to) {
   const Point direction = (to - from).normalized();
   sensing::BeamCommand beam;
   stamp(beam);
-  beam.id(next_command_++);
+  beam.id(next_command_id());
   beam.beam_start({from.x(), from.y(), from.z()});
   beam.beam_direction({direction.x(), direction.y(), direction.z()});
   beam_.write(beam);

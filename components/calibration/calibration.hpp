@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "components/calibration/job_component.hpp"
 #include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
 #include "components/calibration/printing.hpp"
@@ -29,7 +30,7 @@ namespace invar::calibration {
 
 /// A job is a transaction on the compensation: what it measures, fits and validates is put to use on trial, watched, and kept
 /// only if it makes the error smaller; a job that fails, is cancelled or dies leaves the models as they were.
-class Calibration final : public Component, private JobHost {
+class Calibration final : public JobComponent, private JobHost {
  public:
   struct Parameters {
     std::int64_t axes = 2;
@@ -58,8 +59,6 @@ class Calibration final : public Component, private JobHost {
   };
   explicit Calibration(const Parameters& parameters);
   void activate() override;
-  void step(const Tick& tick) noexcept override;
-  void deactivate() noexcept override;
 
  private:
   using Point = Eigen::Vector3d;
@@ -73,13 +72,13 @@ class Calibration final : public Component, private JobHost {
   };
 
   // calibration.cpp: jobs, and what all of them are made of.
-  void start(const job::JobCommand& command);
-  void end(job::JobPhase phase, const std::string& text);
-  void report(job::JobPhase phase, const std::string& text);
+  std::optional<Job> find(const std::string& wanted) override;
+  void make_safe() override;
+  void tend(bool job_runs) override;
   void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const Pace& pace = {});
   Task run(const PrintJob& job);
   void tell(const std::string& text, double progress) override;
-  std::uint64_t next_id() override { return static_cast<std::uint64_t>(id) << 32U | next_command_++; }
+  std::uint64_t next_id() override { return next_command_id(); }
   Task enable_axes() override;
   Task move_to(Point target, Pace pace) override;
   Task wait(double seconds);
@@ -119,8 +118,6 @@ class Calibration final : public Component, private JobHost {
   void follow_heat();
 
   const Parameters& parameters_;
-  Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
-  Output<job::JobStatus> status_{*this, "status", "state"};
   Inbox<sensing::DisplacementReading> reading_{*this, "reading", {.profile = "calibration"}, 4096};
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};
@@ -131,11 +128,6 @@ class Calibration final : public Component, private JobHost {
   std::vector<std::unique_ptr<Input<thermal::NodeTemperature>>> zones_;
   std::vector<std::unique_ptr<Axis>> axes_;
   std::unique_ptr<Printing> printing_;  // only where there are print jobs: its ports must be connected
-
-  Task task_;
-  job::JobStatus sample_;
-  double progress_ = 0.0;
-  std::uint64_t next_command_ = 1;
 
   std::uint64_t transaction_ = 0;   // ours on the compensation; 0: none
   bool transaction_known_ = false;  // the compensation has confirmed it

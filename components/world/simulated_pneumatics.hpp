@@ -20,7 +20,7 @@ namespace invar::world {
 class SimulatedPneumatics final : public Component {
  public:
   struct Parameters {
-    modbus::ServedEndpoint modbus{.port = 1503};
+    modbus::ServedEndpoint modbus{.map = {}, .port = 1503, .faults = {}};
     double supply = 6e5;
     double lag = 0.15;
     double over_pressure = 3e5;

@@ -96,8 +96,8 @@ struct Cell final : Component {
       stage_parameters[axis].control.feedforward_acceleration = 3.2 / 12.0;
     }
     const auto port = test::free_port();
-    air_parameters.map = dispenser_parameters.modbus.map = deployment / "maps/pneumatic.yaml";
-    air_parameters.port = dispenser_parameters.modbus.port = port;
+    air_parameters.modbus.map = dispenser_parameters.modbus.map = deployment / "maps/pneumatic.yaml";
+    air_parameters.modbus.port = dispenser_parameters.modbus.port = port;
     dispenser::Pattern& grid = dispenser_parameters.patterns.emplace_back();
     grid.name = "grid";
     grid.from = {0.056, 0.057};

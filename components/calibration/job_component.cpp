@@ -1,0 +1,67 @@
+#include "components/calibration/job_component.hpp"
+
+#include <exception>
+#include <utility>
+
+namespace invar::calibration {
+
+void JobComponent::activate() {
+  task_ = {};
+  report(job::JOB_IDLE, "ready");
+}
+
+void JobComponent::deactivate() noexcept {
+  if (task_.running()) end(job::JOB_CANCELLED, "the component was deactivated");
+}
+
+void JobComponent::end(job::JobPhase phase, const std::string& text) {
+  task_ = {};
+  make_safe();
+  report(phase, text);
+}
+
+void JobComponent::report(job::JobPhase phase, const std::string& text) {
+  stamp(sample_);
+  sample_.component_id(id);
+  sample_.phase(phase);
+  sample_.progress(progress_);
+  sample_.text(text);
+  status_.write(sample_);
+}
+
+void JobComponent::obey(const job::JobCommand& command) {
+  if (command.kind() == job::JOB_CANCEL) {
+    if (task_.running()) end(job::JOB_CANCELLED, "cancelled");
+    return;
+  }
+  if (command.id() == sample_.id() && sample_.id() != 0) return;  // the same request again
+  if (task_.running()) {
+    report(job::JOB_RUNNING, "job `" + std::string{sample_.name().c_str()} + "` is running; cancel it first");
+    return;
+  }
+  const std::string wanted{command.name().c_str()};
+  sample_.id(command.id());
+  sample_.name(wanted);
+  progress_ = 0.0;
+  std::optional<Job> job = find(wanted);
+  if (!job) {
+    report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
+    return;
+  }
+  sample_.result_path(std::filesystem::absolute(job->folder).string());
+  task_ = std::move(job->task);
+  report(job::JOB_RUNNING, "started");
+}
+
+void JobComponent::step(const Tick&) noexcept {
+  try {
+    job::JobCommand command;
+    while (job_.take(command)) obey(command);
+    tend(task_.running());
+    if (task_.running()) task_.resume();
+  } catch (const std::exception& error) {
+    end(job::JOB_FAILED, error.what());
+  }
+}
+
+}  // namespace invar::calibration

@@ -1,0 +1,53 @@
+// JobComponent: a component that runs jobs, one at a time, as commands ask, and says how far it is.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "components/calibration/task.hpp"
+#include "core/component/component.hpp"
+#include "core/component/parameters.hpp"
+#include "idl/job.h"
+
+namespace invar::calibration {
+
+/// Port `job` takes commands, port `status` answers. A request that comes twice is one. A job that throws has failed; one that
+/// fails, is cancelled or deactivated is made safe. Not real-time.
+class JobComponent : public Component {
+ public:
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
+  void deactivate() noexcept override;
+
+ protected:
+  struct Job {
+    Task task;
+    std::filesystem::path folder;  // of its files
+  };
+  /// The job of this name, if there is one.
+  virtual std::optional<Job> find(const std::string& wanted) = 0;
+  /// The job has ended before its end: everything as it was before.
+  virtual void make_safe() = 0;
+  /// Once a step, before the job goes on.
+  virtual void tend(bool /*job_runs*/) {}
+
+  void report(job::JobPhase phase, const std::string& text);
+  /// A number for a command, never given before.
+  std::uint64_t next_command_id() { return static_cast<std::uint64_t>(id) << 32U | next_command_++; }
+
+  double progress_ = 0.0;  // the job's share that is done
+
+ private:
+  void obey(const job::JobCommand& command);
+  void end(job::JobPhase phase, const std::string& text);
+
+  Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
+  Output<job::JobStatus> status_{*this, "status", "state"};
+  Task task_;
+  job::JobStatus sample_;
+  std::uint64_t next_command_ = 1;
+};
+
+}  // namespace invar::calibration
