@@ -25,16 +25,25 @@ function(invar_library name)
   target_link_libraries(invar_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
 endfunction()
 
-# invar_test(name SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s]) makes one gtest program; each TEST is one ctest entry.
+# invar_paths(target) tells a target of the tests where this tree lies. Only the few that read from it: a path on the command
+# line keeps ccache from serving another checkout.
+function(invar_paths target)
+  target_compile_definitions(${target} PRIVATE INVAR_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data"
+    INVAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" INVAR_PROGRAM="${CMAKE_BINARY_DIR}/bin/invar")
+endfunction()
+
+# invar_test(name SOURCES ... LIBRARIES ... [LABELS ...] [TIMEOUT s] [PATHS]) makes one gtest program; each TEST is one ctest
+# entry. PATHS: it knows where this tree lies (invar_paths).
 function(invar_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "PATHS" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
   target_compile_options(test_${name} PRIVATE ${INVAR_WARNINGS})
-  target_compile_definitions(test_${name} PRIVATE INVAR_TEST_DATA="${PROJECT_SOURCE_DIR}/tests/data"
-    INVAR_SOURCE_DIR="${PROJECT_SOURCE_DIR}" INVAR_PROGRAM="${CMAKE_BINARY_DIR}/bin/invar")
+  if(ARG_PATHS)
+    invar_paths(test_${name})
+  endif()
   target_link_libraries(test_${name} PRIVATE ${ARG_LIBRARIES} GTest::gmock GTest::gtest GTest::gtest_main)
   gtest_discover_tests(test_${name} DISCOVERY_MODE PRE_TEST PROPERTIES TIMEOUT ${ARG_TIMEOUT} LABELS "${ARG_LABELS}")
 endfunction()
