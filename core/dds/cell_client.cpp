@@ -76,7 +76,7 @@ std::optional<Reply> CellClient::call(Writer<Request>& writer, std::map<std::uin
     writer.write(request);  // again, where the process was not yet connected or its reply went astray
     lock.lock();
     const auto has_reply = [&] { return replies.contains(request.request()); };
-    if (news_.wait_for(lock, std::chrono::milliseconds{200}, has_reply)) {
+    if (news_.wait_for(lock, std::chrono::milliseconds{50}, has_reply)) {
       auto reply = replies.extract(request.request());
       return std::move(reply.mapped());
     }

@@ -45,7 +45,7 @@ void Executor::end_loop() {
 
 bool Executor::sleep_until(Instant due) noexcept {
   // A slow loop looks up now and then, so that it obeys and stops without waiting for its next cycle.
-  constexpr Duration longest = Duration::milliseconds(100);
+  constexpr Duration longest = Duration::milliseconds(20);
   for (;;) {
     const Instant current = monotonic_now();
     const bool last = due - current <= longest;

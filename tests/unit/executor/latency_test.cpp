@@ -94,9 +94,11 @@ TEST(Latency, OfACycleStopsTheProcessSafelyWhereThatIsDeclared) {
   Executor executor{options(Duration::milliseconds(2), LatePolicy::safe_stop)};
   executor.add(slow());
   executor.start();
-  bring_up(executor);
-  ASSERT_TRUE(eventually([&] { return executor.state(0) == LifecycleState::inactive; }));
+  (void)executor.transition(0, Transition::configure);
+  (void)executor.transition(0, Transition::activate);  // refused where a starved loop was late before
+  ASSERT_TRUE(eventually([&] { return executor.counters().tripped; }));
   EXPECT_EQ(executor.trip_reason(), "a cycle ended later than its declared latency");
+  EXPECT_NE(executor.state(0), LifecycleState::active);
   executor.stop();
 }
 
