@@ -31,11 +31,9 @@ struct SignalRow {
 std::vector<SignalRow> signal_rows(Plant plant, bool closed_loop) {
   switch (plant) {
     case Plant::axis:
-      return {{"time", "s", false, true},
-              {"reference", "m", false, closed_loop},
-              {"position", "m", true, true},
-              {"current", "A", closed_loop, true},
-              {"temperature", "degC", false, false}};
+      return {{"time", "s", false, true},         {"reference", "m", false, closed_loop},
+              {"position", "m", true, true},      {"current", "A", closed_loop, true},
+              {"feedforward", "A", false, false}, {"temperature", "degC", false, false}};
     case Plant::thermal:
       return {
           {"time", "s", false, true}, {"speed", "m/s", false, false}, {"motor_current", "A", false, false}};
@@ -123,7 +121,7 @@ void read_parameters(const Node& root, Model& model) {
     if (unit == "N/A" && node[row.name].is_map() && node[row.name].text("unit", "N/A") == "N/V") {
       unit = "N/V";
       for (auto& signal : model.signals)
-        if (signal.name == "current") signal.unit = "V";
+        if (signal.name == "current" || signal.name == "feedforward") signal.unit = "V";
     }
     add_parameter(model, row.name, unit, node[row.name], row.bounds);
   }

@@ -1,6 +1,7 @@
 // An axis in closed loop from its reference alone, or in open loop from its current.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/physics/simulate_plants.hpp"
 
@@ -14,6 +15,21 @@ double first_or(const Record& record, const char* name, double otherwise) {
                                                                                  : values->front();
 }
 
+/// What a cubic through two rows on each side adds to a straight line `at` ticks into a gap of `gap` ticks before `row`.
+/// Preconditions: the rows beyond are one tick away.
+double bend(const std::vector<double>& values, std::size_t row, std::size_t gap, std::size_t at) {
+  const double g = static_cast<double>(gap), x = static_cast<double>(at);
+  const double known[] = {-1.0, 0.0, g, g + 1.0};
+  double cubic = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    double weight = 1.0;
+    for (std::size_t j = 0; j < 4; ++j)
+      if (j != i) weight *= (x - known[j]) / (known[i] - known[j]);
+    cubic += weight * values[row - 2 + i];
+  }
+  return cubic - (values[row - 1] + x / g * (values[row] - values[row - 1]));
+}
+
 /// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp.
 class ClosedLoop final : public Simulation {
  public:
@@ -25,37 +41,56 @@ class ClosedLoop final : public Simulation {
     const auto* temperatures = inputs.find("temperature");
     const auto temperature =
         temperatures != nullptr ? bridged(inputs.time, *temperatures) : std::vector<double>{};
+    const auto* forwards = inputs.find("feedforward");
+    const auto forward = forwards != nullptr ? bridged(inputs.time, *forwards) : std::vector<double>{};
     tick_of_row_.reserve(inputs.rows());
     for (std::size_t row = 0; row < inputs.rows(); ++row) {
       const auto tick =
           static_cast<std::size_t>(std::max(0.0, std::round((inputs.time[row] - start_time_) * rate)));
       tick_of_row_.push_back(tick);
-      // Ticks that no row records: the reference is bridged, as far as a straight line can.
+      // Ticks that no row records: the reference is bridged, a lost cycle or two by a cubic, more by a straight line.
       const std::size_t known = reference_.size();
       if (tick < known) continue;
       const double from = row == 0 ? reference[0] : reference_.back();
       const double warm = row == 0 || temperature.empty() ? 20.0 : temperature_.back();
+      const double fed = row == 0 || forward.empty() ? 0.0 : forward_.back();
+      const bool curved = (tick == known + 1 || tick == known + 2) && row > 1 && row + 1 < inputs.rows() &&
+                          tick_of_row_[row - 1] == tick_of_row_[row - 2] + 1 &&
+                          std::lround((inputs.time[row + 1] - inputs.time[row]) * rate) == 1;
       for (std::size_t k = known; k <= tick; ++k) {
         const double share = static_cast<double>(k + 1 - known) / static_cast<double>(tick + 1 - known);
-        reference_.push_back(from + share * (reference[row] - from));
+        reference_.push_back(from + share * (reference[row] - from) +
+                             (curved ? bend(reference, row, tick + 1 - known, k + 1 - known) : 0.0));
         if (!temperature.empty())
           temperature_.push_back(row == 0 ? temperature[0] : warm + share * (temperature[row] - warm));
+        if (!forward.empty()) forward_.push_back(row == 0 ? forward[0] : fed + share * (forward[row] - fed));
       }
     }
     start_position_ = first_or(inputs, "position", reference_.front());
+    start_current_ = first_or(inputs, "current", std::numeric_limits<double>::quiet_NaN());
+    limit_ = structure.controller->limit;
   }
 
   void run(const Model& model, Outputs& outputs) const override {
     auto plant = make_axis(model, period_);
     AxisController controller{*model.controller};
     plant.rest_at(start_position_, start_time_);
+    if (std::isfinite(start_current_)) {  // a loop that has run before: its sum holds what the error does not
+      AxisController fresh{*model.controller};
+      (void)controller.shift(start_current_ - (forward_.empty() ? 0.0 : forward_.front()) -
+                             fresh.step(reference_.front(), plant.reading()));
+    }
     outputs.resize(2);
     outputs[0].assign(tick_of_row_.size(), 0.0);
     outputs[1].assign(tick_of_row_.size(), 0.0);
     std::size_t row = 0;
     for (std::size_t tick = 0; tick < reference_.size(); ++tick) {
       const double shown = plant.reading();
-      const double command = controller.step(reference_[tick], shown);
+      double command = controller.step(reference_[tick], shown);
+      if (!forward_.empty()) {
+        command += forward_[tick];
+        if (limit_ > 0.0) command = std::clamp(command, -limit_, limit_);
+      }
       while (row < tick_of_row_.size() && tick_of_row_[row] <= tick) {
         outputs[0][row] = shown;
         outputs[1][row] = command;
@@ -67,8 +102,8 @@ class ClosedLoop final : public Simulation {
   }
 
  private:
-  double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0;
-  std::vector<double> reference_, temperature_;  // a tick
+  double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0, start_current_ = 0.0, limit_ = 0.0;
+  std::vector<double> reference_, temperature_, forward_;  // a tick
   std::vector<std::size_t> tick_of_row_;
 };
 

@@ -36,7 +36,7 @@ class Wired {
   void step() {
     for (const Part& part : parts_) {
       if (cycle_ % part.every != 0) continue;
-      part.component->set_now(now());
+      part.component->set_now(now(), static_cast<std::uint64_t>(cycle_));
       part.component->step({now(), period_ * part.every, static_cast<std::uint64_t>(cycle_)});
     }
     ++cycle_;

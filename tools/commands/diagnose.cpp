@@ -85,6 +85,11 @@ void add_diagnose(CLI::App& program) {
       program.add_subcommand("diagnose", "Find the physics that a model leaves out, and prove it");
   command->footer(
       "Example: invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis\n"
+      "In an .mcap a column of the model is component.port.field, that of the time component.port.at:\n"
+      "  columns: {time: stage_x.state.at, reference: stage_x.state.setpoint_position + correction,\n"
+      "            position: stage_x.state.position, current: stage_x.state.current, feedforward: "
+      "remainder}\n"
+      "where `remainder` is what of the current the controller's law does not account for.\n"
       "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C: the report holds what "
       "was known by "
       "then and says so");
@@ -92,7 +97,7 @@ void add_diagnose(CLI::App& program) {
   command->add_option("--model", options->model, "model.yaml: what you believe")->required();
   command
       ->add_option("--recording", options->recordings,
-                   "recording of the machine, .csv or .csv.gz; may be repeated")
+                   "recording of the machine, .csv, .csv.gz or .mcap; may be repeated")
       ->required();
   command->add_option("--out", options->out, "folder for report.json, report.html and patched.yaml")
       ->capture_default_str();

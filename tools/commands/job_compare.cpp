@@ -8,6 +8,7 @@
 #include "core/base/unit.hpp"
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
+#include "core/model/recording_file.hpp"
 #include "tools/commands/job.hpp"
 #include "tools/report/page.hpp"
 
@@ -54,7 +55,7 @@ Difference difference(const physics::Signal& signal, const std::vector<double>& 
 
 void compare(const Options& options) {
   const auto model = model::load(options.machine);
-  const auto table = recording::Table::read(options.recording);
+  const auto table = model::read_recording(options.recording, model).front();
   const auto recorded = model::to_record(table, model, true);
   physics::Outputs simulated;
   physics::prepare(model, recorded.record)->run(model, simulated);
@@ -119,7 +120,8 @@ void add_job_compare(CLI::App& job) {
   command->footer(
       "Example: invar job compare --recording recording.csv.gz --machine model.yaml --out out/compare");
   auto options = std::make_shared<Options>();
-  command->add_option("--recording", options->recording, "what the machine did, .csv or .csv.gz")->required();
+  command->add_option("--recording", options->recording, "what the machine did, .csv, .csv.gz or .mcap")
+      ->required();
   command->add_option("--machine", options->machine, "model.yaml: parameters and controller of the machine")
       ->required();
   command->add_option("--out", options->out, "folder for report.html")->capture_default_str();

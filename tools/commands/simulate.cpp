@@ -5,6 +5,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
+#include "core/model/recording_file.hpp"
 #include "tools/command.hpp"
 
 namespace invar::tools {
@@ -19,7 +20,7 @@ struct Options {
 
 void simulate(const Options& options) {
   const auto model = model::load(options.model);
-  const auto table = recording::Table::read(options.inputs);
+  const auto table = model::read_recording(options.inputs, model).front();
   const auto inputs = model::to_record(table, model, false);
   for (std::size_t row = 0; row < inputs.record.rows(); ++row) {
     const double now = inputs.record.time[row];
@@ -41,7 +42,8 @@ void add_simulate(CLI::App& program) {
       "Example: invar simulate --model model.yaml --inputs test_inputs.csv.gz --output simulated.csv");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "model.yaml or patched.yaml")->required();
-  command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz")->required();
+  command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz, or the cell's .mcap")
+      ->required();
   command->add_option("--output", options->output, "table to write: time and outputs, one row per input row")
       ->required();
   command->callback([options] { simulate(*options); });

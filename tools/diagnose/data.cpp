@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "core/model/recording_file.hpp"
 #include "tools/diagnose/statistics.hpp"
 
 namespace invar::diagnose {
@@ -59,6 +60,23 @@ double median_step(const std::vector<double>& time) {
   return steps.empty() ? 1.0 : median(steps);
 }
 
+/// A loop that stands still and yet commands: its sum is not zero, the first command says how much it holds.
+void give_start_of_sum(const Case& data, Recording& recording) {
+  auto& inputs = recording.inputs;
+  const auto* reference = inputs.find("reference");
+  const auto* forward = inputs.find("feedforward");
+  if (!data.model.controller || reference == nullptr || inputs.rows() < 8) return;
+  const auto& position = recording.measured[0];
+  const auto& current = recording.measured[1];
+  if ((*reference)[5] != (*reference)[0] || !std::isfinite(position[0]) || !std::isfinite(current[0])) return;
+  physics::AxisController fresh{*data.model.controller};
+  const double expected =
+      fresh.step((*reference)[0], position[0]) + (forward != nullptr ? forward->front() : 0.0);
+  if (!(std::abs(current[0] - expected) > 6.0 * spread_of_differences(current))) return;
+  inputs.signals["current"].assign(inputs.rows(), nothing);
+  inputs.signals["current"].front() = current[0];
+}
+
 /// The initial state, where the first rows contradict the one that the model starts from.
 void give_start(Case& data, Recording& recording) {
   using physics::Plant;
@@ -95,7 +113,8 @@ void give_start(Case& data, Recording& recording) {
 
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
   std::vector<recording::Table> tables;
-  for (const auto& file : files) tables.push_back(recording::Table::read(file));
+  for (const auto& file : files)
+    for (auto& table : model::read_recording(file, model)) tables.push_back(std::move(table));
   return make_case(model, tables);
 }
 
@@ -141,6 +160,7 @@ Case make_case(const physics::Model& model, const std::vector<recording::Table>&
           for (auto& column : recording.measured) column[j] = nothing;
     }
     give_start(data, recording);
+    if (model.plant == physics::Plant::axis) give_start_of_sum(data, recording);
     recording.simulation = physics::prepare(model, recording.inputs);
     data.recordings.push_back(std::move(recording));
   }

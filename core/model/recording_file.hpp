@@ -1,0 +1,28 @@
+// Recordings of a machine as tables: a CSV as it stands, an MCAP of the cell by what the model's columns say.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "core/physics/model.hpp"
+#include "core/recording/table.hpp"
+
+namespace invar::model {
+
+/// A `.csv` or `.csv.gz` is one table. In an `.mcap` a column of the model is `component.port.field`, a field's path in the
+/// topic of that output (`stage_x.state.position`); `component.port[axis=1].field` where one topic carries several instances;
+/// `a.b.c + d` adds another field of the same message (setpoint plus correction). The column of `time` names the topic's
+/// stamp (`stage_x.state.at`): its cycles are the rows, one a period of the loop. What another topic said last by then
+/// stands in the row.
+/// Where the model's column of `feedforward` is `remainder`, in a CSV too, it is made here: what of the recorded current the
+/// controller's law does not account for.
+/// Rows in which that topic says that its axis is not enabled are left out; each stretch between is a table of its own,
+/// the longest first, and stretches under a twentieth of it are dropped. One that was enabled before the recording began
+/// starts where the axis stands still.
+/// Throws InputError: no such topic or field, no stamp, more than `most_lost` of the cycles missing, each n-th cycle alone
+/// recorded, a loop of another rate than the model's controller.
+std::vector<recording::Table> read_recording(const std::filesystem::path& file, const physics::Model& model);
+
+inline constexpr double most_lost = 0.05;
+
+}  // namespace invar::model

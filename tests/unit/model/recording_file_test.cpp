@@ -1,0 +1,223 @@
+// The cell's recording as a model reads it: every cycle of stage and world, simulated again, is what was recorded.
+#include "core/model/recording_file.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+#include <functional>
+
+#include "components/stage/axis_stage.hpp"
+#include "components/world/simulated_stage.hpp"
+#include "core/model/model_file.hpp"
+#include "core/model/record_file.hpp"
+#include "core/recording/cdr.hpp"
+#include "core/recording/recording_writer.hpp"
+#include "core/recording/type_book.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tests/support/wired.hpp"
+
+namespace invar::model {
+namespace {
+
+using ::testing::HasSubstr;
+
+const std::filesystem::path machines = std::filesystem::path{INVAR_SOURCE_DIR} / "deployment" / "machines";
+
+constexpr const char* columns =
+    "columns: {time: stage_z.state.at, reference: stage_z.state.setpoint_position + correction, position: "
+    "stage_z.state.position, current: stage_z.state.current, feedforward: remainder}\n";
+
+/// An axis with friction and ripple in its loop, and every state that it published.
+class RecordedAxis : public ::testing::Test {
+ protected:
+  struct Human final : Component {
+    Output<stage::AxisCommand> command{*this, "command", "command"};
+    Input<stage::AxisState> state{*this, "state"};
+    void step(const Tick&) noexcept override {}
+  };
+
+  static world::SimulatedStage::Parameters world_parameters() {
+    world::SimulatedStage::Parameters p;
+    p.machine = machines / "axis-trials.yaml";
+    p.z.model = (machines / "axis-rippled.yaml").string();
+    p.z.noise = p.z.resolution = 0.0;
+    return p;
+  }
+  static stage::Stage::Parameters stage_parameters() {
+    stage::Stage::Parameters p;
+    p.axis = 2;
+    p.control.ki = 8e5;
+    p.model = machines / "axis-nominal.yaml";
+    return p;
+  }
+
+  void tell(stage::AxisCommandKind kind, double position = 0.0) {
+    stage::AxisCommand command;
+    command.kind(kind);
+    command.position(position);
+    command.velocity(0.08);
+    command.id(++id);
+    human.command.write(command);
+    for (int k = 0; k < 3000; ++k) {
+      wired.step();
+      states.push_back(*human.state.latest());
+    }
+  }
+  void move_about() {
+    wired.join(stage, "motor", world, "motor_z");
+    wired.join(world, "feedback_z", stage, "feedback");
+    wired.join(stage, "state", human, "state");
+    wired.join(human, "command", stage, "command");
+    wired.add(human);
+    wired.add(world);
+    wired.add(stage);
+    wired.start();
+    wired.step();
+    wired.step();
+    tell(stage::AXIS_COMMAND_ENABLE);
+    tell(stage::AXIS_COMMAND_MOVE, 0.08);
+    tell(stage::AXIS_COMMAND_MOVE, 0.02);
+    tell(stage::AXIS_COMMAND_MOVE, 0.1);
+  }
+
+  std::filesystem::path record(const std::function<bool(std::size_t)>& is_kept, std::size_t from = 0) {
+    const auto file = folder / "run.mcap";
+    const auto& type = *recording::built_in_type("invar::stage::AxisState");
+    recording::RecordingWriter writer{file};
+    const auto channel = writer.add_channel(
+        {"cell/trial/stage_z/state", "invar::stage::AxisState", std::string{type.idl}, "", "", {}});
+    auto value = recording::Value::zero(*type.type);
+    for (std::size_t i = from; i < states.size(); ++i) {
+      const auto& state = states[i];
+      value.at("axis")->content = std::uint64_t{state.axis()};
+      value.at("at.time_ns")->content = std::int64_t{state.at().time_ns()};
+      value.at("at.cycle")->content = std::uint64_t{state.at().cycle()};
+      value.at("setpoint_position")->content = state.setpoint_position();
+      value.at("correction")->content = state.correction();
+      value.at("position")->content = state.position();
+      value.at("current")->content = state.current();
+      value.at("enabled")->content = state.enabled();
+      if (is_kept(i))
+        while (!writer.write(channel, static_cast<std::uint32_t>(i + 1), Instant{state.at().time_ns()}, {},
+                             encode(value))) {
+        }
+    }
+    EXPECT_TRUE(writer.close());
+    return file;
+  }
+  physics::Model model(const std::string& text_of_columns = columns) {
+    std::ifstream in{machines / "axis-rippled.yaml"};
+    std::string text{std::istreambuf_iterator<char>{in}, {}};
+    const auto begin = text.find("columns:");
+    text.replace(begin, text.find('\n', begin) + 1 - begin, text_of_columns);
+    std::ofstream{folder / "model.yaml"} << text;
+    return model::load(folder / "model.yaml");
+  }
+  std::string refusal(const std::filesystem::path& file, const physics::Model& of) {
+    try {
+      (void)read_recording(file, of);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "nothing is refused";
+  }
+
+  testing::TemporaryFolder folder;
+  world::SimulatedStage::Parameters of_world = world_parameters();
+  stage::Stage::Parameters of_stage = stage_parameters();
+  world::SimulatedStage world{of_world};
+  stage::Stage stage{of_stage};
+  Human human;
+  support::Wired wired;
+  std::vector<stage::AxisState> states;
+  std::uint64_t id = 0;
+};
+
+TEST_F(RecordedAxis, SimulatedWithTheTruthIsWhatWasRecorded) {
+  move_about();
+  const auto truth = model();
+  // From before it was enabled; from within, standing still; with a twentieth of the cycles lost on the way.
+  const auto compare = [&](const std::filesystem::path& file, std::size_t rows, double position,
+                           double current) {
+    auto tables = read_recording(file, truth);
+    ASSERT_EQ(tables.size(), 1U);
+    EXPECT_EQ(tables[0].rows(), rows);
+    auto record = to_record(tables[0], truth, true).record;
+    const auto measured = record.signals;
+    for (const char* name : {"position", "current"})
+      std::fill(record.signals[name].begin() + 1, record.signals[name].end(), std::nan(""));
+    if (rows == states.size() - 1) record.signals.erase("current");
+    physics::Outputs simulated;
+    physics::prepare(truth, record)->run(truth, simulated);
+    double most_position = 0.0, most_current = 0.0;
+    for (std::size_t i = 0; i < record.rows(); ++i) {
+      most_position = std::max(most_position, std::abs(simulated[0][i] - measured.at("position")[i]));
+      most_current = std::max(most_current, std::abs(simulated[1][i] - measured.at("current")[i]));
+    }
+    EXPECT_LT(most_position, position);
+    EXPECT_LT(most_current, current);
+  };
+  const auto all = [](std::size_t) { return true; };
+  std::size_t begin = 0;
+  while (!states[begin].enabled()) ++begin;
+  compare(record(all), states.size() - begin, 1e-12, 1e-8);
+  compare(record(all, 5500), states.size() - 5500, 1e-8, 0.02);
+  const auto most = [](std::size_t i) { return i % 23 != 7; };
+  std::size_t rows = 0;
+  for (std::size_t i = begin; i < states.size(); ++i) rows += most(i) ? 1U : 0U;
+  compare(record(most), rows, 5e-7, 0.05);
+}
+
+TEST_F(RecordedAxis, IsCutWhereTheAxisIsNotEnabled) {
+  move_about();
+  tell(stage::AXIS_COMMAND_DISABLE);
+  tell(stage::AXIS_COMMAND_ENABLE);
+  tell(stage::AXIS_COMMAND_MOVE, 0.03);
+  const auto tables = read_recording(record([](std::size_t) { return true; }), model());
+  ASSERT_EQ(tables.size(), 2U);
+  EXPECT_GT(tables[0].rows(), 11'000U);
+  EXPECT_NEAR(static_cast<double>(tables[1].rows()), 6000.0, 3.0);
+  EXPECT_EQ(tables[1].find("stage_z.state.at")->values[0], 0.0);
+}
+
+TEST_F(RecordedAxis, WhatCannotBeUsedIsSaidInOneLine) {
+  move_about();
+  const auto all = [](std::size_t) { return true; };
+  const auto file = record(all);
+  const auto named = [](std::string from, std::string to) {
+    std::string text = columns;
+    const auto at = text.find(from, from == "stage_z.state.position" ? text.find("position: ") : 0);
+    text.replace(at, from.size(), to);
+    return text;
+  };
+  EXPECT_THAT(refusal(file, model("columns: {time: t, reference: r, position: y, current: u}\n")),
+              HasSubstr("column `t` for `time` is no field of a topic; write component.port.at"));
+  EXPECT_THAT(
+      refusal(file, model(named("stage_z.state.position", "stage_x.state.position"))),
+      HasSubstr("holds no topic `stage_x/state` for `position`; there are: cell/trial/stage_z/state"));
+  EXPECT_THAT(
+      refusal(file, model(named("state.position", "state.place"))),
+      HasSubstr("`cell/trial/stage_z/state` has no field `place` for `position`; it has: cell, axis, at,"));
+  EXPECT_THAT(refusal(file, model(named("stage_z.state.position", "'stage_z.state[axis=1].position'"))),
+              HasSubstr("holds no sample"));
+  EXPECT_EQ(refusal(file, model(named("stage_z.state.position", "'stage_z.state[axis=2].position'"))),
+            "nothing is refused");
+  EXPECT_THAT(refusal(folder / "none.mcap", model()), HasSubstr("none.mcap: cannot be read"));
+  EXPECT_THAT(refusal(record([](std::size_t i) { return i % 10 != 0; }), model()),
+              ::testing::ContainsRegex("lacks 1[12][0-9][0-9] of 1[12][0-9][0-9][0-9] cycles of "
+                                       "`cell/trial/stage_z/state`; record on the PC of the loop"));
+  EXPECT_THAT(refusal(record([](std::size_t i) { return i % 20 == 0; }), model()),
+              HasSubstr("holds only each 20th cycle of its loop; leave `state` out of `publish`"));
+  auto slower = model();
+  slower.controller->rate = 500.0;
+  EXPECT_THAT(refusal(record(all), slower),
+              HasSubstr("was recorded in a loop of 1000 Hz, the model's controller runs at 500 Hz"));
+  for (auto& state : states) state.enabled(false);
+  EXPECT_THAT(refusal(record(all), model()), HasSubstr("never says that its axis is enabled"));
+  states.resize(3);
+  EXPECT_THAT(refusal(record(all), model()), HasSubstr("record for longer"));
+}
+
+}  // namespace
+}  // namespace invar::model
