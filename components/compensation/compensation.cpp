@@ -42,24 +42,63 @@ void Compensation::configure() {
   active_ = before_ = transaction_start_ = {};
   staged_ = nullptr;
   transaction_ = 0;
+  kept_refusal_.clear();
+  const bool keeps = keeps_ && !parameters_.state.empty();
+  if (keeps)
+    start_with_kept();
+  else
+    start_with_named();
+  loader_.open();
+  kept_.open(keeps ? parameters_.state : "");
+}
+
+/// Puts a sound model into its layer; why not, if not.
+const char* Compensation::put_into(Stack& stack, LiveModel& model) const noexcept {
+  if (!model.refusal.empty()) return model.refusal.c_str();
+  if (const char* why = why_not_above(model, stack); why != nullptr) return why;
+  if (model.geometric)
+    stack.geometric = &model;
+  else
+    stack.thermal[model.axis] = &model;
+  return nullptr;
+}
+
+void Compensation::start_with_named() {
   for (const auto* file : {&parameters_.model, &parameters_.thermal_model}) {
     if (file->empty()) continue;
-    LiveModel* model = loader_.load(*file);
-    if (const char* why = model->refusal.empty() ? why_not_above(*model) : model->refusal.c_str();
-        why != nullptr)
+    if (const char* why = put_into(active_, *loader_.load(*file)); why != nullptr)
       throw InputError{file->string(), why, "calibrate again"};
-    if (model->geometric)
-      active_.geometric = model;
-    else
-      active_.thermal[model->axis] = model;
   }
-  loader_.open();
+}
+
+/// All of the kept models or none: a part of them would correct for another machine.
+void Compensation::start_with_kept() {
+  try {
+    const auto kept = KeptModels::read(parameters_.state);
+    if (!kept.any) return start_with_named();
+    Stack stack;
+    for (const auto& entry : kept.models) {
+      LiveModel& model = *loader_.load(entry.file);
+      const char* why = put_into(stack, model);
+      if (why == nullptr && model.checksum != entry.checksum) why = "it is not the one that was kept";
+      if (why != nullptr) throw InputError{entry.file.string(), why, "calibrate again"};
+    }
+    active_ = stack;
+  } catch (const InputError& error) {
+    kept_refusal_ = std::string{"the kept model is refused: "} + error.what();
+    start_with_named();
+  }
+}
+
+void Compensation::keep() noexcept {
+  kept_.keep({active_.geometric, active_.thermal[0], active_.thermal[1], active_.thermal[2]});
 }
 
 void Compensation::cleanup() noexcept {
   active_ = before_ = transaction_start_ = {};
   staged_ = nullptr;
   transaction_ = 0;
+  kept_.close();  // before the models go
   loader_.close();
 }
 
@@ -72,7 +111,7 @@ void Compensation::activate() {
   started_ = now();
   easing_.setZero();
   blind_ = true;
-  answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
+  begins_ = true;
 }
 
 void Compensation::notify(event::Severity level, const char* text) noexcept {
@@ -107,10 +146,10 @@ void Compensation::answer(std::uint64_t command, ModelState state, const LiveMod
   publish_status();
 }
 
-/// Why a thermal model may not stand above the geometric model in use; nullptr: it may.
-const char* Compensation::why_not_above(const LiveModel& model) const noexcept {
+/// Why a thermal model may not stand above the geometric model of the stack; nullptr: it may.
+const char* Compensation::why_not_above(const LiveModel& model, const Stack& stack) noexcept {
   if (model.geometric) return nullptr;
-  const std::uint32_t below = active_.geometric != nullptr ? active_.geometric->checksum : 0;
+  const std::uint32_t below = stack.geometric != nullptr ? stack.geometric->checksum : 0;
   if (model.above == below) return nullptr;
   if (model.above == 0)
     return "it describes the whole error of its axis, which the geometric model in use would count twice: "
@@ -132,7 +171,7 @@ void Compensation::take_loaded() noexcept {
   ModelLoader<LiveModel>::Loaded loaded;
   while (loader_.take(loaded)) {
     const LiveModel& model = *loaded.model;
-    const char* why = model.refusal.empty() ? why_not_above(model) : model.refusal.c_str();
+    const char* why = model.refusal.empty() ? why_not_above(model, active_) : model.refusal.c_str();
     if (why == nullptr) staged_ = loaded.model;
     answer(loaded.command, why != nullptr ? MODEL_REFUSED : MODEL_STAGED, loaded.model,
            why != nullptr ? why : "");
@@ -165,7 +204,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
       return;
     case MODEL_ACTIVATE: {
       const char* why =
-          staged_ == nullptr ? "nothing is staged; stage a model first" : why_not_above(*staged_);
+          staged_ == nullptr ? "nothing is staged; stage a model first" : why_not_above(*staged_, active_);
       if (why != nullptr) {
         answer(command.id(), MODEL_REFUSED, staged_, why);
         return;
@@ -186,6 +225,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
       }
       before_ = active_;
       use(next);
+      if (transaction_ == 0) keep();
       answer(command.id(), MODEL_ACTIVE, model, "");
       return;
     }
@@ -216,6 +256,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
     case MODEL_KEEP:
       break;
   }
+  if (transaction_ == 0) keep();
   answer(command.id(), active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
 }
 
@@ -237,6 +278,15 @@ void Compensation::watch_transaction(const Tick& tick) noexcept {
 }
 
 void Compensation::step(const Tick& tick) noexcept {
+  if (begins_) {
+    begins_ = false;
+    answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
+    if (!kept_refusal_.empty()) notify(event::SEVERITY_FAULT, kept_refusal_.c_str());
+  }
+  if (kept_.failed())
+    notify(event::SEVERITY_FAULT,
+           "the models in use could not be written to the folder `state`: the next start will not "
+           "know them");
   take_loaded();
   ModelCommand command;
   while (command_.take(command)) obey(command);

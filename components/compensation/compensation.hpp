@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "components/compensation/kept_models.hpp"
 #include "components/compensation/live_model.hpp"
 #include "components/compensation/temperatures.hpp"
 #include "core/component/component.hpp"
@@ -20,13 +21,15 @@
 
 namespace invar::compensation {
 
-/// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, and for each axis a model
-/// over position and temperature of what the geometric one leaves.
+/// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, grown to the slide's
+/// temperature where its calibration found an expansion, and for each axis a model over position and temperature of what the
+/// geometric one leaves.
 ///
 /// A model is staged (loaded, checked and compiled by a thread of its own, never by the loop), activated and rolled back by
 /// command. What a change would make the correction jump is eased in at `rate_limit`. Changes made in a transaction are
 /// taken back when their owner falls silent. A model that is corrupt, of another machine or beyond the bounds is refused and
-/// the last good one holds. Temperatures outside what was calibrated hold the end value; when they are stale the last one
+/// the last good one holds. What is in use outside a transaction is kept in the folder `state` and used again at the next start,
+/// before the models that the cell file names; a kept model that is corrupt or of another machine is refused. Temperatures outside what was calibrated hold the end value; when they are stale the last one
 /// holds, and after `temperature_hold` the layer is taken out. All of it shows in the status and as notices. Real-time.
 class Compensation final : public Component {
  public:
@@ -35,6 +38,7 @@ class Compensation final : public Component {
     std::filesystem::path machine;
     std::filesystem::path model;
     std::filesystem::path thermal_model;
+    std::string state;
     std::vector<std::string> zones;
     double bound = 2e-3;
     double rate_limit = 1e-3;
@@ -53,6 +57,9 @@ class Compensation final : public Component {
   void activate() override;
   void cleanup() noexcept override;
   void step(const Tick& tick) noexcept override;
+
+  /// Set-up, before configure: reads and keeps no state, as a replay must.
+  void keep_nothing() { keeps_ = false; }
 
  private:
   struct Axis {
@@ -74,9 +81,13 @@ class Compensation final : public Component {
     [[nodiscard]] Eigen::Vector3d sum() const noexcept { return geometric + thermal; }
   };
   // Models and transactions.
+  void start_with_kept();
+  void start_with_named();
+  [[nodiscard]] const char* put_into(Stack& stack, LiveModel& model) const noexcept;
+  void keep() noexcept;
   void obey(const ModelCommand& command) noexcept;
   void take_loaded() noexcept;
-  [[nodiscard]] const char* why_not_above(const LiveModel& model) const noexcept;
+  [[nodiscard]] static const char* why_not_above(const LiveModel& model, const Stack& stack) noexcept;
   void use(const Stack& stack) noexcept;
   void end_transaction() noexcept;
   void watch_transaction(const Tick& tick) noexcept;
@@ -87,11 +98,16 @@ class Compensation final : public Component {
   // The loop: correction.cpp.
   void follow_temperature(const Tick& tick) noexcept;
   [[nodiscard]] TemperatureCondition judge(Instant at) noexcept;
+  [[nodiscard]] bool expands() const noexcept {
+    return active_.geometric != nullptr && active_.geometric->expands;
+  }
+  [[nodiscard]] bool has_temperature() const noexcept {
+    return condition_ != TEMPERATURE_UNUSED && condition_ != TEMPERATURE_REFUSED;
+  }
   [[nodiscard]] double kelvin_outside(const LiveModel& model) const noexcept;
   void set_temperatures() noexcept;
   [[nodiscard]] bool is_used(const LiveModel* thermal) const noexcept {
-    return thermal != nullptr && (!thermal->by_temperature ||
-                                  (condition_ != TEMPERATURE_UNUSED && condition_ != TEMPERATURE_REFUSED));
+    return thermal != nullptr && (!thermal->by_temperature || has_temperature());
   }
   /// Changes what the layers give without a step in the correction: the difference is eased in.
   template <class Change>
@@ -102,6 +118,8 @@ class Compensation final : public Component {
   }
   [[nodiscard]] Layers corrections(const Eigen::Vector3d& at) const noexcept;
   [[nodiscard]] Layers wanted(const Eigen::Vector3d& setpoint) const noexcept;
+  [[nodiscard]] double kelvin_in_doubt(Instant at, unsigned zones) const noexcept;
+  [[nodiscard]] Eigen::Vector3d geometric_sigma(Instant at) const noexcept;
   [[nodiscard]] double thermal_sigma(const LiveModel& model, double x, Instant at) const noexcept;
   void correct(const Tick& tick) noexcept;
   void publish(const Tick& tick, const Layers& layers, const Eigen::Vector3d& before) noexcept;
@@ -130,10 +148,15 @@ class Compensation final : public Component {
   TemperatureCondition condition_ = TEMPERATURE_UNUSED;
   Instant outside_at_{INT64_MIN};
   Instant started_;
+  double expanded_to_ = 0.0;         // degC, the temperature that the geometric layer is grown to
   double temperature_before_ = 0.0;  // at the last step of the lags
   Instant lags_at_;
 
   ModelLoader<LiveModel> loader_;
+  KeptModels kept_{*this};
+  bool keeps_ = true;
+  bool begins_ = false;       // the first step says what stands
+  std::string kept_refusal_;  // why the kept models are not in use
 };
 
 void Compensation::Parameters::describe(auto& p) {
@@ -141,6 +164,10 @@ void Compensation::Parameters::describe(auto& p) {
   p(machine, "machine", "machine.yaml: a model of another chain or travel is refused");
   p(model, "model", "geometric compensation.yaml that is active from the start; none: nothing is corrected");
   p(thermal_model, "thermal_model", "compensation.yaml of kind thermal, likewise");
+  p(state, "state",
+    "folder that keeps the models in use over a restart, created; relative to where the cell was started. "
+    "What it holds wins "
+    "over `model`; none: they are forgotten");
   p(zones, "zones", "further temperatures: each makes a port temperature_<zone>");
   p(bound, "bound", "m", Range{0.0, 0.1}, "a model that corrects more anywhere in the travels is refused");
   p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0},

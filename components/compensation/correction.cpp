@@ -44,7 +44,7 @@ double Compensation::kelvin_outside(const LiveModel& model) const noexcept {
 }
 
 TemperatureCondition Compensation::judge(Instant at) noexcept {
-  bool used = false;
+  bool used = expands();
   bool inside = true;
   double most = 0.0;
   unsigned zones = 0;
@@ -72,6 +72,7 @@ TemperatureCondition Compensation::judge(Instant at) noexcept {
 
 void Compensation::set_temperatures() noexcept {
   if (temperatures_.trace().empty()) return;
+  expanded_to_ = temperatures_.trace().temperature();
   for (LiveModel* model : active_.thermal) {
     if (model == nullptr) continue;
     std::array<double, metrology::most_zones> zones{};
@@ -109,6 +110,8 @@ void Compensation::follow_temperature(const Tick& tick) noexcept {
 Compensation::Layers Compensation::corrections(const Eigen::Vector3d& at) const noexcept {
   Layers layers;
   if (active_.geometric != nullptr) layers.geometric = -active_.geometric->geometric->error(at);
+  if (expands() && has_temperature())
+    layers.geometric -= active_.geometric->expanding.expansion_at(at, expanded_to_);
   for (std::size_t i = 0; i < axes_.size(); ++i)
     if (is_used(active_.thermal[i])) {
       const auto k = static_cast<Eigen::Index>(i);
@@ -122,14 +125,29 @@ Compensation::Layers Compensation::wanted(const Eigen::Vector3d& setpoint) const
   return corrections(setpoint + corrections(setpoint).sum());
 }
 
+/// How far the temperature may have gone since it was last heard [K].
+double Compensation::kelvin_in_doubt(Instant at, unsigned zones) const noexcept {
+  if (condition_ != TEMPERATURE_HELD) return 0.0;
+  return std::max(std::abs(temperatures_.trace().rate()), least_drift) *
+         temperatures_.age(at, zones).in_seconds();
+}
+
+Eigen::Vector3d Compensation::geometric_sigma(Instant at) const noexcept {
+  if (active_.geometric == nullptr || blind_) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d sigma = active_.geometric->geometric->sigma(setpoint_);
+  if (!expands() || !has_temperature()) return sigma;
+  const auto& model = active_.geometric->expanding;
+  const Eigen::Vector3d doubt = model.expansion_at(setpoint_, expanded_to_ + kelvin_in_doubt(at, 0)) -
+                                model.expansion_at(setpoint_, expanded_to_);
+  return (sigma.cwiseAbs2() + model.expansion_sigma_at(setpoint_, expanded_to_).cwiseAbs2() +
+          doubt.cwiseAbs2())
+      .cwiseSqrt();
+}
+
 double Compensation::thermal_sigma(const LiveModel& model, double x, Instant at) const noexcept {
-  double doubt = 0.0;  // K
-  if (condition_ == TEMPERATURE_HELD) {
-    unsigned zones = 0;
-    for (std::size_t z = 0; z < model.zone_ranges.size(); ++z) zones |= 1U << model.zones[z];
-    doubt = std::max(std::abs(temperatures_.trace().rate()), least_drift) *
-            temperatures_.age(at, zones).in_seconds();
-  }
+  unsigned zones = 0;
+  for (std::size_t z = 0; z < model.zone_ranges.size(); ++z) zones |= 1U << model.zones[z];
+  double doubt = kelvin_in_doubt(at, zones);
   if (model.lag > 0.0) doubt += unknown_start * std::exp(-temperatures_.trace().known() / model.lag);
   return std::hypot(model.thermal->sigma(x), model.slope_temperature * doubt);
 }
@@ -166,9 +184,7 @@ void Compensation::correct(const Tick& tick) noexcept {
 }
 
 void Compensation::publish(const Tick& tick, const Layers& layers, const Eigen::Vector3d& before) noexcept {
-  const Eigen::Vector3d sigma = active_.geometric != nullptr && !blind_
-                                    ? active_.geometric->geometric->sigma(setpoint_)
-                                    : Eigen::Vector3d{Eigen::Vector3d::Zero()};
+  const Eigen::Vector3d sigma = geometric_sigma(tick.now);
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     const LiveModel* thermal = active_.thermal[i];
@@ -184,14 +200,15 @@ void Compensation::publish(const Tick& tick, const Layers& layers, const Eigen::
       sample.layer_sigma()[1] = thermal_sigma(*thermal, setpoint_[k], tick.now);
     sample.sigma(std::hypot(sample.layer_sigma()[0], sample.layer_sigma()[1]));
     if (active_.geometric != nullptr) sample.layer_checksum()[0] = active_.geometric->checksum;
-    if (thermal != nullptr) {
-      sample.layer_checksum()[1] = thermal->checksum;
+    if (thermal != nullptr) sample.layer_checksum()[1] = thermal->checksum;
+    const bool by_temperature = thermal != nullptr || expands();
+    if (by_temperature) {
       sample.temperature(temperatures_.trace().temperature());
       sample.heating_rate(temperatures_.trace().rate());
       sample.outside(condition_ == TEMPERATURE_OUTSIDE);
       sample.refused(condition_ == TEMPERATURE_REFUSED);
     }
-    sample.stale(blind_ || (thermal != nullptr && condition_ == TEMPERATURE_HELD));
+    sample.stale(blind_ || (by_temperature && condition_ == TEMPERATURE_HELD));
     sample.limited(clamped_ || easing_[k] != 0.0);
     axes_[i]->correction.write(sample);
   }

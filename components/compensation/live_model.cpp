@@ -156,6 +156,7 @@ void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLim
 void load_live_model(const std::filesystem::path& file, const ModelLimits& limits, LiveModel& live) {
   const auto yaml = config::Yaml::load(file);
   live.checksum = check_seal(yaml);
+  live.text = yaml.text();
   (void)yaml.root().integer("invar_compensation", 1, 1);
   yaml.root()["identified_from"].accept_all();
   const std::string kind = yaml.root().text("kind");
@@ -167,6 +168,9 @@ void load_live_model(const std::filesystem::path& file, const ModelLimits& limit
     const auto model = read_geometric(yaml.root());
     yaml.finish();
     live.geometric.emplace(model);
+    live.expanding = model;
+    live.expands = model.reference_temperature && std::any_of(model.expansion.begin(), model.expansion.end(),
+                                                              [](double each) { return each != 0.0; });
     live.refusal = refusal_of(model, *live.geometric, limits);
   } else {
     live.refusal = "a model of kind `" + kind + "` corrects no axis";

@@ -31,7 +31,11 @@ struct LiveModel {
   std::string refusal;
   std::uint64_t id = 0;
   std::uint32_t checksum = 0;
+  std::string text;  // the file, byte for byte
+
   std::optional<metrology::VolumetricTable> geometric;
+  metrology::GeometricModel expanding;  // what `geometric` was compiled from, for its growth by temperature
+  bool expands = false;
 
   std::optional<metrology::CompiledThermalError> thermal;
   std::size_t axis = 0;                                    // of `thermal`

@@ -1,8 +1,6 @@
 #include "components/dispenser/dispenser.hpp"
 
-#include <charconv>
 #include <cmath>
-#include <utility>
 
 #include "core/compensation/trajectory_file.hpp"
 
@@ -10,7 +8,11 @@ namespace invar::dispenser {
 
 using namespace dispensing;
 
-Dispenser::Dispenser(const Parameters& parameters) : parameters_{parameters} {
+Dispenser::Dispenser(const Parameters& parameters)
+    : parameters_{parameters},
+      model_{*this,
+             [this](const std::filesystem::path& file, Staged::Model& model) { return load(file, model); },
+             "model", "status"} {
   (void)modbus::load_map_of(
       parameters.modbus.map, "modbus.map", "pneumatic controller",
       {"pressure", "purge_pressure", "band", "enable", "purge", "reset_alarms", "actual_pressure",
@@ -18,12 +20,17 @@ Dispenser::Dispenser(const Parameters& parameters) : parameters_{parameters} {
   for (const Pattern& pattern : parameters.patterns) patterns_[pattern.name] = targets(pattern);
   if (patterns_.size() != parameters.patterns.size())
     throw InputError{"patterns", "two have one name", "rename one of them"};
-  if (!parameters.model.empty()) active_ = load(parameters.model);
 }
 
-void Dispenser::configure() { client_.open(parameters_.modbus, simulated_time); }
+void Dispenser::configure() {
+  model_.open(parameters_.model, "look at the head before raising `bound`");
+  client_.open(parameters_.modbus, simulated_time);
+}
 
-void Dispenser::cleanup() noexcept { client_.close(); }
+void Dispenser::cleanup() noexcept {
+  model_.close();
+  client_.close();
+}
 
 void Dispenser::activate() {
   setpoint_ = parameters_.pressure;
@@ -31,6 +38,7 @@ void Dispenser::activate() {
   wanted_ = parameters_.pressurise;
   purge_ = latched_ = false;
   reset_at_ = Instant{} - Duration::seconds(1.0);
+  model_.announce();
 }
 
 void Dispenser::deactivate() noexcept {
@@ -66,68 +74,26 @@ void Dispenser::obey(const PressureCommand& command) noexcept {
   (void)client_.device().write("reset_alarms", 1.0);
 }
 
-Dispenser::Model Dispenser::load(const std::filesystem::path& file) const {
-  Model model;
-  model.trajectory = compensation::load_trajectory(file);
-  const auto& path = *model.trajectory;
-  for (const double height : {path.least_height, path.most_height})
-    if (!(path.offset(height).norm() <= parameters_.bound))
-      throw InputError{
-          file.string(),
-          "moves targets by more than the bound of " + std::to_string(parameters_.bound * 1e6) + " um",
-          "look at the head before raising `bound`"};
-  const std::string seal = config::Yaml::load(file).root().text("checksum");
-  (void)std::from_chars(seal.data(), seal.data() + seal.size(), model.checksum, 16);
-  return model;
-}
-
-void Dispenser::obey(const compensation::ModelCommand& command) {
-  compensation::ModelStatus reply;
-  stamp(reply);
-  reply.component_id(id);
-  reply.command_id(command.id());
-  reply.path(command.path());
-  const Model* about = &active_;
-  switch (command.kind()) {
-    case compensation::MODEL_STAGE:
-      try {
-        staged_ = load(command.path().c_str());
-        about = &staged_;
-        reply.state(compensation::MODEL_STAGED);
-      } catch (const std::exception& error) {
-        about = nullptr;
-        reply.state(compensation::MODEL_REFUSED);
-        reply.text(error.what());
-      }
-      break;
-    case compensation::MODEL_ACTIVATE:
-      if (!staged_.trajectory) {
-        about = nullptr;
-        reply.state(compensation::MODEL_REFUSED);
-        reply.text("nothing is staged; stage a model first");
-        break;
-      }
-      previous_ = std::exchange(active_, std::exchange(staged_, {}));
-      reply.state(compensation::MODEL_ACTIVE);
-      break;
-    default:  // roll back
-      active_ = std::exchange(previous_, {});
-      reply.state(active_.trajectory ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE);
-  }
-  if (about != nullptr) reply.model_checksum(about->checksum);
-  status_.write(reply);
+/// Why this model must not move targets; empty: it may.
+std::string Dispenser::load(const std::filesystem::path& file, Staged::Model& model) const {
+  model.content = compensation::load_trajectory(file);
+  model.checksum = compensation::check_seal(config::Yaml::load(file));
+  for (const double height : {model.content.least_height, model.content.most_height})
+    if (!(model.content.offset(height).norm() <= parameters_.bound))
+      return "it moves targets by more than the bound of " + std::to_string(parameters_.bound * 1e6) + " um";
+  return {};
 }
 
 /// Why there are no points; empty: there are.
-std::string Dispenser::fill(const PatternCommand& command, TriggerPattern& pattern) const {
+std::string Dispenser::fill(const PatternCommand& command, TriggerPattern& pattern) {
   const auto found = patterns_.find(command.name().c_str());
   if (found == patterns_.end())
     return "`" + std::string{command.name().c_str()} + "` is no pattern of this dispenser";
   const double height = command.height();
   if (!(height > 0.0)) return "the height is not positive";
   metrology::DropletTrajectory path;
-  if (active_.trajectory) {
-    path = *active_.trajectory;
+  if (const Staged::Model* model = model_.active(); model != nullptr) {
+    path = model->content;
     if (!(path.sigma(height) <= parameters_.largest_sigma))
       return "the model is not certain enough at this height; calibrate there";
     if (!(path.offset(height).norm() <= parameters_.bound))
@@ -150,7 +116,7 @@ void Dispenser::answer(const PatternCommand& command) {
   stamp(pattern);
   pattern.component_id(id);
   pattern.id(command.id());
-  pattern.model_checksum(active_.checksum);
+  pattern.model_checksum(model_.active() != nullptr ? model_.active()->checksum : 0);
   pattern.refusal(fill(command, pattern));
   for (TriggerPoint& point : pattern.points()) point.droplet(next_droplet_++);
   pattern_.write(pattern);
@@ -181,8 +147,7 @@ void Dispenser::publish() noexcept {
 void Dispenser::step(const Tick& tick) noexcept {
   PressureCommand command;
   while (command_.take(command)) obey(command);
-  compensation::ModelCommand model;
-  while (model_.take(model)) obey(model);
+  (void)model_.update();
   PatternCommand pattern;
   while (wanted_pattern_.take(pattern)) answer(pattern);
 

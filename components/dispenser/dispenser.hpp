@@ -5,16 +5,15 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "components/dispenser/pattern.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/staged_model.hpp"
 #include "core/metrology/droplet_trajectory.hpp"
 #include "core/modbus/endpoint.hpp"
-#include "idl/compensation.h"
 #include "idl/dispensing.h"
 
 namespace invar::dispenser {
@@ -22,7 +21,7 @@ namespace invar::dispenser {
 /// The slow half of a dispenser, for a worker; `valve` in the motion loop is the fast one. Keeps pressure and purge pressure at
 /// their setpoints, lets go of both on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
 /// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use
-/// (compensation.yaml of kind dispenser; staged, activated and rolled back as the stage's is). Not real-time (Modbus).
+/// (compensation.yaml of kind dispenser; a StagedModel as the stage's is). Not real-time (Modbus).
 class Dispenser final : public Component {
  public:
   struct Parameters {
@@ -58,17 +57,12 @@ class Dispenser final : public Component {
   void step(const Tick& tick) noexcept override;
 
  private:
-  /// A trajectory that was loaded and checked; empty: targets stay as they are.
-  struct Model {
-    std::optional<metrology::DropletTrajectory> trajectory;
-    std::uint32_t checksum = 0;
-  };
-  [[nodiscard]] Model load(const std::filesystem::path& file) const;
-  void obey(const compensation::ModelCommand& command);
+  using Staged = StagedModel<metrology::DropletTrajectory>;  // none: targets stay as they are
+  [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
   void obey(const dispensing::PressureCommand& command) noexcept;
   void answer(const dispensing::PatternCommand& command);
   [[nodiscard]] std::string fill(const dispensing::PatternCommand& command,
-                                 dispensing::TriggerPattern& pattern) const;
+                                 dispensing::TriggerPattern& pattern);
   void drive(bool enable) noexcept;
   void publish() noexcept;
   [[nodiscard]] bool flag(const char* reg) const;
@@ -76,14 +70,12 @@ class Dispenser final : public Component {
   const Parameters& parameters_;
   Inbox<dispensing::PressureCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Inbox<dispensing::PatternCommand> wanted_pattern_{*this, "print", {.optional = true, .profile = "command"}};
-  Inbox<compensation::ModelCommand> model_{*this, "model", {.optional = true, .profile = "command"}};
   Output<dispensing::PressureState> pressure_{*this, "pressure", "state"};
   Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
-  Output<compensation::ModelStatus> status_{*this, "status", "state"};
 
   modbus::Client client_;
   std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;
-  Model active_, staged_, previous_;
+  Staged model_;
   double setpoint_ = 0.0;
   double purge_setpoint_ = 0.0;
   bool wanted_ = false;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/physics/terms/droplet/air_drag.hpp"
 #include "core/physics/terms/droplet/crosswind.hpp"
@@ -27,7 +28,7 @@ void SimulatedSubstrate::activate() {
   sample_.height(2e-3);
   stamp(sample_);
   sample_.component_id(id);
-  state_.write(sample_);
+  begins_ = true;
 }
 
 void SimulatedSubstrate::remember(const sensing::ToolPosition& tool) noexcept {
@@ -120,7 +121,7 @@ void SimulatedSubstrate::fly(const ValvePulse& pulse) noexcept {
 
 void SimulatedSubstrate::step(const Tick&) noexcept {
   if (const auto* tool = tool_.latest()) remember(*tool);
-  bool changed = false;
+  bool changed = std::exchange(begins_, false);
   SubstrateCommand command;
   while (command_.take(command)) {
     sample_.command_id(command.id());

@@ -96,6 +96,7 @@ class SimulatedSubstrate final : public Component {
 
   std::array<Tool, 512> way_{};  // of the tool, the last half second
   std::size_t remembered_ = 0;
+  bool begins_ = false;                          // the first step says what lies there
   std::vector<dispensing::ValvePulse> waiting_;  // the tool is not there yet
   dispensing::SubstrateState sample_;
   Instant begun_;

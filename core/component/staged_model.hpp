@@ -1,4 +1,4 @@
-// StagedModel: a model that a loop uses and that commands change - staged from a file, activated, rolled back.
+// StagedModel: a model that a loop uses and that commands change - staged from a file, activated, rolled back, taken out.
 #pragma once
 
 #include <cstdint>
@@ -54,14 +54,15 @@ class StagedModel {
     active_ = staged_ = previous_ = nullptr;
     loader_.close();
   }
-  /// From the component's activate: says which model is in use. Real-time.
-  void announce() noexcept {
-    answer(0, active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE, active_, "");
-  }
+  /// From the component's activate: the next update says which model is in use (what is written before the first step may
+  /// find no reader yet).
+  void announce() noexcept { begins_ = true; }
 
   /// Takes commands; true when another model, or none, is active from now on. Real-time.
   bool update() noexcept {
     bool changed = false;
+    if (std::exchange(begins_, false))
+      answer(0, active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE, active_, "");
     take_loaded();
     compensation::ModelCommand command;
     while (command_.take(command)) changed = obey(command) || changed;
@@ -116,11 +117,17 @@ class StagedModel {
         answer(command.id(), active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE,
                active_, "");
         return true;
-      default:
-        answer(command.id(), compensation::MODEL_REFUSED, nullptr,
-               "one model is staged, activated or rolled back here, without transactions");
-        return false;
+      case compensation::MODEL_CLEAR:
+        previous_ = std::exchange(active_, nullptr);
+        answer(command.id(), compensation::MODEL_NONE, nullptr, "");
+        return true;
+      case compensation::MODEL_KEEP:
+      case compensation::MODEL_COMMIT:
+        break;
     }
+    answer(command.id(), compensation::MODEL_REFUSED, nullptr,
+           "there are no transactions here; stage, activate, roll back or clear");
+    return false;
   }
 
   Component& owner_;
@@ -130,6 +137,7 @@ class StagedModel {
   Model* active_ = nullptr;
   Model* staged_ = nullptr;
   Model* previous_ = nullptr;
+  bool begins_ = false;
   compensation::ModelStatus reply_;
 };
 

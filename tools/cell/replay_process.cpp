@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "components/compensation/compensation.hpp"
 #include "core/dds/typed_wire.hpp"
 #include "core/executor/process_control.hpp"
 #include "core/recording/cdr.hpp"
@@ -85,6 +86,9 @@ class Replayed {
       : file_{*process.file}, executor_{executor_options(file_, true)}, control_{executor_} {
     for (LoadedComponent& member : process.components) {
       member.component->simulated_time = true;
+      // What was kept since is not what the recording began with.
+      if (auto* found = dynamic_cast<compensation::Compensation*>(member.component.get()))
+        found->keep_nothing();
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,

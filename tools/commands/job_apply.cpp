@@ -1,4 +1,5 @@
-// `invar job apply`: a model.yaml - what `invar diagnose` wrote - into the running stage, which feeds forward its forces.
+// `invar job apply`: a model into a running component - a diagnosis's into a stage, which feeds forward its forces; a
+// calibration's into the compensation or the dispenser - or out of it.
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -7,6 +8,7 @@
 #include <optional>
 #include <random>
 
+#include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
 #include "idl/compensation.h"
 #include "tools/commands/job.hpp"
@@ -24,7 +26,23 @@ struct Options {
   CellCall call;
   std::filesystem::path model;
   bool rollback = false;
+  bool none = false;
 };
+
+/// The file's faults are said here, before anything is asked of the cell.
+void check_model(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  if (yaml.root().has("invar_compensation")) {
+    if (compensation::check_seal(yaml) == 0)
+      throw InputError{file.string(), "carries no checksum", "apply a file as a calibration wrote it"};
+    return;
+  }
+  const auto model = model::read(yaml);
+  yaml.finish();
+  if (model.plant != physics::Plant::axis)
+    throw InputError{file.string(), "is of plant " + std::string{physics::name_of(model.plant)},
+                     "a stage takes a model of plant axis"};
+}
 
 /// Orders to one component's model, and its answers.
 class ModelPort {
@@ -75,14 +93,11 @@ class ModelPort {
 int apply(Options& options) {
   options.call.resolve();
   std::filesystem::path file;
-  if (!options.rollback) {
+  if (!options.rollback && !options.none) {
     if (options.model.empty())
-      throw InputError{"--model", "is missing", "name the model.yaml to load, or give --rollback"};
+      throw InputError{"--model", "is missing", "name the model's file, or give --rollback or --none"};
     file = std::filesystem::absolute(options.model);
-    const auto model = model::load(file);  // its faults are said here, before anything is asked of the cell
-    if (model.plant != physics::Plant::axis)
-      throw InputError{file.string(), "is of plant " + std::string{physics::name_of(model.plant)},
-                       "a stage takes a model of plant axis"};
+    check_model(file);
   }
   (void)interrupted();
   LiveCell cell{options.call};
@@ -94,7 +109,7 @@ int apply(Options& options) {
   ModelPort port{cell, component};
   if (!port.connect()) {
     std::cerr << options.call.command << ": `" << component
-              << "` takes no model; is it a stage of this cell?\n";
+              << "` takes no model; is it a stage, compensation or dispenser of this cell?\n";
     return 1;
   }
   const auto refused = [&](const std::optional<compensation::ModelStatus>& answer) {
@@ -103,8 +118,9 @@ int apply(Options& options) {
               << (answer ? std::string{"refused: "} + answer->text().c_str() : "does not answer") << '\n';
     return true;
   };
-  if (options.rollback) {
-    const auto answer = port.order(compensation::MODEL_ROLLBACK, "");
+  if (options.rollback || options.none) {
+    const auto answer =
+        port.order(options.none ? compensation::MODEL_CLEAR : compensation::MODEL_ROLLBACK, "");
     if (refused(answer)) return 1;
     std::cout << component
               << (answer->state() == compensation::MODEL_NONE ? ": no model any more\n"
@@ -120,16 +136,23 @@ int apply(Options& options) {
 }  // namespace
 
 void add_job_apply(CLI::App& job) {
-  auto* command =
-      job.add_subcommand("apply", "Load a model.yaml into a running stage: its forces are fed forward");
+  auto* command = job.add_subcommand("apply", "Load a model into a running stage, compensation or dispenser");
   command->footer(
       "Example: invar job apply deployment/cell.yaml stage_x --model diagnosis/patched.yaml\n"
       "         invar job apply deployment/cell.yaml stage_x --rollback\n"
-      "The stage refuses a model that leaves too little current for its servo.");
+      "         invar job apply deployment/cell.yaml compensation --none\n"
+      "A stage feeds forward the forces of an axis's model.yaml, and refuses one that leaves too little "
+      "current for its servo;\n"
+      "compensation and dispenser take a compensation.yaml. With a folder `state`, what a compensation was "
+      "given here - also\n"
+      "none - is what it starts with next time.");
   auto options =
-      std::make_shared<Options>(*command, std::vector<Word>{{"COMPONENT", "the stage, such as stage_x"}});
-  command->add_option("--model", options->model, "model.yaml of plant axis, as `invar diagnose` writes it");
-  command->add_flag("--rollback", options->rollback, "back to the model before");
+      std::make_shared<Options>(*command, std::vector<Word>{{"COMPONENT", "that takes it, such as stage_x"}});
+  auto* model =
+      command->add_option("--model", options->model,
+                          "model.yaml as `invar diagnose` writes it, or a calibration's compensation.yaml");
+  auto* rollback = command->add_flag("--rollback", options->rollback, "back to the model before");
+  command->add_flag("--none", options->none, "take the models out")->excludes(rollback)->excludes(model);
   command->callback([options] {
     if (const int status = apply(*options); status != 0) throw CLI::RuntimeError{status};
   });

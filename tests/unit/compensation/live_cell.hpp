@@ -82,7 +82,7 @@ inline std::uint32_t checksum_of(const std::filesystem::path& file) {
   return check_seal(config::Yaml::load(file));
 }
 
-struct LiveCell final : Component {
+struct LiveCell : Component {
   Output<stage::AxisState> state_x{*this, "state_x"};
   Output<stage::AxisState> state_y{*this, "state_y"};
   Output<thermal::NodeTemperature> slide{*this, "slide"};

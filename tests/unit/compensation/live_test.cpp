@@ -241,6 +241,36 @@ TEST(LiveCompensation, StartedAgainInTheMiddleOfATransactionItStandsWhereThatBeg
   EXPECT_NEAR(cell.run_for(1.0).correction(), -5e-5 * 0.1, 1e-9);
 }
 
+TEST(LiveCompensation, GrowsTheGeometryToTheSlidesTemperature) {
+  LiveCell cell;
+  cell.period = 1e-2;
+  cell.parameters.rate_limit = 1e-3;
+  cell.parameters.temperature_hold = 20.0;
+  cell.bring_up();
+  metrology::GeometricModel model = geometry(5e-5, 0.0);
+  model.reference_temperature = 20.0;
+  model.expansion = {11.5e-6, 0.0, 0.0};
+  model.expansion_sigma = {0.2e-6, 0.0, 0.0};
+  cell.temperature = 20.0;
+  ASSERT_EQ(cell.use(write(cell.folder, "grown.yaml", model)).state(), MODEL_ACTIVE);
+  EXPECT_NEAR(cell.run_for(2.0).correction(), -5e-5 * 0.1, 1e-9);
+  cell.temperature = 28.0;
+  cell.x = 0.18;
+  AxisCorrection now = cell.run_for(5.0);
+  // steel, 8 K above the reference, 180 mm from the origin: 16.6 um on top of 9 um
+  EXPECT_NEAR(now.correction(), -(5e-5 + 11.5e-6 * 8.0) * 0.18, 5e-9);
+  EXPECT_NEAR(now.sigma(), std::hypot(1e-7, 0.2e-6 * 8.0 * 0.08), 1e-9);  // the expansion's about mid travel
+  EXPECT_EQ(cell.status.latest()->condition(), TEMPERATURE_SOUND);
+  EXPECT_EQ(cell.correction_y.latest()->correction(), 0.0);
+  cell.thermometer_lives = false;
+  now = cell.run_for(10.0);
+  EXPECT_TRUE(now.stale());
+  EXPECT_NEAR(now.correction(), -(5e-5 + 11.5e-6 * 8.0) * 0.18, 5e-9);
+  now = cell.run_for(30.0);  // lost: the field at the reference is what is known
+  EXPECT_EQ(cell.status.latest()->condition(), TEMPERATURE_REFUSED);
+  EXPECT_NEAR(now.correction(), -5e-5 * 0.18, 1e-9);
+}
+
 TEST(LiveCompensation, TakesOutAThermalLayerThatWasMeasuredAboveAnotherGeometry) {
   LiveCell cell;
   cell.bring_up();
@@ -260,6 +290,7 @@ TEST(LiveCompensation, NeitherAllocatesNorLocksWhateverHappens) {
   cell.parameters.temperature_timeout = 0.2;
   cell.parameters.temperature_hold = 0.2;
   cell.parameters.transaction_timeout = 3.0;
+  cell.parameters.state = (cell.folder.path / "state").string();
   cell.bring_up(false);
   const auto below = write(cell.folder, "geometry.yaml", geometry(5e-5, 1e-6));
   const auto above = write(cell.folder, "heat.yaml", heat(1e-5, 50.0), {0, testing::checksum_of(below)});
@@ -311,6 +342,8 @@ TEST(LiveCompensation, NeitherAllocatesNorLocksWhateverHappens) {
   EXPECT_THAT(said, HasSubstr("stale"));
   EXPECT_THAT(said, HasSubstr("taken out"));
   EXPECT_THAT(said, HasSubstr("fell silent"));
+  cell.compensation->cleanup();  // what was committed stands in the folder
+  EXPECT_EQ(KeptModels::read(cell.parameters.state).models.size(), 2U);
 }
 
 }  // namespace

@@ -333,6 +333,24 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
   EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 0);
 }
 
+TEST(Dispenser, TakesItsModelOutAndBackInAndHasNoTransactions) {
+  Folder folder;
+  Bench bench;
+  bench.bring_up();
+  bench.change(compensation::MODEL_STAGE, write_model(folder));
+  EXPECT_EQ(bench.change(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_ACTIVE);
+  for (const auto kind : {compensation::MODEL_KEEP, compensation::MODEL_COMMIT}) {
+    const auto answer = bench.change(kind);
+    EXPECT_EQ(answer.state(), compensation::MODEL_REFUSED);
+    EXPECT_THAT(answer.text().c_str(), ::testing::HasSubstr("no transactions"));
+    EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 10'300'000);  // still in use
+  }
+  EXPECT_EQ(bench.change(compensation::MODEL_CLEAR).state(), compensation::MODEL_NONE);
+  EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 0);
+  EXPECT_EQ(bench.change(compensation::MODEL_ROLLBACK).state(), compensation::MODEL_ACTIVE);
+  EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 10'300'000);
+}
+
 TEST(Dispenser, RefusesModelsThatMustNotAim) {
   invar::testing::TemporaryFolder folder;
   Bench bench;

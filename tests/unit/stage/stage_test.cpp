@@ -149,6 +149,22 @@ TEST(Stage, FeedsForwardTheForcesOfAModelThatIsLoadedWhileRunning) {
   EXPECT_NEAR(bench.following_error(), before, 0.05 * before);
 }
 
+TEST(Stage, TakesItsModelOutByCommandAndHasNoTransactions) {
+  Sprung bench;
+  bench.enable();
+  (void)bench.tell(compensation::MODEL_STAGE, bench.model(600.0));
+  ASSERT_EQ(bench.tell(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_ACTIVE);
+  const double with = bench.following_error();
+  EXPECT_EQ(bench.tell(compensation::MODEL_COMMIT).state(), compensation::MODEL_REFUSED);
+  EXPECT_EQ(bench.tell(compensation::MODEL_KEEP).state(), compensation::MODEL_REFUSED);
+  EXPECT_EQ(bench.tell(compensation::MODEL_CLEAR).state(), compensation::MODEL_NONE);
+  const double without = bench.following_error();
+  EXPECT_GT(without, 4.0 * with);
+  EXPECT_EQ(bench.tell(compensation::MODEL_ROLLBACK).state(), compensation::MODEL_ACTIVE);
+  (void)bench.following_error();  // it fades in
+  EXPECT_LT(bench.following_error(), 0.25 * without);
+}
+
 TEST(Stage, AnotherModelDoesNotMakeTheCarriageJump) {
   Sprung bench;
   bench.enable();

@@ -1,0 +1,105 @@
+#include "components/compensation/kept_models.hpp"
+
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <set>
+
+#include "core/base/fault.hpp"
+#include "core/compensation/model_file.hpp"
+
+namespace invar::compensation {
+
+namespace {
+
+constexpr const char* list_name = "models.yaml";
+
+std::string digits_of(std::uint32_t checksum) {
+  std::array<char, 16> text{};
+  std::snprintf(text.data(), text.size(), "%08x", checksum);
+  return text.data();
+}
+
+std::string file_name(std::size_t place, const std::string& digits) {
+  const std::string layer = place == 0 ? "geometric" : std::string{"thermal_"} + "xyz"[place - 1];
+  return layer + "-" + digits + ".yaml";
+}
+
+}  // namespace
+
+KeptModels::Kept KeptModels::read(const std::filesystem::path& folder) {
+  Kept kept;
+  if (!std::filesystem::exists(folder / list_name)) return kept;
+  kept.any = true;
+  const auto yaml = config::Yaml::load(folder / list_name);
+  if (check_seal(yaml) == 0)
+    throw InputError{yaml.file().string(), "it carries no checksum", "calibrate again"};
+  (void)yaml.root().integer("invar_compensation", 1, 1);
+  (void)yaml.root().choice("kind", {"kept"});
+  for (const config::Node& model : yaml.root()["models"].children())
+    kept.models.push_back({folder / model.text("file"), checksum_number(model.text("crc32"))});
+  yaml.finish();
+  return kept;
+}
+
+void KeptModels::write(const std::filesystem::path& folder, const Selection& models) {
+  std::filesystem::create_directories(folder);
+  ModelText list{"kept", {}};
+  std::set<std::filesystem::path> kept;
+  for (std::size_t place = 0; place < models.size(); ++place) {
+    if (models[place] == nullptr) continue;
+    if (kept.empty()) list.open_list("models");
+    const std::string digits = digits_of(models[place]->checksum);
+    const std::filesystem::path file = folder / file_name(place, digits);
+    std::ofstream copy{file, std::ios::binary};
+    copy << models[place]->text;
+    copy.close();
+    if (!copy) throw InputError{file.string(), "cannot be written", "check the folder and the space left"};
+    list.item().text("file", file.filename().string()).text("crc32", digits);
+    kept.insert(file);
+  }
+  if (!kept.empty()) list.close();
+  list.write(folder / list_name);
+  for (const auto& entry : std::filesystem::directory_iterator{folder}) {
+    const std::string name = entry.path().filename().string();
+    const bool ours = name.starts_with("geometric-") || name.starts_with("thermal_");
+    if (ours && kept.count(entry.path()) == 0) std::filesystem::remove(entry.path());
+  }
+}
+
+void KeptModels::open(const std::filesystem::path& folder) {
+  folder_ = folder;
+  ending_ = false;
+  if (folder_.empty() || owner_.simulated_time) return;
+  thread_ = std::thread{[this] {
+    Selection models;
+    for (bool last = false; !last;) {
+      last = ending_;
+      while (waiting_.pop(models)) put(models);
+      if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }};
+}
+
+void KeptModels::close() noexcept {
+  ending_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void KeptModels::keep(const Selection& models) noexcept {
+  if (folder_.empty()) return;
+  if (owner_.simulated_time)
+    put(models);
+  else if (!waiting_.push(models))
+    failed_ = true;
+}
+
+void KeptModels::put(const Selection& models) noexcept {
+  try {
+    write(folder_, models);
+  } catch (const std::exception&) {
+    failed_ = true;
+  }
+}
+
+}  // namespace invar::compensation

@@ -1,0 +1,61 @@
+// KeptModels: the models in use, kept in a folder so that the next start goes on with them.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "components/compensation/live_model.hpp"
+#include "core/component/component.hpp"
+
+namespace invar::compensation {
+
+/// The folder holds a copy of each model, its checksum in its name, and `models.yaml`, sealed, which lists those in use. That
+/// list is renamed into place after the copies, so a cut of power leaves either the old models or the new ones. Writing
+/// happens on a thread of its own, never in the loop (in simulated time at once, so that runs repeat).
+class KeptModels {
+ public:
+  /// The geometric model, then those of position and temperature by axis; nullptr: none.
+  using Selection = std::array<const LiveModel*, 4>;
+  struct Entry {
+    std::filesystem::path file;
+    std::uint32_t checksum = 0;
+  };
+  struct Kept {
+    bool any = false;  // there is a list, though it may be empty: corrections were taken out on purpose
+    std::vector<Entry> models;
+  };
+  /// Set-up. Throws InputError for a list that is damaged.
+  [[nodiscard]] static Kept read(const std::filesystem::path& folder);
+  /// Throws where the folder cannot be written. Not real-time.
+  static void write(const std::filesystem::path& folder, const Selection& models);
+
+  explicit KeptModels(const Component& owner) : owner_{owner} {}
+  ~KeptModels() { close(); }
+  KeptModels(const KeptModels&) = delete;
+  KeptModels& operator=(const KeptModels&) = delete;
+
+  /// Set-up: from the component's configure; an empty folder keeps nothing.
+  void open(const std::filesystem::path& folder);
+  /// From the component's cleanup, while the models still stand: what is waiting is written.
+  void close() noexcept;
+  /// Real-time where time is real.
+  void keep(const Selection& models) noexcept;
+  /// True once after models could not be written. Real-time.
+  [[nodiscard]] bool failed() noexcept { return failed_.exchange(false); }
+
+ private:
+  void put(const Selection& models) noexcept;
+
+  const Component& owner_;
+  std::filesystem::path folder_;
+  Ring<Selection> waiting_{8};  // loop to thread
+  std::atomic<bool> failed_{false};
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+}  // namespace invar::compensation

@@ -1,0 +1,145 @@
+// Models that outlive the process: kept when committed, used at the next start, refused when they are not what was kept.
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "tests/unit/compensation/live_cell.hpp"
+
+namespace invar::compensation {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::checksum_of;
+using testing::geometry;
+using ::testing::HasSubstr;
+using testing::heat;
+using testing::LiveCell;
+using testing::write;
+
+std::string seal_of(const fs::path& model) { return config::Yaml::load(model).root().text("checksum"); }
+
+struct KeptCell : LiveCell {
+  KeptCell() { parameters.state = (folder.path / "state").string(); }
+  /// The cell ends and begins anew: another component, wired again.
+  void start_again() {
+    compensation->deactivate();
+    compensation->cleanup();
+    bring_up();
+    (void)said();
+    cycle_once();
+  }
+  [[nodiscard]] std::uint32_t geometric() { return status.latest()->geometric_checksum(); }
+  [[nodiscard]] fs::path copy_of(const fs::path& model) const {
+    return fs::path{parameters.state} / ("geometric-" + seal_of(model) + ".yaml");
+  }
+};
+
+TEST(KeptModels, WhatWasCommittedIsInUseAtTheNextStartThoughItsFileIsGone) {
+  KeptCell cell;
+  cell.bring_up();
+  const auto below = write(cell.folder, "geometry.yaml", geometry(1e-4, 0.0));
+  const std::uint32_t checksum = checksum_of(below);
+  const auto above = write(cell.folder, "heat.yaml", heat(1e-5), {0, checksum});
+  ASSERT_EQ(cell.use(below, 7).state(), MODEL_ACTIVE);
+  ASSERT_EQ(cell.use(above, 7).state(), MODEL_ACTIVE);
+  EXPECT_FALSE(KeptModels::read(cell.parameters.state).any);  // on trial
+  ASSERT_EQ(cell.tell(MODEL_COMMIT, {}, 7).state(), MODEL_ACTIVE);
+  const double before = cell.run_for(3.0).correction();
+  fs::remove(below);
+  fs::remove(above);
+
+  cell.start_again();
+  EXPECT_EQ(cell.status.latest()->state(), MODEL_ACTIVE);
+  EXPECT_EQ(cell.geometric(), checksum);
+  EXPECT_NE(cell.status.latest()->thermal_checksum()[0], 0U);
+  EXPECT_NEAR(cell.run_for(3.0).correction(), before, 1e-15);
+  EXPECT_EQ(cell.said(), "the temperature is sound: its correction is in use\n");
+}
+
+TEST(KeptModels, ATrialThatWasNeverCommittedIsForgotten) {
+  KeptCell cell;
+  cell.bring_up();
+  const auto good = write(cell.folder, "good.yaml", geometry(5e-5, 0.0));
+  ASSERT_EQ(cell.use(good).state(), MODEL_ACTIVE);
+  ASSERT_EQ(cell.use(write(cell.folder, "trial.yaml", geometry(1e-4, 0.0)), 7).state(), MODEL_ACTIVE);
+  cell.start_again();
+  EXPECT_EQ(cell.geometric(), checksum_of(good));
+}
+
+TEST(KeptModels, WhatWasTakenOutStaysOutAndOnlyCopiesInUseStay) {
+  KeptCell cell;
+  cell.bring_up();
+  const auto first = write(cell.folder, "first.yaml", geometry(5e-5, 0.0));
+  const auto second = write(cell.folder, "second.yaml", geometry(6e-5, 0.0));
+  cell.use(first);
+  EXPECT_TRUE(fs::exists(cell.copy_of(first)));
+  cell.use(second);
+  EXPECT_FALSE(fs::exists(cell.copy_of(first)));
+  EXPECT_TRUE(fs::exists(cell.copy_of(second)));
+  EXPECT_EQ(cell.tell(MODEL_CLEAR).state(), MODEL_NONE);
+  cell.parameters.model = second;  // the cell file's: for a folder that holds nothing yet
+  cell.start_again();
+  EXPECT_EQ(cell.status.latest()->state(), MODEL_NONE);
+  EXPECT_EQ(cell.run_for(1.0).correction(), 0.0);
+}
+
+TEST(KeptModels, RefusesWhatIsDamagedOrOfAnotherMachineAndSaysSo) {
+  KeptCell cell;
+  cell.bring_up();
+  const auto good = write(cell.folder, "good.yaml", geometry(5e-5, 0.0));
+  const auto other = write(cell.folder, "other.yaml", geometry(6e-5, 0.0));
+  cell.use(good);
+  const fs::path copy = cell.copy_of(good);
+  const fs::path list = fs::path{cell.parameters.state} / "models.yaml";
+  const auto starts_without = [&](const std::string& words) {
+    cell.compensation->cleanup();
+    (void)cell.said();
+    cell.bring_up();
+    cell.cycle_once();
+    EXPECT_EQ(cell.status.latest()->state(), MODEL_NONE) << words;
+    EXPECT_EQ(cell.run_for(0.5).correction(), 0.0) << words;
+    const std::string said = cell.said();
+    EXPECT_THAT(said, HasSubstr("the kept model is refused"));
+    EXPECT_THAT(said, HasSubstr(words));
+  };
+  const auto cut = [](const fs::path& file) { fs::resize_file(file, fs::file_size(file) / 2); };
+  cut(copy);
+  starts_without("geometric-");
+  fs::copy_file(other, copy, fs::copy_options::overwrite_existing);
+  starts_without("not the one that was kept");
+  fs::remove(copy);
+  starts_without("cannot be read");
+  fs::copy_file(good, copy);
+  std::ofstream{list, std::ios::app} << "# edited\nchecksum: \"00000000\"\n";
+  starts_without("models.yaml");
+  std::ofstream{list} << "";
+  starts_without("models.yaml");
+  // Sound in itself, but the machine got a longer travel.
+  KeptModels::write(cell.parameters.state, {});
+  cell.start_again();
+  cell.use(good);
+  std::ofstream{cell.folder.machine()}
+      << "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.3], y: [0, 0.2]}\n";
+  starts_without("of another machine: its axis x has another travel");
+  // The cell file's own model stands in.
+  std::ofstream{cell.folder.machine()}
+      << "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n";
+  cell.parameters.model = other;
+  cut(copy);
+  cell.compensation->cleanup();
+  cell.bring_up();
+  cell.cycle_once();
+  EXPECT_EQ(cell.geometric(), checksum_of(other));
+}
+
+TEST(KeptModels, AFolderThatCannotBeWrittenIsAFault) {
+  KeptCell cell;
+  std::ofstream{cell.parameters.state} << "a file, not a folder";
+  cell.bring_up();
+  cell.use(write(cell.folder, "good.yaml", geometry(5e-5, 0.0)));
+  cell.cycle_once();
+  EXPECT_THAT(cell.said(), HasSubstr("could not be written"));
+}
+
+}  // namespace
+}  // namespace invar::compensation
