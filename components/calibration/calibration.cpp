@@ -27,6 +27,7 @@ Calibration::~Calibration() = default;
 void Calibration::activate() {
   transaction_ = 0;
   heat_.forget();
+  heat_history_ = {};
   JobComponent::activate();
 }
 

@@ -19,6 +19,7 @@
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/heat_trace.hpp"
+#include "core/metrology/thermal_identification.hpp"
 #include "core/recording/table.hpp"
 #include "idl/compensation.h"
 #include "idl/job.h"
@@ -134,6 +135,7 @@ class Calibration final : public JobComponent, private JobHost {
   Instant kept_at_;
 
   metrology::HeatTrace heat_;
+  metrology::ThermalReadings::History heat_history_;
   const TraceSpec* trace_ = nullptr;  // that the heater follows
   Instant trace_start_;
   Instant began_;  // the thermal job; times in its files count from here

@@ -81,9 +81,7 @@ IdentifiedHeat identify_heat(const metrology::ThermalReadings& readings, std::si
 
 double left_over(const metrology::ThermalReadings& readings, const metrology::ThermalError& model,
                  const std::vector<bool>& of) {
-  const Eigen::VectorXd temperature =
-      model.lag > 0.0 ? metrology::lagged_temperature(*readings.time, readings.temperature, model.lag)
-                      : readings.temperature;
+  const Eigen::VectorXd temperature = model.lag > 0.0 ? readings.lagged(model.lag) : readings.temperature;
   double squares = 0.0;
   double count = 0.0;
   for (Eigen::Index i = 0; i < readings.x.size(); ++i) {

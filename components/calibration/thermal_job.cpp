@@ -1,6 +1,9 @@
 // The calibration over position and temperature: a line read again and again while the heater follows a trace, the fit,
 // and what the model is worth at points and temperatures that were not fitted.
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <limits>
 #include <stdexcept>
 
@@ -11,8 +14,10 @@ namespace invar::calibration {
 
 namespace {
 
-constexpr double set_each = 1.0;  // s, between two setpoints of a trace
-constexpr int left_out_each = 4;  // each so many passes one is kept from the fit
+constexpr double set_each = 1.0;         // s, between two setpoints of a trace
+constexpr int left_out_each = 4;         // each so many passes one is kept from the fit
+constexpr double history_spacing = 2.0;  // s, of the temperatures that a lag is worked out from
+constexpr std::size_t most_history = 20'000;
 constexpr const char* models[] = {"room temperature", "position and temperature"};
 
 double square_mean(const recording::Table& table, const char* model) {
@@ -26,6 +31,17 @@ double square_mean(const recording::Table& table, const char* model) {
     count += 1.0;
   }
   return count > 0.0 ? squares / count : 0.0;
+}
+
+/// One line each: what was tried, how it meets passes that were not fitted, and why it was or was not taken.
+void write_models_tried(const metrology::ThermalFit& fit, const std::filesystem::path& file) {
+  std::ofstream out{file};
+  for (const auto& tried : fit.candidates) {
+    std::array<char, 60> lag{};
+    if (tried.lag > 0.0) std::snprintf(lag.data(), lag.size(), " by %.3g s", tried.lag);
+    out << (tried.chosen ? "* " : "  ") << tried.name << lag.data() << ": " << tried.verdict << '\n';
+  }
+  if (!out.flush()) throw std::runtime_error{file.string() + " cannot be written"};
 }
 
 }  // namespace
@@ -57,8 +73,20 @@ void Calibration::set_heater(double setpoint) {
 
 /// Each step: what the temperature did, and where the heater is to be on its trace.
 void Calibration::follow_heat() {
-  if (const auto* sample = temperature_.latest(); sample != nullptr && !sample->stale())
-    heat_.add(static_cast<double>(sample->at().time_ns()) * 1e-9, sample->temperature());
+  if (const auto* sample = temperature_.latest(); sample != nullptr && !sample->stale()) {
+    const double at = static_cast<double>(sample->at().time_ns()) * 1e-9;
+    heat_.add(at, sample->temperature());
+    if (heat_history_.time.empty() || at - heat_history_.time.back() >= history_spacing) {
+      heat_history_.time.push_back(at);
+      heat_history_.temperature.push_back(sample->temperature());
+    }
+    if (heat_history_.time.size() > most_history) {  // the oldest quarter goes
+      const auto quarter = static_cast<std::ptrdiff_t>(most_history / 4);
+      heat_history_.time.erase(heat_history_.time.begin(), heat_history_.time.begin() + quarter);
+      heat_history_.temperature.erase(heat_history_.temperature.begin(),
+                                      heat_history_.temperature.begin() + quarter);
+    }
+  }
   if (trace_ != nullptr && now() - set_at_ >= Duration::seconds(set_each))
     set_heater(trace_->at((now() - trace_start_).in_seconds()));
 }
@@ -179,7 +207,12 @@ Task Calibration::run(const ThermalJob& job) {
     left_out[i] = !cold[i] && (cycle - job.room_passes) % left_out_each == 0;
     fitted[i] = !left_out[i];
   }
-  const auto rows = [&](const std::vector<bool>& of) { return heat_readings(table, parameters_.zones, of); };
+  const auto rows = [&](const std::vector<bool>& of) {
+    auto readings = heat_readings(table, parameters_.zones, of);
+    readings.history =
+        heat_history_;  // a body that lags also remembers the passes left out, and what was before
+    return readings;
+  };
   const auto axis = job.axis();
   metrology::ThermalReadings at_room = rows(cold);
   at_room.heating_rate.reset();  // what little the temperature did there is noise
@@ -187,6 +220,7 @@ Task Calibration::run(const ThermalJob& job) {
   at_room.zones.clear();
   const IdentifiedHeat room = identify_heat(at_room, axis, above, source, folder / "room");
   const IdentifiedHeat heat = identify_heat(rows(fitted), axis, above, source, folder);
+  write_models_tried(heat.fit, folder / "models_tried.txt");
   const metrology::ThermalReadings everything = rows(all);
   if (left_over(everything, heat.fit.model, left_out) > left_over(everything, room.fit.model, left_out))
     throw std::runtime_error{

@@ -25,6 +25,15 @@ struct ThermalReadings {
     Eigen::VectorXd temperature;
   };
   std::vector<Zone> zones;
+  /// What the temperature did, also while nothing was read: for a lagged temperature. Ascending; empty: what the readings say.
+  struct History {
+    std::vector<double> time;         // [s]
+    std::vector<double> temperature;  // [degC]
+  };
+  History history{};
+
+  /// The temperature of a body behind the sensor at each reading [degC]. Needs `time`; `lag` [s] > 0.
+  [[nodiscard]] Eigen::VectorXd lagged(double lag) const;
 };
 
 /// A model that was tried, in the order of trial.
@@ -32,6 +41,7 @@ struct ThermalCandidate {
   std::string name;
   double log_evidence = 0.0;  // log p(readings | model), hyperparameters at their best
   double left_out_rms = 0.0;  // RMS of reading minus prediction without it [m]
+  double held_out_rms = 0.0;  // RMS of reading minus prediction without its pass and every fifth other [m]
   double lag = 0.0;           // [s], of the lag-state model
   bool chosen = false;
   std::string verdict;  // why it was or was not taken
@@ -49,8 +59,8 @@ struct ThermalFit {
 
 /// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
 /// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of further
-/// zones' temperatures, of the heating rate, hysteresis and a lagged temperature are tried in turn and kept where the log
-/// evidence rises by more than three. Outliers (4.5 standard deviations) are rejected. At least four readings at two
+/// zones' temperatures, a lagged temperature, the heating rate and hysteresis are tried in turn and kept where the log
+/// evidence rises by more than three and passes that were not fitted are met no worse. Outliers (4.5 standard deviations) are rejected. At least four readings at two
 /// positions.
 ThermalFit identify_thermal(const ThermalReadings& readings);
 

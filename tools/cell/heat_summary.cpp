@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -84,6 +85,13 @@ void summarise_heat(const std::filesystem::path& folder, report::Page& page, std
   constexpr Part parts[] = {
       {"verify_fixed.csv", "at one temperature", "Error at one temperature"},
       {"verify_varying.csv", "on a varying trace", "Error while the temperature varies"}};
+  if (std::ifstream tried{folder / "models_tried.txt"}; tried) {
+    page.heading("Models tried over position and temperature");
+    for (std::string line; std::getline(tried, line);) {
+      page.paragraph(line);
+      if (line.starts_with("* ")) out << "model           " << line.substr(2) << '\n';
+    }
+  }
   std::vector<Plot> plots;
   std::vector<std::vector<std::string>> rows;
   for (const Part& part : parts) {

@@ -260,8 +260,9 @@ report::Page page_of(const std::filesystem::path& file, const ThermalReadings& r
   std::vector<std::vector<std::string>> rows;
   for (const auto& candidate : fit.candidates)
     rows.push_back({candidate.name + (candidate.lag > 0.0 ? " (" + number(candidate.lag, 3) + " s)" : ""),
-                    number(candidate.log_evidence, 6), si(candidate.left_out_rms, "m"), candidate.verdict});
-  page.table({"model", "log evidence", "RMS of left-out readings", "verdict"}, rows);
+                    number(candidate.log_evidence, 6), si(candidate.left_out_rms, "m"),
+                    si(candidate.held_out_rms, "m"), candidate.verdict});
+  page.table({"model", "log evidence", "RMS of left-out readings", "of left-out passes", "verdict"}, rows);
   page.heading("Error");
   page.plots({levels_plot(readings, fit), surface_plot(fit)},
              "Bands are two standard deviations of the curve.");
@@ -350,6 +351,7 @@ void calibrate(const Options& options) {
     report["models"].push_back({{"name", candidate.name},
                                 {"log_evidence", candidate.log_evidence},
                                 {"left_out_rms_m", candidate.left_out_rms},
+                                {"held_out_passes_rms_m", candidate.held_out_rms},
                                 {"lag_s", candidate.lag},
                                 {"chosen", candidate.chosen},
                                 {"verdict", candidate.verdict}});

@@ -175,6 +175,115 @@ TEST(ThermalIdentification, FindsTheTimeConstantOfABodyThatLags) {
   EXPECT_NEAR(fit.model.lag, 600.0, 60.0);
 }
 
+/// A slide that is heated and cools over 40 minutes while a line is read forth and back, one pass in four left out. Its scale
+/// lags behind the thermistor by `lag`, or its error also follows the heating rate as the thermistor shows it.
+struct HeatedLine {
+  double lag = 0.0;          // s
+  double rate_effect = 0.0;  // m s/(K m)
+  unsigned seed = 1;
+};
+
+ThermalReadings read_while_heated(const HeatedLine& world) {
+  const auto wanted = [](double t) {
+    constexpr std::array<double, 6> time{0, 600, 800, 1400, 1500, 2400};
+    constexpr std::array<double, 6> level{26.8, 28.6, 28.6, 30, 30, 27};
+    for (std::size_t i = 0; i + 1 < time.size(); ++i)
+      if (t < time[i + 1])
+        return level[i] + (level[i + 1] - level[i]) * std::max(0.0, t - time[i]) / (time[i + 1] - time[i]);
+    return level.back();
+  };
+  std::mt19937 random{world.seed};
+  std::normal_distribution<double> normal;
+  HeatTrace trace{20.0};
+  std::vector<double> x, t, e, r, d, at;
+  ThermalReadings readings;
+  constexpr double step = 0.1;
+  double slide = 26.8, scale = slide, next = -150.0;
+  for (int k = 0, i = 0; k < 25'500; ++k) {
+    const double now = k * step - 150.0;
+    const double before = slide;
+    slide += step / 15.0 * (wanted(now) - slide);  // the heater follows its trace a little late
+    scale = world.lag > 0.0 ? lag_step(scale, before, slide, step, world.lag) : slide;
+    const double measured = slide + 3e-3 * normal(random);
+    if (k % 2 == 0) trace.add(now, measured);
+    if (k % 20 == 0) {
+      readings.history.time.push_back(now);
+      readings.history.temperature.push_back(measured);
+    }
+    if (now < next) continue;
+    const int place = i % 42;
+    const double position = 0.01 * (place < 21 ? place : 41 - place), warmth = scale - 26.8;
+    if ((i / 42) % 4 != 3) {
+      x.push_back(position), t.push_back(measured), r.push_back(trace.rate()), at.push_back(now);
+      d.push_back(place < 21 ? 1.0 : -1.0);
+      e.push_back(1.4e-6 * std::sin(37.0 * position + 0.7) - (19e-6 * position + 2e-7) * warmth +
+                  world.rate_effect * position * trace.rate() + 2e-7 * normal(random));
+    }
+    next = now + 1.7 + (++i % 42 == 0 ? 20.0 : 0.0);
+  }
+  const auto vector = [](const std::vector<double>& v) -> Eigen::VectorXd {
+    return Eigen::Map<const Eigen::VectorXd>(v.data(), static_cast<Eigen::Index>(v.size()));
+  };
+  readings.x = vector(x), readings.temperature = vector(t), readings.error = vector(e);
+  readings.heating_rate = vector(r), readings.direction = vector(d), readings.time = vector(at);
+  return readings;
+}
+
+const ThermalCandidate& chosen_of(const ThermalFit& fit) {
+  return *std::find_if(fit.candidates.begin(), fit.candidates.end(), [](const auto& c) { return c.chosen; });
+}
+
+TEST(ThermalIdentification, ChoosesTheBodyThatLagsOrTheHeatingRateAsTheWorldHasIt) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    for (const HeatedLine& world :
+         {HeatedLine{.lag = 90.0, .seed = seed}, HeatedLine{.lag = 300.0, .seed = seed}}) {
+      const ThermalFit fit = identify_thermal(read_while_heated(world));
+      EXPECT_EQ(chosen_of(fit).name, "lagged temperature") << "lag " << world.lag << " seed " << seed;
+      EXPECT_NEAR(fit.model.lag, world.lag, 0.1 * world.lag);
+    }
+    const ThermalFit fit = identify_thermal(read_while_heated({.rate_effect = 1.7e-3, .seed = seed}));
+    EXPECT_EQ(chosen_of(fit).name, "heating rate") << "seed " << seed;
+    EXPECT_EQ(fit.model.lag, 0.0);
+    const ThermalFit neither = identify_thermal(read_while_heated({.seed = seed}));
+    EXPECT_EQ(chosen_of(neither).name, "position and temperature") << "seed " << seed;
+  }
+}
+
+TEST(ThermalIdentification, SaysWhyAndMeetsPassesThatItDidNotSee) {
+  const ThermalFit fit = identify_thermal(read_while_heated({.lag = 90.0}));
+  const ThermalCandidate& chosen = chosen_of(fit);
+  EXPECT_THAT(chosen.verdict, ::testing::StartsWith("taken: log evidence changes by"));
+  EXPECT_THAT(chosen.verdict, ::testing::HasSubstr("passes not fitted are met to"));
+  EXPECT_NEAR(chosen.held_out_rms, 2e-7, 2e-8);  // the noise of one reading
+  for (const auto& candidate : fit.candidates) {
+    EXPECT_GE(candidate.held_out_rms, 0.98 * chosen.held_out_rms) << candidate.name;
+    EXPECT_FALSE(candidate.verdict.empty()) << candidate.name;
+  }
+}
+
+TEST(ThermalReadings, TheTemperatureOfABodyThatLagsComesFromTheHistoryNotFromTheFewReadings) {
+  const auto sensor = [](double t) { return t < 300.0 ? 25.0 + 6e-3 * t : 26.8 - 2e-3 * (t - 300.0); };
+  ThermalReadings readings;
+  readings.time = Eigen::Vector3d{101.0, 640.0, 641.5};
+  readings.x = Eigen::Vector3d::Zero();
+  readings.temperature = readings.time->unaryExpr(sensor);
+  for (double t = 0.0; t <= 640.0; t += 2.0) {
+    readings.history.time.push_back(t);
+    readings.history.temperature.push_back(sensor(t));
+  }
+  // A ramp from equilibrium lags by rate * tau (1 - exp(-t / tau)); the second ramp begins with what the first left.
+  const auto body = [](double t) {
+    const double tau = 150.0, gone = std::exp(-300.0 / tau);
+    if (t < 300.0) return 25.0 + 6e-3 * (t - tau * (1.0 - std::exp(-t / tau)));
+    const double after = std::exp(-(t - 300.0) / tau);
+    return 26.8 - 2e-3 * (t - 300.0) + 2e-3 * tau * (1.0 - after) - 6e-3 * tau * (1.0 - gone) * after;
+  };
+  const Eigen::VectorXd lagged = readings.lagged(150.0);
+  for (Eigen::Index i = 0; i < 3; ++i) EXPECT_NEAR(lagged(i), body((*readings.time)(i)), 1e-9) << i;
+  readings.history = {};
+  EXPECT_GT(std::abs(readings.lagged(150.0)(1) - body(640.0)), 0.1);
+}
+
 TEST(ThermalIdentification, TakesAZoneThatMattersAndLeavesOutOneThatDoesNot) {
   ThermalReadings readings = record(Stage{6}, 6, {0.0, 0.0}, 0.2e-6);
   const Eigen::Index n = readings.x.size();
