@@ -18,11 +18,14 @@
 #include "core/metrology/geometric_identification.hpp"
 #include "core/metrology/identifiability.hpp"
 #include "core/metrology/line_plan.hpp"
+#include "tests/unit/metrology/left_over.hpp"
 #include "tests/unit/metrology/simulated_machine.hpp"
 
 namespace invar::metrology {
 namespace {
 
+using testing::Left;
+using testing::left_over;
 using Random = std::mt19937_64;
 
 double uniform(Random& random, double low, double high) {
@@ -270,44 +273,6 @@ Eigen::VectorXd oracle(const Case& one, const Identification& found) {
   return h.llt().solve(found.equations.right);
 }
 
-struct Left {
-  double rms = 0.0;
-  double inside = 0.0;
-  double sigma = 0.0;
-};
-Left left_over(const Machine& machine, const GeometricModel* model) {
-  const Eigen::Matrix3d directions = axis_directions(machine.chain, machine.errors->squareness);
-  const auto grid = volume_grid(machine.chain, machine.travel, machine.chain.axes == 2 ? 15 : 6);
-  Eigen::MatrixXd modes(3 * static_cast<long>(grid.size()), 6);
-  Eigen::VectorXd field(modes.rows());
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(modes.rows());
-  for (std::size_t g = 0; g < grid.size(); ++g) {
-    const long r = 3 * static_cast<long>(g);
-    Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool);
-    if (model != nullptr) {
-      e -= model->error(grid[g], machine.tool);
-      sigma.segment<3>(r) = model->sigma_at(grid[g], machine.tool);
-    }
-    for (int k = 0; k < 3; ++k)
-      if (!machine.chain.has(k)) e[k] = sigma[r + k] = 0.0;
-    field.segment<3>(r) = e;
-    modes.middleRows<3>(r) = RigidPart::rigid(machine.chain, grid[g]);
-  }
-  field -= modes * modes.completeOrthogonalDecomposition().solve(field).eval();
-  Left left;
-  left.rms = std::sqrt(field.squaredNorm() / static_cast<double>(grid.size()));
-  left.sigma = std::sqrt(sigma.squaredNorm() / static_cast<double>(grid.size()));
-  double inside = 0.0;
-  double all = 0.0;
-  for (long r = 0; r < field.size(); ++r) {
-    if (!machine.chain.has(static_cast<int>(r % 3))) continue;
-    all += 1.0;
-    inside += std::abs(field[r]) <= 2.0 * sigma[r] ? 1.0 : 0.0;
-  }
-  left.inside = inside / all;
-  return left;
-}
-
 double quantile(std::vector<double> values, double part) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5)];
@@ -344,23 +309,24 @@ int main(int argc, char** argv) {
   std::vector<double> seconds;
   for (int i = 0; i < cases; ++i) {
     const Case one = random_case(first + static_cast<unsigned>(i));
+    const int nodes = one.axes == 2 ? 15 : 6;
     const std::clock_t start = std::clock();
     const Identification found = identify(one.machine, one.lines);
     seconds.push_back(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC);
-    const Left left = left_over(one.machine, &found.model);
+    const Left left = left_over(one.machine, &found.model, nodes);
     GeometricModel best = found.model;
     const Eigen::VectorXd unknowns = oracle(one, found);
     for (const auto& block : found.basis.blocks)
       best.coefficients[static_cast<std::size_t>(block.component)] =
           found.basis.spline_coefficients(block.component, unknowns);
     best.squareness = found.basis.squareness(unknowns);
-    const double least = left_over(one.machine, &best).rms;
+    const double least = left_over(one.machine, &best, nodes).rms;
     double steps = -1.0;
     if (i % 3 == 0) {
       IdentificationOptions options;
       options.method = IdentificationMethod::displacement;
       const GeometricModel in_steps = identify(one.machine, one.lines, options).model;
-      steps = left_over(one.machine, &in_steps).inside;
+      steps = left_over(one.machine, &in_steps, nodes).inside;
     }
     const auto place = std::find_if(tallies.begin(), tallies.end(),
                                     [&](const Tally& t) { return t.name == one.lines_name; });

@@ -1,7 +1,6 @@
 // Monte Carlo of the identification on random machines (metrology.md section 6): error left in the volume by line set.
 //
 //     build/bin/bench_geometric_monte_carlo [machines] [rows that contain this text]
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -15,10 +14,14 @@
 #include "core/metrology/identifiability.hpp"
 #include "core/metrology/line_plan.hpp"
 #include "core/metrology/line_search.hpp"
+#include "tests/unit/metrology/left_over.hpp"
 #include "tests/unit/metrology/simulated_machine.hpp"
 
 namespace invar::metrology {
 namespace {
+
+using testing::Left;
+using testing::left_over;
 
 struct Ends {
   Eigen::Vector3d from, to;  // in travels
@@ -68,43 +71,6 @@ std::vector<Ends> edges_faces_bodies() {
   return lines +
          std::vector<Ends>{
              {{0, 0, 0}, {1, 1, 1}}, {{1, 0, 0}, {0, 1, 1}}, {{0, 1, 0}, {1, 0, 1}}, {{0, 0, 1}, {1, 1, 0}}};
-}
-
-/// RMS length of a field over a grid after its best rigid motion, and shares within two sigma.
-struct Left {
-  double rms = 0.0;
-  double inside = 0.0;
-};
-Left left_over(const Machine& machine, const GeometricModel* model, int count) {
-  const Eigen::Matrix3d directions = axis_directions(machine.chain, machine.errors->squareness);
-  const auto grid = volume_grid(machine.chain, machine.travel, count);
-  Eigen::MatrixXd modes(3 * static_cast<long>(grid.size()), 6);
-  Eigen::VectorXd field(modes.rows());
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(modes.rows());
-  for (std::size_t g = 0; g < grid.size(); ++g) {
-    const long r = 3 * static_cast<long>(g);
-    Eigen::Vector3d e = simulated_error(machine, directions, grid[g], Eigen::Vector3d::Zero());
-    if (model != nullptr) {
-      e -= model->error(grid[g], Eigen::Vector3d::Zero());
-      sigma.segment<3>(r) = model->sigma_at(grid[g], Eigen::Vector3d::Zero());
-    }
-    for (int k = 0; k < 3; ++k)
-      if (!machine.chain.has(k)) e[k] = 0.0;
-    field.segment<3>(r) = e;
-    modes.middleRows<3>(r) = RigidPart::rigid(machine.chain, grid[g]);
-  }
-  field -= modes * modes.completeOrthogonalDecomposition().solve(field).eval();
-  Left left;
-  left.rms = std::sqrt(field.squaredNorm() / static_cast<double>(grid.size()));
-  double inside = 0.0;
-  double all = 0.0;
-  for (long r = 0; r < field.size(); ++r) {
-    if (!machine.chain.has(static_cast<int>(r % 3))) continue;
-    all += 1.0;
-    inside += std::abs(field[r]) <= 2.0 * sigma[r] ? 1.0 : 0.0;
-  }
-  left.inside = inside / all;
-  return left;
 }
 
 double quantile(std::vector<double> values, double part) {

@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +9,7 @@
 #include "core/metrology/line_plan.hpp"
 #include "core/metrology/line_search.hpp"
 #include "core/metrology/volumetric_table.hpp"
+#include "tests/unit/metrology/left_over.hpp"
 #include "tests/unit/metrology/simulated_machine.hpp"
 
 namespace invar::metrology {
@@ -30,38 +30,8 @@ std::vector<DisplacementLine> measured(const Machine& machine, const std::vector
   return lines;
 }
 
-/// RMS of truth minus model over a grid, best rigid motion removed, and the share of components within two sigma.
-struct Left {
-  double rms;
-  double inside;
-};
-Left left_over(const Machine& machine, const GeometricModel* model) {
-  const auto directions = axis_directions(machine.chain, machine.errors->squareness);
-  const auto grid = volume_grid(machine.chain, machine.travel, 7);
-  Eigen::MatrixXd modes(3 * static_cast<long>(grid.size()), 6);
-  Eigen::VectorXd field(modes.rows());
-  Eigen::VectorXd sigma = Eigen::VectorXd::Zero(modes.rows());
-  for (std::size_t g = 0; g < grid.size(); ++g) {
-    const long r = 3 * static_cast<long>(g);
-    Eigen::Vector3d e = simulated_error(machine, directions, grid[g], machine.tool);
-    if (model != nullptr) {
-      e -= model->error(grid[g], machine.tool);
-      sigma.segment<3>(r) = model->sigma_at(grid[g], machine.tool);
-    }
-    for (int k = 0; k < 3; ++k)
-      if (!machine.chain.has(k)) e[k] = 0.0;
-    field.segment<3>(r) = e;
-    modes.middleRows<3>(r) = RigidPart::rigid(machine.chain, grid[g]);
-  }
-  field -= modes * modes.completeOrthogonalDecomposition().solve(field).eval();
-  double inside = 0.0;
-  double all = 0.0;
-  for (long r = 0; r < field.size(); ++r) {
-    if (!machine.chain.has(static_cast<int>(r % 3))) continue;
-    all += 1.0;
-    inside += std::abs(field[r]) <= 2.0 * sigma[r] ? 1.0 : 0.0;
-  }
-  return {std::sqrt(field.squaredNorm() / static_cast<double>(grid.size())), inside / all};
+testing::Left left_over(const Machine& machine, const GeometricModel* model) {
+  return testing::left_over(machine, model, 7);
 }
 
 TEST(Identification, FindsTheFieldOfAnXyTableToTheNoise) {
@@ -71,7 +41,7 @@ TEST(Identification, FindsTheFieldOfAnXyTableToTheNoise) {
   for (int m = 0; m < 4; ++m) {
     const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
     const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), 41, random));
-    const Left left = left_over(machine, &found.model);
+    const testing::Left left = left_over(machine, &found.model);
     EXPECT_LT(left.rms, 1.0e-6);
     EXPECT_LT(left.rms, 0.3 * left_over(machine, nullptr).rms);
     inside += left.inside / 4;
