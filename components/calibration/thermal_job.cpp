@@ -209,8 +209,9 @@ Task Calibration::run(const ThermalJob& job) {
   }
   const auto rows = [&](const std::vector<bool>& of) {
     auto readings = heat_readings(table, parameters_.zones, of);
-    readings.history =
-        heat_history_;  // a body that lags also remembers the passes left out, and what was before
+    // A body that lags also remembers the passes left out, and what was before; by the clock of the table.
+    readings.history = heat_history_;
+    for (double& at : readings.history.time) at -= began_.in_seconds();
     return readings;
   };
   const auto axis = job.axis();
