@@ -19,7 +19,7 @@ using testing::write;
 std::string seal_of(const fs::path& model) { return config::Yaml::load(model).root().text("checksum"); }
 
 struct KeptCell : LiveCell {
-  KeptCell() { parameters.state = (folder.path / "state").string(); }
+  KeptCell() { parameters.state = (folder / "state").string(); }
   /// The cell ends, with all that was loaded, and begins anew.
   void start_again() {
     compensation->deactivate();

@@ -290,7 +290,7 @@ TEST(LiveCompensation, NeitherAllocatesNorLocksWhateverHappens) {
   cell.parameters.temperature_timeout = 0.2;
   cell.parameters.temperature_hold = 0.2;
   cell.parameters.transaction_timeout = 3.0;
-  cell.parameters.state = (cell.folder.path / "state").string();
+  cell.parameters.state = (cell.folder / "state").string();
   cell.bring_up(false);
   const auto below = write(cell.folder, "geometry.yaml", geometry(5e-5, 1e-6));
   const auto above = write(cell.folder, "heat.yaml", heat(1e-5, 50.0), {0, testing::checksum_of(below)});
