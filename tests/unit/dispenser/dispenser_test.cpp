@@ -334,7 +334,7 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
 }
 
 TEST(Dispenser, TakesItsModelOutAndBackInAndHasNoTransactions) {
-  Folder folder;
+  const invar::testing::TemporaryFolder folder;
   Bench bench;
   bench.bring_up();
   bench.change(compensation::MODEL_STAGE, write_model(folder));
