@@ -14,6 +14,7 @@
 #include "components/vision/folder_camera.hpp"
 #include "components/vision/simulated_camera.hpp"
 #include "components/vision/vision_component.hpp"
+#include "components/watch/model_watch.hpp"
 #include "components/world/simulated_heater.hpp"
 #include "components/world/simulated_pneumatics.hpp"
 #include "components/world/simulated_sensor.hpp"
@@ -47,6 +48,7 @@ void add_all_components(Registry& registry) {
   registry.add<vision::SimulatedCamera>("simulated_camera", "what a camera over the stage would see");
   registry.add<vision::Vision>("vision", "droplets in frames, in machine coordinates; the camera's scale");
   registry.add<stage::Stage>("stage", "servo of one axis");
+  registry.add<watch::ModelWatch>("model_watch", "says when an axis and its model part, and where");
   registry.add<supervisor::Supervisor>(
       "supervisor", "watches processes and components, makes safe what depends on lost ones");
 }

@@ -1,6 +1,7 @@
 #include "components/world/simulated_stage.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "core/machine/heat_growth.hpp"
 #include "core/machine/machine_file.hpp"
@@ -21,19 +22,20 @@ struct SimulatedStage::Device {
   Device(SimulatedStage& owner, int axis_number, const Axis& axis_parameters)
       : parameters{axis_parameters},
         axis{axis_number},
-        plant{plant_of(parameters)},
+        plant{plant_of(parameters, parameters.model)},
+        later{plant_of(parameters, parameters.changed.empty() ? parameters.model : parameters.changed)},
         motor{owner, "motor_" + letter(axis_number), {.optional = true}},
         feedback{owner, "feedback_" + letter(axis_number)},
         truth{owner, "truth_" + letter(axis_number)} {}
 
-  static physics::AxisPlant plant_of(const Axis& axis) {
-    if (axis.model.empty())
+  static physics::AxisPlant plant_of(const Axis& axis, const std::filesystem::path& file) {
+    if (file.empty())
       return {
           {.mass = axis.mass, .motor_constant = axis.motor_constant, .viscous_damping = axis.viscous_damping},
           {}};
-    const auto model = model::load(axis.model);
+    const auto model = model::load(file);
     if (model.plant != physics::Plant::axis)
-      throw InputError{axis.model.string(), "is of plant " + std::string{physics::name_of(model.plant)},
+      throw InputError{file.string(), "is of plant " + std::string{physics::name_of(model.plant)},
                        "name a model.yaml of plant axis"};
     return physics::make_axis(model, longest_period);
   }
@@ -43,7 +45,8 @@ struct SimulatedStage::Device {
 
   const Axis& parameters;
   int axis;
-  physics::AxisPlant plant;
+  physics::AxisPlant plant, later;
+  bool is_changed = false;
   Input<stage::MotorCommand> motor;
   Output<stage::AxisFeedback> feedback;
   Output<sensing::AxisReading> truth;
@@ -70,8 +73,19 @@ void SimulatedStage::activate() {
   // What drifts or repeats in time goes on where it was; a plant counts its time from the first start, since a double
   // cannot tell two steps apart that are counted from 1970.
   if (!began_) began_ = simulated_time ? Instant{} : now();
-  for (auto& device : devices_)
+  for (auto& device : devices_) {
+    if (device->is_changed) std::swap(device->plant, device->later);
+    device->is_changed = false;
     device->plant.rest_at(device->parameters.start, (now() - *began_).in_seconds());
+  }
+}
+
+/// The motion goes on, the physics is another.
+void SimulatedStage::change(Device& device) noexcept {
+  device.later.rest_at(device.plant.position(), device.plant.time());
+  device.later.set_velocity(device.plant.velocity());
+  std::swap(device.plant, device.later);
+  device.is_changed = true;
 }
 
 void SimulatedStage::step(const Tick& tick) noexcept {
@@ -89,6 +103,9 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     const auto* command = device->motor.latest();
     const bool enabled = command != nullptr && command->enabled() &&
                          device->motor.age(tick.now) < Duration::seconds(parameters_.watchdog);
+    if (!device->is_changed && !device->parameters.changed.empty() &&
+        device->plant.time() >= device->parameters.change_at)
+      change(*device);
     device->plant.set_temperature(temperature);
     device->plant.step(enabled ? command->current() : 0.0, tick.period);
 

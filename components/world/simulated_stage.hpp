@@ -34,6 +34,8 @@ class SimulatedStage final : public Component {
     double noise = 2e-8;
     double velocity_noise = 1e-4;
     double start = 0.0;
+    std::filesystem::path changed;  // another truth ...
+    double change_at = 1e9;         // ... from this time on
     void describe(auto& p);
   };
   struct Parameters {
@@ -52,6 +54,7 @@ class SimulatedStage final : public Component {
 
  private:
   struct Device;
+  static void change(Device& device) noexcept;
   const Parameters& parameters_;
   metrology::Machine machine_;
   Eigen::Matrix3d directions_;
@@ -78,6 +81,9 @@ void SimulatedStage::Axis::describe(auto& p) {
   p(noise, "noise", "m", Range{0.0, 1e-3}, "1 sigma of the encoder");
   p(velocity_noise, "velocity_noise", "m/s", Range{0.0, 1.0}, "1 sigma of the velocity sensor");
   p(start, "start", "m", Range{-10.0, 10.0}, "where the carriage stands at the start");
+  p(changed, "changed", "model.yaml that takes the place of `model` at `change_at`: wear, damage, a fault");
+  p(change_at, "change_at", "s", Range{0.0, 1e9}, "when, in seconds since the stage was first active",
+    while_running);
 }
 
 void SimulatedStage::Parameters::describe(auto& p) {

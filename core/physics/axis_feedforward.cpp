@@ -13,16 +13,35 @@ bool goes_over_time(const Term& term) {
   return term.curve.over == "time" || std::find(on.begin(), on.end(), "time") != on.end();
 }
 
-/// The terms whose force or reading is known from the motion alone.
+/// What acts on plant_: the terms whose force or reading is known from the motion alone.
 Model known_from_motion(Model model) {
   std::erase_if(model.terms, [](const Term& term) {
     const auto memory = axis_kind(*term.info)->memory;
-    return goes_over_time(term) || (memory != AxisMemory::none && memory != AxisMemory::presliding);
+    return !why_not_fed_forward(term).empty() || memory == AxisMemory::transport_delay ||
+           memory == AxisMemory::amplifier_lag;
   });
   return model;
 }
 
 }  // namespace
+
+std::string_view why_not_fed_forward(const Term& term) {
+  if (goes_over_time(term)) return "it goes over time, and a recording's clock is not the loop's";
+  switch (axis_kind(*term.info)->memory) {
+    case AxisMemory::backlash:
+      return "a current cannot take up play";
+    case AxisMemory::measurement_delay:
+      return "a current cannot make a reading younger";
+    case AxisMemory::flexible_mode:
+      return "a swinging part has a motion of its own";
+    case AxisMemory::none:
+    case AxisMemory::presliding:
+    case AxisMemory::transport_delay:
+    case AxisMemory::amplifier_lag:
+      break;
+  }
+  return {};
+}
 
 AxisFeedforward::AxisFeedforward(const Model& model)
     : plant_{make_axis(known_from_motion(model))},

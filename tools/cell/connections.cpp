@@ -109,10 +109,13 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
   const Port* other = named_port(loaded, found->second, at);
   if (other == nullptr) return;
   const bool writes = port.direction() == Port::Direction::output;
+  // An inbox may hear what another one is told.
+  const bool listens =
+      port.direction() == Port::Direction::inbox && other->direction() == Port::Direction::inbox;
   if (writes && other->direction() != Port::Direction::inbox) {
     at.fault("`" + found->second + "` is no inbox, and an output is joined to inboxes only",
              "name the output in the `connect` of the component that reads it");
-  } else if (!writes && other->direction() != Port::Direction::output) {
+  } else if (!writes && !listens && other->direction() != Port::Direction::output) {
     at.fault("`" + found->second + "` is no output", "name the output that this port reads");
   } else if (other->type() != port.type()) {
     at.fault("`" + found->second + "` carries another type than `" + port.name() + "`",
