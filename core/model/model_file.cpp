@@ -8,6 +8,7 @@
 
 #include "core/base/unit.hpp"
 #include "core/physics/library.hpp"
+#include "core/physics/static_plants.hpp"
 
 namespace invar::model {
 
@@ -230,6 +231,32 @@ config::Quantity free_quantity(const Node& node, Range bounds) {
   return quantity;
 }
 
+/// In the user's own equations a term says where it acts; what changes a rate acts on a state.
+bool check_place(const Node& node, const Model& model, const Term& term) {
+  std::vector<std::string> places;
+  for (const auto& state : model.equations.states) places.push_back(state.name);
+  const bool on_state = std::find(places.begin(), places.end(), term.on) != places.end();
+  for (const auto& input : model.equations.inputs) places.push_back(input.symbol);
+  for (const auto& output : model.equations.outputs) places.push_back(output.name);
+  const std::string name{term.info->name};
+  if (std::find(places.begin(), places.end(), term.on) == places.end()) {
+    const auto meant = config::nearest(term.on, places);
+    node.fault("`" + name + "` acts on `" + term.on + "`, which is no state, input or output",
+               meant.empty() ? "name one of them under `on`" : "did you mean `" + meant + "`?");
+    node.accept_all();
+    return false;
+  }
+  const auto* kind = physics::equations_kind(*term.info);
+  const bool is_rate =
+      kind != nullptr && (kind->rate != nullptr || kind->memory == physics::EquationsMemory::dry_friction);
+  if (is_rate && !on_state) {
+    node.fault("`" + name + "` changes a rate, and `" + term.on + "` is no state", "name a state under `on`");
+    node.accept_all();
+    return false;
+  }
+  return true;
+}
+
 std::optional<Term> read_term(const Node& node, const Model& model) {
   const auto name = node.text("term");
   Term term;
@@ -266,6 +293,7 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     node.accept_all();
     return std::nullopt;
   }
+  if (model.plant == Plant::equations && !check_place(node, model, term)) return std::nullopt;
   for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
     const auto& parameter = term.info->parameters[i];
     const std::string key{parameter.name};

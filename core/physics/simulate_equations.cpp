@@ -94,9 +94,10 @@ class Machine {
   }
 
   [[nodiscard]] std::size_t states() const { return states_; }
-  [[nodiscard]] std::size_t all_states() const { return states_ + hidden_.size(); }
+  [[nodiscard]] std::size_t all_states() const { return states_ + hidden_.size() + lags_.size(); }
 
-  using State = std::array<double, 16>;
+  static constexpr std::size_t most_states = 16;
+  using State = std::array<double, most_states>;
 
   void set_input(std::size_t i, double value) { compiled_.symbols[states_ + i] = value; }
   [[nodiscard]] std::size_t controlled() const { return controlled_; }
@@ -108,6 +109,7 @@ class Machine {
 
   State slope(const State& s, double t) {
     show(s, t);
+    bend_states(s, t);
     State d{};
     for (std::size_t i = 0; i < states_; ++i) d[i] = compiled_.rates[i].Eval();
     for (const auto& term : rate_terms_) d[term.on] += term.kind->rate(compiled_.symbols[term.with], term.p);
@@ -117,6 +119,8 @@ class Machine {
       d[term.on] += term.p[0] * difference;
       d[states_ + h] = -difference / term.p[1];
     }
+    for (std::size_t k = 0; k < lags_.size(); ++k)
+      d[first_lag() + k] = (s[lags_[k].on] - s[first_lag() + k]) / time_constant(lags_[k]);
     for (const auto& rub : frictions_)
       d[rub.use.on] = rub.stuck ? 0.0 : d[rub.use.on] - rub.direction * rub.use.p[0];
     for (const auto& term : overflows_)
@@ -133,7 +137,9 @@ class Machine {
 
   void advance(State& s, double t, double h, int parts) {
     h /= parts;
+    shortest_lag_ = h / 2.5;
     for (int part = 0; part < parts; ++part, t += h) {
+      for (auto& late : delays_) late.past.emplace_back(t, s[late.use.on]);
       frictions_.empty() ? void(s = moved(s, t, h)) : slide(s, t, h);
       for (const auto& term : uppers_) s[term.on] = std::min(s[term.on], term.p[0]);
       for (const auto& term : lowers_) s[term.on] = std::max(s[term.on], term.p[0]);
@@ -169,6 +175,7 @@ class Machine {
 
   void balance_hidden(State& s) const {
     for (std::size_t h = 0; h < hidden_.size(); ++h) s[states_ + h] = s[hidden_[h].on];
+    for (std::size_t k = 0; k < lags_.size(); ++k) s[first_lag() + k] = s[lags_[k].on];
   }
 
  private:
@@ -182,6 +189,41 @@ class Machine {
     double direction = 0.0;
     bool stuck = false;
   };
+  struct Delay {
+    Use use;
+    std::vector<std::pair<double, double>> past;  // time, value
+  };
+
+  [[nodiscard]] std::size_t first_lag() const { return states_ + hidden_.size(); }
+  /// Never so short that a step could not follow; what is shorter is blended out.
+  [[nodiscard]] double time_constant(const Use& lag) const { return std::max(lag.p[0], shortest_lag_); }
+
+  /// What the rates see of a state behind a dead zone, a lag or a delay; outputs show the state itself.
+  void bend_states(const State& s, double t) {
+    for (const auto& zone : dead_zones_) {
+      double& seen = compiled_.symbols[zone.on];
+      seen -= std::clamp(seen, -zone.p[0], zone.p[0]);
+    }
+    for (std::size_t k = 0; k < lags_.size(); ++k)
+      compiled_.symbols[lags_[k].on] -=
+          lags_[k].p[0] / time_constant(lags_[k]) * (s[lags_[k].on] - s[first_lag() + k]);
+    for (const auto& late : delays_) {
+      const double when = t - late.use.p[0];
+      const auto& past = late.past;
+      const auto after = std::upper_bound(past.begin(), past.end(), when,
+                                          [](double time, const auto& one) { return time < one.first; });
+      double& seen = compiled_.symbols[late.use.on];
+      if (past.empty() || !(late.use.p[0] > 0.0)) continue;
+      if (after == past.begin()) {
+        seen = past.front().second;
+        continue;
+      }
+      const auto& [t0, s0] = *(after - 1);
+      const double t1 = after == past.end() ? t : after->first,
+                   s1 = after == past.end() ? seen : after->second;
+      seen = t1 > t0 ? s0 + (s1 - s0) * (when - t0) / (t1 - t0) : s1;
+    }
+  }
 
   /// One step of the classical Runge-Kutta rule.
   State moved(const State& s, double t, double h) {
@@ -261,7 +303,16 @@ class Machine {
         overflows_.push_back(use);
         break;
       case EquationsMemory::hidden_state:
-        if (states_ + hidden_.size() < 16) hidden_.push_back(use);
+        if (all_states() < most_states) hidden_.push_back(use);
+        break;
+      case EquationsMemory::lag:
+        if (all_states() < most_states) lags_.push_back(use);
+        break;
+      case EquationsMemory::delay:
+        delays_.push_back({use, {}});
+        break;
+      case EquationsMemory::dead_zone:
+        dead_zones_.push_back(use);
         break;
       default:
         break;
@@ -271,8 +322,40 @@ class Machine {
   Compiled& compiled_;
   std::size_t states_, controlled_;
   std::vector<Friction> frictions_;
-  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_;
+  std::vector<Delay> delays_;
+  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
+  double shortest_lag_ = 0.0;
 };
+
+/// Of each value a share arrives by way of a first-order store, in balance at the start.
+void follow(const std::vector<double>& time, std::vector<double>& values, double time_constant,
+            double share) {
+  double z = values.front(), last = values.front();
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double now = values[i], h = time[i] - time[i - 1];
+    z = last + (z - last) * std::exp(-h / time_constant);
+    last = now;
+    values[i] = now + share * (z - now);
+  }
+}
+
+/// What passes a limit of one column goes, in part, to another.
+void run_over(const Model& model, const std::vector<std::string>& names,
+              std::vector<std::vector<double>>& columns) {
+  const auto place = [&](const std::string& name) {
+    return static_cast<std::size_t>(std::find(names.begin(), names.end(), name) - names.begin());
+  };
+  for (const auto& term : model.terms) {
+    if (equations_kind(*term.info)->memory != EquationsMemory::overflow) continue;
+    const std::size_t on = place(term.on), to = place(term.with);
+    if (on >= names.size()) continue;
+    for (std::size_t i = 0; i < columns[on].size(); ++i) {
+      const double surplus = std::max(0.0, columns[on][i] - term.values[0]);
+      columns[on][i] -= surplus;
+      if (to < names.size() && to != on) columns[to][i] += term.values[1] * surplus;
+    }
+  }
+}
 
 /// What terms at inputs and outputs do to a whole column.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
@@ -290,17 +373,12 @@ void bend(const Model& model, const std::string& on, const std::vector<double>& 
       case EquationsMemory::dead_zone:
         for (double& v : values) v -= std::clamp(v, -p, p);
         break;
-      case EquationsMemory::lag: {
-        if (!(p > 0.0)) break;
-        double z = values.front(), last = values.front();
-        for (std::size_t i = 1; i < values.size(); ++i) {
-          const double now = values[i], h = time[i] - time[i - 1];
-          z = last + (z - last) * std::exp(-h / p);
-          last = now;
-          values[i] = z;
-        }
+      case EquationsMemory::lag:
+        if (p > 0.0) follow(time, values, p, 1.0);
         break;
-      }
+      case EquationsMemory::hidden_state:
+        follow(time, values, term.values[1], p);
+        break;
       case EquationsMemory::delay: {
         if (!(p > 0.0)) break;
         const auto before = values;
@@ -343,7 +421,11 @@ class OwnEquations final : public Simulation {
     const auto& equations = model.equations;
     const std::size_t n = time_.size();
     auto inputs = inputs_;
-    for (std::size_t i = 0; i < inputs.size(); ++i) bend(model, equations.inputs[i].symbol, time_, inputs[i]);
+    std::vector<std::string> input_names, output_names;
+    for (const auto& input : equations.inputs) input_names.push_back(input.symbol);
+    for (const auto& output : equations.outputs) output_names.push_back(output.name);
+    for (std::size_t i = 0; i < inputs.size(); ++i) bend(model, input_names[i], time_, inputs[i]);
+    run_over(model, input_names, inputs);
     outputs.resize(equations.outputs.size());
     for (auto& output : outputs) output.assign(n, 0.0);
     Machine::State s{};
@@ -384,6 +466,7 @@ class OwnEquations final : public Simulation {
         machine.advance(s, time_[row] + h * part / parts, h / parts, 1);
       }
     }
+    run_over(model, output_names, outputs);
     for (std::size_t o = 0; o < outputs.size(); ++o) {
       const auto& output = equations.outputs[o];
       bend(model, output.name, time_, outputs[o]);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <filesystem>
+#include <fstream>
 
 #include "tests/support/mismatch/marks.hpp"
 
@@ -77,6 +79,14 @@ double upper_bound(int hits, int n) {
   return high;
 }
 
+/// As `invar diagnose` reads it.
+void write(const Machine& machine, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  std::ofstream{folder / "model.yaml"} << machine.yaml;
+  for (std::size_t r = 0; r < machine.recordings.size(); ++r)
+    machine.recordings[r].write(folder / ("recording-" + std::to_string(r + 1) + ".csv"));
+}
+
 struct Sum {
   double verdict = 0.0, located = 0.0, named = 0.0, fit = 0.0, false_claims = 0.0;
   int cases = 0, missing = 0;
@@ -118,6 +128,11 @@ int main(int argc, char** argv) {
   unsigned machine = 0;
   program.add_option("--machine", machine, "the one of this seed alone");
   program.add_option("--pairs", pairs, "machines of each plant with two effects");
+  std::size_t rows = 0;
+  program.add_option("--rows", rows, "of a recording (axis, thermal); 0: some thousands");
+  std::filesystem::path folder;
+  program.add_option("--write", folder,
+                     "no diagnosis: model.yaml and recording-1.csv of each machine into this folder");
   CLI11_PARSE(program, argc, argv);
   std::map<std::string, Sum> sums;
   std::map<std::string, std::pair<int, int>> nulls;  // by plant: how many, with a claim
@@ -128,20 +143,30 @@ int main(int argc, char** argv) {
   std::array<Bin, 10> reliability;
   double brier = 0.0;
   std::vector<double> seconds;
+  constexpr std::array colours{"", " memory", " wander", " resonance", " heavy"};
   const auto one = [&](const std::string& plant, const std::string& effect, unsigned number, double least) {
     if (machine > 0 && number != machine) return;
     Draw draw{number};
     Trouble trouble;
-    trouble.coloured = draw.once_in(3.0), trouble.faults = draw.once_in(3.0),
-    trouble.renamed = draw.once_in(4.0);
+    trouble.colour = draw.once_in(2.0) ? static_cast<Colour>(1 + draw.index(4)) : Colour::white;
+    trouble.faults = draw.once_in(3.0), trouble.renamed = draw.once_in(4.0),
+    trouble.quantised = draw.once_in(5.0);
     const double drawn = draw.log_between(least, 2.0);
+    trouble.rows = rows;
+    if (!folder.empty()) {
+      write(make(plant, effect, size > 0.0 ? size : drawn, number, trouble),
+            folder / (plant + "-" + effect + "-" + std::to_string(number)));
+      return;
+    }
     const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out);
     std::printf(
         "%-9s %-34s seed %5u size %.2f%s%s win %9.1f  v %.1f l %.1f n %.1f false %d fit %5.2f %5.1f s  %s: "
         "%s\n",
-        plant.c_str(), effect.c_str(), number, row.machine.size, trouble.coloured ? " coloured" : "",
-        trouble.faults ? " faults" : "", row.win, row.marks.verdict, row.marks.located, row.marks.named,
-        row.marks.false_claims, row.marks.fit, row.marks.seconds, row.verdict.c_str(), row.findings.c_str());
+        plant.c_str(), effect.c_str(), number, row.machine.size,
+        colours[static_cast<std::size_t>(trouble.colour)],
+        trouble.faults ? " faults" : (trouble.quantised ? " steps" : ""), row.win, row.marks.verdict,
+        row.marks.located, row.marks.named, row.marks.false_claims, row.marks.fit, row.marks.seconds,
+        row.verdict.c_str(), row.findings.c_str());
     if (why) std::printf("%s%s", row.rejected.c_str(), row.machine.yaml.c_str());
     std::fflush(stdout);
     sums[plant].add(row);
@@ -179,12 +204,17 @@ int main(int argc, char** argv) {
     std::printf("%s: %d nulls, %d with a claim; the rate is below %.3f (95 %%)\n", plant.c_str(), count.first,
                 count.second, upper_bound(count.second, count.first));
   int claims = 0;
+  double off = 0.0;  // expected calibration error, times the claims
   for (const auto& bin : reliability) {
     claims += bin.count;
+    off += std::abs(bin.said - bin.held);
     if (bin.count > 0)
       std::printf("said %.3f held %.3f of %d\n", bin.said / bin.count, bin.held / bin.count, bin.count);
   }
-  if (claims > 0) std::printf("Brier %.4f over %d claims\n", brier / claims, claims);
+  if (claims > 0)
+    std::printf("Brier %.4f, expected calibration error %.4f over %d claims\n", brier / claims, off / claims,
+                claims);
+  if (seconds.empty()) return 0;
   std::nth_element(seconds.begin(), seconds.begin() + static_cast<std::ptrdiff_t>(seconds.size() / 2),
                    seconds.end());
   if (!seconds.empty()) std::printf("median %.2f s of CPU\n", seconds[seconds.size() / 2]);

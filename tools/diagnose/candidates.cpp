@@ -54,6 +54,7 @@ bool may_show(const Case& data, const physics::Model& model, const TermInfo& inf
 std::vector<std::string> places(const Case& data, const TermInfo& info) {
   switch (info.plant) {
     case Plant::thermal:
+      if (info.name == "ambient_drift") return {data.model.thermal.nodes.front()};  // one air for all
       return data.model.thermal.nodes;
     case Plant::sensor: {
       std::vector<std::string> on;
@@ -96,7 +97,9 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
         for (const auto& r : data.recordings)
           for (double p : *r.inputs.find(heater.name))
             if (std::isfinite(p)) top = std::max(top, p);
-    return {0.92 * top, 0.8 * top, 0.65 * top};
+    std::vector<double> clips;  // close: from one to the next a fit cannot go where no power lies between
+    for (const double share : {0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.57, 0.45}) clips.push_back(share * top);
+    return clips;
   }
   if (info.plant == Plant::thermal && info.name == "hidden_node") {
     const double c = data.model.value(on + ".capacity", 100.0);
@@ -216,6 +219,12 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
           add_starts(starts, term, {median(all), 1013.25, *low, *high});
           continue;
         }
+      }
+      if (info->name == "ambient_drift") {
+        double until = 0.0;
+        for (const auto& r : data.recordings) until = std::max(until, r.inputs.time.back());
+        term.values[info->index_of("over")] = until;
+        term.given[info->index_of("over")] = true;
       }
       if (info->name == "node_coupling") {
         for (const auto& other : data.model.thermal.nodes) {

@@ -31,6 +31,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted);
 /// From where to where a state, input, output or the time goes in a model of equations.
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
+/// How far apart the middle four fifths of its rows lie.
+double inner_span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// Two terms that bend the same rate over the same variable: one law has room for one of them.
 bool same_law(const physics::Term& one, const physics::Term& other);
 /// The starts of one term: every value of its first shape (its own where none is given), the first value of further ones.

@@ -1,7 +1,10 @@
 #include "tools/diagnose/claim.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <complex>
+#include <numbers>
 
 namespace invar::diagnose {
 
@@ -20,7 +23,8 @@ namespace {
 /// Rates against the motion take energy out of it; one that brings some in is no drag, however well it fits.
 bool brings_energy(const physics::Model& model, const Term& term) {
   const auto name = term.info->name;
-  if (!term.with.empty() || term.values[0] <= 0.0 || (name != "linear" && name != "quadratic" && name != "cubic"))
+  if (!term.with.empty() || term.values[0] <= 0.0 ||
+      (name != "linear" && name != "quadratic" && name != "cubic"))
     return false;
   return std::any_of(model.equations.states.begin(), model.equations.states.end(),
                      [&](const auto& state) { return state.derivative == term.on; });
@@ -40,8 +44,9 @@ bool is_affordable(const Case& data, const Fit& fit) {
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const auto [low, high] = span_of(data, model, term.with.empty() ? term.on : term.with);
   const double size = std::max(std::abs(low), std::abs(high));
-  // What repeats must have been seen to repeat.
-  if (term.info->name == "periodic") return high - low >= 2.0 * term.values[1];
+  // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law.
+  if (term.info->name == "periodic")
+    return inner_span_of(data, model, term.with.empty() ? term.on : term.with) >= 2.0 * term.values[1];
   // Friction that never turned is a constant.
   if (term.info->name == "dry_friction") return low < -0.03 * size && high > 0.03 * size;
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
@@ -56,6 +61,61 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
       for (std::size_t i = 0; i < with[r][o].size(); ++i)
         rows += std::abs(with[r][o][i] - without[r][o][i]) > 1e-6 * std::abs(with[r][o][i]) ? 1U : 0U;
   return rows >= 5;
+}
+
+/// Is what a sine in time explains a line, with one phase from beginning to end? A hum of the noise has a band, however
+/// much evidence a sine in it gathers. Against the scatter of its amplitude from block to block (Fisher's F).
+bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
+  const auto& info = *model.terms[term].info;
+  const auto at = info.index_of("frequency");
+  if (at == physics::most_parameters || info.index_of("phase") == physics::most_parameters) return true;
+  const double frequency = model.terms[term].values[at], turn = 2.0 * std::numbers::pi * frequency;
+  const auto onset = info.index_of("onset");
+  const double from = onset < physics::most_parameters ? model.terms[term].values[onset] : -1e300;
+  auto free = model;
+  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  const auto without = simulate(data, free);
+  double least = 1.0;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<std::complex<double>> blocks;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& time = data.recordings[r].inputs.time;
+      const double begin = std::max(from, time.front()), lasts = time.back() - begin;
+      const double count = std::min(16.0, std::floor(0.5 * lasts * frequency));
+      for (double b = 0.0; b < count; b += 1.0) {
+        const double low = begin + lasts * b / count, high = low + lasts / count;
+        std::complex<double> sum;
+        std::array<double, 2> level{}, power{};  // of the two ends: a slow rest is no line
+        for (int pass = 0; pass < 2; ++pass)
+          for (auto i =
+                   static_cast<std::size_t>(std::lower_bound(time.begin(), time.end(), low) - time.begin());
+               i < time.size() && time[i] < high; ++i) {
+            const double e = data.recordings[r].measured[o][i] - without[r][o][i];
+            if (!std::isfinite(e)) continue;
+            const double s = (time[i] - low) / (high - low),
+                         window = 1.0 - std::cos(2.0 * std::numbers::pi * s);
+            const double weights[2] = {window * (1.0 - s), window * s};
+            if (pass == 0) {
+              for (std::size_t k = 0; k < 2; ++k) level[k] += weights[k] * e, power[k] += weights[k];
+            } else {
+              const double slow = (1.0 - s) * level[0] / power[0] + s * level[1] / power[1];
+              sum += window * (e - slow) * std::polar(1.0, -turn * time[i]);
+            }
+          }
+        blocks.push_back(sum);
+      }
+    }
+    const auto n = static_cast<double>(blocks.size());
+    if (n < 6.0) return true;  // too few waves to tell
+    std::complex<double> mean;
+    for (const auto& block : blocks) mean += block / n;
+    double scatter = 0.0;
+    for (const auto& block : blocks) scatter += std::norm(block - mean);
+    // F of 2 and 2 (n - 1) degrees of freedom and its tail.
+    const double share = scatter > 0.0 ? n * std::norm(mean) / scatter : 1e300;
+    least = std::min(least, std::pow(1.0 + share, 1.0 - n));
+  }
+  return least < 1e-5;
 }
 
 }  // namespace
@@ -77,6 +137,7 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       (brings_energy(fit.model, fit.model.terms[term]) || !is_affordable(data, fit) ||
        !acts(data, fit.model, fit.model.terms[term])))
     return false;
+  if (!is_line(data, fit.model, term)) return false;
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
 

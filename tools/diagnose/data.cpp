@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/model/recording_file.hpp"
+#include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
 
 namespace invar::diagnose {
@@ -109,16 +110,7 @@ void give_start(Case& data, Recording& recording) {
   }
 }
 
-}  // namespace
-
-Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
-  std::vector<recording::Table> tables;
-  for (const auto& file : files)
-    for (auto& table : model::read_recording(file, model)) tables.push_back(std::move(table));
-  return make_case(model, tables);
-}
-
-Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables) {
+Case empty_case(const physics::Model& model) {
   Case data;
   data.model = model;
   data.outputs = model.outputs();
@@ -128,42 +120,74 @@ Case make_case(const physics::Model& model, const std::vector<recording::Table>&
   for (auto& parameter : data.model.parameters)
     if (model.plant == physics::Plant::sensor && parameter.name == "resolution")
       parameter.value = 0.0, parameter.sigma = 0.0;
-  for (const auto& table : tables) {
-    const auto content = model::to_record(table, model, true);
-    Recording recording;
-    recording.name = table.file.filename().string();
-    data.count.rows += content.record.rows();
-    recording.inputs = in_order(content.record, data.count);
-    if (model.plant == physics::Plant::equations && model.equations.inputs.empty())
-      thin(recording.inputs, 6000);
-    if (recording.inputs.rows() < 8)
-      throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
-    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-      const auto& name = data.outputs[o];
-      recording.measured.push_back(recording.inputs.signals.at(name));
-      recording.inputs.signals.erase(name);
-      if (const auto noise = model.noise.find(name); noise != model.noise.end())
-        data.given_noise[o] = noise->second * content.units.at(name).factor;
-      for (const double v : recording.measured.back())
-        if (!std::isfinite(v)) ++data.count.missing;
-    }
-    const double step = median_step(recording.inputs.time);
-    for (std::size_t i = 1; i < recording.inputs.rows(); ++i) {
-      const double gap = recording.inputs.time[i] - recording.inputs.time[i - 1];
-      if (!data.is_time_series || gap < 2.5 * step) continue;
-      ++data.count.gaps;
-      // Behind a long gap in a loop nobody knows what the reference did; the loop needs a while to forget.
-      if (model.plant == physics::Plant::axis && gap > 20.0 * step)
-        for (std::size_t j = i; j < recording.inputs.rows() &&
-                                recording.inputs.time[j] < recording.inputs.time[i] + 150.0 * step;
-             ++j)
-          for (auto& column : recording.measured) column[j] = nothing;
-    }
-    give_start(data, recording);
-    if (model.plant == physics::Plant::axis) give_start_of_sum(data, recording);
-    recording.simulation = physics::prepare(model, recording.inputs);
-    data.recordings.push_back(std::move(recording));
+  return data;
+}
+
+void add(Case& data, const physics::Model& model, const std::string& name, physics::Record inputs,
+         std::size_t forget) {
+  Recording recording;
+  recording.name = name;
+  recording.inputs = std::move(inputs);
+  for (const auto& output : data.outputs) {
+    recording.measured.push_back(recording.inputs.signals.at(output));
+    recording.inputs.signals.erase(output);
+    for (const double v : recording.measured.back())
+      if (!std::isfinite(v)) ++data.count.missing;
   }
+  const double step = median_step(recording.inputs.time);
+  for (std::size_t i = 1; i < recording.inputs.rows(); ++i) {
+    const double gap = recording.inputs.time[i] - recording.inputs.time[i - 1];
+    if (!data.is_time_series || gap < 2.5 * step) continue;
+    ++data.count.gaps;
+    // Behind a long gap in a loop nobody knows what the reference did; the loop needs a while to forget.
+    if (model.plant == physics::Plant::axis && gap > 20.0 * step)
+      for (std::size_t j = i;
+           j < recording.inputs.rows() && recording.inputs.time[j] < recording.inputs.time[i] + 150.0 * step;
+           ++j)
+        for (auto& column : recording.measured) column[j] = nothing;
+  }
+  give_start(data, recording);
+  if (model.plant == physics::Plant::axis) give_start_of_sum(data, recording);
+  for (auto& column : recording.measured)
+    std::fill_n(column.begin(), std::min(forget, column.size()), nothing);
+  recording.simulation = physics::prepare(model, recording.inputs);
+  data.recordings.push_back(std::move(recording));
+}
+
+/// One file among `files`: it has its share of the rows that a diagnosis runs through.
+void add(Case& data, const physics::Model& model, const recording::Table& table, std::size_t files) {
+  auto content = model::to_record(table, model, true);
+  data.count.rows += content.record.rows();
+  for (const auto& name : data.outputs)
+    if (const auto noise = model.noise.find(name); noise != model.noise.end())
+      data.given_noise[static_cast<std::size_t>(&name - data.outputs.data())] =
+          noise->second * content.units.at(name).factor;
+  auto record = in_order(content.record, data.count);
+  content = {};
+  if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
+  if (record.rows() < 8)
+    throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
+  const std::size_t ordered = record.rows();
+  std::size_t looked_at = 0;
+  for (auto& stretch : shortened(model, std::move(record), most_rows / files)) {
+    looked_at += stretch.record.rows();
+    add(data, model, table.file.filename().string(), std::move(stretch.record), stretch.forget);
+  }
+  data.count.shortened += ordered - looked_at;
+}
+
+}  // namespace
+
+Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
+  auto data = empty_case(model);
+  for (const auto& file : files)
+    for (const auto& table : model::read_recording(file, model)) add(data, model, table, files.size());
+  return data;
+}
+
+Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables) {
+  auto data = empty_case(model);
+  for (const auto& table : tables) add(data, model, table, tables.size());
   return data;
 }
 

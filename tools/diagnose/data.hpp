@@ -13,6 +13,7 @@ namespace invar::diagnose {
 
 struct DataCount {
   std::size_t rows = 0, used = 0, missing = 0, outliers = 0, duplicates = 0, out_of_order = 0, gaps = 0;
+  std::size_t shortened = 0;  // rows of long recordings that are not run through
 };
 
 /// One recording, ready to be simulated and compared.

@@ -17,7 +17,8 @@ using physics::Term;
 /// Where a variable goes in the fitted model, and how fast.
 struct Span {
   double low = 0.0, high = 0.0;
-  double rate = 0.0;  // [1/s] times the variable: the largest change a row
+  double rate = 0.0;   // [1/s] times the variable: the largest change a row
+  double inner = 0.0;  // how far apart the middle four fifths of the rows lie
   [[nodiscard]] double size() const { return std::max({std::abs(low), std::abs(high), 1e-12}); }
   [[nodiscard]] double width() const { return high - low; }
 };
@@ -57,6 +58,12 @@ class Spans {
     const auto [at, is_new] = spans_.try_emplace(name);
     auto& span = at->second;
     bool first = is_new;
+    std::vector<double> sorted;
+    for (const double v : values)
+      if (std::isfinite(v)) sorted.push_back(v);
+    std::sort(sorted.begin(), sorted.end());
+    if (!sorted.empty())
+      span.inner = std::max(span.inner, sorted[sorted.size() * 9 / 10] - sorted[sorted.size() / 10]);
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!std::isfinite(values[i])) continue;
       span.low = first ? values[i] : std::min(span.low, values[i]);
@@ -107,23 +114,26 @@ class Candidates {
       : data_{data}, model_{fitted}, equations_{data.model.equations}, spans_{data, fitted} {}
 
   std::vector<Start> all() {
+    const double step = spans_.duration / static_cast<double>(spans_.rows);
     for (const auto& state : equations_.states) {
       // A state whose rate is only another state (x' = v) is kinematics; nothing can be missing there.
       const bool kinematic = std::any_of(equations_.states.begin(), equations_.states.end(),
                                          [&](const auto& other) { return state.derivative == other.name; });
+      add_felt(state.name, step);
       if (kinematic) continue;
       add_rates(state.name);
       add_stores(state.name);
     }
-    const double step = spans_.duration / static_cast<double>(spans_.rows);
     for (const auto& input : equations_.inputs) {
       const auto& span = spans_.of(input.symbol);
       add_late(input.symbol, step);
+      add("hidden_state", input.symbol, "", 0.1, store_times());
       for (const double share : {0.02, 0.1}) add("dead_zone", input.symbol, "", share * span.width());
       add_limits(input.symbol, span);
     }
     for (const auto& output : equations_.outputs) {
       add_late(output.name, step);
+      add("hidden_state", output.name, "", 0.1, store_times());
       add_limits(output.name, spans_.of(output.name));
     }
     return std::move(starts_);
@@ -180,9 +190,7 @@ class Candidates {
 
   /// What bounds a state, and what stores behind it.
   void add_stores(const std::string& state) {
-    std::vector<double> times;
-    for (double share = 0.002; share < 0.6; share *= 4.0) times.push_back(share * spans_.duration);
-    add("hidden_state", state, "", 0.02 / spans_.duration, times);
+    add("hidden_state", state, "", 0.02 / spans_.duration, store_times());
     const auto& span = spans_.of(state);
     add_limits(state, span);
     for (const double share : {0.97, 0.9, 0.8, 0.7, 0.55}) {
@@ -190,6 +198,23 @@ class Candidates {
       for (const auto& other : equations_.states)
         if (other.name != state) add("overflow", state, other.name, 0.0, {span.low + share * span.width()});
     }
+  }
+
+  [[nodiscard]] std::vector<double> store_times() const {
+    std::vector<double> times;
+    for (double share = 0.002; share < 0.6; share *= 4.0) times.push_back(share * spans_.duration);
+    return times;
+  }
+
+  /// What the rates see of a state.
+  void add_felt(const std::string& state, double step) {
+    const auto& span = spans_.of(state);
+    for (const double steps : {0.5, 6.0}) {
+      add("delay", state, "", steps * step);
+      add("lag", state, "", steps * step);
+    }
+    if (span.low < 0.0 && span.high > 0.0)
+      for (const double share : {0.02, 0.1}) add("dead_zone", state, "", share * span.width());
   }
 
   void add_limits(const std::string& on, const Span& span) {
@@ -219,6 +244,10 @@ class Candidates {
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name) {
   const auto& span = Spans{data, model}.of(name);
   return {span.low, span.high};
+}
+
+double inner_span_of(const Case& data, const physics::Model& model, const std::string& name) {
+  return Spans{data, model}.of(name).inner;
 }
 
 bool same_law(const Term& one, const Term& other) {

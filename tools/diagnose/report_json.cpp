@@ -232,7 +232,8 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"dropped",
        {{"nan", data.count.missing}, {"outlier", data.count.outliers}, {"duplicate", data.count.duplicates}}},
       {"reordered", data.count.out_of_order},
-      {"gaps", data.count.gaps}};
+      {"gaps", data.count.gaps},
+      {"not_run_through", data.count.shortened}};
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);
 }

@@ -197,11 +197,14 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
                 separating_experiment(std::string{finding.term.info->name}, std::string{a.term.info->name}) +
                 ".",
             "warn");
-  page.paragraph(std::to_string(data.count.rows) +
-                 " rows read; left out: " + std::to_string(data.count.missing) + " missing values, " +
-                 std::to_string(data.count.outliers) + " outliers, " + std::to_string(data.count.duplicates) +
-                 " repeated rows; " + std::to_string(data.count.out_of_order) + " rows put in order, " +
-                 std::to_string(data.count.gaps) + " gaps bridged.");
+  page.paragraph(
+      std::to_string(data.count.rows) + " rows read; left out: " + std::to_string(data.count.missing) +
+      " missing values, " + std::to_string(data.count.outliers) + " outliers, " +
+      std::to_string(data.count.duplicates) + " repeated rows; " + std::to_string(data.count.out_of_order) +
+      " rows put in order, " + std::to_string(data.count.gaps) + " gaps bridged" +
+      (data.count.shortened == 0
+           ? "."
+           : "; of a long recording " + std::to_string(data.count.shortened) + " rows not run through."));
   page.write(file);
 }
 

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/form.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/unnamed.hpp"
@@ -38,6 +39,7 @@ class Search {
   void prune();
   void weigh_alternatives();
   [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
+  [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
 
   Case& data_;
@@ -98,7 +100,8 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
       f = fit(data_, weighing, f.model, data_.model, 8, &f);
     leader = std::max(leader, f.evidence);
   }
-  std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
+  if (options_.refuses)
+    std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
   std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
   last_screen_ = std::move(screened);
   return fits;
@@ -140,19 +143,29 @@ bool Search::add_named(double round) {
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double gain = with_term.evidence - without.evidence;
       // A further claim must be one that an engineer would see in the residual.
-      const double ratio = rivals_.empty() ? 0.995 : 0.95;
-      if (gain > best_gain && stands(data_, with_term, with_term.model.terms.size() - 1) &&
+      const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
+      if (gain > best_gain &&
+          (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)) &&
           least_ratio(data_, with_term, without) < ratio) {
         best_gain = gain, winner = i;
         own_weighing = own, own_fit = std::move(with_term), own_base = std::move(without);
       }
     }
-    if (best_gain < claim_margin_of(d_.weighing)) {
+    if (best_gain < margin()) {
       for (const auto& f : fits)
         d_.reject(std::string{f.model.terms.back().info->name}, "its gain does not pay for its numbers",
                   f.evidence - base.evidence);
       continue;
     }
+    // What the wrong form of an earlier term leaves over is no further physics.
+    if (!rivals_.empty() && options_.refuses)
+      if (const auto other = other_form(data_, own_weighing, own_base, own_fit)) {
+        d_.reject(std::string{fits[winner].model.terms.back().info->name},
+                  "another course of " + std::string{own_base.model.terms[other->term].info->name} +
+                      " over its own variable explains the same",
+                  best_gain);
+        continue;
+      }
     std::vector<Term> rivals;
     std::set<std::string> named{label(fits[winner].model.terms.back())};
     for (const auto& f : fits) {
@@ -257,7 +270,7 @@ Diagnosis Search::run() {
   const bool paired = add_pair();
   for (int round = paired ? 2 : 0; round < 3 && !stopped(); ++round)
     if (!add_named(round)) break;
-  if (!stopped()) prune();
+  if (!stopped() && options_.refuses) prune();
   weigh_alternatives();
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   progress_(0.78, "looking for physics without a name");
@@ -265,7 +278,7 @@ Diagnosis Search::run() {
   d_.is_partial = stopped();
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
-  hold_out(data_, d_);
+  hold_out(data_, d_, options_.refuses);
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
     std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;

@@ -12,6 +12,7 @@ namespace invar::diagnose {
 /// How a search is to go.
 struct Options {
   std::set<std::string, std::less<>> without;  // names of terms that are not tried
+  bool refuses = true;  // false: claims whatever gains a little, for comparison; nobody should act on it
   std::function<bool()> stopped;  // asked between fits; once true, what is known so far is concluded
 };
 

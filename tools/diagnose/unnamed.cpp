@@ -43,6 +43,7 @@ void sharpen(const Case& data, Curved& found) {
   auto rough = fit(data, weighing, model, data.model, 4);
   const Weighing own = weigh(data, simulate(data, rough.model));
   auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
+  if (least_ratio(data, rough, sharp) < 0.97) sharp = fit(data, own, rough.model, data.model, 0, &rough);
   const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
   if (sharp.evidence < blunt.evidence) return;
   found.gain += sharp.evidence - blunt.evidence;
@@ -68,8 +69,17 @@ void add_unnamed(const Case& data, Diagnosis& d) {
       auto rough = fit(data, plain, near.model, data.model, 2, &near);
       const Weighing own = weigh(data, simulate(data, rough.model));
       auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+      // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
+      if (least_ratio(data, rough, curved) < 0.97)
+        curved = fit(data, own, rough.model, data.model, 0, &rough);
       const auto without = fit(data, own, base.model, data.model, 4, &base);
-      const double gain = curved.evidence - without.evidence;
+      double gain = curved.evidence - without.evidence;
+      // Noise that wanders has a course over time too: the curve must beat that.
+      const Weighing far = weigh(data, simulate(data, curved.model), true, true);
+      if (std::any_of(far.filters.begin(), far.filters.end(),
+                      [](const auto& f) { return !f.windows.empty(); }))
+        gain = std::min(gain, fit(data, far, curved.model, data.model, 0, &curved).evidence -
+                                  fit(data, far, without.model, data.model, 4, &without).evidence);
       // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
       if (gain > claim_margin && rough.evidence > best.plain)
         best = {std::move(curved), own, gain, rough.evidence};

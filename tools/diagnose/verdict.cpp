@@ -6,7 +6,7 @@
 
 namespace invar::diagnose {
 
-void hold_out(const Case& data, Diagnosis& d) {
+void hold_out(const Case& data, Diagnosis& d, bool refuses) {
   const std::size_t given = data.model.terms.size();
   // Every third stretch is kept from the fit; the simulation runs through, so its horizon is the whole recording.
   Weighing train = d.weighing, test = d.weighing;
@@ -53,7 +53,7 @@ void hold_out(const Case& data, Diagnosis& d) {
     d.heldout.push_back(row);
     d.train.push_back(trained);
   }
-  if (d.best.model.terms.size() == given) return;
+  if (d.best.model.terms.size() == given || !refuses) return;
   // A claim must help on what it has not seen, counted in whitened residuals.
   const double gain =
       0.5 * d.weighing.temper *

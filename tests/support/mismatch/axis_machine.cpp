@@ -54,9 +54,9 @@ double dry(const Truth& m, double speed) {
 }
 
 Trace run(const Truth& m, const std::vector<double>& reference, const std::vector<double>& temperature,
-          double noise_sigma, double pole, Draw& draw) {
+          double noise_sigma, Colour colour, double pole, Draw& draw) {
   Trace trace;
-  Noise noise{draw, noise_sigma, pole};
+  Noise noise{draw, noise_sigma, colour, pole};
   const double h = period / parts;
   double x = reference[0], v = 0.0, swing = 0.0, swing_speed = 0.0, current = 0.0, bristle = 0.0, shown = x;
   double sum = 0.0, slope = 0.0, last_error = 0.0;
@@ -255,7 +255,8 @@ Machine make_axis(const Wish& wish, Draw& draw) {
   // What needs a kind of motion to show gets it.
   int kind = static_cast<int>(draw.index(4));
   if (kind == 2 && (wish.has("position_stiffness") || wish.has("unknown:dent"))) kind = 0;
-  const auto rows = static_cast<std::size_t>(draw.between(8000.0, 13000.0));
+  auto rows = static_cast<std::size_t>(draw.between(8000.0, 13000.0));
+  if (wish.rows > 0) rows = wish.rows;
   const std::size_t recordings = draw.once_in(4.0) ? 2 : 1;
   const double warm_from = draw.between(20.0, 26.0), warm_by = draw.between(4.0, 12.0);
   const auto warmth = [&](std::size_t n) {
@@ -264,13 +265,13 @@ Machine make_axis(const Wish& wish, Draw& draw) {
       values[i] = warm_from + warm_by * static_cast<double>(i) / static_cast<double>(n);
     return values;
   };
-  const double pole = wish.coloured ? draw.between(0.6, 0.9) : 0.0;
+  const double pole = wish.pole(draw, 0.6, 0.9);
   for (std::size_t r = 0; r < recordings; ++r) {
     const auto reference =
         motion(draw, (kind + 2 * static_cast<int>(r)) % 4, rows / recordings, period, travel);
     const auto temperature = warmth(reference.size());
-    const auto trace = run(m, reference, temperature, noise, pole, draw);
-    const auto quiet = run(m, reference, temperature, 0.0, 0.0, draw);
+    const auto trace = run(m, reference, temperature, noise, wish.colour, pole, draw);
+    const auto quiet = run(m, reference, temperature, 0.0, Colour::white, 0.0, draw);
     for (const double u : quiet.current)
       if (std::abs(u) > 0.9 * m.limit) {  // no machine that anybody would run: less of the effect
         draw = as_begun;
@@ -283,7 +284,7 @@ Machine make_axis(const Wish& wish, Draw& draw) {
   }
   const auto reference = motion(draw, (kind + 1) % 4, 8000, period, travel);
   const auto temperature = warmth(reference.size());
-  const auto trace = run(m, reference, temperature, 0.0, 0.0, draw);
+  const auto trace = run(m, reference, temperature, 0.0, Colour::white, 0.0, draw);
   machine.test_inputs = table(reference, &temperature, nullptr);
   machine.test_outputs = table(reference, nullptr, &trace);
   machine.test_outputs.columns.erase(machine.test_outputs.columns.begin() + 1);

@@ -106,7 +106,7 @@ Machine make_equations(const Wish& wish, Draw& draw) {
     const auto states = integrate(slope, begin, arrives, period);
     recording::Table t;
     std::vector<double> time, x, y;
-    Noise wobble_x{draw, noise * output_scale, wish.coloured ? 0.8 : 0.0}, wobble_y = wobble_x;
+    Noise wobble_x{draw, noise * output_scale, wish.colour, wish.pole(draw, 0.8, 0.8)}, wobble_y = wobble_x;
     for (std::size_t i = 0; i < u.size(); ++i) {
       time.push_back(period * static_cast<double>(i));
       x.push_back(states[i][0] + (noise > 0.0 ? wobble_x() : 0.0));

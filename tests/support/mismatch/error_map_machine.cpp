@@ -132,7 +132,7 @@ Machine make_error_map(const Wish& wish, Draw& draw) {
       measure(static_cast<int>(draw.between(6.0, 14.0)), static_cast<int>(draw.between(30.0, 60.0)), 0.0);
   machine.quiet.push_back(quiet);
   machine.recordings.push_back(quiet);
-  Noise wobble{draw, noise, wish.coloured ? draw.between(0.5, 0.85) : 0.0};
+  Noise wobble{draw, noise, wish.colour, wish.pole(draw, 0.5, 0.85)};
   for (double& v : machine.recordings[0].columns.back().values) v += wobble();
   auto test = measure(4, 40, 9000.0);
   machine.test_outputs.add("col_time", "s", test.columns.front().values);

@@ -13,8 +13,29 @@ namespace invar::test::mismatch {
 double Draw::log_between(double low, double high) { return std::exp(between(std::log(low), std::log(high))); }
 
 double Noise::operator()() {
-  last_ = pole_ * last_ + std::sqrt(1.0 - pole_ * pole_) * sigma_ * draw_->normal();
-  return last_;
+  switch (colour_) {
+    case Colour::memory:
+      last_ = pole_ * last_ + std::sqrt(1.0 - pole_ * pole_) * sigma_ * draw_->normal();
+      return last_;
+    case Colour::wander:  // a tenth of the power goes slowly
+      last_ = 0.995 * last_ + std::sqrt((1.0 - 0.995 * 0.995) * 0.1) * sigma_ * draw_->normal();
+      return last_ + std::sqrt(0.9) * sigma_ * draw_->normal();
+    case Colour::resonance: {  // poles of radius 0.93 at a turn of `pole` radians a row; half the power
+      const double r = 0.93, a = 2.0 * r * std::cos(pole_), b = -r * r;
+      const double gain = std::sqrt((1.0 + b) * ((1.0 - b) * (1.0 - b) - a * a) / (1.0 - b));
+      const double now = a * last_ + b * before_ + gain * draw_->normal();
+      before_ = last_, last_ = now;
+      return sigma_ * std::sqrt(0.5) * (now + draw_->normal());
+    }
+    case Colour::heavy: {  // Student's t of 4 degrees of freedom
+      double chi = 0.0;
+      for (int k = 0; k < 4; ++k) chi += std::pow(draw_->normal(), 2);
+      return sigma_ * std::sqrt(0.5) * draw_->normal() / std::sqrt(chi / 4.0);
+    }
+    case Colour::white:
+      break;
+  }
+  return sigma_ * draw_->normal();
 }
 
 std::string text(double value) {
@@ -133,6 +154,19 @@ void damage(recording::Table& table, const std::vector<std::string>& outputs, Dr
   }
 }
 
+/// Writes a column in steps about as large as its noise.
+void quantise(recording::Table& table, const recording::Table& quiet, const std::string& name, Draw& draw) {
+  auto column =
+      std::find_if(table.columns.begin(), table.columns.end(), [&](const auto& c) { return c.name == name; });
+  const auto& smooth = quiet.find(name)->values;
+  double square = 0.0;
+  for (std::size_t i = 0; i < smooth.size(); ++i) square += std::pow(column->values[i] - smooth[i], 2);
+  const double step = draw.between(0.5, 2.0) *
+                      std::sqrt(square / static_cast<double>(std::max<std::size_t>(1, smooth.size())));
+  if (!(step > 0.0)) return;
+  for (double& v : column->values) v = step * std::round(v / step);
+}
+
 /// Columns get names that say nothing.
 void rename(Machine& machine) {
   std::map<std::string, std::string> names;
@@ -165,7 +199,7 @@ Machine make(const std::string& plant, const std::string& effect, double size, u
   for (std::string part; std::getline(parts, part, '+');)
     if (part != "none") wish.effects.push_back(part);
   wish.size = size;
-  wish.coloured = trouble.coloured;
+  wish.colour = trouble.colour, wish.rows = trouble.rows;
   Machine machine = plant == "axis"        ? make_axis(wish, draw)
                     : plant == "thermal"   ? make_thermal(wish, draw)
                     : plant == "error_map" ? make_error_map(wish, draw)
@@ -185,6 +219,9 @@ Machine make(const std::string& plant, const std::string& effect, double size, u
   std::vector<std::string> outputs;
   for (const auto& column : machine.test_outputs.columns) outputs.push_back(column.name);
   outputs.erase(outputs.begin());  // the time
+  if (trouble.quantised)
+    for (std::size_t r = 0; r < machine.recordings.size(); ++r)
+      for (const auto& name : outputs) quantise(machine.recordings[r], machine.quiet[r], name, draw);
   for (const auto& name : outputs) {
     auto& noise = machine.noise[name];
     noise = machine.recordings.front().find(name)->values;

@@ -31,15 +31,21 @@ class Draw {
   std::normal_distribution<double> normal_;
 };
 
-/// White noise, or one with memory of the same size.
+/// What noise may be like: a first-order memory, white that wanders, a hum about one frequency, or now and then far out.
+enum class Colour { white, memory, wander, resonance, heavy };
+
+/// Noise of one size in any colour.
 class Noise {
  public:
-  Noise(Draw& draw, double sigma, double pole) : draw_{&draw}, sigma_{sigma}, pole_{pole} {}
+  Noise(Draw& draw, double sigma, Colour colour, double pole)
+      : draw_{&draw}, sigma_{sigma}, colour_{colour}, pole_{pole} {}
   double operator()();
 
  private:
   Draw* draw_;
-  double sigma_, pole_, last_ = 0.0;
+  double sigma_;
+  Colour colour_;
+  double pole_, last_ = 0.0, before_ = 0.0;
 };
 
 /// A term that is missing, and the names that count for it: 1 the right one (or its indistinguishable twin), 0.5 a
@@ -65,9 +71,11 @@ struct Machine {
 
 /// How a recording suffers on its way.
 struct Trouble {
-  bool coloured = false;  // noise with memory
-  bool faults = false;    // gaps, empty cells, outliers, repeated and swapped rows
-  bool renamed = false;   // columns called c1, c2, ...
+  Colour colour = Colour::white;
+  std::size_t rows = 0;    // of a recording of an axis or of heat; 0: drawn
+  bool quantised = false;  // written in steps about as large as the noise
+  bool faults = false;     // gaps, empty cells, outliers, repeated and swapped rows
+  bool renamed = false;    // columns called c1, c2, ...
 };
 
 /// The effects that the machines of a plant can have: "none", "parameter", each term, "unknown:..." for what no term

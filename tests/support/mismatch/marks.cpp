@@ -40,11 +40,16 @@ double credit(const Machine& machine, const std::string& term) {
 }
 
 double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched) {
-  const auto content = model::to_record(machine.test_inputs, believed, false);
-  const auto simulation = physics::prepare(believed, content.record);
-  physics::Outputs before, after;
-  simulation->run(believed, before);
-  simulation->run(patched, after);
+  physics::Outputs after;
+  physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
+      ->run(patched, after);
+  return fit_on_test(machine, believed, after);
+}
+
+double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Outputs& after) {
+  physics::Outputs before;
+  physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
+      ->run(believed, before);
   double sum = 0.0, n = 0.0;
   const auto names = believed.outputs();
   for (std::size_t o = 0; o < names.size(); ++o) {

@@ -25,6 +25,8 @@ diagnose::Case case_of(const Machine& machine);
 Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win);
 /// The share of what a perfect model would gain on the test run over the believed one.
 double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched);
+/// The same of outputs on `machine.test_inputs` that are no model's.
+double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Outputs& after);
 /// 1, or what a relative counts; 0 for a false claim.
 double credit(const Machine& machine, const std::string& term);
 

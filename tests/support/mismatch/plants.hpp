@@ -11,10 +11,17 @@ namespace invar::test::mismatch {
 struct Wish {
   std::vector<std::string> effects;  // of the list of the plant
   double size = 1.0;
-  bool coloured = false;
+  Colour colour = Colour::white;
+  std::size_t rows = 0;  // 0: drawn
 
   [[nodiscard]] bool has(const std::string& name) const {
     return std::find(effects.begin(), effects.end(), name) != effects.end();
+  }
+  /// The memory of the noise: of a row, from low to high; of a hum, its turn a row.
+  [[nodiscard]] double pole(Draw& draw, double low, double high) const {
+    return colour == Colour::memory      ? draw.between(low, high)
+           : colour == Colour::resonance ? draw.between(0.2, 2.0)
+                                         : 0.0;
   }
   [[nodiscard]] double of(const std::string& name) const { return has(name) ? size : 0.0; }
 };

@@ -51,7 +51,7 @@ Machine make_sensor(const Wish& wish, Draw& draw) {
     std::vector<double> time, truth, encoder, velocity;
     double shown = at(0.0);
     const double duration = static_cast<double>(rows) * period;
-    Noise wobble{draw, velocity_noise, wish.coloured ? draw.between(0.5, 0.9) : 0.0};
+    Noise wobble{draw, velocity_noise, wish.colour, wish.pole(draw, 0.5, 0.9)};
     for (std::size_t i = 0; i < rows; ++i) {
       const double now = period * static_cast<double>(i);
       double x = at(now - encoder_late), v = rate(now - velocity_late);

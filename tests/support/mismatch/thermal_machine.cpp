@@ -14,6 +14,10 @@ struct Truth {
   double gain = 1.0, contact = 0.0;  // contact that the model knows or misses
   double radiation = 0.0, convection = 0.0, hidden_capacity = 0.0, hidden_conductance = 0.0, sensor = 0.0;
   double resistance = 0.0, air_drift = 0.0, most_power = 1e9;
+  double air_constant = 0.0;   // the air settles with this time constant; 0: goes on warming
+  double second_sensor = 0.0;  // a sensor that follows in two steps
+  double rod = 0.0;            // share of the hidden store that lies behind a second contact
+  double draught_power = 1.0;  // the loss goes with this power of the speed
   double door_from = 1e18, door_to = 1e18, door = 0.0;           // more loss for a while
   double visitor = 0.0, visitor_from = 1e18, visitor_to = 1e18;  // heat from somewhere
 };
@@ -25,7 +29,7 @@ struct Run {
 
 void integrate(const Truth& m, Run& run, int parts) {
   const std::size_t rows = run.time.size();
-  double t[2] = {run.ambient[0], run.ambient[0]}, hidden = t[0], read = t[0];
+  double t[2] = {run.ambient[0], run.ambient[0]}, hidden = t[0], end = t[0], read = t[0], between = t[0];
   run.shown[0].assign(rows, 0.0), run.shown[1].assign(rows, 0.0);
   for (std::size_t i = 0; i < rows; ++i) {
     run.shown[0][i] = m.sensor > 0.0 ? read : t[0];
@@ -34,8 +38,10 @@ void integrate(const Truth& m, Run& run, int parts) {
     const double h = (run.time[i + 1] - run.time[i]) / parts;
     for (int p = 0; p < parts; ++p) {
       const double now = run.time[i] + p * h;
-      const double air = run.ambient[i] + m.air_drift * now;
-      double loss = m.loss[0] + m.convection * run.speed[i];
+      const double air =
+          run.ambient[i] +
+          m.air_drift * (m.air_constant > 0.0 ? m.air_constant * -std::expm1(-now / m.air_constant) : now);
+      double loss = m.loss[0] + m.convection * std::pow(run.speed[i] / 0.4, m.draught_power) * 0.4;
       if (now >= m.door_from && now < m.door_to) loss += m.door;
       double heat = m.gain * std::min(run.power[i], m.most_power) - loss * (t[0] - air);
       const double a = t[0] + 273.15, b = air + 273.15;
@@ -48,8 +54,17 @@ void integrate(const Truth& m, Run& run, int parts) {
         heat -= m.contact * (t[0] - t[1]);
         other = m.contact * (t[0] - t[1]) - m.loss[1] * (t[1] - air);
       }
-      if (m.hidden_capacity > 0.0) hidden += h * m.hidden_conductance * (t[0] - hidden) / m.hidden_capacity;
-      if (m.sensor > 0.0) read += h * (t[0] - read) / m.sensor;
+      if (m.hidden_capacity > 0.0) {
+        const double on = m.rod > 0.0 ? 2.0 * m.hidden_conductance * (hidden - end) : 0.0;
+        hidden += h * (m.hidden_conductance * (t[0] - hidden) - on) / (m.hidden_capacity * (1.0 - m.rod));
+        if (m.rod > 0.0) end += h * on / (m.hidden_capacity * m.rod);
+      }
+      if (m.second_sensor > 0.0) {
+        between += h * (t[0] - between) / m.sensor;
+        read += h * (between - read) / m.second_sensor;
+      } else if (m.sensor > 0.0) {
+        read += h * (t[0] - read) / m.sensor;
+      }
       t[0] += h * heat / m.capacity[0];
       if (m.two) t[1] += h * other / m.capacity[1];
     }
@@ -101,9 +116,18 @@ Machine make_thermal(const Wish& wish, Draw& draw) {
     m.hidden_capacity = m.hidden_conductance * constant * draw.log_between(0.3, 1.5);
   m.sensor = size("sensor_lag") * 0.03 * constant;
   m.resistance = size("motor_heating") * 0.01 * power;
-  const std::size_t rows = static_cast<std::size_t>(draw.between(1500.0, 3500.0));
+  auto rows = static_cast<std::size_t>(draw.between(1500.0, 3500.0));
+  if (wish.rows > 0) rows = wish.rows;
   const double duration = static_cast<double>(rows) * step;
   m.air_drift = size("ambient_drift") * 0.6 / duration * draw.sign();
+  // Half of the machines have the effect in another form than a tool would write it.
+  if (draw.once_in(2.0)) {
+    m.air_constant = duration * draw.between(0.3, 1.2);
+    m.air_drift *= duration / m.air_constant / -std::expm1(-duration / m.air_constant);
+    m.rod = draw.between(0.2, 0.5);
+    m.second_sensor = m.sensor * draw.between(0.1, 0.4);
+    m.draught_power = draw.between(0.8, 1.2);
+  }
   if (wish.has("heater_saturation")) m.most_power = power * std::max(0.3, 1.0 - 0.12 * wish.size);
   if (wish.has("unknown:open_door")) {
     m.door_from = draw.between(0.25, 0.5) * duration,
@@ -156,7 +180,7 @@ Machine make_thermal(const Wish& wish, Draw& draw) {
   simulate(m, run);
   machine.quiet.push_back(table(run, m.two, true, true));
   for (int n = 0; n < 2; ++n) {
-    Noise wobble{draw, noise, wish.coloured ? draw.between(0.7, 0.95) : 0.0};
+    Noise wobble{draw, noise, wish.colour, wish.pole(draw, 0.7, 0.95)};
     for (double& v : run.shown[n]) v = 1e-3 * std::round(1e3 * (v + wobble()));
   }
   machine.recordings.push_back(table(run, m.two, true, true));

@@ -140,5 +140,95 @@ TEST(SimulateEquations, DryFrictionStopsAMassWhereTheClosedFormSays) {
   }
 }
 
+/// Rows of the first output of x' = -2 x from 1, with one term.
+std::vector<double> falling(const physics::Term& added, double step, std::size_t rows) {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\nstates:\n"
+      "  x: {derivative: '-2*x', initial: {value: 1, unit: m}}\noutputs: {way: {column: x, expression: x}}\n",
+      "model.yaml");
+  auto model = model::read(yaml);
+  model.terms = {added};
+  physics::Record inputs;
+  for (std::size_t i = 0; i < rows; ++i) inputs.time.push_back(step * static_cast<double>(i));
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  return out[0];
+}
+
+TEST(SimulateEquations, AStateIsFeltLateBehindALagAndBehindADeadZoneAsClosedFormsSay) {
+  constexpr double k = 2.0, step = 0.01;
+  const double delay = 0.2;
+  const auto late = falling(term("delay", "x", {delay}), step, 41);
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    const double t = step * static_cast<double>(i), second = std::max(0.0, t - delay);
+    EXPECT_NEAR(late[i], 1.0 - k * t + 0.5 * k * k * second * second, 2e-4) << t;
+  }
+  const double tau = 0.25;  // x'' + x' / tau + k x / tau = 0 with x = 1, x' = -k: it swings
+  const auto lagged = falling(term("lag", "x", {tau}), step, 200);
+  const double a = 0.5 / tau, w = std::sqrt(k / tau - a * a);
+  for (std::size_t i = 0; i < lagged.size(); ++i) {
+    const double t = step * static_cast<double>(i);
+    EXPECT_NEAR(lagged[i], std::exp(-a * t) * (std::cos(w * t) + (a - k) / w * std::sin(w * t)), 1e-6) << t;
+  }
+  const double width = 0.3;
+  const auto dead = falling(term("dead_zone", "x", {width}), step, 200);
+  for (std::size_t i = 0; i < dead.size(); ++i)
+    EXPECT_NEAR(dead[i], width + (1.0 - width) * std::exp(-k * step * static_cast<double>(i)), 1e-6);
+  const auto nearly = falling(term("lag", "x", {1e-9}), step, 100),
+             none = falling(term("delay", "x", {0.0}), step, 100);
+  for (std::size_t i = 0; i < nearly.size(); ++i) {
+    EXPECT_NEAR(nearly[i], std::exp(-k * step * static_cast<double>(i)), 1e-6);
+    EXPECT_NEAR(none[i], nearly[i], 1e-6);
+  }
+}
+
+TEST(SimulateEquations, AStoreOnTheWayOfAnInputAndWhatRunsOverFromOneToAnother) {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: pump, w: drain}\nstates:\n"
+      "  x: {derivative: '-x', initial: {value: 0, unit: m, sigma: 0}}\n"
+      "outputs: {one: {column: a, expression: u}, other: {column: b, expression: w}}\n",
+      "model.yaml");
+  auto model = model::read(yaml);
+  physics::Record inputs;
+  for (int i = 0; i < 50; ++i) {
+    inputs.time.push_back(0.1 * i);
+    inputs.signals["u"].push_back(i < 10 ? 0.0 : 2.0);
+    inputs.signals["w"].push_back(0.5);
+  }
+  physics::Outputs out;
+  model.terms = {term("hidden_state", "u", {0.4, 0.7})};
+  physics::prepare(model, inputs)->run(model, out);
+  for (std::size_t i = 10; i < 50; ++i)
+    EXPECT_NEAR(out[0][i], 2.0 * (1.0 - 0.4 * std::exp(-0.1 * (static_cast<double>(i) - 10.0) / 0.7)), 1e-9);
+  model.terms = {term("overflow", "u", {1.5, 0.25}, "w")};
+  physics::prepare(model, inputs)->run(model, out);
+  EXPECT_DOUBLE_EQ(out[0][5], 0.0);
+  EXPECT_DOUBLE_EQ(out[0][20], 1.5);
+  EXPECT_DOUBLE_EQ(out[1][5], 0.5);
+  EXPECT_DOUBLE_EQ(out[1][20], 0.5 + 0.25 * 0.5);
+}
+
+TEST(EquationsModel, SaysWhereATermCannotAct) {
+  const std::string head =
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: pump}\nstates:\n"
+      "  level: {derivative: 'u - level', initial: {value: 0, unit: m}}\n"
+      "outputs: {one: {column: a, expression: level}}\n";
+  const auto fault_of = [&](const std::string& terms) {
+    try {
+      const auto yaml = config::Yaml::parse(head + terms, "model.yaml");
+      (void)model::read(yaml);
+      yaml.finish();
+    } catch (const InputError& error) {
+      return std::string{error.what()};
+    }
+    return std::string{"none"};
+  };
+  EXPECT_THAT(
+      fault_of("terms: [{term: delay, on: leve, delay: 1}]\n"),
+      ::testing::AllOf(::testing::HasSubstr("no state, input or output"), ::testing::HasSubstr("`level`")));
+  EXPECT_THAT(fault_of("terms: [{term: linear, on: u, coefficient: 1}]\n"), ::testing::HasSubstr("no state"));
+  EXPECT_EQ(fault_of("terms: [{term: delay, on: level, delay: 1}]\n"), "none");
+}
+
 }  // namespace
 }  // namespace invar::diagnose

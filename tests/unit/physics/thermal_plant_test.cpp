@@ -72,5 +72,21 @@ TEST(ThermalPlant, SpeedCurrentClippingAndDriftActAsWritten) {
   EXPECT_NEAR(heat_of({term("ambient_drift", {1e-3})}), 50.0, 1e-3);  // no loss, so the air does not matter
 }
 
+TEST(ThermalPlant, TheAirOfARoomSettlesAndItsRateIsTheMeanUntilThen) {
+  // A small part follows the air at once.
+  const double rate = 1e-3, settling = 2e-3, over = 1000.0;
+  ThermalPlant plant{{{1.0, 50.0}}, {}, {}, {term("ambient_drift", {rate, settling, over})}};
+  plant.set_temperature(0, 20.0);
+  for (int i = 1; i <= 2000; ++i) {
+    plant.step({{}, 20.0}, 1.0);
+    const double air =
+        20.0 + rate * over * (1.0 - std::exp(-settling * i)) / (1.0 - std::exp(-settling * over));
+    EXPECT_NEAR(plant.temperature(0), air, 1e-4);
+    if (i == 1000) {
+      EXPECT_NEAR(plant.temperature(0), 20.0 + rate * over, 1e-4);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace invar::physics

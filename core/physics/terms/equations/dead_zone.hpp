@@ -1,4 +1,4 @@
-// Dead zone: small inputs do nothing.
+// Dead zone: small inputs, or small values of a state, do nothing.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,7 @@ struct DeadZone {
       .depends_on = {},
       .parameters = {{{"width", "*", {0.0, 1e300}, Role::amplitude, {1e-3}, "on each side of zero"}}},
       .description = "Play, overlap of a valve, cross-over of an amplifier.",
-      .source = "s - width sign(s) where |s| > width, else 0"};
+      .source = "s - width sign(s) where |s| > width, else 0; of a state: in all rates"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dead_zone};
 };
 

@@ -1,4 +1,4 @@
-// Delay: an input acts, or an output shows, some time later.
+// Delay: an input acts, an output shows, or a state is felt, some time later.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,7 @@ struct Delay {
       .depends_on = {"history"},
       .parameters = {{{"delay", "*", {0.0, 1e6}, Role::amplitude, {1e-3}, "in the unit of time"}}},
       .description = "Transport through a pipe, a bus or a computation.",
-      .source = "s(t - delay)"};
+      .source = "s(t - delay); of a state: in all rates"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::delay};
 };
 

@@ -1,4 +1,4 @@
-// Lag: an input acts, or an output shows, with a time constant.
+// Lag: an input acts, an output shows, or a state is felt, with a time constant.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,7 @@ struct Lag {
       .depends_on = {"history"},
       .parameters = {{{"time_constant", "*", {0.0, 1e9}, Role::amplitude, {1e-3}, "in the unit of time"}}},
       .description = "An actuator or a sensor that follows like a first-order lag.",
-      .source = "dz/dt = (s - z) / time_constant"};
+      .source = "z for s, dz/dt = (s - z) / time_constant; of a state: in all rates"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::lag};
 };
 

@@ -1,0 +1,19 @@
+// Is what a further term explains only the wrong form of a term that was found before?
+#pragma once
+
+#include <optional>
+
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+/// The best fit of `base` with one of its found terms free to take any course over its own variable, where that has more
+/// evidence than `further` (which has one term more than `base`); the number of that term. Both under one weighing.
+struct OtherForm {
+  std::size_t term = 0;
+  double evidence = 0.0;
+};
+std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,
+                                    const Fit& further);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,24 @@
+// What of a long recording is looked at: physics that an hour shows shows in minutes of it, at a cost that does not grow.
+#pragma once
+
+#include <vector>
+
+#include "core/physics/simulation.hpp"
+
+namespace invar::diagnose {
+
+/// Rows of one recording that a fit runs through; beyond, a recording is shortened.
+inline constexpr std::size_t most_rows = 30000;
+
+struct Stretch {
+  physics::Record record;
+  std::size_t forget =
+      0;  // leading rows in which the machine's state is not that of the start: not to be compared
+};
+
+/// The recording itself where it has at most `most` rows. Else, by plant: an axis and a sensor in stretches spread over the
+/// recording, an axis from where it stands; heat in means over equal spans; points of a map and drops one in so many; the
+/// user's equations from their beginning. Rows in order of time.
+std::vector<Stretch> shortened(const physics::Model& model, physics::Record record, std::size_t most);
+
+}  // namespace invar::diagnose
