@@ -49,6 +49,15 @@ std::string micrometres(double value) {
   return text;
 }
 
+/// Whether a model claims nothing beyond another: the same terms, no parameter moved by more than it is uncertain.
+bool says_the_same(const physics::Model& believed, const physics::Model& other) {
+  if (believed.terms.size() != other.terms.size()) return false;
+  return std::all_of(believed.parameters.begin(), believed.parameters.end(), [&](const auto& parameter) {
+    return std::abs(other.value(parameter.name) - parameter.value) <=
+           3.0 * parameter.sigma.value_or(INFINITY);
+  });
+}
+
 /// Following error in the parts of constant velocity.
 std::vector<double> following(const recording::Table& table) {
   const auto time = table.in("t", "s"), reference = table.in("reference", "m"),
@@ -81,6 +90,8 @@ std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
     return begin(*ripple);
   if (const auto tracking = named(parameters_.tracking); tracking != parameters_.tracking.end())
     return begin(*tracking);
+  if (const auto motion = named(parameters_.motion); motion != parameters_.motion.end())
+    return begin(*motion);
   return std::nullopt;
 }
 
@@ -306,6 +317,61 @@ Task AxisTrial::run(const TrackingJob& job) {
   all.write(folder / "tracking.csv");
   progress_ = 1.0;
   report(job::JOB_DONE, found);
+}
+
+Task AxisTrial::move_at_all_speeds(const MotionJob& job, recording::Table& record) {
+  co_await move(job.from, 0.0, nullptr);
+  co_await wait(settle);
+  for (const double velocity : job.velocities)
+    for (std::int64_t pass = 0; pass < job.passes; ++pass)
+      for (const double target : {job.to, job.from}) co_await move(target, velocity, &record);
+  co_await wait(settle);
+}
+
+Task AxisTrial::run(const MotionJob& job) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  co_await enable();
+  recording::Table before = record_table();
+  co_await move_at_all_speeds(job, before);
+  before.write(folder / "motion_before.csv");
+  std::filesystem::remove(folder / "motion_after.csv");  // of a run before
+  if (!job.apply.empty()) {
+    co_await compare(job, std::move(before));
+    co_return;
+  }
+  const Size size = size_of(before.in("following_error", "m"));
+  progress_ = 1.0;
+  report(job::JOB_DONE,
+         "following error " + micrometres(size.rms) + " RMS, at most " + micrometres(size.largest));
+}
+
+Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  const auto file = std::filesystem::absolute(job.apply);
+  if (says_the_same(model::load(job.model), model::load(file))) {
+    progress_ = 1.0;
+    report(job::JOB_DONE, "the diagnosis found nothing that the model lacks; nothing was given to the stage");
+    co_return;
+  }
+  progress_ = 0.5;
+  report(job::JOB_RUNNING, "giving the model to the stage");
+  co_await command_model(compensation::MODEL_STAGE, file.string());
+  co_await command_model(compensation::MODEL_ACTIVATE, file.string());
+  co_await wait(2.0);  // it fades in
+  recording::Table after = record_table();
+  co_await move_at_all_speeds(job, after);
+  after.write(folder / "motion_after.csv");
+  const Size was = size_of(before.in("following_error", "m"));
+  const Size is = size_of(after.in("following_error", "m"));
+  if (is.rms > was.rms) {
+    co_await command_model(compensation::MODEL_ROLLBACK, file.string());
+    throw std::runtime_error{"the following error grew from " + micrometres(was.rms) + " to " +
+                             micrometres(is.rms) + " RMS; rolled back"};
+  }
+  progress_ = 1.0;
+  report(job::JOB_DONE, "following error of the same motion " + micrometres(was.rms) + " to " +
+                            micrometres(is.rms) + " RMS, at most " + micrometres(was.largest) + " to " +
+                            micrometres(is.largest));
 }
 
 }  // namespace invar::calibration

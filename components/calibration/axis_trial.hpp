@@ -59,6 +59,29 @@ struct TrackingJob {
   }
 };
 
+/// Forth and back at several speeds, the same each time: what a diagnosis records, and what tells whether it was right.
+/// With `apply`, once more after that model was given to the stage - unless it says nothing that `model` does not.
+struct MotionJob {
+  std::string name;
+  double from = 0.0;
+  double to = 0.0;
+  std::vector<double> velocities{0.02, 0.05, 0.1};
+  std::int64_t passes = 1;
+  std::filesystem::path model;
+  std::string apply;
+  std::string out = "out";
+  void describe(auto& p) {
+    p(name, "name", "what `invar job run` calls it");
+    p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
+    p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
+    p(velocities, "velocities", "m/s", "one after the other");
+    p(passes, "passes", 1, 100, "forth and back so often, at each velocity");
+    p(model, "model", "with apply: model.yaml of the axis as it was believed to be");
+    p(apply, "apply", "model.yaml that `invar diagnose` writes; relative to where the cell was started");
+    p(out, "out", "folder for the files, created; relative to where the cell was started");
+  }
+};
+
 /// One axis: its stage on `state` and `command`, the stage's model on `model`, a laser along the axis on `reading` and `beam`.
 class AxisTrial final : public JobComponent {
  public:
@@ -66,10 +89,12 @@ class AxisTrial final : public JobComponent {
     std::int64_t axis = 0;
     std::vector<RippleJob> ripple;
     std::vector<TrackingJob> tracking;
+    std::vector<MotionJob> motion;
     void describe(auto& p) {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(ripple, "ripple", "jobs that identify the force ripple");
       p(tracking, "tracking", "jobs that track sinusoids");
+      p(motion, "motion", "jobs that move forth and back, to record and to compare");
     }
   };
   explicit AxisTrial(const Parameters& parameters) : parameters_{parameters} {}
@@ -80,6 +105,9 @@ class AxisTrial final : public JobComponent {
   void send(stage::AxisCommand& command);
   Task run(const RippleJob& job);
   Task run(const TrackingJob& job);
+  Task run(const MotionJob& job);
+  Task move_at_all_speeds(const MotionJob& job, recording::Table& record);
+  Task compare(const MotionJob& job, recording::Table before);
   Task enable();
   Task command_axis(stage::AxisCommand command, recording::Table* record);
   Task move(double target, double velocity, recording::Table* record);

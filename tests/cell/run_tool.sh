@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# tools/run as a user calls it, in a copy of the tree and on the build that is there: the summary names a report and a
-# recording that exist; wrong options end it with the program's own words; recordings beside the checkout are compared.
+# tools/run as a user calls it, in a copy of the tree and on the build that is there: one table of all commands, which names
+# reports and a recording that exist; wrong options end it with the program's own words; recordings beside the checkout are compared.
 # run_tool.sh BUILD_DIR SOURCE_DIR
 set -euo pipefail
 build=$1 source=$2
@@ -9,7 +9,7 @@ mkdir "$folder/checkout"
 cp -r "$source/tools" "$source/deployment" "$folder/checkout"
 domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
 echo "domain $domain, port $port"
-sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder/checkout/deployment/xy-table.yaml"
+sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder"/checkout/deployment/{xy-table,mismatch}.yaml
 export INVAR_BUILD=$build INVAR_SHARED=${INVAR_SHARED:-$source/../shared}
 cd "$folder"
 
@@ -21,13 +21,16 @@ cat wrong
 checkout/tools/run >summary 2>&1 || { cat summary; exit 1; }
 cat summary
 for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'error after +rms [0-9.]+ nm' 'heater +[0-9.]+ degC' \
-  '^motion +1000 Hz +[0-9]+ ' '^time +'; do
+  '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force_ripple ' '^  coulomb_friction ' '^\.\.\. patched +rms .* times less'; do
   grep -Eq "$words" summary || { echo "the summary lacks: $words"; exit 1; }
 done
 for what in report recording; do
   file=$(sed -n "s/^$what  *//p" summary | head -n 1)
   [[ $file == "$folder"/checkout/out/* && -s $file ]] || { echo "the $what that is named does not exist: $file"; exit 1; }
 done
+while read -r file; do
+  [[ -s $file || -s checkout/$file ]] || { echo "the report that is named does not exist: $file"; exit 1; }
+done < <(sed '1,/^== reports/d' summary)
 "$build/bin/invar" recording info "$(sed -n 's/^recording  *//p' summary)" >/dev/null
 
 if [[ -d $INVAR_SHARED/data ]]; then

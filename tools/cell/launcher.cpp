@@ -197,9 +197,19 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   std::string failure = master.wait_for_all(patience, given_up);
   outcome.start_seconds = seconds_since(begin);
   if (failure.empty() && !stop) {
-    const double most = options.duration > 0.0 ? options.duration : 1e9;
-    failure =
-        master.advance_to(Instant{} + Duration::seconds(most), Duration::seconds(120.0), given_up).failure;
+    const Instant end = Instant{} + Duration::seconds(options.duration > 0.0 ? options.duration : 1e9);
+    const auto patience_of_a_window = Duration::seconds(120.0);
+    const auto started = Clock::now();
+    dds::Advance so_far;
+    while (so_far.reached < end && !so_far.finished && so_far.failure.empty() && !given_up()) {
+      const bool paced = options.pace > 0.0;
+      so_far = master.advance_to(paced ? std::min(end, so_far.reached + cell.window) : end,
+                                 patience_of_a_window, given_up);
+      if (paced)
+        std::this_thread::sleep_until(started + std::chrono::nanoseconds{static_cast<std::int64_t>(
+                                                    1e9 * so_far.reached.in_seconds() / options.pace)});
+    }
+    failure = so_far.failure;
   }
   master.end();
   const auto ending = Clock::now();

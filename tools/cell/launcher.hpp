@@ -15,6 +15,8 @@ struct LaunchOptions {
   std::optional<bool> simulated;  // otherwise what the cell file says
   std::string job;                // run it, then stop
   double duration = 0.0;          // s of the cell's time; 0: until stopped
+  double pace =
+      0.0;  // simulated time runs no faster than so many times the wall clock; 0: as fast as it goes
 };
 
 struct ProcessOutcome {

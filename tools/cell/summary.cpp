@@ -9,6 +9,7 @@
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/table.hpp"
 #include "tools/cell/heat_summary.hpp"
+#include "tools/cell/motion_summary.hpp"
 #include "tools/cell/print_summary.hpp"
 #include "tools/report/page.hpp"
 
@@ -116,6 +117,7 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
   }
   summarise_print(folder, page, out);
   summarise_heat(folder, page, out);
+  summarise_motion(folder, page, out);
   add_heater(page, folder, out);
 }
 

@@ -10,6 +10,7 @@
 
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
+#include "core/physics/axis_feedforward.hpp"
 #include "idl/compensation.h"
 #include "tools/commands/job.hpp"
 #include "tools/live/interrupt.hpp"
@@ -27,10 +28,11 @@ struct Options {
   std::filesystem::path model;
   bool rollback = false;
   bool none = false;
+  bool partly = false;
 };
 
 /// The file's faults are said here, before anything is asked of the cell.
-void check_model(const std::filesystem::path& file) {
+void check_model(const std::filesystem::path& file, bool partly) {
   const auto yaml = config::Yaml::load(file);
   if (yaml.root().has("invar_compensation")) {
     if (compensation::check_seal(yaml) == 0)
@@ -42,6 +44,28 @@ void check_model(const std::filesystem::path& file) {
   if (model.plant != physics::Plant::axis)
     throw InputError{file.string(), "is of plant " + std::string{physics::name_of(model.plant)},
                      "a stage takes a model of plant axis"};
+  std::vector<Fault> faults;
+  for (std::size_t i = 0; i < model.terms.size(); ++i)
+    if (const auto why = physics::why_not_fed_forward(model.terms[i]); !why.empty() && !partly)
+      faults.push_back({file.string() + ": terms[" + std::to_string(i) + "]",
+                        "a stage cannot feed `" + std::string{model.terms[i].info->name} +
+                            "` forward: " + std::string{why},
+                        "take it out, or give --partly for the rest"});
+  if (!faults.empty()) throw InputError{faults};
+}
+
+void check_component(const config::Cell& cell, const std::string& name) {
+  if (cell.find(name) != nullptr) return;
+  std::vector<std::string> names;
+  std::string list;
+  for (const auto& process : cell.processes)
+    for (const auto& component : process.components) {
+      names.push_back(component.name);
+      list += (list.empty() ? "" : ", ") + component.name;
+    }
+  const auto near = config::nearest(name, names);
+  throw InputError{"COMPONENT", "`" + name + "` is no component of " + cell.file.string(),
+                   near.empty() ? "there are: " + list : "did you mean `" + near + "`?"};
 }
 
 /// Orders to one component's model, and its answers.
@@ -97,10 +121,11 @@ int apply(Options& options) {
     if (options.model.empty())
       throw InputError{"--model", "is missing", "name the model's file, or give --rollback or --none"};
     file = std::filesystem::absolute(options.model);
-    check_model(file);
+    check_model(file, options.partly);
   }
   (void)interrupted();
   LiveCell cell{options.call};
+  if (cell.file() != nullptr) check_component(*cell.file(), options.call.word(0));
   if (!cell.found()) {
     cell.say_not_found(options.call.command);
     return 1;
@@ -151,6 +176,7 @@ void add_job_apply(CLI::App& job) {
   auto* model =
       command->add_option("--model", options->model,
                           "model.yaml as `invar diagnose` writes it, or a calibration's compensation.yaml");
+  command->add_flag("--partly", options->partly, "leave out the terms that a stage cannot feed forward");
   auto* rollback = command->add_flag("--rollback", options->rollback, "back to the model before");
   command->add_flag("--none", options->none, "take the models out")->excludes(rollback)->excludes(model);
   command->callback([options] {

@@ -63,6 +63,10 @@ void add_run(CLI::App& program) {
       ->check(CLI::PositiveNumber);
   auto* simulated =
       command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
+  command
+      ->add_option("--pace", options->launch.pace,
+                   "simulated time no faster than so many times the wall clock")
+      ->check(CLI::PositiveNumber);
   command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
   command->callback([options] {

@@ -47,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(Files, InvalidCell, ::testing::ValuesIn(names()),
 TEST(Cell, TheOneThatTheyAreMadeFromIsSound) { EXPECT_NO_THROW((void)load_cell(folder / "sound.yaml")); }
 
 TEST(Cell, TheOnesThatShipAreSound) {
-  for (const char* file : {"xy-table.yaml", "print-cell.yaml"})
+  for (const char* file : {"xy-table.yaml", "print-cell.yaml", "mismatch.yaml"})
     EXPECT_NO_THROW((void)load_cell(std::filesystem::path{INVAR_SOURCE_DIR} / "deployment" / file));
 }
 

@@ -1,0 +1,109 @@
+#!/usr/bin/env bash
+# The cell finds out what its model leaves out. Three ways: as jobs in simulated time, on a running cell with `invar record` and
+# `invar job apply`, and with nothing hidden, where nothing may be claimed or applied.
+# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals
+set -euo pipefail
+invar=$1 source=$2 part=$3
+folder=$(mktemp -d); cell_pid=
+trap '[[ -z $cell_pid ]] || kill "$cell_pid" 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
+cp -r "$source/deployment" "$folder/deployment"
+domain=$((100 + RANDOM % 100))
+echo "domain $domain"
+cd "$folder"
+cell=deployment/mismatch.yaml believed=deployment/machines/linear-axis-believed.yaml truth=deployment/machines/linear-axis-true.yaml
+sed -i "s/^domain: .*/domain: $domain/" $cell
+fail() { echo "$*"; exit 1; }
+
+# What the axis really has: one line of YAML a term.
+hide() {
+  sed -i '/^terms:/,$d' $truth
+  echo "terms: [$1]" >>$truth
+}
+# RMS in um of the following error in a file of the job, its mean taken out.
+rms() {
+  awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i ~ /^following_error/) c = i; next }
+    { sum += $c; squares += $c * $c; n++ } END { printf "%.4f\n", 1e6 * sqrt(squares / n - (sum / n) ^ 2) }' "$1"
+}
+# falls BEFORE AFTER SHARE: AFTER is at most SHARE of BEFORE.
+falls() {
+  echo "$1 before, $2 after"
+  awk -v b="$1" -v a="$2" -v s="$3" 'BEGIN { exit !(a > 0 && a <= s * b) }' || fail "it did not fall to $3 of what it was"
+}
+# Both terms of the axis must be named, with the numbers that the file of the truth has.
+finds_the_truth() {
+  python3 - "$1" <<'PYTHON'
+import json, sys
+found = {f["term"]: f["parameters"] for f in json.load(open(sys.argv[1]))["findings"]}
+print("found:", *found)
+for term, parameter, truth, tolerance in (("force_ripple", "pitch", 0.0317, 3e-5), ("force_ripple", "amplitude", 2.4, 0.12),
+                                          ("coulomb_friction", "level", 3.0, 0.15)):
+    assert abs(found[term][parameter]["value"] - truth) < tolerance, (term, parameter, found[term][parameter])
+PYTHON
+}
+verdict_of() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["verdict"])' "$1"; }
+
+case $part in
+  jobs)
+    "$invar" run $cell --job excite
+    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis
+    finds_the_truth out/mismatch/diagnosis/report.json
+    "$invar" run $cell --job prove | tee summary
+    grep -Eq '^\.\.\. patched +rms .* times less\)' summary || fail "the summary does not say what it was good for"
+    falls "$(rms out/mismatch/motion_before.csv)" "$(rms out/mismatch/motion_after.csv)" 0.25
+    # On a recording that was not diagnosed - of the second job - the patched model is nearer to what was measured.
+    share() { # of the current's spread that a model does not explain [%]
+      "$invar" job compare --recording out/mismatch/recording.mcap --machine "$1" --out compare | awk '/state.current/ { print $(NF - 1) }'
+    }
+    falls "$(share $believed)" "$(share out/mismatch/diagnosis/patched.yaml)" 0.5
+    ;;
+  nothing)
+    hide ""
+    "$invar" run $cell --job excite
+    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis
+    [[ $(verdict_of out/mismatch/diagnosis/report.json) == no_mismatch ]] || fail "claimed something where there is nothing"
+    "$invar" run $cell --job prove | tee summary
+    grep -q "nothing was given to the stage" summary || fail "something was applied"
+    [[ ! -e out/mismatch/motion_after.csv ]] || fail "there is a motion after nothing"
+    ;;
+  live)
+    "$invar" run $cell --pace 3 >cell.log 2>&1 &
+    cell_pid=$!
+    "$invar" status $cell --wait 60 >/dev/null || { cat cell.log; fail "the cell does not come up"; }
+    "$invar" record $cell --out run.mcap --topic stage_x.state --wait 60 >recorded 2>&1 &
+    record_pid=$!
+    for _ in $(seq 100); do ! grep -q "^recording into" recorded || break; sleep 0.2; done
+    "$invar" job run $cell excite --wait 60
+    cp out/mismatch/motion_before.csv first.csv
+    kill -INT $record_pid
+    wait $record_pid || { cat recorded; fail "the recording failed"; }
+    cat recorded
+    "$invar" diagnose --model $believed --recording run.mcap --out diagnosis
+    finds_the_truth diagnosis/report.json
+    "$invar" job apply $cell stage_x --model diagnosis/patched.yaml --wait 60 --partly # whatever else it found
+    "$invar" job run $cell excite --wait 60
+    falls "$(rms first.csv)" "$(rms out/mismatch/motion_before.csv)" 0.25
+    "$invar" job apply $cell stage_x --rollback --wait 60
+    "$invar" job run $cell excite --wait 60
+    falls "$(rms out/mismatch/motion_before.csv)" "$(rms first.csv)" 1.1 # as it was
+    kill -INT $cell_pid
+    wait $cell_pid || { cat cell.log; fail "the cell did not end in order"; }
+    cell_pid=
+    ;;
+  refusals)
+    # status WORDS ARGUMENTS...: `invar job apply` ends so and says this in one line.
+    refuses() {
+      local wanted=$1 words=$2 status=0; shift 2
+      "$invar" job apply "$@" >said 2>&1 || status=$?
+      [[ $status == "$wanted" && $(wc -l <said) == 1 ]] && grep -qF -- "$words" said || { cat said; fail "status $status, not $wanted: $words"; }
+    }
+    hide "{term: periodic_disturbance, amplitude: {value: 1, unit: N}, frequency: {value: 20, unit: Hz}, phase: {value: 0, unit: rad}}"
+    refuses 2 "true.yaml: terms[0]: a stage cannot feed \`periodic_disturbance\` forward: it goes over time" $cell stage_x --model $truth
+    hide "{term: backlash, width: {value: 1e-6, unit: m}}"
+    refuses 2 "a stage cannot feed \`backlash\` forward: a current cannot take up play; take it out, or give --partly" $cell stage_x --model $truth
+    refuses 2 "--model: is missing; name the model's file, or give --rollback or --none" $cell stage_x
+    refuses 2 "nowhere.yaml" $cell stage_x --model nowhere.yaml
+    refuses 2 "COMPONENT: \`stage_z\` is no component of" $cell stage_z --model $believed
+    ;;
+  *) fail "$part is none of the parts" ;;
+esac
+echo "passed"
