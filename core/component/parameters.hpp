@@ -46,14 +46,17 @@ concept Described = requires(T& group, detail::Probe& probe) {
 };
 
 /// The visitor that reads parameters from a cell file. In `describe`:
-///   p(cutoff, "cutoff", "Hz", Range{0.1, 450.0}, "-3 dB corner", while_running);   a double with its unit
-///   and bounds p(count, "count", 1, 64, "readings a point");                                  std::int64_t
-///   with bounds p(enabled, "enabled", "..."); p(map, "map", "...");                            bool,
-///   std::string, std::filesystem::path p(limits, "limits", "N", "...") std::vector<double> or Range with
-///   unit p(trajectory, "trajectory", "..."); p(lines, "lines", "...");                  a described group; a
-///   vector of them
-/// std::optional<T> may be absent; everything else keeps the default of the struct where the file says
-/// nothing.
+///
+///   p(cutoff, "cutoff", "Hz", Range{0.1, 450.0}, "-3 dB corner", while_running);  double, its unit and bounds
+///   p(count, "count", 1, 64, "readings a point");                                 std::int64_t with bounds
+///   p(enabled, "enabled", "...");                                                 bool
+///   p(map, "map", "...");                                                         std::string, path
+///   p(limits, "limits", "N", "...");                                              std::vector<double>, Range
+///   p(trajectory, "trajectory", "...");                                           a described group
+///   p(lines, "lines", "...");                                                     a vector of such groups
+///
+/// std::optional<T> may be absent; everything else keeps the default of the struct where the file says nothing. Only a double
+/// may be `while_running`; a number without unit has the unit "".
 class ParameterReader {
  public:
   explicit ParameterReader(config::Node node, std::filesystem::path folder = {})

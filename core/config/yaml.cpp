@@ -54,7 +54,18 @@ std::string located(const Document& document, const Place& place) {
   return where;
 }
 
-void collect_unknown(const Document& document, const Place& place, std::vector<Fault>& faults) {
+/// Keys that stand twice (of which the parser would keep the first) and keys that nobody asked for.
+void collect_keys(const Document& document, const Place& place, std::vector<Fault>& faults) {
+  const auto located_at = [&](const YAML::Node& key) {
+    return document.file.string() + ":" + std::to_string(line_of(key, 0)) + ": " +
+           joined(place.path, key.Scalar());
+  };
+  if (place.yaml.IsDefined() && place.yaml.IsMap()) {
+    std::set<std::string> seen;
+    for (const auto& entry : place.yaml)
+      if (!seen.insert(entry.first.Scalar()).second)
+        faults.push_back({located_at(entry.first), "stands twice", "keep one of them"});
+  }
   if (place.accept_all) return;
   if (place.yaml.IsDefined() && place.yaml.IsMap() && !place.known.empty()) {
     const std::vector<std::string> known{place.known.begin(), place.known.end()};
@@ -67,12 +78,10 @@ void collect_unknown(const Document& document, const Place& place, std::vector<F
       } else {
         for (const auto& name : known) mend += (name == known.front() ? "" : ", ") + name;
       }
-      faults.push_back({document.file.string() + ":" + std::to_string(line_of(entry.first, 0)) + ": " +
-                            joined(place.path, key),
-                        "unknown key", mend});
+      faults.push_back({located_at(entry.first), "unknown key", mend});
     }
   }
-  for (const auto& [key, child] : place.children) collect_unknown(document, *child, faults);
+  for (const auto& [key, child] : place.children) collect_keys(document, *child, faults);
 }
 
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
@@ -148,11 +157,7 @@ std::vector<Node> Node::children() const {
     std::set<std::string> seen;
     for (const auto& entry : place_->yaml) {
       const std::string key = entry.first.Scalar();
-      if (!seen.insert(key).second) {
-        fault("key `" + key + "` stands twice", "keep one of them");
-        continue;
-      }
-      result.push_back((*this)[key]);
+      if (seen.insert(key).second) result.push_back((*this)[key]);
     }
   } else if (is_list()) {
     std::size_t index = 0;
@@ -194,8 +199,10 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
       } else if (!parse_unit(name)) {
         written.fault("`" + name + "` is no unit", "write it in " + std::string{unit});
       } else {
-        written.fault("`" + name + "` does not measure the same as " + std::string{unit},
-                      "write it in " + std::string{unit});
+        const bool pure = unit.empty() || unit == "1";
+        written.fault("`" + name + "` does not measure the same as " +
+                          (pure ? "a number without unit" : std::string{unit}),
+                      pure ? "leave the unit out" : "write it in " + std::string{unit});
       }
     }
     if (const Node sigma = (*this)["sigma"]; sigma.exists())
@@ -206,7 +213,9 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
   if (!number.is_scalar() || !YAML::convert<double>::decode(number.raw(), value)) {
     number.fault(
         "`" + (number.is_scalar() ? number.raw().Scalar() : std::string{"..."}) + "` is not a number",
-        "write a number" + (unit.empty() ? "" : " in " + std::string{unit}));
+        unit.empty() || unit == "1"
+            ? "write a number"
+            : "write a number in " + std::string{unit} + ", or {value: ..., unit: ...}");
     return {harmless, result.sigma};
   }
   value = to_asked(value);
@@ -354,7 +363,7 @@ const std::string& Yaml::text() const { return document_->text; }
 
 std::vector<Fault> Yaml::faults() const {
   auto faults = document_->faults;
-  collect_unknown(*document_, *document_->root, faults);
+  collect_keys(*document_, *document_->root, faults);
   return faults;
 }
 

@@ -167,8 +167,9 @@ std::string Executor::set_parameter(std::size_t index, std::string_view path, do
     return at + ": it may not change while running; change it in the cell file and start the process again";
   if (!std::isfinite(value) || !info->range.contains(value)) {
     std::ostringstream text;
-    text << at << ": " << value << " " << info->unit << " is outside " << info->range.lower << " .. "
-         << info->range.upper << " " << info->unit;
+    const std::string unit = info->unit.empty() ? "" : " " + info->unit;
+    text << at << ": " << value << unit << " is outside " << info->range.lower << " .. " << info->range.upper
+         << unit;
     return text.str();
   }
   const std::lock_guard turn{manager_};

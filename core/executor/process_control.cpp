@@ -128,7 +128,7 @@ std::string ProcessControl::set_parameter(std::string_view component, std::strin
       const auto convert = conversion(unit, info.unit);
       if (!convert)
         return std::string{component} + "." + info.path + ": `" + std::string{unit} +
-               "` is no unit of it; give " + info.unit;
+               "` is no unit of it; give " + (info.unit.empty() ? "a number without unit" : info.unit);
       value = (*convert)(value);
     }
   }

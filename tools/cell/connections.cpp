@@ -33,6 +33,11 @@ std::string mend_name(const std::string& word, const std::vector<std::string>& n
   return text;
 }
 
+std::string type_of(const Port& port) {
+  const dds::WireType* type = dds::WireTypes::all().find(port.type());
+  return type == nullptr ? "a type without IDL" : type->name();
+}
+
 /// Every key of `connect`, `qos`, `publish` and `latency` must be a port of the component.
 void check_port_keys(const LoadedComponent& member) {
   const auto names = port_names(*member.component);
@@ -118,7 +123,8 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
   } else if (!writes && !listens && other->direction() != Port::Direction::output) {
     at.fault("`" + found->second + "` is no output", "name the output that this port reads");
   } else if (other->type() != port.type()) {
-    at.fault("`" + found->second + "` carries another type than `" + port.name() + "`",
+    at.fault("`" + found->second + "` carries " + type_of(*other) + ", but `" + port.name() + "` takes " +
+                 type_of(port),
              "join ports of the same IDL type");
   } else {
     port.topic = loaded.cell->topic(found->second);

@@ -11,7 +11,7 @@ void load_plugins(const config::Cell& cell, Registry& registry, const config::No
     void* library = dlopen(std::filesystem::absolute(cell.plugins[i]).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
       places[i].fault(std::string{"cannot be loaded: "} + dlerror(),
-                      "build it against this version of Invar");
+                      "name a shared library that was built against this version of Invar");
       continue;
     }
     using Entry = void (*)(Registry&);

@@ -249,6 +249,10 @@ std::string LiveCell::process_of(const std::string& component) {
 }
 
 void LiveCell::say_not_found(const std::string& command) const {
+  if (client_ && !client_->processes().empty()) {
+    std::cerr << command << ": the cell " << name_ << " runs, but no component of it answers to this\n";
+    return;
+  }
   std::cerr << command << ": no cell answers in " << where_ << " within " << patience_.in_seconds()
             << " s; is it running, and on an address of this PC?\n";
 }

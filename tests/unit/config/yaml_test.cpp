@@ -36,6 +36,24 @@ TEST(Yaml, SuggestsTheKeyThatWasMeant) {
   EXPECT_EQ(only_fault(yaml), "a.yaml:2: intervall: unknown key; did you mean `interval`?");
 }
 
+TEST(Yaml, RefusesAKeyThatStandsTwiceAtAnyDepth) {
+  const auto yaml = Yaml::parse("loop:\n  rate: 500\n  rate: 100\n", "a.yaml");
+  (void)yaml.root()["loop"].number("rate", "Hz");
+  EXPECT_EQ(only_fault(yaml), "a.yaml:3: loop.rate: stands twice; keep one of them");
+}
+
+TEST(Yaml, SaysHowAUnitIsWritten) {
+  const auto pure = Yaml::parse("share: {value: 2, unit: mm}\n", "a.yaml");
+  (void)pure.root().number("share", "");
+  EXPECT_EQ(
+      only_fault(pure),
+      "a.yaml:1: share.unit: `mm` does not measure the same as a number without unit; leave the unit out");
+  const auto joined = Yaml::parse("way: 2 mm\n", "a.yaml");
+  (void)joined.root().number("way", "m");
+  EXPECT_EQ(only_fault(joined),
+            "a.yaml:1: way: `2 mm` is not a number; write a number in m, or {value: ..., unit: ...}");
+}
+
 TEST(Yaml, FindsAllFaultsInOnePass) {
   const auto yaml = Yaml::parse("x: one\ny: {value: 2, unit: kg}\nz: true\n", "a.yaml");
   (void)yaml.root().number("x", "m");
