@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # The cell finds out what its model leaves out. Three ways: as jobs in simulated time, on a running cell with `invar record` and
 # `invar job apply`, and with nothing hidden, where nothing may be claimed or applied.
-# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals
+# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals     live is run by hand: by the wall clock a starved host skips cycles
 set -euo pipefail
 invar=$1 source=$2 part=$3
 folder=$(mktemp -d); cell_pid=
-trap '[[ -z $cell_pid ]] || kill "$cell_pid" 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
+trap 'kill $cell_pid ${record_pid:-} 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
 cp -r "$source/deployment" "$folder/deployment"
 domain=$((100 + RANDOM % 100))
 echo "domain $domain"
@@ -66,7 +66,7 @@ case $part in
     [[ ! -e out/mismatch/motion_after.csv ]] || fail "there is a motion after nothing"
     ;;
   live)
-    "$invar" run $cell --pace 3 >cell.log 2>&1 &
+    "$invar" run $cell --real-time >cell.log 2>&1 &
     cell_pid=$!
     "$invar" status $cell --wait 60 >/dev/null || { cat cell.log; fail "the cell does not come up"; }
     "$invar" record $cell --out run.mcap --topic stage_x.state --wait 60 >recorded 2>&1 &
