@@ -31,7 +31,7 @@ done
 while read -r file; do
   [[ -s $file || -s checkout/$file ]] || { echo "the report that is named does not exist: $file"; exit 1; }
 done < <(sed '1,/^== reports/d' summary)
-"$build/bin/invar" recording info "$(sed -n 's/^recording  *//p' summary)" >/dev/null
+while read -r file; do "$build/bin/invar" recording info "$file" >/dev/null; done < <(sed -n "s/^recording  *//p" summary)
 
 if [[ -d $INVAR_SHARED/data ]]; then
   for set in linear-axis-emps tclab-two-heaters; do

@@ -28,7 +28,7 @@ processes:
       stage_x:
         type: stage
         travel: [0, 0.2]
-        feedback_timeout: 0.1
+        feedback_timeout: 0.5
         following_error: 0.05
         limits: {velocity: 0.02}
         control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
