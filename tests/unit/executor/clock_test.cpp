@@ -26,16 +26,6 @@ ExecutorOptions by_the_clock() {
   return options;
 }
 
-/// Waits for the world; a watchdog, not a measurement.
-template <class Condition>
-bool eventually(Condition condition) {
-  for (int i = 0; i < 20'000; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds{1});
-  }
-  return false;
-}
-
 TEST(Loop, RunsOnWholeMultiplesOfItsPeriodAndCountsEveryOne) {
   std::vector<Tick> ticks;
   ticks.reserve(100'000);

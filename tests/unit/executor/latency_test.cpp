@@ -13,6 +13,7 @@ namespace invar {
 namespace {
 
 using toys::Call;
+using toys::eventually;
 
 struct StampedSample {
   struct Stamp {
@@ -36,15 +37,6 @@ ExecutorOptions options(std::optional<Duration> latency, LatePolicy late) {
   out.real_time = RealTimeRequest{};
   out.real_time->latency = latency;
   return out;
-}
-
-template <class Condition>
-bool eventually(Condition condition) {
-  for (int i = 0; i < 20'000; ++i) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds{1});
-  }
-  return false;
 }
 
 void bring_up(Executor& executor) {

@@ -1,16 +1,28 @@
 // Small components that the executor's tests step.
 #pragma once
 
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 
 #include "core/component/component.hpp"
 #include "core/executor/executor.hpp"
 
 namespace invar::toys {
+
+/// Waits for the world; a watchdog, not a measurement.
+template <class Condition>
+bool eventually(Condition condition) {
+  for (int i = 0; i < 20'000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  }
+  return false;
+}
 
 struct Sample {
   std::uint64_t cycle = 0;
