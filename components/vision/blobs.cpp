@@ -14,12 +14,13 @@ namespace {
 constexpr double round_enough =
     0.965;  // of area^2 / (2 pi moment): two touching discs reach 0.6, a 1.4:1 ellipse 0.94
 
-constexpr double finest = 3.8;  // px of a reduced image; smaller radii are looked for in a finer one
+constexpr double least_support = 0.18;  // of its circumference, in outline points; a circle with less is none
+
+constexpr double finest = 2.9;  // px of a reduced image; smaller radii are looked for in a finer one
 
 struct Side {
   int polarity = +1;
   Blobs found;
-  cv::Mat1i labels;         // only of the side that counts
   double round_area = 0.0;  // px^2 of the reduced image
 };
 
@@ -55,6 +56,12 @@ double weighted_median(std::vector<std::pair<double, double>> values) {  // (val
   return values.back().first;
 }
 
+// Of pixels' distances, which neither overflow nor vanish: std::hypot, which minds that, takes five times as long.
+template <class T>
+T length_of(T x, T y) {
+  return std::sqrt(x * x + y * y);
+}
+
 struct OutlinePoint {
   float x, y;    // px of the reduced image
   float nx, ny;  // unit, from the ground into the thing
@@ -66,23 +73,24 @@ std::vector<OutlinePoint> outline_of(const Blob& blob, const cv::Mat1b& image, c
   const auto at = [&](int y, int x) {
     return static_cast<int>(image(std::clamp(y, 0, image.rows - 1), std::clamp(x, 0, image.cols - 1)));
   };
-  for (int y = std::max(1, blob.top); y <= std::min(image.rows - 2, blob.bottom); ++y)
+  const cv::Mat1b mask = mask_of(side.found, blob);
+  for (int y = std::max(1, blob.top); y <= std::min(image.rows - 2, blob.bottom); ++y) {
+    const std::uint8_t* row = mask.ptr<std::uint8_t>(y - blob.top + 1);
+    const std::uint8_t *above = row - mask.step, *below = row + mask.step;
     for (int x = std::max(1, blob.left); x <= std::min(image.cols - 2, blob.right); ++x) {
-      const int label = blob.label + 1;
-      if (side.labels(y, x) != label) continue;
-      if (side.labels(y - 1, x) == label && side.labels(y + 1, x) == label &&
-          side.labels(y, x - 1) == label && side.labels(y, x + 1) == label)
-        continue;
+      const int m = x - blob.left + 1;
+      if (row[m] == 0 || (above[m] != 0 && below[m] != 0 && row[m - 1] != 0 && row[m + 1] != 0)) continue;
       const int gx = at(y - 1, x + 1) + 2 * at(y, x + 1) + at(y + 1, x + 1) - at(y - 1, x - 1) -
                      2 * at(y, x - 1) - at(y + 1, x - 1);
       const int gy = at(y + 1, x - 1) + 2 * at(y + 1, x) + at(y + 1, x + 1) - at(y - 1, x - 1) -
                      2 * at(y - 1, x) - at(y - 1, x + 1);
-      const float length = std::hypot(static_cast<float>(gx), static_cast<float>(gy));
+      const float length = length_of(static_cast<float>(gx), static_cast<float>(gy));
       if (length < 1.0F) continue;
       const auto sign = static_cast<float>(side.polarity);
       points.push_back({static_cast<float>(x), static_cast<float>(y), sign * static_cast<float>(gx) / length,
                         sign * static_cast<float>(gy) / length, false});
     }
+  }
   return points;
 }
 
@@ -99,7 +107,7 @@ Found refine(const std::vector<OutlinePoint>& points, Found at) {
     for (const OutlinePoint& p : points) {
       if (p.used) continue;
       const double dx = static_cast<double>(p.x) - at.x, dy = static_cast<double>(p.y) - at.y;
-      const double r = std::hypot(dx, dy);
+      const double r = length_of(dx, dy);
       if (std::abs(r - at.radius) > tolerance ||
           dx * static_cast<double>(p.nx) + dy * static_cast<double>(p.ny) > -0.8 * r)
         continue;
@@ -134,14 +142,15 @@ std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Si
   const int left = blob.left - margin, top = blob.top - margin;
   cv::Mat1f votes(blob.bottom - blob.top + 1 + 2 * margin, blob.right - blob.left + 1 + 2 * margin);
   cv::Mat1f smooth;
-  for (int circles = 0; circles < 200; ++circles) {
+  const double whole = 2.0 * std::numbers::pi * radius;
+  auto unused = static_cast<double>(points.size());
+  for (int circles = 0; circles < 200 && unused >= least_support * whole; ++circles) {
     votes.setTo(0.0F);
     for (const OutlinePoint& p : points) {
       if (p.used) continue;
       for (int k = -3; k <= 3; ++k) {
         const float r = static_cast<float>(radius) * (1.0F + 0.08F * static_cast<float>(k));
-        const int x = static_cast<int>(std::lround(p.x + r * p.nx)) - left,
-                  y = static_cast<int>(std::lround(p.y + r * p.ny)) - top;
+        const int x = cvRound(p.x + r * p.nx) - left, y = cvRound(p.y + r * p.ny) - top;
         if (x >= 0 && y >= 0 && x < votes.cols && y < votes.rows) votes(y, x) += 1.0F;
       }
     }
@@ -150,7 +159,6 @@ std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Si
     cv::Point peak;
     double height = 0.0;
     cv::minMaxLoc(smooth, nullptr, &height, nullptr, &peak);
-    const double whole = 2.0 * std::numbers::pi * radius;
     if (height < 0.15 * whole) break;
     Found at = refine(
         points, {static_cast<double>(peak.x + left), static_cast<double>(peak.y + top), radius - 0.4, 0});
@@ -158,25 +166,23 @@ std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Si
     int removed = 0;
     for (OutlinePoint& p : points) {
       if (p.used) continue;
-      const double r = std::hypot(static_cast<double>(p.x) - at.x, static_cast<double>(p.y) - at.y);
+      const double r = length_of(static_cast<double>(p.x) - at.x, static_cast<double>(p.y) - at.y);
       // The votes that made the peak go, too, so that the same peak never comes twice.
       const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x - left;
       const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y - top;
-      if (std::abs(r - at.radius) < reach || std::hypot(vx, vy) < 0.25 * radius) p.used = true, ++removed;
+      if (std::abs(r - at.radius) < reach || length_of(vx, vy) < 0.25 * radius) p.used = true, ++removed;
     }
     if (removed == 0) break;
+    unused -= removed;
     at.radius += 0.4;
-    if (at.support >= 0.18 * whole) found.push_back(at);
+    if (at.support >= least_support * whole) found.push_back(at);
   }
   return found;
 }
 
 double inscribed_radius(const Blob& blob, const Side& side) {
-  const cv::Rect box(blob.left, blob.top, blob.right - blob.left + 1, blob.bottom - blob.top + 1);
-  cv::Mat1b mask;
-  cv::copyMakeBorder(side.labels(box) == blob.label + 1, mask, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
   cv::Mat1f distance;
-  cv::distanceTransform(mask, distance, cv::DIST_L2, 5);
+  cv::distanceTransform(mask_of(side.found, blob), distance, cv::DIST_L2, 5);
   double largest = 0.0;
   cv::minMaxLoc(distance, nullptr, &largest);
   return largest;
@@ -210,7 +216,6 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
     };
     side = inner(light) >= inner(dark) ? &light : &dark;
   }
-  side->labels = paint_labels(side->found, image.size());
   out.polarity = side->polarity;
   out.contrast = side->polarity > 0 ? parts.light_contrast : parts.dark_contrast;
 
@@ -255,11 +260,13 @@ Detection detect(const cv::Mat& image, const DetectionOptions& options) {
   if (options.level >= 0) return detect_at(halve_to(options.level), options);
   // Coarse first: it is cheap and sees through noise. Finer where the things turn out small there.
   int halvings = 0;
-  while (std::min(image.cols, image.rows) >> (halvings + 1) >= 150) ++halvings;
-  for (;; --halvings) {
+  while (std::min(image.cols, image.rows) >> (halvings + 1) >= 96) ++halvings;
+  for (;;) {
     Detection found = detect_at(halve_to(halvings), options);
     if (halvings == 0 || (found.radius >= finest * (1 << halvings) && !found.candidates.empty()))
       return found;
+    --halvings;
+    while (halvings > 0 && found.radius > 0.0 && found.radius < 0.8 * finest * (1 << halvings)) --halvings;
   }
 }
 

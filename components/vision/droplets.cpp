@@ -116,7 +116,7 @@ std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filter
     const Shape start{candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
     bool done = false;
     if (candidate.alone) {
-      drop.rays.choose(0.5 * candidate.radius);
+      drop.rays.choose(0.25 * candidate.radius);
       drop.shape = start;
       for (int round = 0; round < 3 && !done; ++round) {
         drop.fit =
@@ -129,7 +129,7 @@ std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filter
     }
     if (!done) {
       drop.shape = start;
-      drop.rays.choose(candidate.radius);
+      drop.rays.choose(std::max(10.0, 0.6 * candidate.radius));
       const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
       drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
       if (!drop.fit.valid || drop.fit.coverage < 0.2) continue;
@@ -209,8 +209,8 @@ Droplets measure_droplets(const cv::Mat& image, const MeasureOptions& options) {
   out.blur = blur;
 
   // Where noise rules, more rays are worth their time; elsewhere the pixels are used up already.
-  const double density = found.noise > 0.04 * found.contrast ? 1.5 : 1.0;
-  for (Measured& drop : drops) drop.rays.choose(density * drop.shape.radius);
+  const double density = found.noise > 0.04 * found.contrast ? 0.8 : 0.6;
+  for (Measured& drop : drops) drop.rays.choose(std::max(10.0, density * drop.shape.radius));
   close_rays(drops, 3.0 * blur + 3.0, 1.0 + 1.5 * blur);
   std::vector<double> contrasts;
   for (Measured& drop : drops) {

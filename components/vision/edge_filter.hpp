@@ -23,11 +23,10 @@ struct EdgeFilter {
       spread;            // the same as step and contrast * (change of blur)
   Profile inner, outer;  // the ramps of slope inside and outside
 
-  // In single precision for the loop over rays, whose products are taken in `lanes` sums side by side: what a sample
-  // adds to ground, contrast, contrast * offset, and to its product with the two ramps. Zero beyond the last sample.
-  static constexpr std::size_t lanes = 8, padded = 32;
+  // In single precision for the loop over rays: what a sample adds to ground, contrast, contrast * offset, and to its
+  // product with the two ramps.
   enum Row : std::size_t { to_ground, to_height, to_shift, to_inner, to_outer, rows };
-  alignas(64) std::array<std::array<float, padded>, rows> products{};
+  std::array<std::array<float, most>, rows> products{};
   // What the ramps themselves add to ground, contrast, contrast * offset; the products of the columns 1, S, g with one
   // another, and of the ramps: with them the misfit of a ray follows from its products alone.
   Eigen::Vector3d from_inner, from_outer;

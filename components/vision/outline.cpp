@@ -5,166 +5,33 @@
 #include <cmath>
 #include <numbers>
 
+#include "components/vision/outline_curve.hpp"
 #include "components/vision/ray_samples.hpp"
 
 namespace invar::vision {
 
 namespace {
 
-using Vector5 = Eigen::Matrix<double, 5, 1>;
-using Matrix5 = Eigen::Matrix<double, 5, 5>;
-
-struct Direction {
-  double c, s, c2, s2;
+// The samples of the open rays of a block of eight; those that leave the image are closed. True where any is open.
+struct Block {
+  std::array<double, lanes> open{};  // 1 or 0
+  EightRays rays;
 };
-
-// Directions for each number of rays that is used: multiples of 16.
-const std::array<Direction, Rays::most>& directions(int count) {
-  static const auto tables = [] {
-    std::array<std::array<Direction, Rays::most>, Rays::most / 16 + 1> all{};
-    for (int sixteens = 1; sixteens <= Rays::most / 16; ++sixteens)
-      for (int i = 0; i < 16 * sixteens; ++i) {
-        // Half a step off the axes, so that no ray runs along a row of pixels.
-        const double angle = 2.0 * std::numbers::pi * (i + 0.5) / (16.0 * sixteens);
-        all[static_cast<std::size_t>(sixteens)][static_cast<std::size_t>(i)] = {
-            std::cos(angle), std::sin(angle), std::cos(2.0 * angle), std::sin(2.0 * angle)};
-      }
-    return all;
-  }();
-  return tables[static_cast<std::size_t>(count / 16)];
-}
-
-double radius_at(const Shape& shape, const Direction& d) {
-  return shape.radius + shape.cos2 * d.c2 + shape.sin2 * d.s2;
-}
-
-// Of the first `count` values, which are reordered; of every other one where there are many.
-double median_of(std::array<double, Rays::most>& values, int count) {
-  if (count == 0) return 0.0;
-  if (count >= 40) {
-    count /= 2;
-    for (int i = 0; i < count; ++i)
-      values[static_cast<std::size_t>(i)] = values[static_cast<std::size_t>(2 * i)];
+bool prepare(const RaySamples& samples, const Shape& shape, const Directions& d, std::size_t first,
+             double inward, double outward, Rays& rays, Block& block) {
+  bool any = false;
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    const std::size_t k = first + lane;
+    if (!rays.open[k]) continue;
+    const double r = radius_at(shape, d, k), begin = r - inward, end = r + outward;
+    const double x = shape.x + begin * d.c[k], y = shape.y + begin * d.s[k];
+    rays.open[k] = samples.holds(x, y) && samples.holds(shape.x + end * d.c[k], shape.y + end * d.s[k]);
+    if (!rays.open[k]) continue;
+    block.rays.set(lane, x, y, d.c[k], d.s[k]);
+    block.open[lane] = 1.0;
+    any = true;
   }
-  const auto middle = values.begin() + count / 2;
-  std::nth_element(values.begin(), middle, values.begin() + count);
-  return *middle;
-}
-
-struct Harmonics {
-  Matrix5 normal;
-  Vector5 right;
-};
-
-// Weighted normal equations of a + b cos + c sin + d cos2 + e sin2 for the residuals `r`; without the last two where an
-// arc is too short to tell an ellipse from a shift.
-Harmonics assemble(const std::array<Direction, Rays::most>& table, const std::array<double, Rays::most>& r,
-                   const std::array<double, Rays::most>& weight, int count, bool ellipse) {
-  std::array<double, 15> n{};
-  std::array<double, 5> b{};
-  for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) {
-    const double w = weight[k];
-    if (w == 0.0) continue;
-    const Direction& d = table[k];
-    const double wc = w * d.c, ws = w * d.s, wc2 = w * d.c2, ws2 = w * d.s2;
-    n[0] += w, n[1] += wc, n[2] += ws, n[3] += wc2, n[4] += ws2;
-    n[5] += wc * d.c, n[6] += wc * d.s, n[7] += wc * d.c2, n[8] += wc * d.s2;
-    n[9] += ws * d.s, n[10] += ws * d.c2, n[11] += ws * d.s2;
-    n[12] += wc2 * d.c2, n[13] += wc2 * d.s2, n[14] += ws2 * d.s2;
-    b[0] += w * r[k], b[1] += wc * r[k], b[2] += ws * r[k], b[3] += wc2 * r[k], b[4] += ws2 * r[k];
-  }
-  Harmonics out;
-  std::size_t next = 0;
-  for (int i = 0; i < 5; ++i) {
-    for (int k = i; k < 5; ++k) out.normal(i, k) = out.normal(k, i) = n[next++];
-    out.right(i) = b[static_cast<std::size_t>(i)];
-  }
-  if (!ellipse) {
-    out.normal.bottomRows<2>().setZero();
-    out.normal.rightCols<2>().setZero();
-    out.normal(3, 3) = out.normal(4, 4) = 1.0;
-    out.right.tail<2>().setZero();
-  }
-  return out;
-}
-
-// The offsets of the usable rays as a smooth curve: least squares where they all agree, else with Tukey's weights.
-// Updates the shape, weights, residual, support and coverage. `floor` is the smallest scale [px] that a residual is
-// judged by.
-bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double floor, OutlineFit& fit) {
-  const auto& table = directions(rays.count);
-  const auto count = static_cast<std::size_t>(rays.count);
-  int open = 0, used = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    open += rays.open[k];
-    used += usable[k];
-    rays.weight[k] = usable[k] ? 1.0 : 0.0;
-  }
-  if (used < 8) return false;
-  const bool ellipse = used >= 0.6 * rays.count;
-  std::array<double, Rays::most> sizes, rest{};
-  const auto residuals = [&](const Vector5& p) {
-    int n = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      if (!usable[k]) continue;
-      const Direction& d = table[k];
-      rest[k] = rays.offset[k] - (p(0) + p(1) * d.c + p(2) * d.s + p(3) * d.c2 + p(4) * d.s2);
-      sizes[static_cast<std::size_t>(n++)] = std::abs(rest[k]);
-    }
-    return n;
-  };
-  residuals(Vector5::Zero());
-  Harmonics h = assemble(table, rest, rays.weight, rays.count, ellipse);
-  Vector5 p = h.normal.ldlt().solve(h.right);
-  int n = residuals(p);
-  const double largest = *std::max_element(sizes.begin(), sizes.begin() + n);
-  double scale = std::max(floor, 1.4826 * median_of(sizes, n));
-  if (!p.allFinite() || largest > 3.7 * scale) {
-    p.setZero();  // the median is a safe start
-    n = 0;
-    for (std::size_t k = 0; k < count; ++k)
-      if (usable[k]) sizes[static_cast<std::size_t>(n++)] = rays.offset[k];
-    p(0) = median_of(sizes, n);
-    for (int round = 0; round < 14; ++round) {
-      n = residuals(p);
-      const double previous = scale;
-      scale = std::max(floor, 1.4826 * median_of(sizes, n));
-      for (std::size_t k = 0; k < count; ++k) {
-        if (!usable[k]) continue;
-        // Cauchy's weight while far off keeps every ray's say; Tukey's drops what does not belong.
-        const double u = rest[k] / (scale * (round < 4 ? 2.4 : 4.7));
-        rays.weight[k] =
-            round < 4 ? 1.0 / (1.0 + u * u) : (std::abs(u) < 1.0 ? (1.0 - u * u) * (1.0 - u * u) : 0.0);
-      }
-      h = assemble(table, rest, rays.weight, rays.count, ellipse);
-      const Vector5 step = h.normal.ldlt().solve(h.right);
-      if (!step.allFinite()) return false;
-      p += step;
-      if (round >= 5 && step.norm() < 1e-3 && std::abs(scale - previous) < 0.03 * scale) break;
-    }
-    residuals(p);
-  }
-  double sum = 0.0, square = 0.0;
-  int agree = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    sum += rays.weight[k];
-    square += rays.weight[k] * rest[k] * rest[k];
-    agree += rays.weight[k] > 0.2;
-  }
-  if (!(sum > 5.0)) return false;
-  fit.residual = std::sqrt(square / (sum - 5.0 + 1e-9));
-  fit.support = agree / static_cast<double>(std::max(1, open));
-  fit.coverage = agree / static_cast<double>(rays.count);
-  fit.moved = std::abs(p(0)) + std::hypot(p(1), p(2)) + std::hypot(p(3), p(4));
-  const Vector5 x_direction = h.normal.ldlt().solve(Vector5::Unit(1)),
-                y_direction = h.normal.ldlt().solve(Vector5::Unit(2));
-  fit.sigma = fit.residual * std::sqrt(std::max(x_direction(1), y_direction(2)));
-  fit.shape.x += p(1);
-  fit.shape.y += p(2);
-  fit.shape.radius += p(0);
-  fit.shape.cos2 += p(3);
-  fit.shape.sin2 += p(4);
-  return fit.shape.radius > 0.5;
+  return any;
 }
 
 }  // namespace
@@ -179,7 +46,7 @@ double Shape::axis_ratio() const {
 }
 
 void Rays::choose(double radius) {
-  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 2, most / 16);
+  count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 1, most / 16);
   open.fill(true);
   weight.fill(1.0);
 }
@@ -190,45 +57,41 @@ void Rays::close(const Shape& shape, double reach, double x, double y, double ra
   const double dx = x - shape.x, dy = y - shape.y, limit = radius + guard;
   const double near = shape.radius + reach + limit;
   if (dx * dx + dy * dy > near * near) return;
-  const auto& table = directions(count);
-  for (int i = 0; i < count; ++i) {
-    const Direction& d = table[static_cast<std::size_t>(i)];
-    const double r = radius_at(shape, d);
+  const Directions& d = directions(count);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const double r = radius_at(shape, d, i);
     // The nearest point of the ray's piece to the disc's centre.
-    const double along = std::clamp(dx * d.c + dy * d.s, r - 0.5 * reach, r + reach);
-    if (std::hypot(dx - along * d.c, dy - along * d.s) < limit) open[static_cast<std::size_t>(i)] = false;
+    const double along = std::clamp(dx * d.c[i] + dy * d.s[i], r - 0.5 * reach, r + reach);
+    const double away_x = dx - along * d.c[i], away_y = dy - along * d.s[i];
+    if (away_x * away_x + away_y * away_y < limit * limit) open[i] = false;
   }
 }
 
 OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, double reach, Rays& rays) {
   const RaySamples samples{image};
-  const auto& table = directions(rays.count);
+  const Directions& d = directions(rays.count);
   const int half = std::clamp(static_cast<int>(std::ceil(reach)), 3, 30);
-  alignas(64) std::array<float, 72> f{};  // 65, and what a read fills up
-  std::array<double, Rays::most> heights{}, sorted{};
+  const int inward = std::min(half, static_cast<int>(shape.radius - std::hypot(shape.cos2, shape.sin2)));
+  const int length = inward + half + 5;
+  std::array<Lanes, 65> f;
+  Values heights{}, sorted{};
   std::array<bool, Rays::most> usable{};
   int n = 0;
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    if (!rays.open[k]) continue;
-    const Direction& d = table[k];
-    const double r0 = radius_at(shape, d);
-    const int inward = std::min(half, static_cast<int>(r0));
-    const double begin = r0 - inward - 2, end = r0 + half + 2;
-    if (!samples.holds(shape.x + begin * d.c, shape.y + begin * d.s) ||
-        !samples.holds(shape.x + end * d.c, shape.y + end * d.s)) {
-      rays.open[k] = false;
-      continue;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rays.count); ++k) {
+    const std::size_t lane = k % lanes;
+    if (lane == 0) {
+      Block block;
+      if (prepare(samples, shape, d, k, inward + 2, half + 2, rays, block))
+        samples.read(block.rays, static_cast<std::size_t>(length), f.data());
     }
-    const int length = inward + half + 5;
-    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, static_cast<std::size_t>(length),
-                 f.data());
+    if (!rays.open[k]) continue;
     // Differences of two samples each side; an edge nearer to where it is expected wins over an equal one farther off.
     double best = 0.0, height = 0.0;
     int at = -1;
     const auto difference = [&](int j) {
       const auto m = static_cast<std::size_t>(j);
-      return 0.5 * polarity * static_cast<double>(f[m - 2] + f[m - 1] - f[m + 1] - f[m + 2]);
+      return 0.5 * polarity *
+             static_cast<double>(f[m - 2][lane] + f[m - 1][lane] - f[m + 1][lane] - f[m + 2][lane]);
     };
     for (int j = 2; j < length - 2; ++j) {
       const double away = (j - 2 - inward) / (reach + 1.0), value = difference(j) * (1.0 - 0.3 * away * away);
@@ -250,10 +113,8 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
   fit.shape = shape;
   if (n < 8) return fit;
   fit.contrast = median_of(sorted, n);
-  for (int i = 0; i < rays.count; ++i) {
-    const auto k = static_cast<std::size_t>(i);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rays.count); ++k)
     if (usable[k] && heights[k] < 0.35 * fit.contrast) usable[k] = false;
-  }
   fit.valid = fit_shape(rays, usable, 0.35, fit);
   return fit;
 }
@@ -261,33 +122,31 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
 OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity, const EdgeFilter& filter,
                           Rays& rays) {
   const RaySamples samples{image};
-  const auto& table = directions(rays.count);
+  const Directions& d = directions(rays.count);
   const auto count = static_cast<std::size_t>(rays.count);
-  const int half = filter.half;
-  const auto length = static_cast<std::size_t>(2 * half + 1);
+  const auto length = static_cast<std::size_t>(2 * filter.half + 1);
   std::array<bool, Rays::most> usable{};
-  std::array<RayProducts, Rays::most> products;  // written before they are read
+  std::array<RayProducts, Rays::most / lanes> products;  // written before they are read
+  std::array<Lanes, EdgeFilter::most> f;
+  HarmonicSums by_lane;  // level, cosine, sine: over the rays
+  for (auto& sums : by_lane) std::fill_n(sums.begin(), length, Lanes{});
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  alignas(64) std::array<std::array<float, EdgeFilter::padded>, 3>
-      sums{};  // level, cosine, sine: over the rays
-  alignas(64) std::array<float, EdgeFilter::padded> f{};
-  for (std::size_t k = 0; k < count; ++k) {
-    if (!rays.open[k]) continue;
-    const Direction& d = table[k];
-    const double begin = radius_at(shape, d) - half, end = begin + 2 * half;
-    if (!samples.holds(shape.x + begin * d.c, shape.y + begin * d.s) ||
-        !samples.holds(shape.x + end * d.c, shape.y + end * d.s)) {
-      rays.open[k] = false;
-      continue;
+  for (std::size_t first = 0; first < count; first += lanes) {
+    Block block;
+    if (!prepare(samples, shape, d, first, filter.half, filter.half, rays, block)) continue;
+    std::array<Lanes, 3> harmonic;
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::size_t k = first + lane;
+      usable[k] = block.open[lane] > 0.0;
+      const double w = block.open[lane] * rays.weight[k], c = d.c[k], s = d.s[k];
+      harmonic[0][lane] = static_cast<float>(w);
+      harmonic[1][lane] = static_cast<float>(w * c);
+      harmonic[2][lane] = static_cast<float>(w * s);
+      normal(0, 0) += w, normal(0, 1) += w * c, normal(0, 2) += w * s;
+      normal(1, 1) += w * c * c, normal(1, 2) += w * c * s, normal(2, 2) += w * s * s;
     }
-    samples.read(shape.x + begin * d.c, shape.y + begin * d.s, d.c, d.s, length, f.data());
-    usable[k] = true;
-    const double w = rays.weight[k];
-    const std::array<float, 3> harmonic{static_cast<float>(w), static_cast<float>(w * d.c),
-                                        static_cast<float>(w * d.s)};
-    products[k] = take_products(f, filter, length, harmonic, sums);
-    normal(0, 0) += w, normal(0, 1) += w * d.c, normal(0, 2) += w * d.s;
-    normal(1, 1) += w * d.c * d.c, normal(1, 2) += w * d.c * d.s, normal(2, 2) += w * d.s * d.s;
+    samples.read(block.rays, length, f.data());
+    take_products(f.data(), filter, harmonic, products[first / lanes], by_lane);
   }
   OutlineFit fit;
   fit.shape = shape;
@@ -302,9 +161,13 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   EdgeFilter::Profile mean(static_cast<Eigen::Index>(length));
   for (std::size_t j = 0; j < length; ++j) {
     const auto column = static_cast<Eigen::Index>(j);
-    const Eigen::Vector3d harmonic =
-        inverse * Eigen::Vector3d{static_cast<double>(sums[0][j]), static_cast<double>(sums[1][j]),
-                                  static_cast<double>(sums[2][j])};
+    Eigen::Vector3d sums;
+    for (std::size_t m = 0; m < 3; ++m) {
+      const Lanes& part = by_lane[m][j];
+      sums(static_cast<Eigen::Index>(m)) = static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) +
+                                                               ((part[2] + part[6]) + (part[3] + part[7])));
+    }
+    const Eigen::Vector3d harmonic = inverse * sums;
     for (std::size_t m = 0; m < 3; ++m)
       sloped[m] += harmonic(static_cast<Eigen::Index>(m)) * filter.sloped.col(column);
     mean(column) = harmonic(0);
@@ -318,36 +181,38 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   fit.blur = std::clamp(filter.blur + common(3) / common(1), 0.5 * filter.blur, 2.0 * filter.blur);
 
   int n = 0;
-  std::array<double, Rays::most> misfit, sorted;  // written before they are read
+  Values misfit, sorted;                         // written before they are read
+  const double reach = 2.0 * filter.blur + 0.5;  // the linear step reaches no farther
   for (std::size_t k = 0; k < count; ++k) {
     if (!usable[k]) continue;
-    const Direction& d = table[k];
-    const double in = inside(0) + inside(1) * d.c + inside(2) * d.s;
-    const double out = outside(0) + outside(1) * d.c + outside(2) * d.s;
-    const RayProducts& p = products[k];
+    const double in = inside(0) + inside(1) * d.c[k] + inside(2) * d.s[k];
+    const double out = outside(0) + outside(1) * d.c[k] + outside(2) * d.s[k];
+    const RayProducts& p = products[k / lanes];
+    const auto row = [&](EdgeFilter::Row which) { return static_cast<double>(p.rows[which][k % lanes]); };
     // Least squares is linear: what the slopes give is taken off the result instead of off every sample.
     const Eigen::Vector3d levels =
-        Eigen::Vector3d{p.rows[EdgeFilter::to_ground], p.rows[EdgeFilter::to_height],
-                        p.rows[EdgeFilter::to_shift]} -
+        Eigen::Vector3d{row(EdgeFilter::to_ground), row(EdgeFilter::to_height), row(EdgeFilter::to_shift)} -
         in * filter.from_inner - out * filter.from_outer;
     const double height = levels(1), shift = levels(2), contrast = polarity * height;
     if (contrast < 0.4 * fit.contrast || contrast > 2.5 * fit.contrast) {
       usable[k] = false;
       continue;
     }
-    const double square = p.square -
-                          2.0 * (in * p.rows[EdgeFilter::to_inner] + out * p.rows[EdgeFilter::to_outer]) +
+    const double square = static_cast<double>(p.square[k % lanes]) -
+                          2.0 * (in * row(EdgeFilter::to_inner) + out * row(EdgeFilter::to_outer)) +
                           in * in * filter.inner_inner + 2.0 * in * out * filter.inner_outer +
                           out * out * filter.outer_outer - levels.dot(filter.columns * levels);
-    const double limit = 2.0 * filter.blur + 0.5;  // the linear step reaches no farther
-    rays.offset[k] = std::clamp(shift / height, -limit, limit);
+    rays.offset[k] = std::clamp(shift / height, -reach, reach);
     misfit[k] = std::sqrt(std::max(0.0, square));
     sorted[static_cast<std::size_t>(n++)] = misfit[k];
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.
-  const double usual = median_of(sorted, n);
-  for (std::size_t k = 0; k < count; ++k)
-    if (usable[k] && misfit[k] > 2.5 * usual + 0.03 * fit.contrast) usable[k] = false;
+  const double most = n > 0 ? *std::max_element(sorted.begin(), sorted.begin() + n) : 0.0;
+  if (!half_reach(sorted, n, (most - 0.03 * fit.contrast) / 2.5)) {
+    const double limit = 2.5 * median_of(sorted, n) + 0.03 * fit.contrast;
+    for (std::size_t k = 0; k < count; ++k)
+      if (usable[k] && misfit[k] > limit) usable[k] = false;
+  }
   fit.valid = fit_shape(rays, usable, 0.015, fit);
   return fit;
 }

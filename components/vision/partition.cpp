@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
-#include <numeric>
 
 #include "components/vision/wide_vectors.hpp"
 
@@ -13,8 +12,12 @@ namespace invar::vision {
 
 namespace {
 
-constexpr int tile = 8;                     // px a side
-constexpr int first_row = 2, next_row = 4;  // of a tile: two of its rows are enough for means
+constexpr int tile = 16;                    // px a side
+constexpr int lanes = 8;                    // px that are interpolated at once
+constexpr int first_row = 2, next_row = 4;  // of a tile: a quarter of its rows is enough for means
+
+// Of what goes into a histogram a few thousand pixels are enough.
+int histogram_step(const cv::Mat1b& image) { return next_row * std::max(1, image.rows / 160); }
 
 // Sums over tiles, then over windows of tiles, by one table of running sums.
 class TileSums {
@@ -61,14 +64,17 @@ void interpolate(const std::vector<float>& levels, std::vector<std::uint8_t>& ro
     const float left = level(i);
     const int slope = static_cast<int>((level(i + 1) - left) * (256.0F / tile));
     const int start = static_cast<int>(left * 256.0F) + slope / 2 + 128, begin = i * tile + tile / 2;
-    const Words words =
-        (Words{} + static_cast<std::uint16_t>(start) + ramp * static_cast<std::uint16_t>(slope)) >> 8;
-    const Bytes bytes = __builtin_convertvector(words, Bytes);
-    const int from = std::max(0, -begin), to = std::min(tile, width - begin);
-    if (to - from == tile) {
-      std::memcpy(row.data() + begin, &bytes, sizeof bytes);
-    } else {
-      for (int k = from; k < to; ++k) row[static_cast<std::size_t>(begin + k)] = bytes[k];
+    for (int part = 0; part < tile; part += lanes) {
+      const Words words = (Words{} + static_cast<std::uint16_t>(start + part * slope) +
+                           ramp * static_cast<std::uint16_t>(slope)) >>
+                          8;
+      const Bytes bytes = __builtin_convertvector(words, Bytes);
+      const int at = begin + part, from = std::max(0, -at), to = std::min(lanes, width - at);
+      if (to - from == lanes) {
+        std::memcpy(row.data() + at, &bytes, sizeof bytes);
+      } else {
+        for (int k = from; k < to; ++k) row[static_cast<std::size_t>(at + k)] = bytes[k];
+      }
     }
   }
 }
@@ -121,30 +127,52 @@ void classify(const std::uint8_t* p, const std::uint8_t* high, const std::uint8_
   for (int x = 0; x < width; ++x) dark[x] = p[x] < low[x] ? 255 : 0;
 }
 
-// Adds one row's pixels above and below their thresholds to sums down the columns.
+// Pixels of a tile's row, or sums of such down the tile.
+using TileBytes [[gnu::vector_size(tile)]] = std::uint8_t;
+using TileWords [[gnu::vector_size(2 * tile)]] = std::uint16_t;
+
+// The tile's sum and count of the sampled pixels, of those above `high` and of those below `low`.
+struct TileCounts {
+  float sum, count, above, above_count, below, below_count;
+};
+
+// `high`, `low`: the thresholds along the tile's middle.
 INVAR_WIDE_VECTORS
-void add_columns(const std::uint8_t* p, const std::vector<std::uint8_t>& high,
-                 const std::vector<std::uint8_t>& low, std::vector<std::uint16_t>& up,
-                 std::vector<std::uint16_t>& up_n, std::vector<std::uint16_t>& down,
-                 std::vector<std::uint16_t>& down_n) {
-  const std::size_t width = up.size();
-  const std::uint8_t *h = high.data(), *l = low.data();
-  std::uint16_t *a = up.data(), *an = up_n.data(), *b = down.data(), *bn = down_n.data();
-  for (std::size_t x = 0; x < width; ++x) {
-    const auto is_up = static_cast<std::uint16_t>(p[x] > h[x]),
-               is_down = static_cast<std::uint16_t>(p[x] < l[x]);
-    a[x] = static_cast<std::uint16_t>(a[x] + is_up * p[x]);
-    an[x] = static_cast<std::uint16_t>(an[x] + is_up);
-    b[x] = static_cast<std::uint16_t>(b[x] + is_down * p[x]);
-    bn[x] = static_cast<std::uint16_t>(bn[x] + is_down);
+TileCounts count_tile(const std::uint8_t* first, std::size_t stride, int rows, int columns,
+                      const std::uint8_t* high, const std::uint8_t* low) {
+  const auto load = [columns](const std::uint8_t* from, TileWords& to) {
+    TileBytes bytes{};
+    if (columns == tile) {
+      std::memcpy(&bytes, from, sizeof bytes);
+    } else {
+      for (int k = 0; k < columns; ++k) bytes[k] = from[k];
+    }
+    to = __builtin_convertvector(bytes, TileWords);
+  };
+  TileWords p, h, l, sum{}, above{}, above_count{}, below{}, below_count{};
+  load(high, h), load(low, l);  // beyond the image nothing is above or below
+  for (int y = 0; y < rows; ++y) {
+    load(first + static_cast<std::size_t>(y) * stride, p);
+    const auto up = static_cast<TileWords>(p > h), down = static_cast<TileWords>(p < l);
+    sum += p;
+    above += p & up, above_count -= up;
+    below += p & down, below_count -= down;
   }
+  const auto total = [](const TileWords& words) {
+    int all = 0;
+    for (int k = 0; k < tile; ++k) all += words[k];
+    return static_cast<float>(all);
+  };
+  return {total(sum),   static_cast<float>(rows * columns),
+          total(above), total(above_count),
+          total(below), total(below_count)};
 }
 
 double noise_of(const cv::Mat1b& image) {
   // Second differences along rows: blind to slopes.
   std::array<int, 512> histogram{};
   int count = 0;
-  for (int y = first_row; y < image.rows; y += next_row) {
+  for (int y = first_row; y < image.rows; y += histogram_step(image)) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     for (int x = 2; x < image.cols; x += 2, ++count)
       ++histogram[static_cast<std::size_t>(std::abs(p[x - 2] - 2 * p[x - 1] + p[x]) & 511)];
@@ -204,18 +232,26 @@ Partition partition(const cv::Mat1b& image, int window) {
   const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
   Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, 0.0, noise_of(image)};
 
+  // Every tile's sampled rows, against thresholds along its middle.
+  const auto for_each_tile = [&](TileField& high, TileField& low, const auto& take) {
+    for (int j = 0; j < rows; ++j) {
+      const int first = std::min(j * tile + first_row, height - 1), beyond = std::min(height, (j + 1) * tile);
+      const auto &up = high.row(j * tile + tile / 2), &down = low.row(j * tile + tile / 2);
+      for (int i = 0; i < columns; ++i)
+        take(i, j,
+             count_tile(image.ptr<std::uint8_t>(first) + i * tile, next_row * image.step,
+                        (beyond - first + next_row - 1) / next_row, std::min(tile, width - i * tile),
+                        up.data() + i * tile, down.data() + i * tile));
+    }
+  };
+
   // What lies clearly above or below its surroundings' mean.
   TileSums sum{columns, rows}, count{columns, rows};
-  for (int y = first_row; y < height; y += next_row) {
-    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    for (int i = 0; i < columns; ++i) {
-      const int end = std::min(width, (i + 1) * tile);
-      int total = 0;
-      for (int x = i * tile; x < end; ++x) total += p[x];
-      sum.at(i, y / tile) += static_cast<float>(total);
-      count.at(i, y / tile) += static_cast<float>(end - i * tile);
-    }
-  }
+  TileField high{columns, rows, width}, low{columns, rows, width};
+  for_each_tile(high, low, [&](int i, int j, const TileCounts& tile_counts) {
+    sum.at(i, j) = tile_counts.sum;
+    count.at(i, j) = tile_counts.count;
+  });
   TileField mean{columns, rows, width};
   {
     TileSums s = sum.windowed(window), n = count.windowed(window);
@@ -224,7 +260,7 @@ Partition partition(const cv::Mat1b& image, int window) {
   }
   std::array<int, 256> histogram{};
   int counted = 0;
-  for (int y = first_row; y < height; y += next_row) {
+  for (int y = first_row; y < height; y += histogram_step(image)) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     const auto& level = mean.row(y);
     counted += (width + 1) / 2;
@@ -238,7 +274,6 @@ Partition partition(const cv::Mat1b& image, int window) {
 
   // Light things against the rest, and dark things against the rest: each class's local level, then the middle between
   // the two; twice, since the second time sees real classes.
-  TileField high{columns, rows, width}, low{columns, rows, width};
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i) {
       high.at(i, j) = mean.at(i, j) + static_cast<float>(margin);
@@ -247,23 +282,10 @@ Partition partition(const cv::Mat1b& image, int window) {
   const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
   for (int pass = 0; pass < 2; ++pass) {
     TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
-    // Sums down the columns of a row of tiles first: they run over whole rows at once.
-    std::vector<std::uint16_t> up(static_cast<std::size_t>(width)), up_n(up), down(up), down_n(up);
-    for (int j = 0; j < rows; ++j) {
-      std::fill(up.begin(), up.end(), 0), std::fill(up_n.begin(), up_n.end(), 0);
-      std::fill(down.begin(), down.end(), 0), std::fill(down_n.begin(), down_n.end(), 0);
-      for (int y = j * tile + first_row; y < std::min(height, (j + 1) * tile); y += next_row)
-        add_columns(image.ptr<std::uint8_t>(y), high.row(y), low.row(y), up, up_n, down, down_n);
-      for (int i = 0; i < columns; ++i) {
-        const auto begin = static_cast<std::ptrdiff_t>(i) * tile,
-                   end = std::min<std::ptrdiff_t>(width, begin + tile);
-        const auto total = [&](const std::vector<std::uint16_t>& column) {
-          return static_cast<float>(std::accumulate(column.begin() + begin, column.begin() + end, 0));
-        };
-        above.at(i, j) = total(up), above_n.at(i, j) = total(up_n);
-        below.at(i, j) = total(down), below_n.at(i, j) = total(down_n);
-      }
-    }
+    for_each_tile(high, low, [&](int i, int j, const TileCounts& tile_counts) {
+      above.at(i, j) = tile_counts.above, above_n.at(i, j) = tile_counts.above_count;
+      below.at(i, j) = tile_counts.below, below_n.at(i, j) = tile_counts.below_count;
+    });
     out.light_contrast =
         set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
     out.dark_contrast = set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
@@ -277,8 +299,8 @@ Partition partition(const cv::Mat1b& image, int window) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
     std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
     std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
-    const std::uint8_t* down = (y % 2 == 0 ? low.row(y) : low.last()).data();  // two rows hardly differ
-    const std::uint8_t* up = (y % 2 == 0 ? high.row(y) : high.last()).data();
+    const std::uint8_t* down = (y % 4 == 0 ? low.row(y + 2) : low.last()).data();  // four rows hardly differ
+    const std::uint8_t* up = (y % 4 == 0 ? high.row(y + 2) : high.last()).data();
     classify(p, up, down, width, light, dark);
   }
   if (!(out.light_contrast > 0.0)) out.light.setTo(0);
@@ -359,13 +381,15 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
   return out;
 }
 
-cv::Mat1i paint_labels(const Blobs& blobs, cv::Size size) {
-  cv::Mat1i labels(size, 0);
-  for (const BlobRun& run : blobs.runs) {
-    int* row = labels.ptr<int>(run.y);
-    std::fill(row + run.begin, row + run.end, run.label);
-  }
-  return labels;
+cv::Mat1b mask_of(const Blobs& blobs, const Blob& blob) {
+  cv::Mat1b mask(blob.bottom - blob.top + 3, blob.right - blob.left + 3, static_cast<std::uint8_t>(0));
+  auto run = std::lower_bound(blobs.runs.begin(), blobs.runs.end(), blob.top,
+                              [](const BlobRun& a, int y) { return a.y < y; });
+  for (; run != blobs.runs.end() && run->y <= blob.bottom; ++run)
+    if (run->label == blob.label + 1)
+      std::memset(mask.ptr<std::uint8_t>(run->y - blob.top + 1) + run->begin - blob.left + 1, 255,
+                  static_cast<std::size_t>(run->end - run->begin));
+  return mask;
 }
 
 }  // namespace invar::vision

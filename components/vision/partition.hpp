@@ -7,7 +7,7 @@
 
 namespace invar::vision {
 
-/// The image's two classes in local averages, in tiles of 8 px.
+/// The image's two classes in local averages, in tiles of 16 px.
 struct Partition {
   cv::Mat1b light;  // 255 where a pixel belongs to the lighter class as a thing would (see polarity), else 0
   cv::Mat1b dark;   // 255 where it belongs to the darker class as a thing would
@@ -37,13 +37,13 @@ struct BlobRun {
 
 struct Blobs {
   std::vector<Blob> blobs;
-  std::vector<BlobRun> runs;
+  std::vector<BlobRun> runs;  // by rows
 };
 
 /// Blobs of a mask by runs and union-find. Those below `smallest` px are left out.
 Blobs label_blobs(const cv::Mat1b& mask, double smallest);
 
-/// An image of label + 1 in each blob, 0 outside.
-cv::Mat1i paint_labels(const Blobs& blobs, cv::Size size);
+/// One blob alone: 255 where it is, 0 elsewhere in its box and in a margin of 1 px around it.
+cv::Mat1b mask_of(const Blobs& blobs, const Blob& blob);
 
 }  // namespace invar::vision

@@ -1,7 +1,9 @@
-// What the image shows along a ray, and its products with an edge filter: the inner loop of every outline.
+// What the image shows along rays, eight of them side by side, and their products with an edge filter: the inner loops of
+// every outline.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
 
@@ -9,7 +11,17 @@
 
 namespace invar::vision {
 
-/// Reads an image between its pixels, bilinearly. Positions along a ray count in 1/65536 px.
+constexpr std::size_t lanes = 8;  // rays that are read at once
+using Lanes [[gnu::vector_size(lanes * sizeof(float))]] = float;
+
+/// Where eight rays begin and how they step from sample to sample, in 1/65536 px. One that is left out reads the first
+/// pixel.
+struct EightRays {
+  std::array<std::int32_t, lanes> u{}, v{}, step_u{}, step_v{};
+  void set(std::size_t lane, double x, double y, double dx, double dy);
+};
+
+/// Reads an image between its pixels, bilinearly.
 class RaySamples {
  public:
   /// `image`: CV_8UC1, which must live as long.
@@ -17,9 +29,8 @@ class RaySamples {
   [[nodiscard]] bool holds(double x, double y) const {
     return x >= 0.0 && y >= 0.0 && x <= right_ && y <= bottom_;
   }
-  /// `count` samples a pixel apart from (x, y) in direction (dx, dy), all of which the image holds; `out` is filled up
-  /// with zeros to a multiple of eight.
-  void read(double x, double y, double dx, double dy, std::size_t count, float* out) const;
+  /// `count` samples a pixel apart along each ray, all of which the image holds.
+  void read(const EightRays& rays, std::size_t count, Lanes* out) const;
 
  private:
   const std::uint8_t* data_;
@@ -27,15 +38,17 @@ class RaySamples {
   double right_, bottom_;  // the last coordinates that bilinear reading allows
 };
 
-/// The products of one ray's samples with the rows of a filter, and the sum of their squares.
+/// The products of eight rays' samples with the rows of a filter, and the sums of their squares.
 struct RayProducts {
-  std::array<double, EdgeFilter::rows> rows;
-  double square;
+  std::array<Lanes, EdgeFilter::rows> rows;
+  Lanes square;
 };
 
-/// Also adds the samples to `sums`, by the weights of `harmonic`. `f` is zero beyond `length`.
-RayProducts take_products(const std::array<float, EdgeFilter::padded>& f, const EdgeFilter& filter,
-                          std::size_t length, const std::array<float, 3>& harmonic,
-                          std::array<std::array<float, EdgeFilter::padded>, 3>& sums);
+/// Sums over rays of what they show at each sample, by three weights a ray (1, cosine, sine of its angle).
+using HarmonicSums = std::array<std::array<Lanes, EdgeFilter::most>, 3>;
+
+/// Also adds the samples to `sums`, by the weights of `harmonic`.
+void take_products(const Lanes* samples, const EdgeFilter& filter, const std::array<Lanes, 3>& harmonic,
+                   RayProducts& products, HarmonicSums& sums);
 
 }  // namespace invar::vision

@@ -46,7 +46,7 @@ Circle make_circle(const Shape& sought, const OutlineFit& fit, const Rays& rays)
 std::vector<Circle> find_circles(const cv::Mat& image) {
   // A ruler's circles are few, large and of different sizes: a wide window, and reduced so far that dust is gone.
   DetectionOptions options;
-  options.window = 12;
+  options.window = 6;
   options.level = 0;
   while (std::min(image.cols, image.rows) >> (options.level + 1) >= 150) ++options.level;
   const Detection found = detect(image, options);
