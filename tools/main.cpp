@@ -5,6 +5,7 @@
 #include "core/base/fault.hpp"
 #include "tools/command.hpp"
 #include "tools/live/commands.hpp"
+#include "tools/wrong_call.hpp"
 
 int main(int argc, char** argv) {
   CLI::App program{
@@ -42,7 +43,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     // Help and version come this way too, with status 0; every real fault of the call is status 2.
     if (error.get_exit_code() == 0) return program.exit(error);
-    std::cerr << "invar: " << error.what() << "; see `invar --help`\n";
+    std::cerr << "invar: " << invar::tools::wrong_call(program, {argv + 1, argv + argc}, error) << '\n';
     return 2;
   } catch (const invar::InputError& error) {
     std::cerr << error.what();

@@ -24,11 +24,9 @@ void keep_earlier(const std::filesystem::path& file) {
 
 void Recorder::configure() {
   std::filesystem::create_directories(parameters_.out);
-  const std::filesystem::path file = std::filesystem::path{parameters_.out} / parameters_.name;
-  keep_earlier(file);
+  keep_earlier(file());
   const std::scoped_lock lock{mutex_};
-  writer_ =
-      std::make_unique<recording::RecordingWriter>(std::filesystem::path{parameters_.out} / parameters_.name);
+  writer_ = std::make_unique<recording::RecordingWriter>(file());
   channels_.clear();
 }
 

@@ -43,6 +43,9 @@ class Recorder final : public Component {
   void cleanup() noexcept override;
   void step(const Tick&) noexcept override {}
 
+  [[nodiscard]] std::filesystem::path file() const {
+    return std::filesystem::path{parameters_.out} / parameters_.name;
+  }
   [[nodiscard]] bool is_wanted(const std::string& topic) const;
   /// Any thread: one sample of one writer. `sequence` counts that writer's samples from 1. Nothing is written unless the
   /// component is configured.

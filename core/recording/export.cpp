@@ -82,6 +82,7 @@ class Exporter {
  public:
   Exporter(const Recording& recording, const std::filesystem::path& folder, const ExportOptions& options)
       : recording_{recording}, options_{options} {
+    complete_topics();
     refuse_unknown_topics();
     std::error_code error;
     std::filesystem::create_directories(folder, error);
@@ -135,6 +136,24 @@ class Exporter {
         throw InputError{"--topic " + topic, "is not in the recording",
                          "`invar recording info` lists its topics"};
     }
+  }
+
+  /// `component.port` stands for the topics that end in component/port, as in the commands that look at a running cell.
+  void complete_topics() {
+    std::set<std::string> whole;
+    for (const std::string& topic : options_.selection.topics) {
+      const std::size_t dot = topic.find('.');
+      const std::string end =
+          dot == std::string::npos ? "" : "/" + topic.substr(0, dot) + "/" + topic.substr(dot + 1);
+      bool found = false;
+      for (const auto& [id, channel] : recording_.channels()) {
+        if (end.empty() || !channel.topic.ends_with(end)) continue;
+        whole.insert(channel.topic);
+        found = true;
+      }
+      if (!found) whole.insert(topic);
+    }
+    options_.selection.topics = std::move(whole);
   }
 
   void add_channel(std::uint16_t id, const mcap::Channel& channel, const std::filesystem::path& folder) {
@@ -234,7 +253,7 @@ class Exporter {
   }
 
   const Recording& recording_;
-  const ExportOptions& options_;
+  ExportOptions options_;
   std::map<std::pair<std::string, std::uint16_t>, std::unique_ptr<Topic>> topics_;
   std::vector<Topic*> in_order_;
   std::map<std::uint16_t, Topic*> by_channel_;

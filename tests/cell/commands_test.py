@@ -434,6 +434,10 @@ class WrongCalls(unittest.TestCase):
                 (["doctor", "--what"], "--what"),
                 (["latency-test", "--rate", "0"], "rate"),
                 (["latency-test", "--cpu", "4000"], "no core 4000"),
+                (["stauts"], "invar has no subcommand `stauts`; did you mean `status`? See `invar --help`"),
+                (["param", "lst"], "invar param has no subcommand `lst`; did you mean `list`? See `invar param --help`"),
+                (["run", CELL_FILE, "--jbo", "x"], "invar run has no option `--jbo`; did you mean `--job`?"),
+                (["run", CELL_FILE, "--duration", "0"], "--duration: `0` is not a number above 0; see `invar run --help`"),
                 (["profiles", "nowhere.yaml"], "nowhere.yaml"),
                 (["profiles", "--xml", "word"], "word")):
             with self.subTest(" ".join(map(str, words))):

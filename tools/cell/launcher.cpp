@@ -217,6 +217,16 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   return stop ? "" : failure;
 }
 
+/// A run is silent while all is well: one line says what goes on and how to end it.
+void announce(const LaunchOptions& options, const config::Cell& cell, bool simulated) {
+  std::string names;
+  for (const auto& process : cell.processes)
+    if (options.host.empty() || process.host == options.host)
+      names += (names.empty() ? "" : ", ") + process.name;
+  spdlog::info("cell `{}` runs {} in {}; Ctrl-C stops it in order", cell.name, names,
+               simulated ? "simulated time" : "real time");
+}
+
 }  // namespace
 
 LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop) {
@@ -232,6 +242,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
     throw InputError{"--host", "`" + options.host + "` is no host of " + cell.file.string(),
                      "use a name below `hosts`"};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
+  announce(options, cell, outcome.simulated);
 
   const Folder folder;
   std::vector<Child> children;

@@ -129,6 +129,7 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
   std::vector<std::vector<std::string>> loops;
   std::filesystem::path folder;
   nlohmann::json job;
+  std::vector<std::string> recordings;
   for (const ProcessOutcome& process : outcome.processes) {
     const auto report = nlohmann::json::parse(process.report, nullptr, false);
     if (report.is_discarded()) {
@@ -140,9 +141,10 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
     loops.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
                      std::to_string(report.value("cycles", 0ULL)),
                      std::to_string(report.value("overruns", 0ULL)),
-                     us("compute_p50_ns") + " / " + us("compute_p99_ns"),
+                     outcome.simulated ? "-" : us("compute_p50_ns") + " / " + us("compute_p99_ns"),
                      outcome.simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
     if (report.contains("job")) job = report["job"];
+    if (report.contains("recording")) recordings.push_back(report["recording"]);
   }
   const std::vector<std::string> header{"process",          "rate", "cycles", "overruns", "compute p50 / p99",
                                         "wake-up p50 / p99"};
@@ -160,14 +162,14 @@ void summarise(const LaunchOutcome& outcome, std::ostream& out) {
   }
   page.heading("Processes");
   page.table(header, loops);
-  out << "time            " << number(outcome.wall_seconds, 3) << " s";
+  out << "time            " << number(outcome.wall_seconds, 3) << " s of the wall clock";
   if (!job.is_null()) out << " for a job of " << number(job.value("seconds", 0.0), 4) << " s of the cell";
   out << '\n';
-  if (folder.empty()) return;
-  page.write(folder / "report.html");
-  out << "report          " << (folder / "report.html").string() << '\n';
-  if (std::filesystem::exists(folder / "recording.mcap"))
-    out << "recording       " << (folder / "recording.mcap").string() << '\n';
+  if (!folder.empty()) {
+    page.write(folder / "report.html");
+    out << "report          " << (folder / "report.html").string() << '\n';
+  }
+  for (const std::string& file : recordings) out << "recording       " << file << '\n';
 }
 
 }  // namespace invar::tools

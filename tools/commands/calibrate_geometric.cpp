@@ -16,6 +16,7 @@
 #include "tools/commands/calibration_result.hpp"
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/positive.hpp"
 
 namespace invar::tools {
 
@@ -79,7 +80,7 @@ void add_calibrate_geometric(CLI::App& group) {
       ->check(CLI::IsMember({"full", "displacement"}))
       ->capture_default_str();
   command->add_option("--interval", options->interval, "use only readings at this interval along a line [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_flag("--interval-study", options->study, "also report the accuracy at coarser data intervals");
   command->callback([options] { calibrate(*options); });
 }

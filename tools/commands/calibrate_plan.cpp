@@ -15,6 +15,7 @@
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/positive.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -167,21 +168,21 @@ void add_calibrate_plan(CLI::App& group) {
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
       ->required()
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_option("--pilot", options->pilot,
                       "lines already measured: noise and roughness are taken from them");
   command->add_option("--noise", options->noise, "standard deviation of one reading [m], without a pilot")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command
       ->add_option("--motions", options->motions,
                    "positioning and straightness expected, RMS about the best line [m], without a pilot")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command
       ->add_option("--angles", options->angles,
                    "angular error motions expected, RMS about the best line [rad], without a pilot")
-      ->check(CLI::PositiveNumber)
+      ->check(positive())
       ->capture_default_str();
   command->add_flag("--search", options->search,
                     "also search end points freely over the travels, not only the recipe (some seconds)");

@@ -8,6 +8,7 @@
 #include "core/metrology/thermistor.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/positive.hpp"
 
 namespace invar::tools {
 

@@ -56,12 +56,16 @@ int export_(const Options& options) {
 void add_export(CLI::App& program) {
   auto* command = program.add_subcommand("export", "Write a recording's topics as CSV tables with units");
   command->footer(
-      "Example: invar export run.mcap --out tables --topic cell/a/stage/state --from 10 --to 20\n"
+      "Example: invar export run.mcap --out tables --topic stage.state --from 10 --to 20\n"
+      "Column `time` is when the recorder took the sample, in s since the recording's first message; the "
+      "sample's own\n"
+      "time is its `at.time_ns`\n"
       "Exit status: 0 everything was written, 1 some messages could not be read, 2 a fault of the call");
   auto options = std::make_shared<Options>();
   command->add_option("recording", options->recording, "the recording (.mcap)")->required();
   command->add_option("--out", options->out, "folder for the tables; made where missing")->required();
-  command->add_option("--topic", options->topics, "only this topic; may stand several times");
+  command->add_option("--topic", options->topics,
+                      "only this topic, by its full name or component.port; may stand several times");
   command->add_option("--from", options->from, "only from here on, in s since the recording's first message");
   command->add_option("--to", options->to, "only before this, in s since the recording's first message");
   command->add_option("--elements", options->elements,

@@ -9,6 +9,7 @@
 #include "tools/live/live_cell.hpp"
 #include "tools/live/text_table.hpp"
 #include "tools/live/topic_watch.hpp"
+#include "tools/positive.hpp"
 
 namespace invar::tools {
 
@@ -96,7 +97,7 @@ void add_hz(CLI::App& program) {
   command
       ->add_option("--duration", options->duration,
                    "end after this time [s]; otherwise every 2 s until Ctrl-C")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_flag("--json", options->json, "one JSON object a look");
   command->callback([options] {
     if (const int result = hz(*options); result != 0) throw CLI::RuntimeError(result);

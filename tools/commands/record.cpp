@@ -14,6 +14,7 @@
 #include "tools/live/live_cell.hpp"
 #include "tools/live/text_table.hpp"
 #include "tools/live/topic_watch.hpp"
+#include "tools/positive.hpp"
 
 namespace invar::tools {
 
@@ -165,7 +166,7 @@ void add_record(CLI::App& program) {
       ->add_option("--topic", options->topics,
                    "only topics that contain this text, or component.port; may stand several times")
       ->allow_extra_args(false);
-  command->add_option("--duration", options->duration, "end after this time [s]")->check(CLI::PositiveNumber);
+  command->add_option("--duration", options->duration, "end after this time [s]")->check(positive());
   command->add_flag("--all", options->all, "also the topics by which processes are watched");
   command->add_flag("--json", options->json, "print the ledger as JSON");
   command->callback([options] {

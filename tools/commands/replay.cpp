@@ -173,7 +173,7 @@ void add_replay(CLI::App& program) {
   auto* rate = command->add_option("--rate", options->rate, "times as fast as it was (1)")
                    ->check(CLI::Range(1e-3, 1e6));
   command->add_option("--from", options->from, "leave out so much of the beginning [s]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(CLI::Range(0.0, 1e9));
   command->add_flag("--fast", options->fast, "as fast as possible")->excludes(rate);
   command->add_flag("--beside", options->beside, "also topics that somebody writes now");
   command

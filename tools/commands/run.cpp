@@ -1,6 +1,9 @@
 // `invar run`: brings a cell up, keeps it running, runs a job, stops it in a safe order.
 #include <signal.h>
 
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
 #include <atomic>
 #include <filesystem>
 #include <iostream>
@@ -10,6 +13,7 @@
 #include "tools/cell/process.hpp"
 #include "tools/cell/summary.hpp"
 #include "tools/command.hpp"
+#include "tools/positive.hpp"
 
 namespace invar::tools {
 
@@ -28,6 +32,7 @@ struct Options {
 };
 
 int run(Options& options) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("run"));  // stdout is the summary's
   struct sigaction action {};
   action.sa_handler = request_stop;
   sigaction(SIGINT, &action, nullptr);
@@ -60,13 +65,13 @@ void add_run(CLI::App& program) {
   command->add_option("--process", options->process, "only this process, here and now (no children)");
   command->add_option("--job", options->launch.job, "run this job, then stop");
   command->add_option("--duration", options->launch.duration, "stop after this time of the cell [s]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   auto* simulated =
       command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
   command
       ->add_option("--pace", options->launch.pace,
                    "simulated time no faster than so many times the wall clock")
-      ->check(CLI::PositiveNumber);
+      ->check(positive());
   command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
   command->callback([options] {

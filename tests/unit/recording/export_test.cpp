@@ -98,6 +98,9 @@ TEST_F(ExportTest, WritesOnlyWhatWasSelected) {
   ASSERT_THAT(report.topics, SizeIs(1));
   EXPECT_EQ(report.topics[0].rows, 3U);
   EXPECT_THAT(line("cell.a.stage.position.csv", 2), ::testing::StartsWith("0.003,"));
+  options.selection.topics = {"stage.position"};  // component.port
+  EXPECT_EQ(export_recording(Recording::open(folder / "a.mcap"), folder / "out", options).topics.at(0).rows,
+            3U);
   options.selection.topics = {"cell/a/none"};
   try {
     export_recording(Recording::open(folder / "a.mcap"), folder / "out", options);
