@@ -71,9 +71,12 @@ void ParameterLister::operator()(std::filesystem::path& value, std::string_view 
                                  std::string_view description) {
   add(name, "file", description).otherwise = value.string();
 }
-void ParameterLister::operator()(std::vector<double>&, std::string_view name, std::string_view unit,
+void ParameterLister::operator()(std::vector<double>& values, std::string_view name, std::string_view unit,
                                  std::string_view description) {
-  add(name, "list", description).unit = unit;
+  ParameterInfo& info = add(name, "list", description);
+  info.unit = unit;
+  for (const double value : values) info.otherwise += (info.otherwise.empty() ? "[" : ", ") + shown(value);
+  info.otherwise += info.otherwise.empty() ? "[]" : "]";
 }
 void ParameterLister::operator()(Range& value, std::string_view name, std::string_view unit,
                                  std::string_view description) {
@@ -81,9 +84,11 @@ void ParameterLister::operator()(Range& value, std::string_view name, std::strin
   info.unit = unit;
   info.otherwise = "[" + shown(value.lower) + ", " + shown(value.upper) + "]";
 }
-void ParameterLister::operator()(std::vector<std::string>&, std::string_view name,
+void ParameterLister::operator()(std::vector<std::string>& values, std::string_view name,
                                  std::string_view description) {
-  add(name, "list", description);
+  ParameterInfo& info = add(name, "list", description);
+  for (const std::string& value : values) info.otherwise += (info.otherwise.empty() ? "[" : ", ") + value;
+  info.otherwise += info.otherwise.empty() ? "[]" : "]";
 }
 
 }  // namespace invar

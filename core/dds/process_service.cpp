@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <sstream>
 #include <utility>
@@ -63,7 +64,9 @@ lifecycle::Parameter on_wire(const std::string& component, const ParameterStatus
   out.kind(status.info.type);
   out.unit_text(status.info.unit);
   out.value(status.value ? shown(*status.value) : status.info.otherwise);
-  out.bounds("[" + shown(status.info.range.lower) + ", " + shown(status.info.range.upper) + "]");
+  const Range& range = status.info.range;
+  if (std::isfinite(range.lower) || std::isfinite(range.upper))
+    out.bounds("[" + shown(range.lower) + ", " + shown(range.upper) + "]");
   out.description(status.info.description);
   out.changeable(status.info.changeable);
   return out;

@@ -270,6 +270,10 @@ class Acting(unittest.TestCase):
         known = {p["path"]: p for p in json.loads(out)}
         self.assertEqual(known["setpoint"]["unit"], "degC")
         self.assertEqual(known["setpoint"]["value"], "30")
+        status, out, err = invar("param", "list", CELL_FILE, "calibration", "--json")
+        self.assertEqual(status, 0, err)
+        ends = {p["path"]: p for p in json.loads(out)}["jobs[0].lines[0].to"]
+        self.assertEqual((ends["value"], ends["unit"], ends["bounds"]), ("[0.06, 0]", "m", ""))
         self.assertEqual(invar("param", "set", CELL_FILE, "thermal", "setpoint", "31.5"), (0, "31.5 degC\n", ""))
         self.assertEqual(invar("param", "get", CELL_FILE, "thermal", "setpoint"), (0, "31.5 degC\n", ""))
         status, _, err = invar("param", "set", CELL_FILE, "thermal", "setpoint", "3000")
@@ -425,7 +429,7 @@ class WrongCalls(unittest.TestCase):
                 (["param", "set", CELL_FILE, "thermal", "setpoint"], "VALUE is missing"),
                 (["param", "list", CELL_FILE, "thermol"], "`thermol` is no component"),
                 (["job", "run", CELL_FILE], "JOB is missing"),
-                (["job", "run", CELL_FILE, "lnog"], "there are: long"),
+                (["job", "run", CELL_FILE, "lnog"], "did you mean `long`"),
                 (["record", CELL_FILE], "--out"),
                 (["record", CELL_FILE, "--out", "nowhere/../broken.yaml/x.mcap"], "broken.yaml"),
                 (["replay", CELL_FILE], "FILE is missing"),

@@ -38,8 +38,7 @@ int show(const std::vector<lifecycle::Parameter>& parameters, bool json) {
   TextTable table{{"component", "parameter", "value>", "unit", "bounds", "while running", "what it is"}};
   for (const auto& p : parameters)
     table.add({p.component_name().c_str(), p.path().c_str(), p.value().c_str(), p.unit_text().c_str(),
-               p.kind().to_string() == "text" || p.kind().to_string() == "flag" ? "" : p.bounds().c_str(),
-               p.changeable() ? "yes" : "no", p.description().c_str()});
+               p.bounds().c_str(), p.changeable() ? "yes" : "no", p.description().c_str()});
   table.print(std::cout);
   return 0;
 }
