@@ -15,14 +15,15 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
-void prepare(LoadedCell& loaded, const config::CellComponent& component) {
+/// `types_known`: an unknown type is a fault, for no plugin that may bring it is missing.
+void prepare(LoadedCell& loaded, const config::CellComponent& component, bool types_known) {
   LoadedComponent result;
   result.file = &component;
   if (!loaded.registry->has(component.type)) {
     const auto names = loaded.registry->names();
     const std::string near = config::nearest(component.type, names);
     component.node.accept_all();
-    if (!component.type.empty())
+    if (!component.type.empty() && types_known)
       component.node["type"].fault(
           "`" + component.type + "` is no component type",
           near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
@@ -68,10 +69,10 @@ LoadedCell load_cell(const std::filesystem::path& file) {
   LoadedCell loaded{config::Yaml::load(file), nullptr, std::make_shared<Registry>(), {}};
   loaded.cell = std::make_unique<config::Cell>(config::read_cell(loaded.yaml));
   add_all_components(*loaded.registry);
-  load_plugins(*loaded.cell, *loaded.registry, loaded.yaml.root());
+  const bool types_known = load_plugins(*loaded.cell, *loaded.registry, loaded.yaml.root());
   for (const config::CellProcess& process : loaded.cell->processes) {
     loaded.processes.push_back({&process, {}});
-    for (const config::CellComponent& component : process.components) prepare(loaded, component);
+    for (const config::CellComponent& component : process.components) prepare(loaded, component, types_known);
   }
   connect_ports(loaded);
   check_qos(loaded);

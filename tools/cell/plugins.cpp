@@ -4,14 +4,19 @@
 
 namespace invar::tools {
 
-void load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root) {
+bool load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root) {
   const auto places = root["plugins"].children();
+  bool all = true;
   for (std::size_t i = 0; i < cell.plugins.size(); ++i) {
-    if (!std::filesystem::is_regular_file(cell.plugins[i])) continue;  // read_cell has said so
+    if (!std::filesystem::is_regular_file(cell.plugins[i])) {  // read_cell has said so
+      all = false;
+      continue;
+    }
     void* library = dlopen(std::filesystem::absolute(cell.plugins[i]).c_str(), RTLD_NOW | RTLD_LOCAL);
     if (library == nullptr) {
       places[i].fault(std::string{"cannot be loaded: "} + dlerror(),
                       "name a shared library that was built against this version of Invar");
+      all = false;
       continue;
     }
     using Entry = void (*)(Registry&);
@@ -19,10 +24,12 @@ void load_plugins(const config::Cell& cell, Registry& registry, const config::No
     if (entry == nullptr) {
       places[i].fault("has no entry function `invar_add_components`",
                       "add INVAR_PLUGIN(registry) { ... } to it");
+      all = false;
       continue;
     }
     entry(registry);
   }
+  return all;
 }
 
 }  // namespace invar::tools

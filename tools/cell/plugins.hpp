@@ -8,7 +8,7 @@ namespace invar::tools {
 
 /// Each library has one entry function, `extern "C" void invar_add_components(invar::Registry&)`; INVAR_PLUGIN in
 /// core/component/plugin.hpp writes it. Faults (not loadable, no entry) go to the cell file's document. A library stays
-/// loaded until the process ends.
-void load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root);
+/// loaded until the process ends. True: all were loaded, so what no one brought is no component type.
+bool load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root);
 
 }  // namespace invar::tools

@@ -354,7 +354,7 @@ class RunningProcess {
                            {"wake_up_p50_ns", status_.wake_up.p50.ns},
                            {"wake_up_p99_ns", status_.wake_up.p99.ns},
                            {"not_granted", status_.not_granted}};
-    if (recorder_ != nullptr) outcome["recording"] = recorder_->file().string();
+    if (recorder_ != nullptr) outcome["recording"] = std::filesystem::absolute(recorder_->file()).string();
     if (runs_job_) {
       const std::scoped_lock lock{job_mutex_};
       outcome["job"] = {{"name", job_.name().c_str()},
