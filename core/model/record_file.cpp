@@ -1,5 +1,7 @@
 #include "core/model/record_file.hpp"
 
+#include <cmath>
+
 #include "core/base/unit.hpp"
 
 namespace invar::model {
@@ -44,6 +46,16 @@ RecordFile to_record(const recording::Table& table, const physics::Model& model,
   }
   if (!faults.empty()) throw InputError{faults};
   return result;
+}
+
+void check_order(const physics::Record& record, const std::filesystem::path& file) {
+  for (std::size_t row = 0; row < record.rows(); ++row) {
+    const double now = record.time[row];
+    if (!std::isfinite(now) || (row > 0 && now < record.time[row - 1]))
+      throw InputError{file.string() + ":" + std::to_string(row + 2),
+                       std::isfinite(now) ? "time goes back" : "the time is missing",
+                       "put the rows in order of time"};
+  }
 }
 
 recording::Table to_table(const physics::Model& model, const RecordFile& inputs,

@@ -1,6 +1,7 @@
 // Recordings in, simulations out: tables of columns as the model names them, in SI.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -24,6 +25,9 @@ struct RecordFile {
 /// The model's signals out of a table, in SI; rows as they stand. Throws InputError where a column that the
 /// model needs is missing or measures something else; outputs may be missing when `outputs_needed` is false.
 RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed);
+
+/// Throws InputError where a time is missing or goes back: a simulation takes rows in order.
+void check_order(const physics::Record& record, const std::filesystem::path& file);
 
 /// Time and outputs under the recording's column names, in the units that the inputs had, otherwise in SI.
 recording::Table to_table(const physics::Model& model, const RecordFile& inputs,

@@ -11,6 +11,7 @@
 
 #include "core/model/model_file.hpp"
 #include "tools/command.hpp"
+#include "tools/diagnose/other_run.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/live/interrupt.hpp"
 
@@ -22,6 +23,8 @@ struct Options {
   std::filesystem::path model;
   std::vector<std::filesystem::path> recordings;
   std::filesystem::path out = "diagnosis";
+  std::vector<std::filesystem::path> checks, check_outputs;
+  bool fits_check_start = false;
   bool json = false;
   unsigned seed = 1;
 };
@@ -46,10 +49,20 @@ void show_progress(double share, const std::string& what) {
 }
 
 int run(const Options& options) {
+  if (!options.check_outputs.empty() && options.check_outputs.size() != options.checks.size())
+    throw InputError{"--check-outputs",
+                     "are " + std::to_string(options.check_outputs.size()) + ", but --check are " +
+                         std::to_string(options.checks.size()),
+                     "give one file of outputs for each --check, in the same order"};
   const auto yaml = config::Yaml::load(options.model);
   const auto model = model::read(yaml);
   yaml.finish();
   auto data = diagnose::load_case(model, options.recordings);
+  std::vector<diagnose::OtherRun> checks;  // read before the search: what is unusable is said at once
+  for (std::size_t i = 0; i < options.checks.size(); ++i)
+    checks.push_back(diagnose::read_other_run(
+        model, {options.checks[i], options.check_outputs.empty() ? "" : options.check_outputs[i],
+                options.fits_check_start}));
   const bool terminal = isatty(STDERR_FILENO) == 1;
   const auto progress = [&](double share, const std::string& what) {
     if (terminal) show_progress(share, what);
@@ -58,17 +71,23 @@ int run(const Options& options) {
   diagnose::Options how;
   how.stopped = interrupted;
   (void)interrupted();
-  const auto diagnosis = diagnose::search(data, progress, how);
+  auto diagnosis = diagnose::search(data, progress, how);
   if (terminal) std::cerr << "\r\033[K";
+  for (auto& run : checks) {
+    diagnose::compare(data, diagnosis, run);
+    diagnosis.other_runs.push_back(std::move(run));
+  }
   std::error_code error;
   std::filesystem::create_directories(options.out, error);
   if (error)
     throw InputError{options.out.string(), "cannot be made: " + error.message(), "choose another --out"};
   const auto json = diagnose::report_json(data, diagnosis);
-  auto patched = diagnosis.best.model;
-  for (std::size_t i = 0; i < patched.parameters.size(); ++i)  // the fit looks through the encoder's steps
-    if (patched.parameters[i].name == "resolution") patched.parameters[i] = model.parameters[i];
-  write_text(options.out / "patched.yaml", model::patched(yaml, patched));
+  for (const bool is_retuned : {true, false}) {
+    auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
+    for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
+      if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
+    write_text(options.out / (is_retuned ? "retuned.yaml" : "patched.yaml"), model::patched(yaml, changed));
+  }
   diagnose::write_page(data, diagnosis, options.model.string(), options.out / "report.html");
   write_text(options.out / "report.json", json + "\n");
   if (options.json)
@@ -99,8 +118,18 @@ void add_diagnose(CLI::App& program) {
       ->add_option("--recording", options->recordings,
                    "recording of the machine, .csv, .csv.gz or .mcap; may be repeated")
       ->required();
-  command->add_option("--out", options->out, "folder for report.json, report.html and patched.yaml")
+  command
+      ->add_option("--out", options->out,
+                   "folder for report.json, report.html, patched.yaml and retuned.yaml (no physics added)")
       ->capture_default_str();
+  command->add_option(
+      "--check", options->checks,
+      "another recording, which no fit sees: the model as it is, retuned and patched run freely over "
+      "it; may be repeated");
+  command->add_option("--check-outputs", options->check_outputs,
+                      "the outputs of each --check, where they lie in a file of their own");
+  command->add_flag("--check-fits-start", options->fits_check_start,
+                    "the first row of --check is a guess: each model starts where it comes nearest");
   command->add_flag("--json", options->json, "print report.json instead of the summary");
   command->add_option("--seed", options->seed, "accepted for scripts; the search draws no random numbers")
       ->capture_default_str();

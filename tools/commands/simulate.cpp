@@ -1,5 +1,4 @@
 // `invar simulate`: runs a model on the input columns alone and writes its outputs.
-#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -22,13 +21,7 @@ void simulate(const Options& options) {
   const auto model = model::load(options.model);
   const auto table = model::read_recording(options.inputs, model).front();
   const auto inputs = model::to_record(table, model, false);
-  for (std::size_t row = 0; row < inputs.record.rows(); ++row) {
-    const double now = inputs.record.time[row];
-    if (!std::isfinite(now) || (row > 0 && now < inputs.record.time[row - 1]))
-      throw InputError{options.inputs.string() + ":" + std::to_string(row + 2),
-                       std::isfinite(now) ? "time goes back" : "the time is missing",
-                       "put the rows in order of time"};
-  }
+  model::check_order(inputs.record, options.inputs);
   physics::Outputs outputs;
   physics::prepare(model, inputs.record)->run(model, outputs);
   model::to_table(model, inputs, outputs).write(options.output);

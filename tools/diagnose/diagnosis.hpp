@@ -36,6 +36,16 @@ struct FitRow {
   double before = 0.0, retuned = 0.0, after = 0.0, noise_floor = 0.0;
 };
 
+/// A recording that no fit has seen, and what each model makes of it.
+struct OtherRun {
+  std::string name;
+  physics::Record inputs;
+  bool fits_start = false;                    // each model starts where it comes nearest
+  std::vector<std::vector<double>> measured;  // by output; NaN where nothing is to be compared
+  physics::Outputs before, retuned, after;
+  std::vector<FitRow> fit;  // of the outputs that were measured
+};
+
 enum class Verdict { no_mismatch, parameters_only, explained, partly_explained, ambiguous, unknown_physics };
 
 struct Diagnosis {
@@ -48,6 +58,7 @@ struct Diagnosis {
   std::vector<Rejection> rejected;
   std::vector<Detectable> detectable;
   std::vector<FitRow> heldout, train;
+  std::vector<OtherRun> other_runs;
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
   bool is_unnamed = false;  // the finding is a curve alone

@@ -43,6 +43,8 @@ Start coarser(Start start, std::size_t knots) {
 
 std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,
                                     const Fit& further) {
+  // What goes with nothing, a steady force, is no course of what does: a curve would merely hold it as well.
+  if (further.model.terms.back().info->depends_on.front().empty()) return std::nullopt;
   std::vector<Start> starts;
   for (const auto& start : unmodelled_starts(data, base))
     for (std::size_t t = data.model.terms.size(); t < base.model.terms.size(); ++t)

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "core/config/yaml.hpp"
 #include "tools/diagnose/search.hpp"
@@ -23,6 +24,14 @@ std::string summary(const Case& data, const Diagnosis& diagnosis);
 std::string site_of(const Case& data, const physics::Term& term);
 /// The signals on which a term depends.
 std::vector<std::string> dependence(const Case& data, const physics::Term& term);
+/// "coulomb friction"
+std::string readable(std::string_view name);
+/// Where a term acts, for somebody who does not know the library: "temperature sensor of pad".
+std::string place_of(const Case& data, const physics::Term& term);
+/// "amplitude 2.40 +- 0.01 N, pitch ..."
+std::string sizes_of(const Case& data, const Finding& finding);
+/// What to do next, in a sentence.
+std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
 /// The motion or recording that would tell two terms apart.

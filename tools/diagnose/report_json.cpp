@@ -31,97 +31,6 @@ std::string text(double value) {
 
 }  // namespace
 
-std::string site_of(const Case& data, const physics::Term& term) {
-  const std::string plant{physics::name_of(data.model.plant)};
-  if (data.model.plant == physics::Plant::equations) {
-    for (const auto& input : data.model.equations.inputs)
-      if (input.symbol == term.on) return plant + ".input";
-    for (const auto& output : data.model.equations.outputs)
-      if (output.name == term.on) return plant + ".output";
-    return plant + "." + term.on;
-  }
-  return plant + "." + std::string{term.info->site};
-}
-
-std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
-  std::vector<std::string> names;
-  for (const auto name : term.info->depends_on)
-    if (!name.empty()) names.emplace_back(name);
-  if (!term.curve.over.empty()) {
-    names.push_back(term.curve.over);
-    if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
-    if (term.curve.over.rfind("velocity", 0) == 0) names.emplace_back("velocity");
-  }
-  if (data.model.plant == physics::Plant::equations) names.push_back(term.with.empty() ? term.on : term.with);
-  return names;
-}
-
-std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
-  const std::string unit{term.info->parameters[parameter].unit};
-  if (unit != "*") return unit;
-  const auto* signal = data.model.signal(term.on);
-  return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
-}
-
-std::string separating_experiment(const std::string& one, const std::string& other) {
-  const auto is = [&](const char* a, const char* b) {
-    return (one == a && other == b) || (one == b && other == a);
-  };
-  if (is("coulomb_friction", "constant_force") || is("stribeck_friction", "constant_force") ||
-      is("presliding_friction", "constant_force"))
-    return "move in both directions: friction turns its sign with the motion, a constant force does not";
-  if (is("transport_delay", "measurement_delay"))
-    return "record the position with a second, direct instrument: a late encoder trails it, a late motor "
-           "does not";
-  if (is("transport_delay", "amplifier_lag") || is("measurement_delay", "amplifier_lag"))
-    return "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
-  if (is("stage_velocity_carry", "valve_delay"))
-    return "print at two clearly different heights: carry grows with the height, a valve delay does not";
-  if (is("force_ripple", "motor_constant_ripple"))
-    return "cross the same places at high and at low current: the ripple of the motor constant goes with the "
-           "current";
-  if (is("periodic_disturbance", "additive_disturbance"))
-    return "record with the motor switched off and the carriage free: a force shakes it still";
-  return "a recording in which " + one + " and " + other + " act at different times, places or speeds";
-}
-
-std::string verdict_sentence(const Case& data, const Diagnosis& d) {
-  if (d.is_partial) {
-    auto whole = d;
-    whole.is_partial = false;
-    return "Stopped before all was tried; so far: " + verdict_sentence(data, whole);
-  }
-  std::string names;
-  for (std::size_t i = 0; i < d.findings.size(); ++i) {
-    const auto& finding = d.findings[i];
-    names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) +
-             std::string{finding.term.info->name} + " at " + site_of(data, finding.term);
-  }
-  switch (d.verdict) {
-    case Verdict::no_mismatch:
-      return "No mismatch: the model explains the recording to the noise.";
-    case Verdict::parameters_only:
-      return "Only parameters are off: no physics is missing, but a parameter stands " +
-             text(d.parameter_excursion) + " sigma from what was believed.";
-    case Verdict::explained:
-      return "Explained: the model leaves out " + names + ".";
-    case Verdict::partly_explained:
-      return "Partly explained: the model leaves out " + names + ", and something more.";
-    case Verdict::ambiguous: {
-      std::string also;
-      for (const auto& f : d.findings)
-        for (const auto& a : f.alternatives)
-          if (a.log_odds > -ambiguous_margin)
-            also += (also.empty() ? "" : ", ") + std::string{a.term.info->name};
-      return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
-    }
-    case Verdict::unknown_physics:
-      return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
-             " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
-  }
-  return "";
-}
-
 std::string report_json(const Case& data, const Diagnosis& d) {
   json report;
   report["invar_report"] = 1;
@@ -209,8 +118,11 @@ std::string report_json(const Case& data, const Diagnosis& d) {
              {"unit", unit_of(data, term, f.index)}});
     }
   }
+  json other_runs = json::object();
+  for (const auto& run : d.other_runs) other_runs[run.name] = fit_json(run.fit);
   report["fit"] = {{"heldout", fit_json(d.heldout)},
                    {"train", fit_json(d.train)},
+                   {"other_recordings", other_runs},
                    {"split",
                     "every third of 18 stretches of each recording was kept from the fit; simulated without "
                     "restart over the whole recording"}};
@@ -236,24 +148,6 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"not_run_through", data.count.shortened}};
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);
-}
-
-std::string summary(const Case& data, const Diagnosis& d) {
-  std::ostringstream out;
-  out.precision(4);
-  out << verdict_sentence(data, d) << '\n';
-  for (const auto& finding : d.findings) {
-    out << "  " << finding.term.info->name << " (" << 100.0 * finding.probability << " %)";
-    for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)
-      out << "  " << finding.term.info->parameters[i].name << " = " << finding.term.values[i] << ' '
-          << unit_of(data, finding.term, i) << " +- " << finding.sigmas[i];
-    for (const auto& a : finding.alternatives) out << "  [" << a.term.info->name << ' ' << a.log_odds << ']';
-    out << '\n';
-  }
-  for (const auto& row : d.heldout)
-    out << "  " << row.signal << " [" << row.unit << "] held out: before " << row.before << ", retuned "
-        << row.retuned << ", after " << row.after << ", noise " << row.noise_floor << '\n';
-  return out.str();
 }
 
 }  // namespace invar::diagnose

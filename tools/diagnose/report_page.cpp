@@ -12,8 +12,17 @@ namespace {
 
 using report::Plot;
 using report::Series;
+using Names = std::vector<std::vector<std::string>>;
+
+constexpr const char* grey = "#9aa5b1";
+constexpr const char* orange = "#d08770";
+constexpr const char* blue = "#2e6f9e";
+constexpr const char* green = "#7fb08a";
 
 std::string unit_shown(const std::string& unit) { return unit == "degC" ? "K" : unit; }
+std::string in_brackets(const std::string& unit) {
+  return unit.empty() || unit == "1" ? "" : " [" + unit + "]";
+}
 
 /// measured - simulated of one output, one recording behind the other.
 std::vector<double> difference(const Case& data, const std::vector<physics::Outputs>& simulated,
@@ -36,6 +45,13 @@ std::vector<double> over(const Case& data, const std::string& variable) {
     out.push_back(std::nan(""));
   }
   return out;
+}
+
+double rms(const std::vector<double>& values) {
+  double sum = 0.0, n = 0.0;
+  for (const double v : values)
+    if (std::isfinite(v)) sum += v * v, n += 1.0;
+  return n > 0.0 ? std::sqrt(sum / n) : 0.0;
 }
 
 /// Mean of y in cells of x.
@@ -62,8 +78,185 @@ Series averaged(const std::string& label, const std::vector<double>& x, const st
   return series;
 }
 
-std::string share_text(double before, double after) {
-  return before > 0.0 ? report::number(100.0 * (1.0 - after / before), 3) + " % less" : "-";
+/// The four numbers of one output beside one another.
+void add_bars(report::Page& page, const FitRow& row) {
+  const auto bar = [&](const char* label, double value, const char* colour) {
+    std::string text = report::si(value, row.unit);
+    if (row.noise_floor > 0.0 && value != row.noise_floor)
+      text += " (" + report::number(value / row.noise_floor) + " x noise)";
+    return report::Page::Bar{label, value, text, colour};
+  };
+  std::vector<report::Page::Bar> bars{bar("model as it is", row.before, grey),
+                                      bar("its parameters refitted", row.retuned, orange),
+                                      bar("with what was found", row.after, blue)};
+  if (row.noise_floor > 0.0) bars.push_back(bar("noise", row.noise_floor, green));
+  page.bars(row.signal, bars);
+}
+
+/// What somebody must know who reads no further.
+void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
+  std::string missing, sure, fit;
+  for (const auto& finding : d.findings) {
+    missing += (missing.empty() ? "" : "; ") + readable(finding.term.info->name) + " (" +
+               place_of(data, finding.term) + "): " + sizes_of(data, finding);
+    sure += (sure.empty() ? "" : "; ") + readable(finding.term.info->name) + " " +
+            report::number(100.0 * finding.probability) + " %";
+  }
+  for (const auto& row : d.heldout)
+    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + ", refitted " +
+           report::si(row.retuned, row.unit) + ", now " + report::si(row.after, row.unit) + " (noise " +
+           report::si(row.noise_floor, row.unit) + ")";
+  const std::string rest = report::number(d.unexplained, 3) + " times the noise";
+  Names rows{{"what is missing", missing.empty() ? "nothing that this recording shows" : missing}};
+  if (!sure.empty()) rows.push_back({"how sure", sure});
+  rows.push_back({"error (RMS) on data that no fit saw", fit});
+  rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
+  rows.push_back({"next experiment", next_experiment(data, d)});
+  page.table({"in short", ""}, rows);
+}
+
+void add_other_run(report::Page& page, const Case& data, const OtherRun& run) {
+  page.heading("Another recording, not used here: " + run.name);
+  page.paragraph("All three models run freely from the recording's first row to its last.");
+  for (const auto& row : run.fit) add_bars(page, row);
+  std::vector<Plot> plots;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    if (std::none_of(run.fit.begin(), run.fit.end(),
+                     [&](const FitRow& row) { return row.signal == data.outputs[o]; }))
+      continue;
+    const auto& unit = data.model.signal(data.outputs[o])->unit;
+    Plot both, apart;
+    both.title = data.outputs[o];
+    both.x_label = apart.x_label = "time [s]";
+    both.y_label = data.outputs[o] + in_brackets(unit);
+    apart.title = data.outputs[o] + ": measured - simulated";
+    apart.y_label = "difference" + in_brackets(unit_shown(unit));
+    const auto line = [&](const char* label, const std::vector<double>& y, const char* colour) {
+      return Series{label, Series::Style::line, run.inputs.time, y, {}, {}, colour};
+    };
+    const auto rest = [&](const physics::Outputs& simulated) {
+      auto values = run.measured[o];
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] -= simulated[o][i];
+      return values;
+    };
+    both.series = {line("measured", run.measured[o], "#1c2733"), line("refitted", run.retuned[o], orange),
+                   line("with what was found", run.after[o], blue)};
+    apart.series = {line("refitted", rest(run.retuned), orange),
+                    line("with what was found", rest(run.after), blue)};
+    plots.push_back(std::move(both));
+    plots.push_back(std::move(apart));
+  }
+  page.plots(plots);
+}
+
+/// A finding's own section: what it is, and what would be missing without it alone.
+void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::size_t which,
+                 const std::vector<physics::Outputs>& after) {
+  const auto& finding = d.findings[which];
+  const auto& info = *finding.term.info;
+  page.paragraph(readable(info.name) + " (" + place_of(data, finding.term) + "; in the model file " +
+                 std::string{info.name} + " at " + site_of(data, finding.term) + "): " +
+                 std::string{info.description} + " " + std::string{info.source} + ". Of the mismatch, " +
+                 report::number(100.0 * finding.share, 3) + " % comes back when it alone is taken out.");
+  auto model = d.best.model;
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
+  const auto without = simulate(data, model);
+  // The output that it moves most, seen from its noise.
+  std::size_t shown = 0;
+  double most = -1.0;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    const double noise = o < d.heldout.size() ? d.heldout[o].noise_floor : 0.0;
+    const double by =
+        (rms(difference(data, without, o)) - rms(difference(data, after, o))) / (noise > 0.0 ? noise : 1.0);
+    if (by > most) most = by, shown = o;
+  }
+  const auto unit = unit_shown(data.model.signal(data.outputs[shown])->unit);
+  std::vector<Plot> plots;
+  const auto add = [&](const std::string& variable, const std::string& label) {
+    const auto x = over(data, variable);
+    if (plots.size() >= 2 || std::none_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); }))
+      return;
+    Plot plot;
+    const auto* signal = data.model.signal(variable);
+    plot.title = data.outputs[shown] + " over " + label;
+    plot.x_label = label + (signal != nullptr        ? in_brackets(signal->unit)
+                            : variable == "time"     ? " [s]"
+                            : variable == "velocity" ? " [m/s]"
+                                                     : "");
+    plot.y_label = "mean of measured - simulated" + in_brackets(unit);
+    plot.series = {averaged("without it", x, difference(data, without, shown), 80),
+                   averaged("with it", x, difference(data, after, shown), 80)};
+    plot.series[0].colour = orange, plot.series[1].colour = blue;
+    if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
+  };
+  for (const auto& variable : dependence(data, finding.term)) {
+    if (variable == "direction" || variable == "speed")
+      add("velocity", "velocity");
+    else if (data.model.plant == physics::Plant::thermal && variable == "temperature" &&
+             !finding.term.on.empty())
+      add(finding.term.on, "temperature of " + finding.term.on);
+    else
+      add(variable, variable);
+  }
+  if (plots.empty() && data.is_time_series) add("time", "time");
+  if (!finding.term.curve.knots.empty()) {
+    Plot plot;
+    plot.title = "the effect without a name";
+    plot.x_label = finding.term.curve.over;
+    plot.y_label = "fitted curve";
+    plot.series.push_back(
+        {"", Series::Style::line, finding.term.curve.knots, finding.term.curve.values, {}, {}, blue});
+    plots.push_back(std::move(plot));
+  }
+  if (!plots.empty()) page.plots(plots, "Averaged over cells of the variable with which it goes.");
+  Names numbers;
+  for (std::size_t i = 0; i < info.parameter_count(); ++i)
+    numbers.push_back(
+        {readable(info.parameters[i].name),
+         report::with_sigma(finding.term.values[i], finding.sigmas[i], unit_of(data, finding.term, i)),
+         std::string{info.parameters[i].description}});
+  if (!numbers.empty()) page.table({"parameter", "value +- 1 sigma", "meaning"}, numbers);
+}
+
+void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
+  Names corrections;
+  for (std::size_t k = 0; k < d.best.free.size(); ++k) {
+    const auto& f = d.best.free[k];
+    if (f.where != Freedom::Where::parameter) continue;
+    const auto& p = data.model.parameters[f.index];
+    const double to = get(d.best.model, f), sigma = d.best.sigma(static_cast<Eigen::Index>(k));
+    corrections.push_back(
+        {p.name,
+         f.sigma > 0.0 ? report::with_sigma(p.value, f.sigma, p.unit) : report::si(p.value, p.unit, 4),
+         report::with_sigma(to, sigma, p.unit),
+         f.sigma > 0.0 ? report::number(std::abs(to - f.center) / f.sigma, 2) + " sigma of what was believed"
+                       : "nothing was believed beyond a start value"});
+  }
+  if (corrections.empty()) return;
+  page.heading("The model's own parameters");
+  page.table({"parameter", "believed", "fitted beside what was found", "moved by"}, corrections);
+}
+
+void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
+  page.heading("What was considered and why it is not claimed");
+  Names considered;
+  for (const auto& finding : d.findings)
+    for (const auto& a : finding.alternatives)
+      considered.push_back({readable(a.term.info->name) + " (" + place_of(data, a.term) + ")",
+                            "in place of " + readable(finding.term.info->name) +
+                                (a.log_odds > -ambiguous_margin ? ": explains the recording as well"
+                                                                : ": explains the recording worse"),
+                            report::number(a.log_odds)});
+  for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, report::number(r.gain)});
+  if (considered.empty()) {
+    page.paragraph("No other term of the library came near: none had a gain worth a fit.");
+    return;
+  }
+  page.table({"effect", "why not", "log evidence"}, considered);
+  page.paragraph(
+      "Log evidence: for a rival, against what it would replace (each unit makes it e times less likely); "
+      "otherwise what the effect gained by itself, of which claims need " +
+      report::number(claim_margin_of(d.weighing)) + " and a gain on held-out data.");
 }
 
 }  // namespace
@@ -74,129 +267,54 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
   const bool fine = d.verdict == Verdict::no_mismatch;
   const bool clear = d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only;
   page.callout(verdict_sentence(data, d), fine ? "good" : (clear ? "plain" : "warn"));
+  in_short(page, data, d);
 
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& row : d.heldout)
-    rows.push_back({row.signal, report::si(row.before, row.unit), report::si(row.retuned, row.unit),
-                    report::si(row.after, row.unit), report::si(row.noise_floor, row.unit),
-                    share_text(row.retuned, row.after)});
-  page.heading("Error on data that was not fitted");
-  page.table({"output", "model as it is", "its parameters refitted", "with what was found", "noise",
-              "against refitted"},
-             rows);
+  page.heading("Error on data that no fit saw");
+  for (const auto& row : d.heldout) add_bars(page, row);
   page.paragraph(
-      "RMS of measured - simulated on every third stretch of the recording, which the fit did not see. "
-      "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added.");
+      "RMS of measured - simulated on every third stretch of the recording, which the fits did not see. "
+      "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added. `Noise` "
+      "is what the model file says, or the part of the residual that is not related from row to row.");
+  for (const auto& run : d.other_runs) add_other_run(page, data, run);
 
-  const auto nominal = simulate(data, data.model), retuned = simulate(data, d.retuned.model),
-             after = simulate(data, d.best.model);
+  const auto retuned = simulate(data, d.retuned.model), after = simulate(data, d.best.model);
   const auto time = over(data, "time");
   std::vector<Plot> residuals;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    const auto unit = unit_shown(data.model.signal(data.outputs[o])->unit);
     Plot plot;
     plot.title = data.outputs[o] + ": what the model leaves";
-    plot.x_label = "time [s]";
-    plot.y_label = "measured - simulated" + (unit.empty() ? "" : " [" + unit + "]");
+    plot.x_label = data.is_time_series ? "time [s]" : "time of the droplet [s]";
+    plot.y_label = "measured - simulated" + in_brackets(unit_shown(data.model.signal(data.outputs[o])->unit));
     const auto style =
         data.is_time_series && time.size() > 1500 ? Series::Style::line : Series::Style::points;
-    plot.series.push_back({"refitted", style, time, difference(data, retuned, o), {}, {}, "#d08770"});
-    plot.series.push_back({"after", style, time, difference(data, after, o), {}, {}, "#2e6f9e"});
+    plot.series.push_back({"refitted", style, time, difference(data, retuned, o), {}, {}, orange});
+    if (!d.findings.empty())
+      plot.series.push_back({"with what was found", style, time, difference(data, after, o), {}, {}, blue});
     residuals.push_back(std::move(plot));
   }
-  page.heading("The residual");
-  page.plots(residuals, "Before and after, in the unit of the signal; what is left should look like noise.");
+  page.heading("The residual of this recording");
+  page.plots(residuals, "In the unit of the signal; what is left at the end should look like noise.");
 
   if (!d.findings.empty()) page.heading("Where it lives");
-  for (const auto& finding : d.findings) {
-    std::vector<Plot> plots;
-    for (const auto& variable : dependence(data, finding.term)) {
-      if (plots.size() >= 2) break;
-      const auto x = over(data, variable == "direction" || variable == "speed" ? "velocity" : variable);
-      if (std::none_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); })) continue;
-      // In a loop the controller's output tells; elsewhere the first output.
-      const std::size_t o = data.model.controller && data.outputs.size() > 1 ? 1 : 0;
-      Plot plot;
-      plot.title = data.outputs[o] + " over " + variable;
-      plot.x_label = variable;
-      plot.y_label = "mean of measured - simulated";
-      plot.series.push_back(averaged("refitted", x, difference(data, retuned, o), 60));
-      plot.series.push_back(averaged("after", x, difference(data, after, o), 60));
-      // A variable that stood still has nothing to show.
-      if (plot.series[0].x.size() < 2) continue;
-      plot.series[0].colour = "#d08770", plot.series[1].colour = "#2e6f9e";
-      plots.push_back(std::move(plot));
-    }
-    if (!finding.term.curve.knots.empty()) {
-      Plot plot;
-      plot.title = "the effect without a name";
-      plot.x_label = finding.term.curve.over;
-      plot.y_label = "fitted curve";
-      plot.series.push_back(
-          {"", Series::Style::line, finding.term.curve.knots, finding.term.curve.values, {}, {}, "#2e6f9e"});
-      plots.push_back(std::move(plot));
-    }
-    page.paragraph(std::string{finding.term.info->name} + " at " + site_of(data, finding.term) + ": " +
-                   std::string{finding.term.info->description} + " (" +
-                   std::string{finding.term.info->source} + "). Without it, " +
-                   report::number(100.0 * finding.share, 3) + " % of the excess comes back. Probability " +
-                   report::number(finding.probability, 3) + ".");
-    if (!plots.empty()) page.plots(plots, "Averaged over cells of the variable on which it depends.");
-    std::vector<std::vector<std::string>> numbers;
-    for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)
-      numbers.push_back({std::string{finding.term.info->parameters[i].name},
-                         report::si(finding.term.values[i], unit_of(data, finding.term, i), 4),
-                         report::si(finding.sigmas[i], unit_of(data, finding.term, i), 2),
-                         std::string{finding.term.info->parameters[i].description}});
-    if (!numbers.empty()) page.table({"parameter", "value", "1 sigma", "meaning"}, numbers);
-  }
-
-  std::vector<std::vector<std::string>> corrections;
-  for (std::size_t k = 0; k < d.best.free.size(); ++k) {
-    const auto& f = d.best.free[k];
-    if (f.where != Freedom::Where::parameter) continue;
-    const auto& p = data.model.parameters[f.index];
-    const double to = get(d.best.model, f);
-    corrections.push_back(
-        {p.name, report::number(p.value, 5) + " " + p.unit, report::number(to, 5) + " " + p.unit,
-         report::number(d.best.sigma(static_cast<Eigen::Index>(k)), 2),
-         f.sigma > 0.0 ? report::number((to - f.center) / f.sigma, 2) + " sigma of what was believed" : "-"});
-  }
-  page.heading("The model's own parameters");
-  page.table({"parameter", "was", "is", "1 sigma", "moved by"}, corrections);
-
-  page.heading("What was considered and why it is not claimed");
-  std::vector<std::vector<std::string>> considered;
-  for (const auto& finding : d.findings)
-    for (const auto& a : finding.alternatives)
-      considered.push_back(
-          {std::string{a.term.info->name}, "in place of " + std::string{finding.term.info->name} +
-                                               ": log evidence " + report::number(a.log_odds, 3)});
-  for (const auto& r : d.rejected) considered.push_back({r.term, r.why});
-  if (considered.empty())
-    page.paragraph("No other term of the library came near: none had a gain worth a fit.");
-  else
-    page.table({"term", "why not"}, considered);
+  for (std::size_t i = 0; i < d.findings.size(); ++i) add_finding(page, data, d, i, after);
+  add_parameters(page, data, d);
+  add_considered(page, data, d);
 
   if (!d.detectable.empty()) {
     page.heading("The smallest effects that this recording would have shown");
-    std::vector<std::vector<std::string>> smallest;
+    Names smallest;
     for (const auto& entry : d.detectable)
-      smallest.push_back(
-          {entry.term, entry.parameter, report::si(entry.value, entry.unit == "*" ? "" : entry.unit)});
-    page.table({"term", "parameter", "smallest"}, smallest);
+      smallest.push_back({readable(entry.term), readable(entry.parameter),
+                          report::si(entry.value, entry.unit == "*" ? "" : entry.unit)});
+    page.table({"effect", "parameter", "smallest"}, smallest);
   }
   page.heading("What remains, and what to do next");
+  std::string with;
+  for (const auto& one : d.unexplained_over) with += (with.empty() ? ", and goes with " : ", ") + one;
   page.paragraph("After all that, the residual on held-out data is " + report::number(d.unexplained, 3) +
-                 " times the noise.");
-  for (const auto& finding : d.findings)
-    for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin)
-        page.callout(
-            "Next experiment: " +
-                separating_experiment(std::string{finding.term.info->name}, std::string{a.term.info->name}) +
-                ".",
-            "warn");
+                 " times the noise" + with + ".");
+  page.callout("Next experiment: " + next_experiment(data, d),
+               d.verdict == Verdict::ambiguous ? "warn" : "plain");
   page.paragraph(
       std::to_string(data.count.rows) + " rows read; left out: " + std::to_string(data.count.missing) +
       " missing values, " + std::to_string(data.count.outliers) + " outliers, " +

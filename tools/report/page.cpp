@@ -1,5 +1,6 @@
 #include "tools/report/page.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -56,8 +57,11 @@ h1{font-size:1.7rem;margin:0}h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bo
 margin:.8rem 0;font-size:1.06rem}.callout.good{border-color:var(--good)}.callout.bad{border-color:var(--bad)}
 .callout.warn{border-color:var(--warn)}table{border-collapse:collapse;margin:.6rem 0;font-size:.93rem}
 th,td{padding:.28rem .8rem;text-align:left;border-bottom:1px solid var(--line);font-variant-numeric:tabular-nums}
-th{color:var(--soft);font-weight:600}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0}
+th{color:var(--soft);font-weight:600}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0;max-width:760px}
 figure svg,figure img{max-width:100%;height:auto}figcaption{color:var(--soft);font-size:.9rem}
+table.bars{width:100%;max-width:760px;margin:.4rem 0 1.2rem}table.bars caption{text-align:left;font-weight:600;padding-bottom:.2rem}
+.bars th,.bars td{border:0;padding:.12rem .6rem .12rem 0}.bars th{width:13rem;font-weight:400}.bars td:nth-child(2){width:55%}.bars td{white-space:nowrap}
+.bars div{height:1rem;border-radius:2px}
 pre{background:#f5f7f9;padding:.8rem;overflow-x:auto;font-size:.86rem})";
 
 }  // namespace
@@ -81,6 +85,19 @@ void Page::table(const std::vector<std::string>& header, const std::vector<std::
     out += "<tr>";
     for (const auto& cell : row) out += "<td>" + escaped(cell) + "</td>";
     out += "</tr>";
+  }
+  html(out + "</tbody></table>");
+}
+
+void Page::bars(const std::string& title, const std::vector<Bar>& bars) {
+  double longest = 0.0;
+  for (const auto& bar : bars) longest = std::max(longest, bar.value);
+  std::string out = "<table class=\"bars\"><caption>" + escaped(title) + "</caption><tbody>";
+  for (const auto& bar : bars) {
+    const double share = longest > 0.0 ? 100.0 * std::max(0.0, bar.value) / longest : 0.0;
+    out += "<tr><th>" + escaped(bar.label) +
+           "</th><td><div style=\"width:" + number(std::max(0.3, share), 4) +
+           "%;background:" + escaped(bar.colour) + "\"></div></td><td>" + escaped(bar.text) + "</td></tr>";
   }
   html(out + "</tbody></table>");
 }
@@ -134,20 +151,62 @@ std::string number(double value, int digits) {
   return {text.data(), static_cast<std::size_t>(length)};
 }
 
-std::string si(double value, const std::string& unit, int digits) {
-  struct Prefix {
-    double factor;
-    const char* name;
-  };
+namespace {
+
+struct Prefix {
+  double factor;
+  const char* name;
+};
+
+/// The prefix that suits the value; none where the unit begins with a power, a gram, a degree or a pure number.
+Prefix prefix_of(double value, const std::string& unit) {
   static constexpr Prefix prefixes[] = {{1e-9, "n"}, {1e-6, "u"}, {1e-3, "m"},
                                         {1.0, ""},   {1e3, "k"},  {1e6, "M"}};
-  const Prefix* best = &prefixes[3];
-  if (value != 0.0 && std::isfinite(value)) {
-    best = &prefixes[0];
-    for (const Prefix& prefix : prefixes)
-      if (std::abs(value) >= 0.9995 * prefix.factor) best = &prefix;
+  static constexpr std::array symbols{"m", "s", "N", "A", "V", "K", "W", "J", "Hz", "Pa", "rad", "ohm"};
+  const auto first = unit.substr(0, unit.find_first_of(" /("));
+  const bool takes =
+      std::any_of(symbols.begin(), symbols.end(), [&](const char* one) { return first == one; });
+  Prefix best = prefixes[3];
+  if (!takes || value == 0.0 || !std::isfinite(value)) return best;
+  best = prefixes[0];
+  for (const Prefix& prefix : prefixes)
+    if (std::abs(value) >= 0.9995 * prefix.factor) best = prefix;
+  return best;
+}
+
+std::string with_unit(const std::string& text, const std::string& unit) {
+  return unit.empty() || unit == "1" ? text : text + " " + unit;
+}
+
+std::string fixed(double value, int decimals) {
+  std::array<char, 64> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+}  // namespace
+
+std::string si(double value, const std::string& unit, int digits) {
+  const auto prefix = prefix_of(value, unit);
+  const double shown = value / prefix.factor;
+  if (std::abs(shown) >= 10.0 && std::abs(shown) < 1e5)  // 780, not 7.8e+02
+    digits = std::max(digits, static_cast<int>(std::log10(std::abs(shown))) + 1);
+  return with_unit(number(shown, digits), prefix.name + unit);
+}
+
+std::string with_sigma(double value, double sigma, const std::string& unit) {
+  if (!(sigma > 0.0) || !std::isfinite(sigma) || !std::isfinite(value)) return si(value, unit, 4);
+  const auto prefix = prefix_of(value, unit);
+  double v = value / prefix.factor, s = sigma / prefix.factor;
+  const double size = std::max(std::abs(v), s);
+  std::string before, behind;
+  if (size >= 1e5 || size < 1e-3) {
+    const double exponent = std::floor(std::log10(size));
+    v *= std::pow(10.0, -exponent), s *= std::pow(10.0, -exponent);
+    before = "(", behind = ")e" + fixed(exponent, 0);
   }
-  return number(value / best->factor, digits) + " " + best->name + unit;
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(s))), 0, 9);
+  return with_unit(before + fixed(v, decimals) + " +- " + fixed(s, decimals) + behind, prefix.name + unit);
 }
 
 }  // namespace invar::report

@@ -25,6 +25,14 @@ class Page {
   /// A PNG or JPEG file's bytes, embedded.
   void image(const std::vector<unsigned char>& bytes, const std::string& mime,
              const std::string& caption = "");
+  /// Numbers of one kind beside one another; the longest bar is the largest value.
+  struct Bar {
+    std::string label;
+    double value = 0.0;
+    std::string text;    // the value with its unit
+    std::string colour;  // "#rrggbb"
+  };
+  void bars(const std::string& title, const std::vector<Bar>& bars);
   void preformatted(const std::string& text);
   /// HTML that the caller made and escaped.
   void html(const std::string& text);
@@ -46,7 +54,10 @@ class Page {
 
 /// "12.3" with the given number of significant digits; "-" for NaN.
 std::string number(double value, int digits = 3);
-/// A value with its unit in the handiest prefix: si(4.1e-6, "m") is "4.1 um".
+/// A value with its unit in the handiest prefix: si(4.1e-6, "m") is "4.1 um". Units that take none ("1", "kg", "1/A2",
+/// "degC") stand as they are.
 std::string si(double value, const std::string& unit, int digits = 3);
+/// A value with its standard deviation, two digits of which are shown: "19.40 +- 0.78 s".
+std::string with_sigma(double value, double sigma, const std::string& unit);
 
 }  // namespace invar::report

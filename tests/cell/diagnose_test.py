@@ -1,0 +1,147 @@
+#!/usr/bin/env python3
+"""`invar diagnose` as somebody at a terminal meets it: a tank made here loses heat by a law that its model lacks.
+
+Usage: diagnose_test.py INVAR
+"""
+import csv
+import json
+import math
+import os
+import pathlib
+import pty
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+INVAR = sys.argv.pop(1)
+
+MODEL = """invar_model: 1
+plant: equations
+columns: {time: t}
+inputs: {u: heat}
+states:
+  x: {derivative: "u - k*x", initial: {value: 1.0, unit: V, sigma: 0.5}}
+outputs: {warmth: {column: warmth, expression: "x"}}
+parameters: {k: {value: 0.3, unit: 1/s, sigma: 0.2}}
+noise: {warmth: 0.01}
+terms: []
+"""
+
+
+def tank(file, rows, seed, start=1.0, step=0.05, split=None):
+    """x' = u - 0.3 x - 0.12 x^3, by small steps; the heat jumps every now and then."""
+    draw = random.Random(seed)
+    x, heat, table = start, 1.0, []
+    for i in range(rows):
+        if i % 70 == 0:
+            heat = draw.uniform(-1.5, 2.5)
+        table.append([step * i, heat, x + draw.gauss(0.0, 0.01)])
+        for _ in range(20):
+            x += step / 20 * (heat - 0.3 * x - 0.12 * x ** 3)
+    columns = ["t [s]", "heat [V/s]", "warmth [V]"]
+    with open(file, "w", newline="") as out:
+        write = csv.writer(out)
+        write.writerow(columns)
+        for i, row in enumerate(table):
+            write.writerow(row if split is None or i == 0 else row[:2] + [""])
+    if split is not None:
+        with open(split, "w", newline="") as out:
+            write = csv.writer(out)
+            write.writerow(["t [s]", "warmth [V]"])
+            write.writerows([row[0], row[2]] for row in table)
+    return [row[2] for row in table]
+
+
+def call(folder, *words):
+    return subprocess.run([INVAR, *words], cwd=folder, capture_output=True, text=True, check=False)
+
+
+class Diagnose(unittest.TestCase):
+    def setUp(self):
+        self.kept = tempfile.TemporaryDirectory()
+        self.folder = pathlib.Path(self.kept.name)
+        (self.folder / "model.yaml").write_text(MODEL)
+        tank(self.folder / "run.csv", 1500, 1)
+
+    def tearDown(self):
+        self.kept.cleanup()
+
+    def test_another_recording_proves_it_and_anybody_can_check(self):
+        measured = tank(self.folder / "other.csv", 900, 2, start=0.4)
+        done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--check", "other.csv", "--out", "d")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for words in ("missing", "cubic", "state x", "error held out", "in other.csv", "next: ", "d/report.html"):
+            self.assertIn(words, done.stdout)
+        report = json.loads((self.folder / "d/report.json").read_text())
+        fit = report["fit"]["other_recordings"]["other.csv"]["warmth"]
+        self.assertLess(fit["after"], 0.012)
+        self.assertGreater(fit["retuned"], 3 * fit["after"])
+        page = (self.folder / "d/report.html").read_text()
+        for words in ("what is missing", "how sure", "next experiment", "Another recording, not used here: other.csv"):
+            self.assertIn(words, page)
+        for model, said in (("model.yaml", "before"), ("d/retuned.yaml", "retuned"), ("d/patched.yaml", "after")):
+            done = call(self.folder, "simulate", "--model", model, "--inputs", "other.csv", "--output", "s.csv")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            with open(self.folder / "s.csv") as text:
+                simulated = [float(row[1]) for row in list(csv.reader(text))[1:]]
+            error = math.sqrt(sum((a - b) ** 2 for a, b in zip(measured, simulated)) / len(measured))
+            self.assertAlmostEqual(error, fit[said], delta=0.01 * fit[said])
+
+    def test_a_start_that_is_a_guess_is_moved(self):
+        tank(self.folder / "other.csv", 60, 3, start=2.0, split=self.folder / "outputs.csv")
+        text = (self.folder / "other.csv").read_text().splitlines()
+        text[1] = ",".join(text[1].split(",")[:2] + ["0.7"])
+        (self.folder / "other.csv").write_text("\n".join(text) + "\n")
+        words = ["diagnose", "--model", "model.yaml", "--recording", "run.csv", "--check", "other.csv", "--check-outputs", "outputs.csv"]
+        error = []
+        for more in ([], ["--check-fits-start"]):
+            done = call(self.folder, *words, *more, "--out", "d")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            report = json.loads((self.folder / "d/report.json").read_text())
+            error.append(report["fit"]["other_recordings"]["other.csv"]["warmth"]["after"])
+        self.assertGreater(error[0], 0.1)
+        self.assertLess(error[1], 0.013)
+
+    def test_a_check_that_cannot_be_used_is_said_in_one_line_before_the_search(self):
+        tank(self.folder / "other.csv", 60, 3, split=self.folder / "outputs.csv")
+        (self.folder / "short.csv").write_text("t [s],warmth [V]\n0,1\n1,2\n")
+        (self.folder / "back.csv").write_text("t [s],heat [V/s],warmth [V]\n0,1,2\n1,1,2\n0.5,1,2\n")
+        (self.folder / "empty.csv").write_text("t [s],heat [V/s],warmth [V]\n" + "".join(f"{i},1,\n" for i in range(60)))
+        for words, said in ((["--check", "nowhere.csv"], "nowhere.csv"),
+                            (["--check", "other.csv", "--check-outputs", "short.csv"], "short.csv: has 2 rows, other.csv has 60"),
+                            (["--check", "back.csv"], "back.csv:4: time goes back"),
+                            (["--check", "empty.csv"], "empty.csv: has fewer than 8 values of each output"),
+                            (["--check-outputs", "outputs.csv"], "--check-outputs: are 1, but --check are 0")):
+            done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--out", "d", *words)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+            self.assertIn(said, done.stderr)
+            self.assertFalse((self.folder / "d").exists())
+
+    def test_ctrl_c_ends_the_search_with_what_is_known(self):
+        tank(self.folder / "long.csv", 25000, 4, step=0.02)
+        mine, its = pty.openpty()
+        process = subprocess.Popen([INVAR, "diagnose", "--model", "model.yaml", "--recording", "long.csv", "--out", "d"],
+                                   cwd=self.folder, stdout=subprocess.PIPE, stderr=its, text=True)
+        os.close(its)
+        shown, until = "", time.monotonic() + 120
+        while "screening" not in shown and time.monotonic() < until:
+            shown += os.read(mine, 4096).decode()
+        self.assertRegex(shown, r"\[#+-+\] +\d+ %")
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=120)
+        os.close(mine)
+        self.assertEqual(process.returncode, 130)
+        self.assertIn("Stopped before all was tried", said)
+        self.assertTrue(json.loads((self.folder / "d/report.json").read_text())["partial"])
+        self.assertIn("Stopped before all was tried", (self.folder / "d/report.html").read_text())
+        done = call(self.folder, "simulate", "--model", "d/patched.yaml", "--inputs", "long.csv", "--output", "s.csv")
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

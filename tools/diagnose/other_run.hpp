@@ -1,0 +1,22 @@
+// A recording that no fit has seen: what the models before, retuned and after make of it in a free run.
+#pragma once
+
+#include <filesystem>
+
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+struct OtherRunFiles {
+  std::filesystem::path inputs;   // .csv, .csv.gz or the cell's .mcap
+  std::filesystem::path outputs;  // where they lie in a file of their own: the same rows
+  bool fits_start =
+      false;  // the initial state in the first row is a guess: moved until each model is nearest
+};
+
+/// Reads it. Throws InputError for what is unusable.
+OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files);
+/// Runs the three models over it as `invar simulate` does, and compares.
+void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,60 @@
+// The few lines for the terminal.
+#include <algorithm>
+
+#include "tools/diagnose/report.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// Columns as wide as their widest cell.
+std::string aligned(const std::vector<std::vector<std::string>>& rows) {
+  std::vector<std::size_t> widths;
+  for (const auto& row : rows)
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (c >= widths.size()) widths.push_back(0);
+      widths[c] = std::max(widths[c], row[c].size());
+    }
+  std::string out;
+  for (const auto& row : rows) {
+    std::string line = " ";
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      line += " " + row[c];
+      if (c + 1 < row.size()) line += std::string(widths[c] - row[c].size() + 1, ' ');
+    }
+    out += line + "\n";
+  }
+  return out;
+}
+
+void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& title,
+             const std::vector<FitRow>& fit) {
+  rows.push_back({title, "before", "retuned", "after", "noise"});
+  for (const auto& row : fit)
+    rows.push_back({row.signal, report::si(row.before, row.unit), report::si(row.retuned, row.unit),
+                    report::si(row.after, row.unit), report::si(row.noise_floor, row.unit)});
+}
+
+}  // namespace
+
+std::string summary(const Case& data, const Diagnosis& d) {
+  std::string out = verdict_sentence(data, d) + "\n";
+  std::vector<std::vector<std::string>> rows;
+  if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
+  for (const auto& finding : d.findings)
+    rows.push_back({std::string{finding.term.info->name}, place_of(data, finding.term),
+                    report::number(100.0 * finding.probability) + " %", sizes_of(data, finding)});
+  out += aligned(rows);
+  rows.clear();
+  add_fit(rows, "error held out", d.heldout);
+  for (const auto& run : d.other_runs) add_fit(rows, "in " + run.name, run.fit);
+  out += aligned(rows);
+  std::string considered;
+  for (std::size_t i = 0; i < d.rejected.size() && i < 5; ++i)
+    considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;
+  if (!considered.empty()) out += "  not claimed: " + considered + "\n";
+  return out + "  next: " + next_experiment(data, d) + "\n";
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,223 @@
+// What the diagnosis says, in words that page and terminal share.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "tools/diagnose/report.hpp"
+#include "tools/report/page.hpp"
+
+namespace invar::diagnose {
+
+std::string site_of(const Case& data, const physics::Term& term) {
+  const std::string plant{physics::name_of(data.model.plant)};
+  if (data.model.plant == physics::Plant::equations) {
+    for (const auto& input : data.model.equations.inputs)
+      if (input.symbol == term.on) return plant + ".input";
+    for (const auto& output : data.model.equations.outputs)
+      if (output.name == term.on) return plant + ".output";
+    return plant + "." + term.on;
+  }
+  return plant + "." + std::string{term.info->site};
+}
+
+std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
+  std::vector<std::string> names;
+  for (const auto name : term.info->depends_on)
+    if (!name.empty()) names.emplace_back(name);
+  if (!term.curve.over.empty()) {
+    names.push_back(term.curve.over);
+    if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
+    if (term.curve.over.rfind("velocity", 0) == 0) names.emplace_back("velocity");
+  }
+  if (data.model.plant == physics::Plant::equations) names.push_back(term.with.empty() ? term.on : term.with);
+  return names;
+}
+
+std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
+  const std::string unit{term.info->parameters[parameter].unit};
+  if (unit != "*") return unit;
+  const auto* signal = data.model.signal(term.on);
+  return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
+}
+
+std::string separating_experiment(const std::string& one, const std::string& other) {
+  const auto is = [&](const char* a, const char* b) {
+    return (one == a && other == b) || (one == b && other == a);
+  };
+  if (is("coulomb_friction", "constant_force") || is("stribeck_friction", "constant_force") ||
+      is("presliding_friction", "constant_force"))
+    return "move in both directions: friction turns its sign with the motion, a constant force does not";
+  if (is("transport_delay", "measurement_delay"))
+    return "record the position with a second, direct instrument: a late encoder trails it, a late motor "
+           "does not";
+  if (is("transport_delay", "amplifier_lag") || is("measurement_delay", "amplifier_lag"))
+    return "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
+  if (is("stage_velocity_carry", "valve_delay"))
+    return "print at two clearly different heights: carry grows with the height, a valve delay does not";
+  if (is("force_ripple", "motor_constant_ripple"))
+    return "cross the same places at high and at low current: the ripple of the motor constant goes with the "
+           "current";
+  if (is("periodic_disturbance", "additive_disturbance"))
+    return "record with the motor switched off and the carriage free: a force shakes it still";
+  return "a recording in which " + one + " and " + other + " act at different times, places or speeds";
+}
+
+std::string readable(std::string_view name) {
+  std::string text{name};
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
+}
+
+std::string place_of(const Case& data, const physics::Term& term) {
+  struct Words {
+    const char* site;
+    const char* words;
+  };
+  static constexpr std::array known{Words{"axis.force", "force on the carriage"},
+                                    Words{"axis.actuator", "amplifier and motor"},
+                                    Words{"axis.measurement", "position measurement"},
+                                    Words{"axis.structure", "structure of the machine"},
+                                    Words{"axis.disturbance", "disturbance from outside"},
+                                    Words{"thermal.loss", "heat loss"},
+                                    Words{"thermal.storage", "heat storage"},
+                                    Words{"thermal.measurement", "temperature sensor"},
+                                    Words{"thermal.exchange", "heat exchange"},
+                                    Words{"thermal.source", "heat source"},
+                                    Words{"error_map.kinematic", "guideway and scale"},
+                                    Words{"error_map.thermal", "thermal growth"},
+                                    Words{"error_map.measurement", "the instrument that measured the error"},
+                                    Words{"droplet.flight", "flight of the droplet"},
+                                    Words{"droplet.valve", "valve"},
+                                    Words{"droplet.camera", "camera"},
+                                    Words{"sensor.measurement", "the instrument"}};
+  const auto site = site_of(data, term);
+  if (data.model.plant == physics::Plant::equations) {
+    for (const auto& input : data.model.equations.inputs)
+      if (input.symbol == term.on) return "input " + term.on;
+    for (const auto& output : data.model.equations.outputs)
+      if (output.name == term.on) return "output " + term.on;
+    return "state " + term.on + (term.with.empty() || term.with == term.on ? "" : ", with " + term.with);
+  }
+  std::string text = site;
+  for (const auto& one : known)
+    if (site == one.site) text = one.words;
+  if (!term.on.empty()) text += " of " + term.on;
+  if (!term.with.empty()) text += " and " + term.with;
+  return text;
+}
+
+std::string sizes_of(const Case& data, const Finding& finding) {
+  const auto& info = *finding.term.info;
+  std::string text;
+  for (std::size_t i = 0; i < info.parameter_count(); ++i)
+    text += (i == 0 ? "" : ", ") + readable(info.parameters[i].name) + " " +
+            report::with_sigma(finding.term.values[i], finding.sigmas[i], unit_of(data, finding.term, i));
+  if (!finding.term.curve.knots.empty()) {
+    double top = 0.0;
+    for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
+    text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over + ", up to " +
+            report::number(top);
+  }
+  return text;
+}
+
+std::string next_experiment(const Case& data, const Diagnosis& d) {
+  for (const auto& finding : d.findings)
+    for (const auto& a : finding.alternatives)
+      if (a.log_odds > -ambiguous_margin && a.term.info != finding.term.info)
+        return "To tell " + readable(finding.term.info->name) + " from " + readable(a.term.info->name) +
+               ": " +
+               separating_experiment(std::string{finding.term.info->name}, std::string{a.term.info->name}) +
+               ".";
+  const auto over = [&]() -> std::string {
+    if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
+      return d.findings.back().term.curve.over;
+    return d.unexplained_over.empty() ? "" : d.unexplained_over.front();
+  }();
+  switch (d.verdict) {
+    case Verdict::unknown_physics:
+    case Verdict::partly_explained:
+      return "Record again with " + (over.empty() ? "one input" : over) +
+             " varied on its own and all else held: what has no name yet goes with it, or with something "
+             "that "
+             "moved beside it.";
+    case Verdict::no_mismatch:
+      return "None is needed. An effect smaller than those listed as detectable would take a longer or a "
+             "livelier recording.";
+    case Verdict::parameters_only:
+      return "Measure the parameter that moved on its own, or take over patched.yaml.";
+    default:
+      return (d.other_runs.empty()
+                  ? std::string{"Simulate patched.yaml on a recording that was not used here (--check)"}
+                  : std::string{"None is needed: see what patched.yaml makes of the other recording"}) +
+             (data.model.plant == physics::Plant::axis
+                  ? "; then give it to the running stage (invar job apply)."
+                  : ".");
+  }
+}
+
+namespace {
+
+/// Those that left what the user believed.
+std::string moved_parameters(const Diagnosis& d) {
+  std::string text;
+  for (const auto& f : d.best.free) {
+    if (f.where == Freedom::Where::curve || !(f.sigma > 0.0)) continue;
+    const double to = get(d.best.model, f), sigmas = std::abs(to - f.center) / f.sigma;
+    if (!(sigmas > 3.0)) continue;
+    const bool own = f.where == Freedom::Where::parameter;
+    std::string name, unit;
+    if (own) {
+      name = d.best.model.parameters[f.index].name;
+      unit = d.best.model.parameters[f.index].unit;
+    } else {
+      const auto& info = *d.best.model.terms[f.term].info;
+      name = readable(info.name) + " " + std::string{info.parameters[f.index].name};
+      unit = info.parameters[f.index].unit;
+    }
+    text += (text.empty() ? "" : ", ") + name + " is " + report::si(to, unit, 4) + ", not " +
+            report::si(f.center, unit, 4) + " (" + report::number(sigmas, 2) + " sigma of what was believed)";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string verdict_sentence(const Case& data, const Diagnosis& d) {
+  if (d.is_partial) {
+    auto whole = d;
+    whole.is_partial = false;
+    return "Stopped before all was tried; so far: " + verdict_sentence(data, whole);
+  }
+  std::string names;
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    const auto& finding = d.findings[i];
+    names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) +
+             readable(finding.term.info->name) + " (" + place_of(data, finding.term) + ")";
+  }
+  switch (d.verdict) {
+    case Verdict::no_mismatch:
+      return "No mismatch: the model explains the recording to the noise.";
+    case Verdict::parameters_only:
+      return "Only parameters are off, no physics is missing: " + moved_parameters(d) + ".";
+    case Verdict::explained:
+      return "Explained: the model leaves out " + names + ".";
+    case Verdict::partly_explained:
+      return "Partly explained: the model leaves out " + names + ", and something more.";
+    case Verdict::ambiguous: {
+      std::string also;
+      for (const auto& f : d.findings)
+        for (const auto& a : f.alternatives)
+          if (a.log_odds > -ambiguous_margin)
+            also += (also.empty() ? "" : ", ") + readable(a.term.info->name) + " (" + place_of(data, a.term) +
+                    ")";
+      return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
+    }
+    case Verdict::unknown_physics:
+      return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
+             " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
+  }
+  return "";
+}
+
+}  // namespace invar::diagnose
