@@ -1,16 +1,8 @@
 #include "core/component/parameters.hpp"
 
-#include <sstream>
+#include "core/base/shown.hpp"
 
 namespace invar {
-
-namespace {
-std::string shown(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
-}  // namespace
 
 void ParameterReader::operator()(std::filesystem::path& value, std::string_view name, std::string_view) {
   if (!node_.has(name)) return;

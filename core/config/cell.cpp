@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cctype>
 #include <set>
-#include <sstream>
+
+#include "core/base/shown.hpp"
 
 namespace invar::config {
 
@@ -17,12 +18,6 @@ void check_name(const Node& node, const std::string& name) {
                     std::all_of(name.begin(), name.end(),
                                 [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; });
   if (!good) node.fault("`" + name + "` is no name", "use 1 to 31 letters, digits, _ or -");
-}
-
-std::string milliseconds(Duration time) {
-  std::ostringstream text;
-  text << time.in_seconds() * 1e3 << " ms";
-  return text.str();
 }
 
 CellHost read_host(const Node& node) {

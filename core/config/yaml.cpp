@@ -9,6 +9,7 @@
 #include <set>
 #include <sstream>
 
+#include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 
 namespace invar::config {
@@ -86,12 +87,6 @@ void collect_keys(const Document& document, const Place& place, std::vector<Faul
 
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
   throw InputError{file.string(), what, mend};
-}
-
-std::string shown(double number) {
-  std::ostringstream text;
-  text << number;
-  return text.str();
 }
 
 std::string range_text(Range range, std::string_view unit) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/base/clock.hpp"
+#include "core/base/shown.hpp"
 #include "core/dds/simulated_clock.hpp"
 
 namespace invar::dds {
@@ -50,23 +51,16 @@ std::optional<Transition> from_wire(lifecycle::Transition transition) {
   return std::nullopt;
 }
 
-std::string shown(double value) {
-  std::ostringstream text;
-  text.precision(12);
-  text << value;
-  return text.str();
-}
-
 lifecycle::Parameter on_wire(const std::string& component, const ParameterStatus& status) {
   lifecycle::Parameter out;
   out.component_name(component);
   out.path(status.info.path);
   out.kind(status.info.type);
   out.unit_text(status.info.unit);
-  out.value(status.value ? shown(*status.value) : status.info.otherwise);
+  out.value(status.value ? shown(*status.value, 12) : status.info.otherwise);
   const Range& range = status.info.range;
   if (std::isfinite(range.lower) || std::isfinite(range.upper))
-    out.bounds("[" + shown(range.lower) + ", " + shown(range.upper) + "]");
+    out.bounds("[" + shown(range.lower, 12) + ", " + shown(range.upper, 12) + "]");
   out.description(status.info.description);
   out.changeable(status.info.changeable);
   return out;
@@ -76,13 +70,6 @@ std::uint32_t own_endpoints(const Node& node) {
   const Snapshot snapshot = node.snapshot();
   return static_cast<std::uint32_t>(std::count_if(snapshot.endpoints.begin(), snapshot.endpoints.end(),
                                                   [](const Endpoint& end) { return end.is_local; }));
-}
-
-std::string milliseconds(Duration time) {
-  std::ostringstream text;
-  text.precision(3);
-  text << time.in_seconds() * 1e3 << " ms";
-  return text.str();
 }
 
 std::string joined(const std::vector<std::string>& lines) {
@@ -209,13 +196,13 @@ void ProcessService::publish_late(const ProcessStatus& status) {
   };
   if (status.latency_limit)
     say(node_.options().process, "", status.counters.late,
-        " cycles ended later than the declared latency of " + milliseconds(*status.latency_limit) +
-            " allows; the latest so far after " + milliseconds(status.latency.max));
+        " cycles ended later than the declared latency of " + milliseconds(*status.latency_limit, 3) +
+            " allows; the latest so far after " + milliseconds(status.latency.max, 3));
   for (const ComponentStatus& component : status.components)
     for (const InputAge& input : component.ages)
       say(component.name, component.name + "." + input.port, input.late,
           " steps read a sample of `" + input.port + "` older than the declared latency of " +
-              milliseconds(input.limit) + "; the oldest so far was of " + milliseconds(input.age.max));
+              milliseconds(input.limit, 3) + "; the oldest so far was of " + milliseconds(input.age.max, 3));
 }
 
 void ProcessService::publish_status() {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <vector>
 
+#include "core/base/shown.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/cell_client.hpp"
 #include "core/dds/wire_type.hpp"
@@ -148,12 +148,6 @@ void check_owners(const LoadedCell& loaded) {
               "`" + target + "` is commanded by `" + known->second + "` already",
               "let one component command it, or give this output another profile by `qos`");
       }
-}
-
-std::string milliseconds(Duration time) {
-  std::ostringstream text;
-  text << time.in_seconds() * 1e3 << " ms";
-  return text.str();
 }
 
 /// How long it takes until the next sample of an output comes to another process.
