@@ -20,7 +20,7 @@ cat wrong
 
 checkout/tools/run >summary 2>&1 || { cat summary; exit 1; }
 cat summary
-for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'error after +rms [0-9.]+ nm' 'heater +[0-9.]+ degC' \
+for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'error after +rms [0-9.]+ nm' 'heater +[0-9.]+ degC' '^6 lines, 288 readings' \
   '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force_ripple ' '^  coulomb_friction ' '^\.\.\. patched +rms .* times less'; do
   grep -Eq "$words" summary || { echo "the summary lacks: $words"; exit 1; }
 done

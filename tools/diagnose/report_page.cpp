@@ -179,6 +179,8 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
     Plot plot;
     const auto* signal = data.model.signal(variable);
     plot.title = data.outputs[shown] + " over " + label;
+    if (!plots.empty() && plots.back().title == plot.title)
+      return;  // direction and speed are both seen over velocity
     plot.x_label = label + (signal != nullptr        ? in_brackets(signal->unit)
                             : variable == "time"     ? " [s]"
                             : variable == "velocity" ? " [m/s]"
