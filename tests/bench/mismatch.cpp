@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
 namespace invar::test::mismatch {
@@ -17,7 +18,8 @@ struct Row {
   double win = 0.0;
   Marks marks;
   std::string verdict, findings, rejected;
-  std::vector<std::pair<double, double>> claims;  // probability, credit
+  std::vector<diagnose::Finding> claims;
+  double still_follows = 0.0;
 };
 
 Row run(const std::string& plant, const std::string& effect, double size, unsigned seed,
@@ -40,11 +42,11 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
   row.marks = mark(row.machine, data, d, row.win);
   row.marks.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   row.verdict = diagnose::name_of(d.verdict);
+  row.still_follows = d.still_follows;
   for (const auto& r : d.rejected)
     row.rejected += "    " + r.term + " " + std::to_string(r.gain) + ": " + r.why + "\n";
   for (const auto& finding : d.findings) {
-    if (finding.term.curve.knots.empty())
-      row.claims.emplace_back(finding.probability, credit(row.machine, std::string{finding.term.info->name}));
+    row.claims.push_back(finding);
     char text[200];
     std::snprintf(text, sizeof text, "%s%s%s %.2f", row.findings.empty() ? "" : ", ",
                   std::string{finding.term.info->name}.c_str(),
@@ -133,15 +135,13 @@ int main(int argc, char** argv) {
   std::filesystem::path folder;
   program.add_option("--write", folder,
                      "no diagnosis: model.yaml and recording-1.csv of each machine into this folder");
+  std::string claims_file;
+  program.add_option("--claims", claims_file, "add one line a claim to this file");
   CLI11_PARSE(program, argc, argv);
   std::map<std::string, Sum> sums;
   std::map<std::string, std::pair<int, int>> nulls;  // by plant: how many, with a claim
-  struct Bin {
-    int count = 0;
-    double said = 0.0, held = 0.0;
-  };
-  std::array<Bin, 10> reliability;
-  double brier = 0.0;
+  Claims claims;
+  if (!claims_file.empty()) claims.write_to(claims_file);
   std::vector<double> seconds;
   constexpr std::array colours{"", " memory", " wander", " resonance", " heavy"};
   const auto one = [&](const std::string& plant, const std::string& effect, unsigned number, double least) {
@@ -173,11 +173,9 @@ int main(int argc, char** argv) {
     sums["all"].add(row);
     if (row.machine.missing.empty())
       ++nulls[plant].first, nulls[plant].second += row.marks.false_claims > 0 ? 1 : 0;
-    for (const auto& [probability, credit] : row.claims) {
-      auto& bin = reliability[static_cast<std::size_t>(std::min(9.0, 10.0 * probability))];
-      ++bin.count, bin.said += probability, bin.held += credit > 0.9 ? 1.0 : 0.0;
-      brier += std::pow(probability - (credit > 0.9 ? 1.0 : 0.0), 2);
-    }
+    for (const auto& finding : row.claims)
+      claims.add(finding, row.still_follows, credit(row.machine, std::string{finding.term.info->name}),
+                 plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""));
     seconds.push_back(row.marks.seconds);
   };
   for (const auto& plant : of) {
@@ -203,17 +201,7 @@ int main(int argc, char** argv) {
   for (const auto& [plant, count] : nulls)
     std::printf("%s: %d nulls, %d with a claim; the rate is below %.3f (95 %%)\n", plant.c_str(), count.first,
                 count.second, upper_bound(count.second, count.first));
-  int claims = 0;
-  double off = 0.0;  // expected calibration error, times the claims
-  for (const auto& bin : reliability) {
-    claims += bin.count;
-    off += std::abs(bin.said - bin.held);
-    if (bin.count > 0)
-      std::printf("said %.3f held %.3f of %d\n", bin.said / bin.count, bin.held / bin.count, bin.count);
-  }
-  if (claims > 0)
-    std::printf("Brier %.4f, expected calibration error %.4f over %d claims\n", brier / claims, off / claims,
-                claims);
+  claims.print();
   if (seconds.empty()) return 0;
   std::nth_element(seconds.begin(), seconds.begin() + static_cast<std::ptrdiff_t>(seconds.size() / 2),
                    seconds.end());

@@ -63,6 +63,26 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   return rows >= 5;
 }
 
+/// Was what repeats seen to repeat? Less than two waves are any bent course.
+bool repeats(const Case& data, const Term& term) {
+  const auto pitch = term.info->index_of("pitch"), frequency = term.info->index_of("frequency");
+  if (term.info->index_of("phase") == physics::most_parameters) return true;
+  const bool in_place = pitch < physics::most_parameters;
+  if (!in_place && frequency == physics::most_parameters) return true;
+  std::vector<double> all;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto* name = !in_place                                    ? "time"
+                       : data.model.plant == physics::Plant::sensor ? "true_position"
+                                                                    : "position";
+    const auto values = variable_values(data, r, name);
+    all.insert(all.end(), values.begin(), values.end());
+  }
+  if (all.empty()) return true;
+  std::sort(all.begin(), all.end());
+  const double span = all[all.size() - 1 - all.size() / 200] - all[all.size() / 200];
+  return span * (in_place ? 1.0 / term.values[pitch] : term.values[frequency]) >= 2.0;
+}
+
 /// Is what a sine in time explains a line, with one phase from beginning to end? A hum of the noise has a band, however
 /// much evidence a sine in it gathers. Against the scatter of its amplitude from block to block (Fisher's F).
 bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
@@ -137,7 +157,7 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       (brings_energy(fit.model, fit.model.terms[term]) || !is_affordable(data, fit) ||
        !acts(data, fit.model, fit.model.terms[term])))
     return false;
-  if (!is_line(data, fit.model, term)) return false;
+  if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term)) return false;
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
 

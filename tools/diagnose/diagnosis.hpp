@@ -16,6 +16,7 @@ struct Alternative {
 struct Finding {
   physics::Term term;
   std::vector<double> sigmas;  // of the term's parameters
+  double gain = 0.0;           // log likelihood that is lost without it
   double probability = 1.0;
   double share = 0.0;  // of the mismatch that goes with it
   std::vector<Alternative> alternatives;
@@ -61,9 +62,10 @@ struct Diagnosis {
   std::vector<OtherRun> other_runs;
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
-  bool is_unnamed = false;  // the finding is a curve alone
-  bool is_partial = false;  // stopped before all was tried
-  bool has_rest = false;    // the last finding is a curve beside named ones
+  double still_follows = 0.0;  // share of the mismatch that is left and follows what was recorded
+  bool is_unnamed = false;     // the finding is a curve alone
+  bool is_partial = false;     // stopped before all was tried
+  bool has_rest = false;       // the last finding is a curve beside named ones
 
   /// Remembers the best showing of a term that is not claimed.
   void reject(const std::string& term, const std::string& why, double gain);

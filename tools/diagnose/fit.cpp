@@ -117,7 +117,7 @@ std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
   return all;
 }
 
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured, bool far) {
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
   Weighing weighing;
   weighing.present.resize(data.recordings.size());
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
@@ -137,9 +137,9 @@ Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated,
       weighing.rows += static_cast<Eigen::Index>(measured.size());
     }
     const std::size_t most = coloured && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
-    auto filter = fit_whitening(series, most, far);
+    auto filter = fit_whitening(series, most);
     // Hardly any values: nothing but the user's word says how good they are.
-    if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o], {}, {}};
+    if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o]};
     weighing.filters.push_back(filter);
   }
   // In a loop the command repeats the noise of the reading.

@@ -41,10 +41,7 @@ struct Weighing {
 
 /// Rows that are measured; filters as fitted to the residuals of these simulations. Without `coloured` every row counts
 /// alike: right for looking for physics in a residual that is not noise yet.
-/// With `far` the filters also know noise that wanders slowly: they judge a claim; a fit under them would take slow physics
-/// for noise.
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured = true,
-               bool far = false);
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured = true);
 
 std::vector<physics::Outputs> simulate(const Case& data, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);

@@ -17,14 +17,6 @@ bool are_kin(const physics::Term& one, const physics::Term& other) {
          });
 }
 
-/// May this curve stand for another course of the term's own effect?
-bool is_course_of(const physics::Term& curve, const physics::Term& term) {
-  const auto& info = *term.info;
-  const auto site = info.site == "disturbance" ? std::string_view{"force"} : info.site;
-  if (curve.info->site != site || (!curve.on.empty() && curve.on != term.on)) return false;
-  return std::find(info.depends_on.begin(), info.depends_on.end(), curve.curve.over) != info.depends_on.end();
-}
-
 /// The same with fewer knots: a course that bends a little costs little.
 Start coarser(Start start, std::size_t knots) {
   auto& curve = start.term.curve;
@@ -40,6 +32,13 @@ Start coarser(Start start, std::size_t knots) {
 }
 
 }  // namespace
+
+bool is_course_of(const physics::Term& curve, const physics::Term& term) {
+  const auto& info = *term.info;
+  const auto site = info.site == "disturbance" ? std::string_view{"force"} : info.site;
+  if (curve.info->site != site || (!curve.on.empty() && curve.on != term.on)) return false;
+  return std::find(info.depends_on.begin(), info.depends_on.end(), curve.curve.over) != info.depends_on.end();
+}
 
 std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,
                                     const Fit& further) {

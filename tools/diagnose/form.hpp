@@ -7,6 +7,9 @@
 
 namespace invar::diagnose {
 
+/// May this curve stand for another course of the term's own effect?
+bool is_course_of(const physics::Term& curve, const physics::Term& term);
+
 /// The best fit of `base` with one of its found terms free to take any course over its own variable, where that has more
 /// evidence than `further` (which has one term more than `base`); the number of that term. Both under one weighing.
 struct OtherForm {

@@ -214,6 +214,10 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
     }
     case Verdict::unknown_physics:
+      if (d.findings.empty())
+        return "Unknown physics: what the model leaves over follows what was recorded and its past, and "
+               "neither a known "
+               "term nor a curve describes it.";
       return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
              " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
   }

@@ -8,6 +8,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/unnamed.hpp"
@@ -38,6 +39,8 @@ class Search {
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
+  /// Takes back names in whose place a free course over another variable does clearly better.
+  void doubt();
   [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
   [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
@@ -253,6 +256,24 @@ void Search::weigh_alternatives() {
     }
 }
 
+void Search::doubt() {
+  progress_(0.75, "trying other causes in place of names");
+  for (std::size_t i = d_.findings.size(); i-- > 0;) {
+    const auto other = other_cause(data_, d_.best, given() + i);
+    if (!other) continue;
+    d_.reject(
+        std::string{d_.best.model.terms[given() + i].info->name},
+        "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
+        other->lead);
+    auto model = d_.best.model;
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given() + i));
+    d_.findings.erase(d_.findings.begin() + static_cast<std::ptrdiff_t>(i));
+    d_.weighing = weigh(data_, simulate(data_, other->fit.model));
+    d_.best = fit(data_, d_.weighing, model, data_.model, 8);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  }
+}
+
 bool Search::add_pair() {
   if (data_.model.plant != physics::Plant::equations) return false;
   progress_(0.05, "screening pairs");
@@ -273,6 +294,7 @@ Diagnosis Search::run() {
   if (!stopped() && options_.refuses) prune();
   weigh_alternatives();
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
+  if (!stopped() && options_.refuses) doubt();
   progress_(0.78, "looking for physics without a name");
   if (!stopped()) add_unnamed(data_, d_);
   d_.is_partial = stopped();

@@ -1,6 +1,5 @@
 #include "tools/diagnose/statistics.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -31,43 +30,7 @@ double spread_of_differences(const std::vector<double>& values) {
   return robust_sigma(second);
 }
 
-namespace {
-
-/// Means over older rows beside the `most` latest ones, where Akaike's number asks for them.
-void look_far(const std::vector<double>& covariance, std::size_t most, double count, double akaike,
-              Whitening& result) {
-  const std::vector<Whitening::Past> windows{{most + 1, 4 * most}, {4 * most + 1, 16 * most}};
-  std::vector<Whitening::Past> all;
-  for (std::size_t lag = 1; lag <= most; ++lag) all.push_back({lag, lag});
-  all.insert(all.end(), windows.begin(), windows.end());
-  const auto n = static_cast<Eigen::Index>(all.size());
-  const auto between = [&](const Whitening::Past& x, const Whitening::Past& y) {
-    double sum = 0.0;
-    for (std::size_t i = x.from; i <= x.to; ++i)
-      for (std::size_t k = y.from; k <= y.to; ++k) sum += covariance[i > k ? i - k : k - i];
-    return sum / static_cast<double>((x.to - x.from + 1) * (y.to - y.from + 1));
-  };
-  Eigen::MatrixXd m(n, n);
-  Eigen::VectorXd v(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto& x = all[static_cast<std::size_t>(i)];
-    v(i) = between(x, {0, 0});
-    for (Eigen::Index k = 0; k <= i; ++k) m(i, k) = m(k, i) = between(x, all[static_cast<std::size_t>(k)]);
-  }
-  const Eigen::VectorXd weights = m.ldlt().solve(v);
-  const double error = covariance[0] - weights.dot(v);
-  if (!weights.allFinite() || !(error > 0.0) ||
-      count * std::log(error) + 2.0 * static_cast<double>(n) > akaike - 6.0)
-    return;
-  result.a.assign(weights.data(), weights.data() + most);
-  result.b.assign(weights.data() + most, weights.data() + n);
-  result.windows = windows;
-  result.sigma = std::sqrt(error);
-}
-
-}  // namespace
-
-Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::size_t most, bool far) {
+Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::size_t most) {
   Whitening result;
   std::vector<double> all;
   for (const auto& one : series)
@@ -81,10 +44,8 @@ Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::siz
   if (!(clip > 0.0)) return result;
   const auto kept = [clip](double v) { return std::clamp(v, -clip, clip); };
 
-  const bool looks_far = far && most >= 8 && all.size() >= 1500;
-  const std::size_t farthest = looks_far ? 16 * most : most;
-  std::vector<double> covariance(farthest + 1, 0.0);
-  for (std::size_t lag = 0; lag <= farthest; ++lag) {
+  std::vector<double> covariance(most + 1, 0.0);
+  for (std::size_t lag = 0; lag <= most; ++lag) {
     double sum = 0.0;
     std::size_t n = 0;
     for (const auto& one : series)
@@ -116,7 +77,6 @@ Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::siz
       result.sigma = std::sqrt(error);
     }
   }
-  if (looks_far) look_far(covariance, most, count, best, result);
   return result;
 }
 
@@ -124,20 +84,41 @@ void whiten(const Whitening& filter, const std::vector<double>& r, const std::ve
             double* out) {
   const std::size_t order = filter.a.size();
   std::vector<double> filled(r.size());
-  std::vector<double> sums(filter.windows.empty() ? 0 : r.size() + 1, 0.0);  // of all rows before
   for (std::size_t i = 0; i < r.size(); ++i) {
     double predicted = 0.0;
     for (std::size_t j = 0; j < order && j < i; ++j) predicted += filter.a[j] * filled[i - 1 - j];
-    for (std::size_t w = 0; w < filter.windows.size(); ++w) {
-      const auto& past = filter.windows[w];
-      if (i < past.from) continue;
-      const double sum = sums[i - past.from + 1] - sums[i > past.to ? i - past.to : 0];
-      predicted += filter.b[w] * sum / static_cast<double>(past.to - past.from + 1);
-    }
     filled[i] = present[i] ? r[i] : predicted;
-    if (!sums.empty()) sums[i + 1] = sums[i] + filled[i];
     out[i] = present[i] ? (r[i] - predicted) / filter.sigma : 0.0;
   }
+}
+
+double independent_share(const std::vector<std::vector<double>>& series) {
+  double mean = 0.0, count = 0.0;
+  std::size_t longest = 0;
+  for (const auto& one : series) {
+    longest = std::max(longest, one.size());
+    for (double v : one)
+      if (std::isfinite(v)) mean += v, count += 1.0;
+  }
+  if (count < 8.0) return 1.0;
+  mean /= count;
+  const auto covariance = [&](std::size_t lag) {
+    double sum = 0.0, n = 0.0;
+    for (const auto& one : series)
+      for (std::size_t i = lag; i < one.size(); ++i)
+        if (std::isfinite(one[i]) && std::isfinite(one[i - lag]))
+          sum += (one[i] - mean) * (one[i - lag] - mean), n += 1.0;
+    return n > 0.0 ? sum / n : 0.0;
+  };
+  const double variance = covariance(0);
+  if (!(variance > 0.0)) return 1.0;
+  double sum = 0.0;
+  for (std::size_t lag = 1; lag + 1 < longest / 4; lag += 2) {
+    const double pair = (covariance(lag) + covariance(lag + 1)) / variance;
+    if (pair <= 0.0) break;
+    sum += pair;
+  }
+  return 1.0 / (1.0 + 2.0 * sum);
 }
 
 double normal_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
@@ -73,13 +74,9 @@ void add_unnamed(const Case& data, Diagnosis& d) {
       if (least_ratio(data, rough, curved) < 0.97)
         curved = fit(data, own, rough.model, data.model, 0, &rough);
       const auto without = fit(data, own, base.model, data.model, 4, &base);
-      double gain = curved.evidence - without.evidence;
-      // Noise that wanders has a course over time too: the curve must beat that.
-      const Weighing far = weigh(data, simulate(data, curved.model), true, true);
-      if (std::any_of(far.filters.begin(), far.filters.end(),
-                      [](const auto& f) { return !f.windows.empty(); }))
-        gain = std::min(gain, fit(data, far, curved.model, data.model, 0, &curved).evidence -
-                                  fit(data, far, without.model, data.model, 4, &without).evidence);
+      const double gain = curved.evidence - without.evidence;
+      // Noise that wanders has a course over time too: counted in independent rows the curve must still pay.
+      if (s.start.term.curve.over == "time" && lead(data, rough, under_plain) < 2.0 * claim_margin) continue;
       // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
       if (gain > claim_margin && rough.evidence > best.plain)
         best = {std::move(curved), own, gain, rough.evidence};

@@ -4,6 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "tools/diagnose/left_over.hpp"
+#include "tools/diagnose/other_cause.hpp"
+#include "tools/diagnose/probability.hpp"
+
 namespace invar::diagnose {
 
 void hold_out(const Case& data, Diagnosis& d, bool refuses) {
@@ -88,7 +92,32 @@ void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d) {
   for (const auto& [name, entry] : smallest) d.detectable.push_back(entry);
 }
 
+namespace {
+
+/// How much of the mismatch still follows what was recorded, beside what the best model explains of it: 0 to 1.
+double share_left(const Case& data, const Diagnosis& d, const std::vector<double>& followed) {
+  const auto best = simulate(data, d.best.model), retuned = simulate(data, d.retuned.model);
+  double left = 0.0, won = 0.0;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    double after = 0.0, before = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r)
+      for (std::size_t i = 0; i < best[r][o].size(); ++i)
+        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
+          after += std::pow(y - best[r][o][i], 2), before += std::pow(y - retuned[r][o][i], 2);
+    if (!(after > 0.0)) continue;
+    left += followed[o];
+    won += std::max(0.0, before / after - 1.0);
+  }
+  return left > 0.0 ? left / (left + won) : 0.0;
+}
+
+}  // namespace
+
 void conclude(const Case& data, Diagnosis& d) {
+  const auto followed = followed_share(data, d.best.model);
+  const double most_followed = *std::max_element(followed.begin(), followed.end());
+  d.still_follows = share_left(data, d, followed);
+  if (most_followed > 0.5) d.unexplained_over = {"history"};
   const std::size_t given = data.model.terms.size();
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
@@ -108,6 +137,9 @@ void conclude(const Case& data, Diagnosis& d) {
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
     double sum = 1.0;
     for (const auto& a : finding.alternatives) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    const auto rival = fit(data, d.weighing, without, data.model, 5);
+    finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
+    if (finding.term.curve.knots.empty()) sum += odds_of_another_cause(finding.gain, d.still_follows);
     finding.probability = std::min(0.995, 1.0 / sum);
   }
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
@@ -122,13 +154,16 @@ void conclude(const Case& data, Diagnosis& d) {
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives) ambiguous = ambiguous || a.log_odds > -ambiguous_margin;
   if (d.findings.empty())
-    d.verdict = d.parameter_excursion > 3.0 ? Verdict::parameters_only : Verdict::no_mismatch;
+    // What follows the recording is no noise, even where no curve and no name describes it.
+    d.verdict = most_followed > 0.5           ? Verdict::unknown_physics
+                : d.parameter_excursion > 3.0 ? Verdict::parameters_only
+                                              : Verdict::no_mismatch;
   else if (d.is_unnamed)
     d.verdict = Verdict::unknown_physics;
   else if (ambiguous)
     d.verdict = Verdict::ambiguous;
   else
-    d.verdict = d.has_rest ? Verdict::partly_explained : Verdict::explained;
+    d.verdict = d.has_rest || d.still_follows > 0.05 ? Verdict::partly_explained : Verdict::explained;
   double sum = 0.0;
   for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
   d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));

@@ -1,6 +1,7 @@
 // No trick: names, cuts and sampling do not change what a diagnosis says; without the right term it does not make one up.
 #include <gmock/gmock.h>
 
+#include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
 #include "tools/diagnose/shorten.hpp"
 
@@ -87,6 +88,36 @@ TEST(NoTrick, WithoutTheRightTermNoOtherIsClaimedWithConfidence) {
           << k.plant << ' ' << k.effect << ": " << name;
     }
   }
+}
+
+// What comes nearest among the other names explains most of these; a free course, or what is left over, tells.
+TEST(NoTrick, ANearNameIsNotClaimedWithConfidence) {
+  constexpr Known near[] = {{"error_map", "sag", 6},
+                            {"error_map", "thermal_expansion", 7},
+                            {"error_map", "refractive_index", 9},
+                            {"droplet", "stage_velocity_carry", 3},
+                            {"droplet", "valve_delay", 7},
+                            {"thermal", "radiation", 3},
+                            {"thermal", "node_coupling", 7}};
+  for (const auto& k : near) {
+    const auto machine = make(k.plant, k.effect, 1.0, k.seed);
+    ASSERT_THAT(names(diagnosed(machine)), ::testing::Contains(k.effect)) << k.plant;
+    diagnose::Options options;
+    options.without = {k.effect};
+    for (const auto& finding : diagnosed(machine, options).findings) {
+      const std::string name{finding.term.info->name};
+      EXPECT_TRUE(name == "unmodelled" || credit(machine, name) > 0.0 || finding.probability < confident)
+          << k.plant << ' ' << k.effect << ": " << name << ' ' << finding.probability;
+    }
+  }
+}
+
+TEST(NoTrick, WhatFollowsTheInputsIsNotCalledNoise) {
+  diagnose::Options options;
+  options.without = {"sensor_lag"};
+  for (const unsigned seed : {1006U, 2006U})
+    EXPECT_EQ(names(diagnosed(make("thermal", "sensor_lag", 1.0, seed), options)).front(), "unknown_physics")
+        << seed;
 }
 
 physics::Record long_record(std::size_t rows, double step) {

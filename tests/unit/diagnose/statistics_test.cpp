@@ -43,31 +43,18 @@ TEST(Whitening, MakesColouredNoiseWhite) {
   EXPECT_NEAR(lagged / square, 0.0, 0.03);
 }
 
-TEST(Whitening, KnowsWhatWandersSlowlyUnderWhiteNoise) {
-  auto noise = coloured(0.0, 15, 6000);
-  const auto slow = coloured(0.995, 16, 6000);  // ten times as large as its steps
-  for (std::size_t i = 0; i < noise.size(); ++i) noise[i] += 0.04 * slow[i];
-  const auto filter = fit_whitening({noise}, 16, true);
-  std::vector<double> white(noise.size());
-  whiten(filter, noise, std::vector<bool>(noise.size(), true), white.data());
-  // Means over 200 rows are as small as those of white noise; without the filter they are five times that.
-  const auto spread = [](const std::vector<double>& values) {
-    double square = 0.0, n = 0.0;
-    for (std::size_t i = 400; i + 200 <= values.size(); i += 200, n += 1.0) {
-      double sum = 0.0;
-      for (std::size_t k = i; k < i + 200; ++k) sum += values[k];
-      square += sum * sum / 200.0;
-    }
-    return std::sqrt(square / n);
-  };
-  EXPECT_GT(spread(noise), 3.0);
-  EXPECT_LT(spread(white), 1.5);
-}
-
 TEST(RobustSigma, IsNotMovedByOutliers) {
   auto noise = coloured(0.0, 14, 5000);
   for (std::size_t i = 0; i < noise.size(); i += 50) noise[i] = 1000.0;
   EXPECT_NEAR(robust_sigma(noise), 1.0, 0.06);
+}
+
+TEST(IndependentShare, IsThatOfAFirstOrderMemory) {
+  for (const double pole : {0.0, 0.6, 0.9}) {
+    const double truth = (1.0 - pole) / (1.0 + pole);
+    EXPECT_NEAR(independent_share({coloured(pole, 3, 20000), coloured(pole, 4, 20000)}), truth, 0.2 * truth)
+        << pole;
+  }
 }
 
 }  // namespace

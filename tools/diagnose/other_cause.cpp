@@ -1,0 +1,95 @@
+#include "tools/diagnose/other_cause.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/diagnose/form.hpp"
+#include "tools/diagnose/screen.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// Sum of squares of measured - simulated by output.
+std::vector<double> squares_of(const Case& data, const Fit& fit) {
+  const auto simulated = simulate(data, fit.model);
+  std::vector<double> sums(data.outputs.size(), 0.0);
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    for (std::size_t o = 0; o < sums.size(); ++o)
+      for (std::size_t i = 0; i < simulated[r][o].size(); ++i)
+        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
+          sums[o] += std::pow(y - simulated[r][o][i], 2);
+  return sums;
+}
+
+}  // namespace
+
+double lead(const Case& data, const Fit& one, const Fit& other) {
+  const auto with_one = simulate(data, one.model), with_other = simulate(data, other.model);
+  double sum = 0.0, independent = 0.0;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<std::vector<double>> left[2];
+    double squares[2] = {0.0, 0.0}, rows = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& y = data.recordings[r].measured[o];
+      for (int side = 0; side < 2; ++side) {
+        const auto& simulated = (side == 0 ? with_one : with_other)[r][o];
+        auto& e = left[side].emplace_back(y.size());
+        for (std::size_t i = 0; i < y.size(); ++i) {
+          e[i] = y[i] - simulated[i];
+          if (std::isfinite(y[i])) squares[side] += e[i] * e[i], rows += 0.5;
+        }
+      }
+    }
+    if (!(squares[0] > 0.0) || !(squares[1] > 0.0)) continue;
+    // The smaller residual is nearer to the noise, and so is its colour.
+    const auto& nearer = left[squares[0] < squares[1] ? 0 : 1];
+    const double worth = rows * (data.is_time_series ? independent_share(nearer) : 1.0);
+    sum += 0.5 * worth * std::log(squares[1] / squares[0]);
+    independent += worth;
+  }
+  return sum - 0.5 * (static_cast<double>(one.free.size()) - static_cast<double>(other.free.size())) *
+                   std::log(std::max(10.0, independent));
+}
+
+namespace {
+
+/// Of what `course` explains of the residual of `base`, the share of the power that `named` leaves. Terms are idealised:
+/// the machine's own form of one may well differ by a few percent.
+double lost_share(const Case& data, const Fit& base, const Fit& named, const Fit& course) {
+  const auto b = squares_of(data, base), n = squares_of(data, named), c = squares_of(data, course);
+  double lost = 0.0, all = 0.0;
+  for (std::size_t o = 0; o < c.size(); ++o)
+    if (c[o] > 0.0) lost += n[o] / c[o] - 1.0, all += b[o] / c[o] - 1.0;
+  return all > 0.0 ? lost / all : 0.0;
+}
+
+}  // namespace
+
+std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::size_t term) {
+  const Weighing plain = weigh(data, simulate(data, best.model), false);
+  const Fit named = fit(data, plain, best.model, data.model, 4, &best);
+  auto starts = unmodelled_starts(data, named);
+  if (starts.empty()) return std::nullopt;
+  const auto beside = screen(data, plain, named, starts, 1);
+  if (beside.empty() || beside[0].merit < claim_margin || beside[0].columns.size() == 0) return std::nullopt;
+  auto without_term = named.model;
+  without_term.terms.erase(without_term.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  const Fit base = fit(data, plain, without_term, data.model, 6);
+  const auto instead = screen(data, plain, base, starts, 4);
+  std::optional<OtherCause> found;
+  for (const auto& s : instead) {
+    if (s.merit < claim_margin || s.columns.size() == 0) break;
+    const Fit start = with_columns(data, base, s);
+    OtherCause one;
+    one.fit = fit(data, plain, start.model, data.model, 4, &start);
+    one.lead = lead(data, one.fit, named);
+    // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
+    const bool is_form = is_course_of(s.start.term, best.model.terms[term]);
+    if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
+    if (!found || one.lead > found->lead) found = std::move(one);
+  }
+  return found;
+}
+
+}  // namespace invar::diagnose

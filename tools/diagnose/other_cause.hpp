@@ -1,0 +1,23 @@
+// The hypothesis "some other cause": a free course over any variable, at any site, in place of a named term or beside it.
+#pragma once
+
+#include <optional>
+
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+/// log likelihood of `one` over `other` counted in independent rows of the residual that `one` leaves, less the price
+/// of the numbers that it has more: says which is right whatever the colour of the noise.
+double lead(const Case& data, const Fit& one, const Fit& other);
+
+struct OtherCause {
+  Fit fit;
+  double lead = 0.0;  // over the named model
+};
+
+/// The free course that does clearly better in place of named term `term` of `best` (the other terms stay). None is tried
+/// where no course would gain beside the name: what helps in its place helps beside it too.
+std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::size_t term);
+
+}  // namespace invar::diagnose
