@@ -75,8 +75,11 @@ void add_unnamed(const Case& data, Diagnosis& d) {
         curved = fit(data, own, rough.model, data.model, 0, &rough);
       const auto without = fit(data, own, base.model, data.model, 4, &base);
       const double gain = curved.evidence - without.evidence;
-      // Noise that wanders has a course over time too: counted in independent rows the curve must still pay.
-      if (s.start.term.curve.over == "time" && lead(data, rough, under_plain) < 2.0 * claim_margin) continue;
+      // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
+      // independent rows.
+      if (s.start.term.curve.over == "time" && least_ratio(data, rough, under_plain) > 0.9 &&
+          lead(data, rough, under_plain) < 2.0 * claim_margin)
+        continue;
       // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
       if (gain > claim_margin && rough.evidence > best.plain)
         best = {std::move(curved), own, gain, rough.evidence};
