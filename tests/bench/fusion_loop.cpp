@@ -10,14 +10,12 @@
 #include <random>
 
 #include "components/fusion/fusion.hpp"
-#include "components/stage/axis_stage.hpp"
 #include "components/world/simulated_sensor.hpp"
-#include "components/world/simulated_stage.hpp"
 #include "core/compensation/fusion_file.hpp"
 #include "core/metrology/fusion_identification.hpp"
 #include "core/physics/terms/sensor/gain_droop.hpp"
 #include "core/physics/terms/sensor/latency.hpp"
-#include "tests/support/wired.hpp"
+#include "tests/support/wired_axis.hpp"
 
 namespace {
 
@@ -58,21 +56,6 @@ std::vector<metrology::FusionRun> training() {
   return runs;
 }
 
-struct Ends final : Component {
-  Output<stage::AxisCommand> command{*this, "command", "command"};
-  void step(const Tick&) noexcept override {}
-  void send(stage::AxisCommandKind kind, double period = 0.0, std::uint32_t periods = 0) {
-    stage::AxisCommand c;
-    c.kind(kind);
-    c.id(next++);
-    c.amplitude(amplitude);
-    c.period(period);
-    c.periods(periods);
-    command.write(c);
-  }
-  std::uint64_t next = 1;
-};
-
 struct Trial {
   double period, noise, bandwidth;
   bool feedforward;
@@ -88,7 +71,6 @@ double tracking_error(const Trial& trial, const std::filesystem::path& machine,
   of_world.x.model = axis;  // friction and ripple that the loop does not know
   of_world.x.resolution = resolution;
   of_world.x.noise = 0.0;
-  world::SimulatedStage world{of_world};
   world::SimulatedSensor::Parameters of_sensor;
   of_sensor.quantity = "velocity";
   of_sensor.latency = latency;
@@ -117,44 +99,45 @@ double tracking_error(const Trial& trial, const std::filesystem::path& machine,
     of_stage.control.feedforward_velocity = damping / motor;
     of_stage.control.feedforward_acceleration = mass / motor;
   }
-  stage::Stage stage{of_stage};
-  Ends ends;
+  support::WiredAxis loop{of_world, of_stage, dt};
+  support::Wired& wired = loop.wired;
   struct Watch final : Component {
     Input<sensing::AxisReading> truth{*this, "truth"};
-    Input<stage::AxisState> state{*this, "state"};
     void step(const Tick&) noexcept override {}
   } watch;
-  support::Wired wired{dt};
-  wired.join(stage, "motor", world, "motor_x");
-  wired.join(world, "feedback_x", stage, "feedback");
-  wired.join(world, "truth_x", watch, "truth");
-  wired.join(stage, "state", watch, "state");
-  wired.join(ends, "command", stage, "command");
-  wired.add(world);
+  wired.join(loop.world, "truth_x", watch, "truth");
+  wired.add(loop.world);
   if (!trial.model.empty()) {
-    wired.join(world, "truth_x", tachometer, "truth");
-    wired.join(world, "feedback_x", fused, "feedback");
+    wired.join(loop.world, "truth_x", tachometer, "truth");
+    wired.join(loop.world, "feedback_x", fused, "feedback");
     wired.join(tachometer, "reading", fused, "sensor_tachometer");
-    wired.join(fused, "fused", stage, "fused");
+    wired.join(fused, "fused", loop.stage, "fused");
     wired.add(tachometer);
     wired.add(fused);
   }
-  wired.add(stage);
-  wired.add(ends);
+  wired.add(loop.stage);
+  wired.add(loop.hand);
   wired.add(watch);
   wired.start();
   for (int k = 0; k < 10; ++k) wired.step();
-  ends.send(stage::AXIS_COMMAND_ENABLE);
+  loop.tell(stage::AXIS_COMMAND_ENABLE);
   for (int k = 0; k < 500; ++k) wired.step();
-  ends.send(stage::AXIS_COMMAND_SINE, trial.period, 3);
+  stage::AxisCommand sine;
+  sine.kind(stage::AXIS_COMMAND_SINE);
+  sine.id(loop.next++);
+  sine.amplitude(amplitude);
+  sine.period(trial.period);
+  sine.periods(3);
+  loop.hand.command.write(sine);
+  auto& state = loop.hand.state;
   double squares = 0.0;
   int count = 0;
   const auto cycles = static_cast<int>(3.0 * trial.period / dt);
   for (int k = 0; k < cycles; ++k) {
     wired.step();
-    if (!watch.state.latest()->enabled()) return 1e9;  // it tripped: its setpoint goes where it stands
+    if (!state.latest()->enabled()) return 1e9;  // it tripped: its setpoint goes where it stands
     if (k < cycles / 3) continue;
-    squares += std::pow(watch.truth.latest()->position() - watch.state.latest()->setpoint_position(), 2);
+    squares += std::pow(watch.truth.latest()->position() - state.latest()->setpoint_position(), 2);
     ++count;
   }
   return std::sqrt(squares / count);

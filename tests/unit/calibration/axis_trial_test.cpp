@@ -8,12 +8,10 @@
 
 #include "components/fusion/fusion.hpp"
 #include "components/interferometer/interferometer.hpp"
-#include "components/stage/axis_stage.hpp"
 #include "components/world/simulated_sensor.hpp"
-#include "components/world/simulated_stage.hpp"
 #include "core/model/model_file.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/support/wired.hpp"
+#include "tests/support/wired_axis.hpp"
 
 namespace invar::calibration {
 namespace {
@@ -26,32 +24,27 @@ struct Operator final : Component {
   void step(const Tick&) noexcept override {}
 };
 
-/// One axis of the world with its stage, a laser along it and the trial; the trial is stepped at 500 Hz.
+/// One axis with a laser along it and the trial, which is stepped at 500 Hz.
 struct Cell {
-  Cell(char axis_letter, world::SimulatedStage::Parameters world_parameters,
-       stage::Stage::Parameters stage_parameters, AxisTrial::Parameters trial_parameters)
-      : letter{axis_letter},
-        of_world{std::move(world_parameters)},
-        of_stage{std::move(stage_parameters)},
+  Cell(world::SimulatedStage::Parameters world_parameters, stage::Stage::Parameters stage_parameters,
+       AxisTrial::Parameters trial_parameters)
+      : axis{std::move(world_parameters), std::move(stage_parameters)},
         of_trial{std::move(trial_parameters)} {
-    const std::string a{letter};
-    wired.join(stage, "motor", world, "motor_" + a);
-    wired.join(world, "feedback_" + a, stage, "feedback");
-    wired.join(world, "tool", laser, "tool");
-    wired.join(stage, "state", trial, "state");
-    wired.join(stage, "model_status", trial, "model_status");
-    wired.join(trial, "model", stage, "model");
-    wired.join(trial, "command", stage, "command");
+    wired.join(axis.world, "tool", laser, "tool");
+    wired.join(axis.stage, "state", trial, "state");
+    wired.join(axis.stage, "model_status", trial, "model_status");
+    wired.join(trial, "model", axis.stage, "model");
+    wired.join(trial, "command", axis.stage, "command");
     wired.join(trial, "beam", laser, "beam");
     wired.join(laser, "reading", trial, "reading");
     wired.join(human, "job", trial, "job");
     wired.join(trial, "status", human, "status");
   }
   void bring_up() {
-    wired.add(world);
+    wired.add(axis.world);
     wired.add(laser);
     for (Component* component : between) wired.add(*component);
-    wired.add(stage);
+    wired.add(axis.stage);
     wired.add(trial, 2);
     wired.add(human);
     wired.start();
@@ -72,16 +65,12 @@ struct Cell {
     return {};
   }
 
-  char letter;
-  support::Wired wired;
-  world::SimulatedStage::Parameters of_world;
-  stage::Stage::Parameters of_stage;
+  support::WiredAxis axis;
+  support::Wired& wired = axis.wired;
   AxisTrial::Parameters of_trial;
   interferometer::Interferometer::Parameters of_laser;
-  world::SimulatedStage world{of_world};
   interferometer::Interferometer laser{of_laser};
   std::vector<Component*> between;
-  stage::Stage stage{of_stage};
   AxisTrial trial{of_trial};
   Operator human;
   std::uint64_t next = 1;
@@ -110,7 +99,7 @@ TEST(AxisTrial, IdentifiesTheRippleAndLowersTheFollowingErrorOfRunsNotFitted) {
   of_trial.ripple[0].from = 0.01;
   of_trial.ripple[0].to = 0.19;
   of_trial.ripple[0].out = out.string();
-  Cell cell{'z', of_world, of_stage, of_trial};
+  Cell cell{of_world, of_stage, of_trial};
   cell.bring_up();
   const auto status = cell.run("ripple");
   EXPECT_EQ(status.phase(), job::JOB_DONE) << status.text().c_str();
@@ -157,7 +146,7 @@ TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
     of_trial.tracking[0].name = "track";
     of_trial.tracking[0].periods = {3.0};
     of_trial.tracking[0].out = out.string();
-    Cell cell{'x', of_world, of_stage, of_trial};
+    Cell cell{of_world, of_stage, of_trial};
     world::SimulatedSensor::Parameters of_tachometer;
     of_tachometer.quantity = "velocity";
     of_tachometer.latency = 0.003;
@@ -175,10 +164,10 @@ TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
     of_fusion.sensors[1].delay_sigma = 0.005;
     fusion::Fusion fusion{of_fusion};
     if (fused) {
-      cell.wired.join(cell.world, "truth_x", tachometer, "truth");
+      cell.wired.join(cell.axis.world, "truth_x", tachometer, "truth");
       cell.wired.join(tachometer, "reading", fusion, "sensor_tachometer");
-      cell.wired.join(cell.world, "feedback_x", fusion, "feedback");
-      cell.wired.join(fusion, "fused", cell.stage, "fused");
+      cell.wired.join(cell.axis.world, "feedback_x", fusion, "feedback");
+      cell.wired.join(fusion, "fused", cell.axis.stage, "fused");
       cell.between = {&tachometer, &fusion};
     }
     cell.bring_up();
@@ -206,7 +195,7 @@ TEST(AxisTrial, SaysWhyAJobCannotRun) {
   const invar::testing::TemporaryFolder folder;
   of_trial.tracking[0].out = (folder / "fails").string();
   stage::Stage::Parameters of_stage;  // no more than 0.1 m/s
-  Cell cell{'x', world_parameters(), of_stage, of_trial};
+  Cell cell{world_parameters(), of_stage, of_trial};
   cell.bring_up();
   EXPECT_STREQ(cell.run("nonsense").text().c_str(), "`nonsense` is no job of this component");
   const auto status = cell.run("track");

@@ -7,15 +7,13 @@
 #include <fstream>
 #include <functional>
 
-#include "components/stage/axis_stage.hpp"
-#include "components/world/simulated_stage.hpp"
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
 #include "core/recording/cdr.hpp"
 #include "core/recording/recording_writer.hpp"
 #include "core/recording/type_book.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/support/wired.hpp"
+#include "tests/support/wired_axis.hpp"
 
 namespace invar::model {
 namespace {
@@ -31,12 +29,6 @@ constexpr const char* columns =
 /// An axis with friction and ripple in its loop, and every state that it published.
 class RecordedAxis : public ::testing::Test {
  protected:
-  struct Human final : Component {
-    Output<stage::AxisCommand> command{*this, "command", "command"};
-    Input<stage::AxisState> state{*this, "state"};
-    void step(const Tick&) noexcept override {}
-  };
-
   static world::SimulatedStage::Parameters world_parameters() {
     world::SimulatedStage::Parameters p;
     p.machine = machines / "axis-trials.yaml";
@@ -53,28 +45,19 @@ class RecordedAxis : public ::testing::Test {
   }
 
   void tell(stage::AxisCommandKind kind, double position = 0.0) {
-    stage::AxisCommand command;
-    command.kind(kind);
-    command.position(position);
-    command.velocity(0.08);
-    command.id(++id);
-    human.command.write(command);
+    axis.tell(kind, position, 0.08);
     for (int k = 0; k < 3000; ++k) {
-      wired.step();
-      states.push_back(*human.state.latest());
+      axis.wired.step();
+      states.push_back(*axis.hand.state.latest());
     }
   }
   void move_about() {
-    wired.join(stage, "motor", world, "motor_z");
-    wired.join(world, "feedback_z", stage, "feedback");
-    wired.join(stage, "state", human, "state");
-    wired.join(human, "command", stage, "command");
-    wired.add(human);
-    wired.add(world);
-    wired.add(stage);
-    wired.start();
-    wired.step();
-    wired.step();
+    axis.wired.add(axis.hand);
+    axis.wired.add(axis.world);
+    axis.wired.add(axis.stage);
+    axis.wired.start();
+    axis.wired.step();
+    axis.wired.step();
     tell(stage::AXIS_COMMAND_ENABLE);
     tell(stage::AXIS_COMMAND_MOVE, 0.08);
     tell(stage::AXIS_COMMAND_MOVE, 0.02);
@@ -124,14 +107,8 @@ class RecordedAxis : public ::testing::Test {
   }
 
   testing::TemporaryFolder folder;
-  world::SimulatedStage::Parameters of_world = world_parameters();
-  stage::Stage::Parameters of_stage = stage_parameters();
-  world::SimulatedStage world{of_world};
-  stage::Stage stage{of_stage};
-  Human human;
-  support::Wired wired;
+  support::WiredAxis axis{world_parameters(), stage_parameters()};
   std::vector<stage::AxisState> states;
-  std::uint64_t id = 0;
 };
 
 TEST_F(RecordedAxis, SimulatedWithTheTruthIsWhatWasRecorded) {

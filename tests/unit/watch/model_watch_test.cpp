@@ -8,11 +8,9 @@
 #include <map>
 #include <optional>
 
-#include "components/stage/axis_stage.hpp"
-#include "components/world/simulated_stage.hpp"
 #include "tests/support/real_time_guard.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/support/wired.hpp"
+#include "tests/support/wired_axis.hpp"
 
 namespace invar::watch {
 namespace {
@@ -22,9 +20,7 @@ using ::testing::HasSubstr;
 const std::filesystem::path machines = std::filesystem::path{INVAR_SOURCE_DIR} / "deployment" / "machines";
 
 struct Human final : Component {
-  Output<stage::AxisCommand> command{*this, "command", "command"};
   Output<compensation::ModelCommand> model{*this, "model", "command"};
-  Input<stage::AxisState> state{*this, "state"};
   Inbox<event::Notice> notices{*this, "notices", {.profile = "event"}};
   void step(const Tick&) noexcept override {}
 };
@@ -40,17 +36,14 @@ class WatchedAxis {
  public:
   WatchedAxis(const testing::TemporaryFolder& folder, const std::optional<Truth>& later, double at,
               const Truth& first = {})
-      : of_world_{world_parameters(folder, later, at, first)} {
-    wired_.join(stage_, "motor", world_, "motor_x");
-    wired_.join(world_, "feedback_x", stage_, "feedback");
-    wired_.join(stage_, "state", watch_, "state");
-    wired_.join(stage_, "state", human_, "state");
-    wired_.join(human_, "command", stage_, "command");
+      : axis_{world_parameters(folder, later, at, first), stage_parameters()} {
+    wired_.join(axis_.stage, "state", watch_, "state");
     wired_.join(human_, "model", watch_, "model");
     wired_.join(watch_, "notices", human_, "notices");
-    wired_.add(world_);
-    wired_.add(stage_);
+    wired_.add(axis_.world);
+    wired_.add(axis_.stage);
     wired_.add(watch_);
+    wired_.add(axis_.hand);
     wired_.add(human_);
     wired_.start();
     wired_.step();
@@ -68,8 +61,8 @@ class WatchedAxis {
       violations_ += guard.violations();
       event::Notice notice;
       while (human_.notices.take(notice)) heard[wired_.time()] = notice.text().c_str();
-      if (human_.state.latest()->command_done() &&
-          human_.state.latest()->mode() == stage::AXIS_MODE_HOLDING) {
+      if (axis_.hand.state.latest()->command_done() &&
+          axis_.hand.state.latest()->mode() == stage::AXIS_MODE_HOLDING) {
         tell(stage::AXIS_COMMAND_MOVE, moves_ % 2 == 0 ? 0.16 : 0.02, speeds[(moves_ / 2) % 3]);
         ++moves_;
       }
@@ -126,22 +119,14 @@ class WatchedAxis {
     return p;
   }
   void tell(stage::AxisCommandKind kind, double position, double velocity) {
-    stage::AxisCommand command;
-    command.kind(kind);
-    command.position(position);
-    command.velocity(velocity);
-    command.id(++id_);
-    human_.command.write(command);
+    axis_.tell(kind, position, velocity);
     wired_.step();
     wired_.step();
   }
 
-  support::Wired wired_;
-  world::SimulatedStage::Parameters of_world_;
-  stage::Stage::Parameters of_stage_ = stage_parameters();
+  support::WiredAxis axis_;
+  support::Wired& wired_ = axis_.wired;
   ModelWatch::Parameters of_watch_ = watch_parameters();
-  world::SimulatedStage world_{of_world_};
-  stage::Stage stage_{of_stage_};
   ModelWatch watch_{of_watch_};
   Human human_;
   std::uint64_t id_ = 0;
