@@ -6,7 +6,7 @@ invar=$1 source=$2
 source "$(dirname "$0")/own_cell.sh"
 own_cell print-cell "$source" 15030
 # The geometric calibration in front has a test of its own (main_job.sh).
-sed -i "s/{prints: 5, pause: 5}/{prints: 1}/; /first: calibrate-geometry/d" "$folder/deployment/print-cell.yaml"
+sed -i "s/{prints: 4, pause: 3}/{prints: 1}/; /first: calibrate-geometry/d" "$folder/deployment/print-cell.yaml"
 
 for run in one two; do
   mkdir "$folder/$run"; cd "$folder/$run"

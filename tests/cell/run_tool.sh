@@ -9,7 +9,9 @@ mkdir "$folder/checkout"
 cp -r "$source/tools" "$source/deployment" "$folder/checkout"
 domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
 echo "domain $domain, port $port"
-sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder"/checkout/deployment/{xy-table,mismatch}.yaml
+sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder"/checkout/deployment/{xy-table,mismatch,print-cell}.yaml
+# The print job without what has tests of its own (main_job.sh, print_job.sh).
+sed -i "s/15030/$((port + 1))/g; s/{prints: 4, pause: 3}/{prints: 0}/; /first: calibrate-geometry/d" "$folder/checkout/deployment/print-cell.yaml"
 export INVAR_BUILD=$build INVAR_SHARED=${INVAR_SHARED:-$source/../shared}
 cd "$folder"
 
@@ -21,7 +23,8 @@ cat wrong
 checkout/tools/run >summary 2>&1 || { cat summary; exit 1; }
 cat summary
 for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'error after +rms [0-9.]+ nm' 'heater +[0-9.]+ degC' '^6 lines, 288 readings' \
-  '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force_ripple ' '^  coulomb_friction ' '^\.\.\. patched +rms .* times less'; do
+  '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force_ripple ' '^  coulomb_friction ' '^\.\.\. patched +rms .* times less' \
+  'from 20 mm +[0-9.]+ um before, [0-9.]+ um after'; do
   grep -Eq "$words" summary || { echo "the summary lacks: $words"; exit 1; }
 done
 for what in report recording; do
