@@ -2,6 +2,7 @@
 
 #include "components/calibration/axis_trial.hpp"
 #include "components/calibration/calibration.hpp"
+#include "components/calibration/fusion_trial.hpp"
 #include "components/compensation/compensation.hpp"
 #include "components/dispenser/dispenser.hpp"
 #include "components/dispenser/valve.hpp"
@@ -42,6 +43,8 @@ void add_all_components(Registry& registry) {
   registry.add<calibration::Calibration>("calibration", "measures, identifies, activates, verifies");
   registry.add<calibration::AxisTrial>("axis_trial",
                                        "force ripple and tracking error of one axis, measured by jobs");
+  registry.add<calibration::FusionTrial>(
+      "fusion_trial", "the sensors of an axis identified beside a laser, their fusion in use");
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
   registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
   registry.add<vision::FolderCamera>("folder_camera", "pictures of a folder as a camera's frames");

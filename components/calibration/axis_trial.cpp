@@ -14,8 +14,6 @@ namespace invar::calibration {
 
 namespace {
 
-constexpr double settle = 0.5;  // s, at rest before something is measured
-
 recording::Table record_table() {
   recording::Table table;
   table.add("t", "s", {});
@@ -24,29 +22,6 @@ recording::Table record_table() {
   table.add("following_error", "m", {});
   table.add("laser", "m", {});
   return table;
-}
-
-struct Size {
-  double rms = 0.0, largest = 0.0;
-};
-
-/// Of what is left of values when their mean is taken out.
-Size size_of(const std::vector<double>& values) {
-  Size size;
-  double mean = 0.0;
-  for (const double value : values) mean += value / static_cast<double>(values.size());
-  for (const double value : values) {
-    size.rms += std::pow(value - mean, 2) / static_cast<double>(values.size());
-    size.largest = std::max(size.largest, std::abs(value - mean));
-  }
-  size.rms = std::sqrt(size.rms);
-  return size;
-}
-
-std::string micrometres(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g um", 1e6 * value);
-  return text;
 }
 
 /// Whether a model claims nothing beyond another: the same terms, no parameter moved by more than it is uncertain.
@@ -95,19 +70,6 @@ std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
   return std::nullopt;
 }
 
-void AxisTrial::make_safe() {
-  stage::AxisCommand stop;
-  stop.kind(stage::AXIS_COMMAND_STOP);
-  send(stop);
-}
-
-void AxisTrial::send(stage::AxisCommand& command) {
-  stamp(command);
-  command.axis(static_cast<std::uint32_t>(parameters_.axis));
-  command.id(next_command_id());
-  command_.write(command);
-}
-
 /// The newest state and what the laser says into the record; the setpoint of the laser's instant is known exactly.
 void AxisTrial::take_down(recording::Table& record) {
   const auto* state = state_.latest();
@@ -131,90 +93,11 @@ void AxisTrial::take_down(recording::Table& record) {
   for (std::size_t i = 0; i < record.columns.size(); ++i) record.columns[i].values.push_back(row[i]);
 }
 
-Task AxisTrial::wait(double seconds) {
-  const Instant until = now() + Duration::seconds(seconds);
-  while (now() < until) co_await NextStep{};
-}
-
-/// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
-Task AxisTrial::command_axis(stage::AxisCommand command, recording::Table* record) {
-  send(command);
-  const Instant started = now();
-  for (;;) {
-    co_await NextStep{};
-    if (record != nullptr) take_down(*record);
-    const auto* state = state_.latest();
-    const bool answered = state != nullptr && state->command_id() == command.id();
-    if (answered && state->command_refused())
-      throw std::runtime_error{"the axis refused a motion of the job"};
-    if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
-      throw std::runtime_error{"the axis tripped while moving"};
-    if (answered && state->command_done()) co_return;
-    if (!answered && now() - started > Duration::seconds(5.0))
-      throw std::runtime_error{"the axis does not answer: is its stage active?"};
-  }
-}
-
-Task AxisTrial::enable() {
-  const Instant give_up = now() + Duration::seconds(10.0);
-  while (state_.latest() == nullptr || !state_.latest()->enabled()) {  // processes come up in any order
-    stage::AxisCommand command;
-    command.kind(stage::AXIS_COMMAND_ENABLE);
-    send(command);
-    co_await wait(0.5);
-    if (now() > give_up)
-      throw std::runtime_error{"the axis does not answer to `enable`: is its stage active?"};
-  }
-}
-
-Task AxisTrial::move(double target, double velocity, recording::Table* record) {
-  stage::AxisCommand command;
-  command.kind(stage::AXIS_COMMAND_MOVE);
-  command.position(target);
-  command.velocity(velocity);
-  co_await command_axis(command, record);
-}
-
-Task AxisTrial::align(double from) {
-  sensing::BeamCommand beam;
-  stamp(beam);
-  beam.id(next_command_id());
-  beam.beam_start()[static_cast<std::size_t>(parameters_.axis)] = from;
-  beam.beam_direction()[static_cast<std::size_t>(parameters_.axis)] = 1.0;
-  beam_.write(beam);
-  beam_from_ = from;
-  co_await wait(0.1);
-  sensing::DisplacementReading before;
-  while (reading_.take(before)) {  // of another beam
-  }
-}
-
 Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64_t passes,
                                recording::Table& record) {
   for (std::int64_t pass = 0; pass < passes; ++pass) {
     co_await move(job.to, velocity, &record);
     co_await move(job.from, velocity, &record);
-  }
-}
-
-Task AxisTrial::command_model(compensation::ModelCommandKind kind, const std::string& path) {
-  compensation::ModelCommand command;
-  stamp(command);
-  command.id(next_command_id());
-  command.kind(kind);
-  command.path(path);
-  model_.write(command);
-  const Instant give_up = now() + Duration::seconds(5.0);
-  for (;;) {
-    co_await NextStep{};
-    const auto* status = model_status_.latest();
-    if (status != nullptr && status->command_id() == command.id()) {
-      if (status->state() == compensation::MODEL_REFUSED)
-        throw std::runtime_error{"the stage refused the model: " + std::string{status->text().c_str()}};
-      co_return;
-    }
-    if (now() > give_up)
-      throw std::runtime_error{"the stage does not answer: connect `model` and `model_status`"};
   }
 }
 

@@ -7,14 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "components/calibration/job_component.hpp"
+#include "components/calibration/axis_runner.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
-#include "core/recording/table.hpp"
-#include "idl/compensation.h"
-#include "idl/job.h"
-#include "idl/sensing.h"
-#include "idl/stage.h"
 
 namespace invar::calibration {
 
@@ -82,8 +77,8 @@ struct MotionJob {
   }
 };
 
-/// One axis: its stage on `state` and `command`, the stage's model on `model`, a laser along the axis on `reading` and `beam`.
-class AxisTrial final : public JobComponent {
+/// One axis; `model` is its stage's.
+class AxisTrial final : public AxisRunner {
  public:
   struct Parameters {
     std::int64_t axis = 0;
@@ -97,37 +92,19 @@ class AxisTrial final : public JobComponent {
       p(motion, "motion", "jobs that move forth and back, to record and to compare");
     }
   };
-  explicit AxisTrial(const Parameters& parameters) : parameters_{parameters} {}
+  explicit AxisTrial(const Parameters& parameters) : AxisRunner{parameters.axis}, parameters_{parameters} {}
 
  private:
   std::optional<Job> find(const std::string& wanted) override;
-  void make_safe() override;
-  void send(stage::AxisCommand& command);
+  void take_down(recording::Table& record) override;
   Task run(const RippleJob& job);
   Task run(const TrackingJob& job);
   Task run(const MotionJob& job);
   Task move_at_all_speeds(const MotionJob& job, recording::Table& record);
   Task compare(const MotionJob& job, recording::Table before);
-  Task enable();
-  Task command_axis(stage::AxisCommand command, recording::Table* record);
-  Task move(double target, double velocity, recording::Table* record);
-  Task wait(double seconds);
   Task there_and_back(const RippleJob& job, double velocity, std::int64_t passes, recording::Table& record);
-  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
-  Task align(double from);
-  void take_down(recording::Table& record);
 
   const Parameters& parameters_;
-  Input<stage::AxisState> state_{*this, "state"};
-  Output<stage::AxisCommand> command_{*this, "command", "command"};
-  Inbox<sensing::DisplacementReading> reading_{
-      *this, "reading", {.optional = true, .profile = "calibration"}, 4096};
-  Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
-  Output<compensation::ModelCommand> model_{*this, "model", "command"};
-  Input<compensation::ModelStatus> model_status_{
-      *this, "model_status", {.optional = true, .profile = "state"}};
-
-  double beam_from_ = 0.0;  // where the laser was zeroed [m]
   Instant began_;           // the job; times in records count from here
   std::int64_t taken_ = 0;  // stamp of the last state in a record
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/compensation/fusion_file.hpp"
 #include "core/metrology/fusion_observer.hpp"
@@ -89,7 +90,10 @@ Fusion::Fusion(const Parameters& parameters)
       rest_{{parameters.rest.least_weight, parameters.rest.after, parameters.rest.look_again},
             positions_,
             sensors_.size()},
-      step_free_{parameters.fade} {
+      step_free_{parameters.fade},
+      model_{*this,
+             [this](const std::filesystem::path& file, Staged::Model& model) { return load(file, model); },
+             "model", "model_status"} {
   bool from_feedback = false;
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     sources_.push_back(std::make_unique<Source>(*this, sensors_[i], i));
@@ -104,12 +108,15 @@ void Fusion::configure() {
   const std::string mend = "describe one position sensor at least and eight sensors at most";
   if (positions_ < 1) throw InputError{name, "has no position sensor", mend};
   if (sensors_.size() > metrology::most_sensors) throw InputError{name, "has more than eight sensors", mend};
-  if (parameters_.model.empty()) {
-    estimator_ = std::make_unique<metrology::FusionObserver>(model_of(sensors_));
-    return;
-  }
-  const auto yaml = config::Yaml::load(parameters_.model);
-  compensation::check_seal(yaml);
+  described_ = std::make_unique<metrology::FusionObserver>(model_of(sensors_));
+  model_.open(parameters_.model, "calibrate the fusion of this axis again");
+  use_model();
+}
+
+/// A model of other sensors, or none of fusion, throws.
+std::string Fusion::load(const std::filesystem::path& file, Staged::Model& staged) const {
+  const auto yaml = config::Yaml::load(file);
+  staged.checksum = compensation::check_seal(yaml);
   (void)yaml.root().integer("invar_compensation", 1, 1);
   (void)yaml.root().choice("kind", {"fusion"});
   yaml.root()["identified_from"].accept_all();
@@ -123,18 +130,30 @@ void Fusion::configure() {
   if (!same) {
     std::string list;
     for (const auto& text : names) list += (list.empty() ? "" : ", ") + text;
-    throw InputError{parameters_.model.string(), "is of the sensors " + list,
+    throw InputError{file.string(), "is of the sensors " + list,
                      "name the component's sensors so, in this order"};
   }
-  estimator_ = compensation::make_estimator(model);
+  const auto& learning = parameters_.learning;
+  staged.content =
+      compensation::make_estimator(model, {learning.memory, learning.most, learning.most_intercept});
+  return {};
+}
+
+/// The estimator of the model in use begins afresh; the step that this makes fades.
+void Fusion::use_model() noexcept {
+  estimator_ = model_.active() != nullptr ? model_.active()->content.get() : described_.get();
+  estimator_->reset();
+  rest_.reset();
+  resting_ = 0;
+  step_free_.expect_step();
 }
 
 void Fusion::activate() {
-  estimator_->reset();
-  rest_.reset();
+  use_model();
   step_free_.reset();
-  resting_ = 0;
+  velocity_ = 0.0;
   started_ = false;
+  model_.announce();
   for (auto& source : sources_) source->last = now();
 }
 
@@ -168,12 +187,27 @@ bool Fusion::read(Source& source, const Tick& tick, metrology::FusionSample& sam
   return fresh;
 }
 
+/// Where an instrument along the axis says that it is now; NaN where none reads.
+double Fusion::reference(const Tick& tick) noexcept {
+  constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+  const auto* reading = reference_.latest();
+  if (reading == nullptr || std::exchange(referred_, reference_.received()) == reference_.received())
+    return nothing;
+  const auto axis = static_cast<std::size_t>(parameters_.axis);
+  const double along = reading->beam_direction()[axis];
+  if (!reading->valid() || std::abs(along) < 0.9999) return nothing;
+  const double age = (tick.now - Instant{reading->at().time_ns()}).in_seconds();
+  return reading->beam_start()[axis] + reading->displacement() / along + age * velocity_;
+}
+
 void Fusion::step(const Tick& tick) noexcept {
+  if (model_.update()) use_model();
   metrology::FusionSample sample;
   sample.positions.fill(std::numeric_limits<double>::quiet_NaN());
   sample.velocities.fill(std::numeric_limits<double>::quiet_NaN());
   sample.period = started_ ? tick.period : 0.0;
   sample.selector = parameters_.selector;
+  sample.reference = reference(tick);
   bool any = false;
   for (auto& source : sources_) any = (read(*source, tick, sample) && source->is_position) || any;
   if (!started_ && !any) return;  // says nothing before its first position
@@ -181,7 +215,11 @@ void Fusion::step(const Tick& tick) noexcept {
   sample.silent |= resting_;
   const metrology::FusedPosition found = estimator_->step(sample);
   resting_ = rest_.update(found, tick.period);
+  velocity_ = found.velocity;
+  write(found, sample);
+}
 
+void Fusion::write(const metrology::FusedPosition& found, const metrology::FusionSample& sample) noexcept {
   sensing::FusedPosition fused;
   stamp(fused);
   fused.axis(static_cast<std::uint32_t>(parameters_.axis));

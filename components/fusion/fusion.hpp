@@ -9,16 +9,18 @@
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/staged_model.hpp"
 #include "core/metrology/sensor_fusion.hpp"
 #include "core/metrology/sensor_rest.hpp"
 #include "core/metrology/step_free.hpp"
+#include "core/metrology/weighted_fusion.hpp"
 #include "idl/sensing.h"
 #include "idl/stage.h"
 
 namespace invar::fusion {
 
-/// Runs the estimator of a model that `invar calibrate fusion` made; without a model the structured observer of the sensors
-/// as they are described here. Each sensor has a port `sensor_<name>`, or is the position or velocity of `feedback`. A
+/// Runs the estimator of a model that `invar calibrate fusion` made, also one that it is given while it runs; without a model
+/// the structured observer of the sensors as they are described here. Each sensor has a port `sensor_<name>`, or is the position or velocity of `feedback`. A
 /// sensor may have a rate of its own. One that is missing or late is left out after `patience`, one that jumps at once, one
 /// that dies or sticks as FusionObserver says; the fused position makes no step meanwhile. Real-time.
 class Fusion final : public Component {
@@ -46,6 +48,16 @@ class Fusion final : public Component {
       p(look_again, "look_again", "s", Range{1e-2, 1e5}, "all wake again after it at the latest");
     }
   };
+  struct Learning {
+    double memory = 0.0;
+    double most = 0.5;
+    double most_intercept = 2e-3;
+    void describe(auto& p) {
+      p(memory, "memory", "s", Range{0.0, 1e5}, "older errors count less and less; 0: nothing is learnt");
+      p(most, "most", "1", Range{0.0, 1.0}, "that a weight moves from the model's");
+      p(most_intercept, "most_intercept", "m", Range{0.0, 0.1}, "that the intercept moves");
+    }
+  };
   struct Parameters {
     std::int64_t axis = 0;
     std::filesystem::path model;
@@ -56,6 +68,7 @@ class Fusion final : public Component {
     double fade = 0.05;
     double selector = 0.0;
     Rest rest;
+    Learning learning;
     void describe(auto& p) {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(model, "model", "compensation.yaml of kind fusion; none: the parameters below");
@@ -68,16 +81,23 @@ class Fusion final : public Component {
       p(selector, "selector", "1", Range{-1e9, 1e9}, "further attribute, where the model's weights have one",
         while_running);
       p(rest, "rest", "sensors that add little are switched off");
+      p(learning, "learning", "of a model's weights, while an instrument reads on `reference`");
     }
   };
   explicit Fusion(const Parameters& parameters);
   ~Fusion() override;
   void configure() override;
   void activate() override;
+  void cleanup() noexcept override { model_.close(); }
   void step(const Tick& tick) noexcept override;
 
  private:
   struct Source;
+  using Staged = StagedModel<std::unique_ptr<metrology::FusionEstimator>>;
+  [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
+  void use_model() noexcept;
+  void write(const metrology::FusedPosition& found, const metrology::FusionSample& sample) noexcept;
+  [[nodiscard]] double reference(const Tick& tick) noexcept;
   [[nodiscard]] bool read(Source& source, const Tick& tick, metrology::FusionSample& sample) noexcept;
 
   const Parameters& parameters_;
@@ -85,11 +105,17 @@ class Fusion final : public Component {
   std::size_t positions_ = 0;
   std::vector<std::unique_ptr<Source>> sources_;
   std::unique_ptr<Input<stage::AxisFeedback>> feedback_;
+  Input<sensing::DisplacementReading> reference_{
+      *this, "reference", {.optional = true, .profile = "calibration"}};
   Output<sensing::FusedPosition> fused_{*this, "fused"};
-  std::unique_ptr<metrology::FusionEstimator> estimator_;
+  std::unique_ptr<metrology::FusionEstimator> described_;  // by the parameters: where there is no model
+  metrology::FusionEstimator* estimator_ = nullptr;
   metrology::SensorRest rest_;
   metrology::StepFree step_free_;
+  Staged model_;
   unsigned resting_ = 0;
+  double velocity_ = 0.0;  // last fused one [m/s]
+  std::uint64_t referred_ = 0;
   bool started_ = false;
 };
 

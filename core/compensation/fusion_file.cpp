@@ -200,8 +200,9 @@ FusionFile read_fusion(const config::Node& root) {
   return model;
 }
 
-std::unique_ptr<metrology::FusionEstimator> make_estimator(const FusionFile& model) {
-  if (model.method == "weights") return std::make_unique<metrology::WeightedFusion>(model.weights);
+std::unique_ptr<metrology::FusionEstimator> make_estimator(const FusionFile& model,
+                                                           const metrology::WeightLearning& learning) {
+  if (model.method == "weights") return std::make_unique<metrology::WeightedFusion>(model.weights, learning);
   return std::make_unique<metrology::FusionObserver>(model.sensors);
 }
 

@@ -24,8 +24,10 @@ void write_fusion(ModelText& text, const FusionFile& model);
 /// Reads what `write_fusion` wrote. Faults go to the document's list; the caller ends with `finish`.
 FusionFile read_fusion(const config::Node& root);
 
-/// The estimator of the file's method. Set-up only; its `step` is real-time.
-std::unique_ptr<metrology::FusionEstimator> make_estimator(const FusionFile& model);
+/// The estimator of the file's method; `learning` is of weights alone, an observer follows its sensors by itself. Set-up only;
+/// its `step` is real-time.
+std::unique_ptr<metrology::FusionEstimator> make_estimator(const FusionFile& model,
+                                                           const metrology::WeightLearning& learning = {});
 
 /// A network in a file of any kind: units are those of the surrounding keys.
 void write_network(ModelText& text, const std::string& key, const numerics::RbfNetwork& network);

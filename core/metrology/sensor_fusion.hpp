@@ -18,6 +18,8 @@ struct FusionSample {
   std::array<double, most_sensors> velocities{};  // [m/s]
   double noise_level = std::numeric_limits<double>::quiet_NaN();  // of the largest reading; NaN: unknown
   double selector = 0.0;  // a further attribute, where the weights depend on one
+  /// Where an instrument beside the sensors says the axis is [m]; NaN: there is none. Only who learns looks at it.
+  double reference = std::numeric_limits<double>::quiet_NaN();
   /// How long ago each was read (positions first, then velocities): known from stamps, beside what the sensor's own delay is
   /// [s].
   std::array<double, most_sensors> ages{};

@@ -138,8 +138,10 @@ VelocitySensorModel identify_velocity(const std::vector<FusionRun>& runs, const 
   model.fastest = fastest;
   model.largest = std::max(numerics::median(largest), 1e-6);
 
-  // reading = offset + f(v) - lag f'(v) a; powers of |v| / fastest, ridged a little; the lag by two rounds.
+  // reading = offset + f(v) - lag f'(v) a; powers of |v| / fastest, ridged a little; the lag by two rounds. In means over
+  // 50 ms: where a servo follows the sensor, its noise shakes the axis, which at once would look like lag.
   constexpr int powers = 4;
+  constexpr double mean_over = 0.05;  // [s]
   Eigen::MatrixXd gram;
   Eigen::VectorXd moment;
   Eigen::VectorXd p = Eigen::VectorXd::Zero(powers + 2);
@@ -149,21 +151,31 @@ VelocitySensorModel identify_velocity(const std::vector<FusionRun>& runs, const 
     moment = Eigen::VectorXd::Zero(powers + 2);
     for (std::size_t r = 0; r < runs.size(); ++r) {
       const double weight = 1.0 / (noise[r] * noise[r]);
+      Eigen::VectorXd rows = Eigen::VectorXd::Zero(powers + 2);
+      double readings = 0.0, count = 0.0, begun = runs[r].time(0);
       for (Eigen::Index i = 0; i < runs[r].time.size(); ++i) {
         const double reading = runs[r].velocities(i, sensor);
-        if (!std::isfinite(reading)) continue;
-        const double v = motions[r].velocity(i);
-        const double size = std::abs(v) / fastest;
-        Eigen::VectorXd row(powers + 2);
-        double slope = 0.0;
-        for (int k = 0; k < powers; ++k) {
-          row(k) = (v < 0.0 ? -1.0 : 1.0) * std::pow(size, k + 1);
-          slope += p(k) * (k + 1) * std::pow(size, k) / fastest;
+        if (std::isfinite(reading)) {
+          const double v = motions[r].velocity(i);
+          const double size = std::abs(v) / fastest;
+          double slope = 0.0;
+          for (int k = 0; k < powers; ++k) {
+            rows(k) += (v < 0.0 ? -1.0 : 1.0) * std::pow(size, k + 1);
+            slope += p(k) * (k + 1) * std::pow(size, k) / fastest;
+          }
+          rows(powers) += 1.0;
+          rows(powers + 1) -= slope * motions[r].acceleration(i);
+          readings += reading;
+          count += 1.0;
         }
-        row(powers) = 1.0;
-        row(powers + 1) = -slope * motions[r].acceleration(i);
-        gram.selfadjointView<Eigen::Lower>().rankUpdate(row, weight);
-        moment += weight * reading * row;
+        if (runs[r].time(i) - begun < mean_over && i + 1 < runs[r].time.size()) continue;
+        if (count > 0.0) {
+          gram.selfadjointView<Eigen::Lower>().rankUpdate(rows, weight / count);
+          moment += weight / count * readings * rows;
+        }
+        rows.setZero();
+        readings = count = 0.0;
+        begun = runs[r].time(i);
       }
     }
     gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <utility>
 
 #include "core/metrology/sensor_fusion.hpp"
 
@@ -13,13 +14,16 @@ class StepFree {
  public:
   explicit StepFree(double time_constant) : time_constant_{time_constant} {}
   void reset() noexcept {
-    started_ = false;
+    started_ = expected_ = false;
     aside_ = 0.0;
   }
+  /// The next estimate comes from elsewhere: what it jumps by is set aside, however little.
+  void expect_step() noexcept { expected_ = true; }
   /// The position to give out [m].
   double operator()(const FusedPosition& fused, double period) noexcept {
     const double jump = fused.position - (position_ + velocity_ * period);
-    const bool broken = fused.live != live_ || std::abs(jump) > 4.0 * sigma_;  // false where sigma is unknown
+    const bool broken = std::exchange(expected_, false) || fused.live != live_ ||
+                        std::abs(jump) > 4.0 * sigma_;  // false where sigma is unknown
     if (started_ && broken) aside_ -= jump;
     aside_ *= std::exp(-period / time_constant_);
     position_ = fused.position;
@@ -34,7 +38,7 @@ class StepFree {
   double time_constant_;
   double position_ = 0.0, velocity_ = 0.0, sigma_ = 0.0, aside_ = 0.0;
   unsigned live_ = 0;
-  bool started_ = false;
+  bool started_ = false, expected_ = false;
 };
 
 }  // namespace invar::metrology

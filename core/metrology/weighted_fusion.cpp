@@ -32,35 +32,6 @@ WeightFit fit_weights(const Eigen::Ref<const Eigen::MatrixXd>& sensors,
   return fit;
 }
 
-RecursiveWeights::RecursiveWeights(Eigen::Index sensors, double forgetting)
-    : forgetting_{forgetting},
-      theta_{Eigen::VectorXd::Zero(sensors)},
-      covariance_{Eigen::MatrixXd::Identity(sensors, sensors) * 1e12},
-      row_{Eigen::VectorXd::Zero(sensors)},
-      gain_{Eigen::VectorXd::Zero(sensors)} {
-  INVAR_EXPECTS(sensors >= 1 && forgetting > 0.0 && forgetting <= 1.0, sensors, forgetting);
-}
-
-void RecursiveWeights::add(const Eigen::Ref<const Eigen::VectorXd>& sensors, double reference) noexcept {
-  const Eigen::Index n = theta_.size();
-  for (Eigen::Index i = 0; i + 1 < n; ++i) row_(i) = sensors(i + 1) - sensors(0);
-  row_(n - 1) = 1.0;
-  gain_.noalias() = covariance_ * row_;
-  const double scale = 1.0 / (forgetting_ + row_.dot(gain_));
-  const double error = reference - sensors(0) - row_.dot(theta_);
-  theta_ += gain_ * (error * scale);
-  covariance_.noalias() -= (scale * gain_) * gain_.transpose();
-  covariance_ /= forgetting_;
-}
-
-Eigen::VectorXd RecursiveWeights::weights() const {
-  const Eigen::Index n = theta_.size();
-  Eigen::VectorXd weights(n);
-  weights.tail(n - 1) = theta_.head(n - 1);
-  weights(0) = 1.0 - theta_.head(n - 1).sum();
-  return weights;
-}
-
 double NoiseBySpeed::operator()(double at) const noexcept {
   const std::size_t n = speed.size();
   if (n == 0) return 0.0;
@@ -106,11 +77,13 @@ Eigen::VectorXd weights_at(const WeightModel& model, const Eigen::Ref<const Eige
   return weights;
 }
 
-WeightedFusion::WeightedFusion(const WeightModel& model)
+WeightedFusion::WeightedFusion(const WeightModel& model, const WeightLearning& learning)
     : model_{model},
+      learning_{learning},
       positions_{static_cast<std::size_t>(model.positions)},
       sensors_{static_cast<std::size_t>(model.positions + model.velocities)},
-      powers_{monomials(static_cast<int>(sensors_), model.polynomial.degree)} {
+      powers_{monomials(static_cast<int>(sensors_), model.polynomial.degree)},
+      recursive_{sensors_} {
   INVAR_EXPECTS(model.positions >= 1 && sensors_ <= most_sensors, model.positions, model.velocities);
   model_.delays.resize(sensors_, 0.0);
   for (const numerics::RbfNetwork& network : model.weights) {
@@ -128,6 +101,9 @@ void WeightedFusion::reset() noexcept {
   last_.fill(std::numeric_limits<double>::quiet_NaN());
   repeats_.fill(0);
   unread_.fill(0.0);
+  recursive_.reset();
+  shift_.fill(0.0);
+  intercept_shift_ = 0.0;
   step_moved_ = moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
   started_ = moving_ = false;
 }
@@ -185,8 +161,8 @@ void WeightedFusion::read_position(std::size_t i, const FusionSample& sample, Fu
   if (std::isfinite(reading)) fused.live |= 1U << i;
 }
 
-/// Fills the weights: by the selectors, of those that live, sum one.
-void WeightedFusion::weigh(const FusionSample& sample, FusedPosition& fused) const noexcept {
+/// Fills the weights: by the selectors and what was learnt, of those that live, sum one.
+void WeightedFusion::weigh(const FusionSample& sample, FusedPosition& fused) noexcept {
   const double speed = std::abs(speed_);
   double level = sample.noise_level;
   if (!std::isfinite(level)) {
@@ -199,7 +175,8 @@ void WeightedFusion::weigh(const FusionSample& sample, FusedPosition& fused) con
     const double weight = tables_[i - 1].index() == 0
                               ? (*std::get_if<0>(&tables_[i - 1]))({speed, level})
                               : (*std::get_if<1>(&tables_[i - 1]))({speed, level, sample.selector});
-    fused.weights[i] = weight > 0.0 ? (weight < 1.0 ? weight : 1.0) : 0.0;
+    found_[i] = std::clamp(weight, 0.0, 1.0);
+    fused.weights[i] = std::clamp(found_[i] + shift_[i], 0.0, 1.0);
     others += fused.weights[i];
   }
   fused.weights[0] = others < 1.0 ? 1.0 - others : 0.0;
@@ -229,6 +206,28 @@ double WeightedFusion::corrected(double mean, const FusedPosition& fused) const 
   return mean + sum;
 }
 
+/// Its position now: on by its delay and its reading's age.
+double WeightedFusion::aligned(std::size_t i, const FusionSample& sample) const noexcept {
+  return value_[i] + (model_.delays[i] + sample.ages[i]) * speed_;
+}
+
+/// What the weights in use leave is learnt as a further shift of them, a little of it at each sample.
+void WeightedFusion::learn(const FusionSample& sample, const FusedPosition& fused) noexcept {
+  if (learning_.memory <= 0.0 || !std::isfinite(sample.reference) || fused.live != (1U << sensors_) - 1U)
+    return;
+  Values at{};
+  for (std::size_t i = 0; i < sensors_; ++i) at[i] = aligned(i, sample);
+  double mean = at[0];  // by the model's own weights: the shift in use is no part of what is learnt
+  for (std::size_t i = 1; i < sensors_; ++i) mean += found_[i] * (at[i] - at[0]);
+  const double share = std::min(1.0, sample.period / learning_.memory);
+  recursive_.add(at, at[0] + sample.reference - model_.intercept - mean, 1.0 - share);
+  const auto ease = [share](double& from, double to, double most) {
+    from += share * (std::clamp(to, -most, most) - from);
+  };
+  for (std::size_t i = 1; i < sensors_; ++i) ease(shift_[i], recursive_.weight(i), learning_.most);
+  ease(intercept_shift_, recursive_.intercept(), learning_.most_intercept);
+}
+
 FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
   if (!started_) start(sample);
   FusedPosition fused;
@@ -248,10 +247,10 @@ FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
     fused.lateness[i] = model_.delays[i];
     if (fused.weights[i] <= 0.0) continue;
     total += fused.weights[i];
-    mean += fused.weights[i] * (value_[i] + (model_.delays[i] + sample.ages[i]) * speed_);
+    mean += fused.weights[i] * aligned(i, sample);
   }
   if (total > 0.0) {
-    const double before = std::exchange(fused_, corrected(mean, fused) + model_.intercept);
+    const double before = std::exchange(fused_, corrected(mean, fused) + model_.intercept + intercept_shift_);
     const bool tachometer = sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U;
     if (!tachometer && moving_ && sample.period > 0.0) {  // speed from the position itself
       const double forget = std::exp(-sample.period / speed_memory);
@@ -260,6 +259,7 @@ FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
     }
     moving_ = true;
   }
+  learn(sample, fused);
   fused.position = fused_;
   fused.velocity = speed_;
   fused.sigma = std::numeric_limits<double>::quiet_NaN();  // the method does not know

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/metrology/recursive_weights.hpp"
 #include "core/metrology/sensor_fusion.hpp"
 #include "core/numerics/lookup_table.hpp"
 #include "core/numerics/rbf_network.hpp"
@@ -22,24 +23,6 @@ struct WeightFit {
 };
 WeightFit fit_weights(const Eigen::Ref<const Eigen::MatrixXd>& sensors,
                       const Eigen::Ref<const Eigen::VectorXd>& reference);
-
-/// The same, sample by sample with exponential forgetting (recursive least squares). Real-time: sizes are
-/// fixed when it is built.
-class RecursiveWeights {
- public:
-  /// `forgetting` in (0, 1]: 1 keeps all samples alike.
-  explicit RecursiveWeights(Eigen::Index sensors, double forgetting = 1.0);
-  void add(const Eigen::Ref<const Eigen::VectorXd>& sensors, double reference) noexcept;
-  [[nodiscard]] Eigen::VectorXd weights() const;
-  [[nodiscard]] double intercept() const { return theta_(theta_.size() - 1); }
-
- private:
-  double forgetting_;
-  Eigen::VectorXd theta_;  // weights of sensors 2..N, intercept
-  Eigen::MatrixXd covariance_;
-  Eigen::VectorXd row_;
-  Eigen::VectorXd gain_;
-};
 
 /// Noise of the first velocity sensor as a function of speed (seed, 6.2: two models in series); logarithm of the
 /// deviation [m/s], monotone and straight between the knots. No knots: noise does not follow speed.
@@ -80,12 +63,21 @@ struct WeightModel {
 /// Weights of all sensors at selectors (speed, noise level, ...): clipped to [0, 1], sum one.
 Eigen::VectorXd weights_at(const WeightModel& model, const Eigen::Ref<const Eigen::VectorXd>& selectors);
 
+/// Learning while running: what an instrument beside the sensors says moves the weights that were found before.
+struct WeightLearning {
+  double memory = 0.0;           // older errors count less and less [s]; 0: nothing is learnt
+  double most = 0.5;             // that a weight moves
+  double most_intercept = 2e-3;  // that the intercept moves [m]
+};
+
 /// Runs the weights: integrates the velocities from the first position reading, moves every sensor on by its delay,
 /// looks the weights up by the low-passed speed and the noise level - given, or by the model from the speed, or
-/// estimated over a window of readings. A sensor that is missing or repeats itself loses its weight.
+/// estimated over a window of readings. A sensor that is missing or repeats itself loses its weight. Where a sample has
+/// a reference, recursive least squares learns how far weights and intercept have moved from the model since: within bounds,
+/// and eased in with the memory, so that nothing steps.
 class WeightedFusion final : public FusionEstimator {
  public:
-  explicit WeightedFusion(const WeightModel& model);
+  explicit WeightedFusion(const WeightModel& model, const WeightLearning& learning = {});
   void reset() noexcept override;
   FusedPosition step(const FusionSample& sample) noexcept override;
 
@@ -95,10 +87,13 @@ class WeightedFusion final : public FusionEstimator {
   [[nodiscard]] double travel(const FusionSample& sample) noexcept;
   void read_velocity(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
   void read_position(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
-  void weigh(const FusionSample& sample, FusedPosition& fused) const noexcept;
+  void weigh(const FusionSample& sample, FusedPosition& fused) noexcept;
+  void learn(const FusionSample& sample, const FusedPosition& fused) noexcept;
+  [[nodiscard]] double aligned(std::size_t i, const FusionSample& sample) const noexcept;
   [[nodiscard]] double corrected(double mean, const FusedPosition& fused) const noexcept;
 
   WeightModel model_;
+  WeightLearning learning_;
   std::size_t positions_, sensors_;
   using Table = std::variant<numerics::LookupTable<2>, numerics::LookupTable<3>>;
   std::vector<Table> tables_;
@@ -107,8 +102,12 @@ class WeightedFusion final : public FusionEstimator {
   Values last_{};   // its reading
   std::array<int, most_sensors> repeats_{};
   std::array<double, most_sensors> unread_{};  // time since it was read [s]
-  double step_moved_ = 0.0;                    // by the first velocity sensor in this period [m]
-  double moved_ = 0.0;                         // by it since each position last changed [m]
+  RecursiveWeights recursive_;
+  Values found_{};                // weights by the model
+  Values shift_{};                // of the weights of the second sensor and those behind it, as learnt
+  double intercept_shift_ = 0.0;  // [m]
+  double step_moved_ = 0.0;       // by the first velocity sensor in this period [m]
+  double moved_ = 0.0;            // by it since each position last changed [m]
   double fused_ = 0.0;
   double speed_ = 0.0;
   double spread_ = 0.0;

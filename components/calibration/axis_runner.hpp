@@ -1,0 +1,60 @@
+// AxisRunner: jobs that move one axis while a laser looks along it.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "components/calibration/job_component.hpp"
+#include "core/recording/table.hpp"
+#include "idl/compensation.h"
+#include "idl/sensing.h"
+#include "idl/stage.h"
+
+namespace invar::calibration {
+
+constexpr double settle = 0.5;  // s, at rest before something is measured
+
+struct Size {
+  double rms = 0.0, largest = 0.0;
+};
+/// Of what is left of values when their mean is taken out.
+Size size_of(const std::vector<double>& values);
+/// With its unit, for what a job says.
+std::string micrometres(double value);
+
+/// Its stage on `state` and `command`, a laser along the axis on `reading` and `beam`, and on `model` what uses the model that
+/// a job makes. Not real-time.
+class AxisRunner : public JobComponent {
+ protected:
+  explicit AxisRunner(const std::int64_t& axis) : axis_{axis} {}
+  /// What a step adds to the record of a motion.
+  virtual void take_down(recording::Table& record) = 0;
+
+  Task enable();
+  /// A command to its end; nullptr: nothing is taken down.
+  Task command_axis(stage::AxisCommand command, recording::Table* record);
+  Task move(double target, double velocity, recording::Table* record);
+  Task wait(double seconds);
+  /// Zeroes the laser where the tool stands, which is called `from` [m].
+  Task align(double from);
+  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
+
+  Input<stage::AxisState> state_{*this, "state"};
+  Inbox<sensing::DisplacementReading> reading_{
+      *this, "reading", {.optional = true, .profile = "calibration"}, 4096};
+  double beam_from_ = 0.0;  // where the laser was zeroed [m]
+
+ private:
+  void make_safe() override;
+  void send(stage::AxisCommand& command);
+
+  const std::int64_t& axis_;
+  Output<stage::AxisCommand> command_{*this, "command", "command"};
+  Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
+  Output<compensation::ModelCommand> model_{*this, "model", "command"};
+  Input<compensation::ModelStatus> model_status_{
+      *this, "model_status", {.optional = true, .profile = "state"}};
+};
+
+}  // namespace invar::calibration

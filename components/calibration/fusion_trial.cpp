@@ -1,0 +1,244 @@
+#include "components/calibration/fusion_trial.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <stdexcept>
+
+#include "core/compensation/fusion_file.hpp"
+
+namespace invar::calibration {
+
+namespace {
+
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+using Readings = std::array<double, metrology::most_sensors>;
+
+Readings no_readings() {
+  Readings readings;
+  readings.fill(nothing);
+  return readings;
+}
+
+std::string millimetres(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g mm", 1e3 * value);
+  return text;
+}
+
+/// The first sensor, which the axis was homed by, keeps its zero: the laser's was wherever the tool stood.
+void keep_zero(std::vector<metrology::FusionRun>& runs) {
+  double off = 0.0, count = 0.0;
+  for (const auto& run : runs)
+    for (Eigen::Index i = 0; i < run.time.size(); ++i)
+      if (std::isfinite(run.positions(i, 0))) off += run.positions(i, 0) - run.reference(i), ++count;
+  if (count < 100.0) throw std::runtime_error{"the first position sensor does not read: connect it"};
+  for (auto& run : runs) run.reference.array() += off / count;
+}
+
+/// As `invar calibrate fusion` reads it.
+recording::Table table_of(const std::vector<metrology::FusionRun>& runs,
+                          const std::vector<std::string>& names, std::size_t positions) {
+  recording::Table table;
+  table.add("run", "", {});
+  table.add("t", "s", {});
+  table.add("reference", "m", {});
+  for (std::size_t k = 0; k < names.size(); ++k)
+    table.add((k < positions ? "position_" : "velocity_") + names[k], k < positions ? "m" : "m/s", {});
+  for (std::size_t r = 0; r < runs.size(); ++r)
+    for (Eigen::Index i = 0; i < runs[r].time.size(); ++i) {
+      auto column = table.columns.begin();
+      for (const double value : {static_cast<double>(r + 1), runs[r].time(i), runs[r].reference(i)})
+        (column++)->values.push_back(value);
+      for (const double value : runs[r].positions.row(i)) (column++)->values.push_back(value);
+      for (const double value : runs[r].velocities.row(i)) (column++)->values.push_back(value);
+    }
+  return table;
+}
+
+}  // namespace
+
+struct FusionTrial::Source {
+  Source(FusionTrial& owner, const Sensor& sensor)
+      : name{sensor.name}, is_position{sensor.quantity == "position"} {
+    if (sensor.from == "port")
+      reading =
+          std::make_unique<Inbox<sensing::AxisReading>>(owner, "sensor_" + sensor.name, InputOptions{}, 4096);
+  }
+  std::string name;
+  bool is_position;
+  std::unique_ptr<Inbox<sensing::AxisReading>> reading;  // nullptr: from `feedback`
+};
+
+struct FusionTrial::Row {
+  double laser = nothing;
+  double setpoint = nothing;
+  double fused = nothing;
+  Readings sensors = no_readings();
+};
+
+FusionTrial::FusionTrial(const Parameters& parameters)
+    : AxisRunner{parameters.axis}, parameters_{parameters} {
+  for (const bool position : {true, false})
+    for (const Sensor& sensor : parameters.sensors) {
+      if ((sensor.quantity == "position") != position) continue;
+      sources_.push_back(std::make_unique<Source>(*this, sensor));
+      positions_ += position ? 1U : 0U;
+      if (sensor.from == "feedback" && feedback_ == nullptr)
+        feedback_ = std::make_unique<Inbox<stage::AxisFeedback>>(*this, "feedback", InputOptions{}, 4096);
+    }
+}
+
+FusionTrial::~FusionTrial() = default;
+
+std::optional<JobComponent::Job> FusionTrial::find(const std::string& wanted) {
+  const auto job = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
+                                [&](const FusionJob& one) { return one.name == wanted; });
+  if (job == parameters_.jobs.end()) return std::nullopt;
+  std::filesystem::create_directories(job->out);
+  return Job{run(*job), job->out};
+}
+
+/// Everything that was read since the last step, by its stamp.
+void FusionTrial::take_down(recording::Table&) {
+  sensing::DisplacementReading laser;
+  while (reading_.take(laser))
+    if (laser.valid()) rows_[laser.at().time_ns()].laser = beam_from_ + laser.displacement();
+  stage::AxisFeedback feedback;
+  while (feedback_ != nullptr && feedback_->take(feedback))
+    for (std::size_t i = 0; i < sources_.size(); ++i)
+      if (sources_[i]->reading == nullptr)
+        rows_[feedback.at().time_ns()].sensors[i] =
+            sources_[i]->is_position ? feedback.position() : feedback.velocity();
+  sensing::AxisReading reading;
+  for (std::size_t i = 0; i < sources_.size(); ++i)
+    while (sources_[i]->reading != nullptr && sources_[i]->reading->take(reading))
+      rows_[reading.at().time_ns()].sensors[i] =
+          sources_[i]->is_position ? reading.position() : reading.velocity();
+  sensing::FusedPosition fused;
+  while (fused_.take(fused)) rows_[fused.at().time_ns()].fused = fused.position();
+  if (const auto* state = state_.latest(); state != nullptr)
+    rows_[state->at().time_ns()].setpoint = state->setpoint_position();
+}
+
+/// One sinusoid from rest; what was read stands in `rows_` afterwards.
+Task FusionTrial::swing(const FusionJob& job, double period) {
+  co_await move(job.from, 0.0, nullptr);
+  co_await wait(settle);
+  recording::Table unused;
+  take_down(unused);  // what waited
+  rows_.clear();
+  stage::AxisCommand sine;
+  sine.kind(stage::AXIS_COMMAND_SINE);
+  sine.amplitude(job.amplitude);
+  sine.period(period);
+  sine.periods(1);
+  co_await command_axis(sine, &unused);
+  std::erase_if(rows_, [](const auto& row) { return !std::isfinite(row.second.laser); });
+  if (rows_.size() < 100)
+    throw std::runtime_error{"no reading of the laser arrives: connect `reading` and `beam`"};
+}
+
+metrology::FusionRun FusionTrial::run_of_rows() const {
+  const auto n = static_cast<Eigen::Index>(rows_.size());
+  const auto positions = static_cast<Eigen::Index>(positions_);
+  const Eigen::Index velocities = static_cast<Eigen::Index>(sources_.size()) - positions;
+  metrology::FusionRun run{Eigen::VectorXd(n),
+                           Eigen::VectorXd(n),
+                           Eigen::MatrixXd(n, positions),
+                           Eigen::MatrixXd(n, velocities),
+                           {},
+                           {}};
+  Eigen::Index i = 0;
+  for (const auto& [stamp, row] : rows_) {
+    run.time(i) = static_cast<double>(stamp - rows_.begin()->first) * 1e-9;
+    run.reference(i) = row.laser;
+    for (Eigen::Index k = 0; k < positions + velocities; ++k) {
+      const double value = row.sensors[static_cast<std::size_t>(k)];
+      if (k < positions)
+        run.positions(i, k) = value;
+      else
+        run.velocities(i, k - positions) = value;
+    }
+    ++i;
+  }
+  return run;
+}
+
+/// The errors by the laser of sinusoids that are not fitted: of the fused position, and of the axis that follows it.
+Task FusionTrial::verify(const FusionJob& job, const std::string& when, Size& fused, Size& tracked) {
+  std::vector<double> of_fused, of_axis;
+  recording::Table table;
+  for (const char* time : {"period", "t"}) table.add(time, "s", {});
+  for (const char* place : {"reference", "fused", "setpoint"}) table.add(place, "m", {});
+  for (const double period : job.verify_periods) {
+    co_await swing(job, period);
+    for (const auto& [stamp, row] : rows_) {
+      if (std::isfinite(row.fused)) of_fused.push_back(row.fused - row.laser);
+      if (std::isfinite(row.setpoint)) of_axis.push_back(row.laser - row.setpoint);
+      const double cells[] = {period, static_cast<double>(stamp - rows_.begin()->first) * 1e-9, row.laser,
+                              row.fused, row.setpoint};
+      for (std::size_t c = 0; c < table.columns.size(); ++c) table.columns[c].values.push_back(cells[c]);
+    }
+  }
+  if (of_fused.size() < 100) throw std::runtime_error{"nothing fused arrives: connect `fused`"};
+  table.write(std::filesystem::absolute(job.out) / ("fusion_" + when + ".csv"));
+  fused = size_of(of_fused);
+  tracked = size_of(of_axis);
+}
+
+Task FusionTrial::run(const FusionJob& job) {
+  const std::filesystem::path folder = std::filesystem::absolute(job.out);
+  co_await enable();
+  co_await move(job.from, 0.0, nullptr);
+  co_await wait(settle);
+  co_await align(job.from);
+  Size fused_before, tracked_before, fused_after, tracked_after;
+  co_await verify(job, "before", fused_before, tracked_before);
+  progress_ = 0.2;
+  report(job::JOB_RUNNING, "sinusoids beside the laser");
+  std::vector<metrology::FusionRun> runs;
+  for (const double period : job.periods) {
+    co_await swing(job, period);
+    runs.push_back(run_of_rows());
+    progress_ += 0.5 / static_cast<double>(job.periods.size());
+  }
+
+  keep_zero(runs);
+  std::vector<std::string> names;
+  for (const auto& source : sources_) names.push_back(source->name);
+  table_of(runs, names, positions_).write(folder / "fusion.csv");
+
+  report(job::JOB_RUNNING, "identifying the sensors");
+  const auto middle = names.begin() + static_cast<std::ptrdiff_t>(positions_);
+  const metrology::FusionFit fit = metrology::identify_fusion(
+      runs, {names.begin(), middle}, {middle, names.end()}, {.noise_estimated = true});
+  const bool observer = fit.method == metrology::FusionMethod::observer;
+  compensation::ModelText text{"fusion", {folder / "fusion.csv"}};
+  compensation::write_fusion(text, {observer ? "observer" : "weights", false, fit.sensors, fit.weights, ""});
+  const auto file = folder / "compensation.yaml";
+  text.write(file);
+  co_await move(job.from, 0.0, nullptr);
+  co_await wait(settle);
+  co_await command_model(compensation::MODEL_STAGE, file.string());
+  co_await command_model(compensation::MODEL_ACTIVATE, file.string());
+  progress_ = 0.8;
+  report(job::JOB_RUNNING, "the model is in use; verifying");
+  co_await verify(job, "after", fused_after, tracked_after);
+  const std::string fused = "fused position of runs not fitted " + millimetres(fused_before.rms) + " to " +
+                            millimetres(fused_after.rms) + " RMS by the laser";
+  if (fused_after.rms > fused_before.rms) {
+    co_await move(job.from, 0.0, nullptr);
+    co_await command_model(compensation::MODEL_ROLLBACK, file.string());
+    throw std::runtime_error{fused + ": no better; rolled back"};
+  }
+  progress_ = 1.0;
+  report(job::JOB_DONE, fused + ", the axis that follows it " + millimetres(tracked_before.rms) + " to " +
+                            millimetres(tracked_after.rms) + "; method " +
+                            (observer ? "observer" : "weights"));
+}
+
+}  // namespace invar::calibration

@@ -1,0 +1,101 @@
+// FusionTrial: the sensors of an axis identified in the cell, from sinusoids beside a laser, and their fusion put to use.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "components/calibration/axis_runner.hpp"
+#include "core/component/parameters.hpp"
+#include "core/metrology/fusion_identification.hpp"
+
+namespace invar::calibration {
+
+/// Sinusoids to identify from, and others before and after, which are not fitted.
+struct FusionJob {
+  std::string name;
+  double from = 0.0;
+  double amplitude = 0.1;
+  std::vector<double> periods{1.3, 2.0, 2.6, 3.5, 4.5, 6.0};
+  std::vector<double> verify_periods{3.0, 5.0};
+  std::string out = "out";
+  void describe(auto& p) {
+    p(name, "name", "what `invar job run` calls it");
+    p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
+    p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
+    p(periods, "periods", "s", "one sinusoid each, to identify from");
+    p(verify_periods, "verify_periods", "s", "those before and after");
+    p(out, "out", "folder for the files, created; relative to where the cell was started");
+    if constexpr (requires { p.node(); }) {
+      if (periods.size() < 3)
+        p.node()["periods"].fault("fewer than three sinusoids: none could be held out", "give three or more");
+      if (verify_periods.empty()) p.node()["verify_periods"].fault("is empty", "give one period or more");
+    }
+  }
+};
+
+/// One axis; `model` is its fusion's, `fused` what that says, and each sensor of the fusion has a port `sensor_<name>`, or is the
+/// position or velocity of `feedback`. A model that does not lessen the error of the runs that were not fitted is taken back.
+class FusionTrial final : public AxisRunner {
+ public:
+  struct Sensor {
+    std::string name;
+    std::string quantity = "position";
+    std::string from = "port";
+    void describe(auto& p);
+  };
+  struct Parameters {
+    std::int64_t axis = 0;
+    std::vector<Sensor> sensors;
+    std::vector<FusionJob> jobs;
+    void describe(auto& p) {
+      p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
+      p(sensors, "sensors", "as the fusion has them");
+      p(jobs, "jobs", "that identify them");
+      if constexpr (requires { p.node(); })
+        if (std::none_of(sensors.begin(), sensors.end(),
+                         [](const Sensor& sensor) { return sensor.quantity == "position"; }))
+          p.node()["sensors"].fault("none measures a position", "name the sensors of the fusion");
+    }
+  };
+  explicit FusionTrial(const Parameters& parameters);
+  ~FusionTrial() override;
+
+ private:
+  struct Source;
+  /// What was read at one instant; NaN where nothing was.
+  struct Row;
+  using Rows = std::map<std::int64_t, Row>;  // by the stamp [ns]
+
+  std::optional<Job> find(const std::string& wanted) override;
+  void take_down(recording::Table& record) override;
+  Task run(const FusionJob& job);
+  Task swing(const FusionJob& job, double period);
+  Task verify(const FusionJob& job, const std::string& when, Size& fused, Size& tracked);
+  [[nodiscard]] metrology::FusionRun run_of_rows() const;
+
+  const Parameters& parameters_;
+  std::vector<std::unique_ptr<Source>> sources_;  // positions first
+  std::size_t positions_ = 0;
+  std::unique_ptr<Inbox<stage::AxisFeedback>> feedback_;
+  Inbox<sensing::FusedPosition> fused_{*this, "fused", {}, 4096};
+  Rows rows_;  // of the motion that runs
+};
+
+void FusionTrial::Sensor::describe(auto& p) {
+  p(name, "name", "of the sensor; its port is `sensor_<name>`");
+  p(quantity, "quantity", "position or velocity");
+  p(from, "from", "port, or feedback: the drive's own encoder or velocity");
+  if constexpr (requires { p.node(); }) {
+    if (quantity != "position" && quantity != "velocity")
+      p.node()["quantity"].fault("`" + quantity + "` is not fused", "use position or velocity");
+    if (from != "port" && from != "feedback")
+      p.node()["from"].fault("`" + from + "` is no source", "use port or feedback");
+  }
+}
+
+}  // namespace invar::calibration
