@@ -103,35 +103,55 @@ GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges
   return basis;
 }
 
-Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
-                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
-  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(3, basis.size);
-  const Eigen::Matrix3d directions = axis_directions(basis.chain, squareness);
-  const Eigen::Matrix3d arms = lever_arms(basis.chain, directions, position, tool);
-  for (const auto& block : basis.blocks) {
-    const int axis = axis_of(block.component);
-    const Eigen::Vector3d along = Eigen::Vector3d::Unit(direction_of(block.component));
+std::vector<FieldTerm> field_terms(const GeometricBasis& basis, const Squareness& squareness,
+                                   const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
+  const Eigen::Matrix3d arms =
+      lever_arms(basis.chain, axis_directions(basis.chain, squareness), position, tool);
+  std::vector<FieldTerm> terms;
+  for (std::size_t b = 0; b < basis.blocks.size(); ++b) {
+    const int component = basis.blocks[b].component;
+    const int axis = axis_of(component);
+    const Eigen::Vector3d along = Eigen::Vector3d::Unit(direction_of(component));
     const Eigen::Vector3d effect =
-        is_rotation(block.component) ? Eigen::Vector3d{along.cross(arms.col(axis))} : along;
+        is_rotation(component) ? Eigen::Vector3d{along.cross(arms.col(axis))} : along;
     if (effect.isZero(0.0)) continue;
-    const auto w = basis.splines[index(axis)].at(position[axis]);
-    Eigen::RowVectorXd row = w.value[0] * block.coefficients.row(w.first);
-    for (int i = 1; i < 4; ++i) row += w.value[index(i)] * block.coefficients.row(w.first + i);
-    for (int k = 0; k < 3; ++k)
-      if (effect[k] != 0.0) map.row(k).segment(block.first, block.size()) = effect[k] * row;
+    terms.push_back({b, effect, basis.splines[index(axis)].at(position[axis])});
   }
+  return terms;
+}
+
+Eigen::MatrixXd squareness_map(const GeometricBasis& basis, const Squareness& squareness,
+                               const Eigen::Vector3d& position) {
+  const Eigen::Matrix3d directions = axis_directions(basis.chain, squareness);
+  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(3, static_cast<Eigen::Index>(basis.pairs.size()));
   for (std::size_t i = 0; i < basis.pairs.size(); ++i) {
     for (int a = 0; a < 3; ++a) {
       for (int b = a + 1; b < 3; ++b) {
         if (squareness_of(a, b) != basis.pairs[i]) continue;
         const int later = basis.chain.place(a) > basis.chain.place(b) ? a : b;
         const int towards = later == a ? b : a;
-        const int column = basis.first_squareness() + static_cast<int>(i);
+        const auto column = static_cast<Eigen::Index>(i);
         map(towards, column) = position[later];
         map(later, column) = -position[later] * squareness[index(basis.pairs[i])] / directions(later, later);
       }
     }
   }
+  return map;
+}
+
+Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
+                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
+  Eigen::MatrixXd map = Eigen::MatrixXd::Zero(3, basis.size);
+  for (const FieldTerm& term : field_terms(basis, squareness, position, tool)) {
+    const auto& block = basis.blocks[term.block];
+    const auto& w = term.weights;
+    Eigen::RowVectorXd row = w.value[0] * block.coefficients.row(w.first);
+    for (int i = 1; i < 4; ++i) row += w.value[index(i)] * block.coefficients.row(w.first + i);
+    for (int k = 0; k < 3; ++k)
+      if (term.effect[k] != 0.0) map.row(k).segment(block.first, block.size()) = term.effect[k] * row;
+  }
+  map.middleCols(basis.first_squareness(), static_cast<Eigen::Index>(basis.pairs.size())) =
+      squareness_map(basis, squareness, position);
   return map;
 }
 

@@ -47,6 +47,19 @@ struct GeometricBasis {
 GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges,
                           const std::array<int, 3>& intervals, const std::vector<Eigen::Vector3d>& tools);
 
+/// What one unit of the error motion of `blocks[block]` does to the tool, and the coefficients of its spline that count there.
+struct FieldTerm {
+  std::size_t block;
+  Eigen::Vector3d effect;  // m per m, or the arm in m per rad
+  numerics::CubicBSpline::Weights weights;
+};
+std::vector<FieldTerm> field_terms(const GeometricBasis& basis, const Squareness& squareness,
+                                   const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
+
+/// What each squareness of `pairs` does to the tool, to first order about the given squareness: 3 x pairs.
+Eigen::MatrixXd squareness_map(const GeometricBasis& basis, const Squareness& squareness,
+                               const Eigen::Vector3d& position);
+
 /// e(P, p) = V * unknowns at the reference temperature, to first order about the given squareness: 3 x size. With `squareness` not zero the constant
 /// remainder is `squareness_remainder`.
 Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,

@@ -1,6 +1,7 @@
 #include "core/metrology/geometric_equations.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 
 #include "core/base/contract.hpp"
@@ -94,47 +95,58 @@ LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const S
   return result;
 }
 
+LineInformation information_of(const CondensedLine& line, const LineRows& rows, double misfit,
+                               const Eigen::VectorXd* points) {
+  LineInformation result{line.information, line.weighted, line.constant, 0.0};
+  Eigen::MatrixXd& information = result.information;
+  Eigen::VectorXd& weighted = result.weighted;
+  const Eigen::VectorXd& h = rows.remainder;
+  weighted -= information * h;
+  result.constant += h.dot(information * h) - 2.0 * h.dot(line.weighted);
+  const auto identity = Eigen::MatrixXd::Identity(information.rows(), information.rows());
+  if (points != nullptr && points->minCoeff() < 1.0) {
+    // A point of weight w counts as if its reading had variance 1/w: extra variance in front of the information.
+    const Eigen::VectorXd extra = (points->cwiseInverse().array() - 1.0) *
+                                  information.diagonal().cwiseMax(1e-300).cwiseInverse().array();
+    const Eigen::VectorXd root = extra.cwiseSqrt();
+    const Eigen::LLT<Eigen::MatrixXd> factor{identity + root.asDiagonal() * information * root.asDiagonal()};
+    const Eigen::MatrixXd left = information * root.asDiagonal();
+    const Eigen::VectorXd moved = factor.solve(root.cwiseProduct(weighted));
+    result.constant -= root.cwiseProduct(weighted).dot(moved);
+    weighted -= left * moved;
+    information -= left * factor.solve(left.transpose());
+  }
+  if (misfit > 0.0) {
+    const double variance = misfit * misfit;
+    const Eigen::LLT<Eigen::MatrixXd> factor{identity + variance * information};
+    result.log_misfit = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+    const Eigen::VectorXd moved = factor.solve(weighted);
+    result.constant -= variance * weighted.dot(moved);
+    weighted = moved;
+    information = factor.solve(information).eval();
+    information = 0.5 * (information + information.transpose().eval());
+  }
+  return result;
+}
+
 NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
                          int unknowns, double misfit, const std::vector<Eigen::VectorXd>& points) {
   NormalEquations sum;
   sum.normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
   sum.right = Eigen::VectorXd::Zero(unknowns);
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    Eigen::MatrixXd information = lines[l].information;
-    const Eigen::VectorXd& h = rows[l].remainder;
-    Eigen::VectorXd weighted = lines[l].weighted - information * h;
-    double constant = lines[l].constant - 2.0 * h.dot(lines[l].weighted) + h.dot(information * h);
-    if (!points.empty() && points[l].minCoeff() < 1.0) {
-      // A point of weight w counts as if its reading had variance 1/w: extra variance in front of the information.
-      const Eigen::VectorXd extra = (points[l].cwiseInverse().array() - 1.0) *
-                                    information.diagonal().cwiseMax(1e-300).cwiseInverse().array();
-      const Eigen::VectorXd root = extra.cwiseSqrt();
-      const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(information.rows(), information.rows()) +
-                                    root.asDiagonal() * information * root.asDiagonal();
-      const Eigen::LLT<Eigen::MatrixXd> factor{inner};
-      const Eigen::MatrixXd left = information * root.asDiagonal();
-      const Eigen::VectorXd moved = factor.solve(root.cwiseProduct(weighted));
-      constant -= root.cwiseProduct(weighted).dot(moved);
-      weighted -= left * moved;
-      information -= left * factor.solve(left.transpose());
+    const LineInformation line =
+        information_of(lines[l], rows[l], misfit, points.empty() ? nullptr : &points[l]);
+    sum.constant += line.constant;
+    sum.log_misfit += line.log_misfit;
+    const double expansion = lines[l].noise.expansion_information;
+    if (expansion > 0.0) {
+      sum.normal += rows[l].expansion * expansion * rows[l].expansion.transpose();
+      sum.right += expansion * lines[l].noise.expansion * rows[l].expansion;
     }
-    if (misfit > 0.0) {
-      const double variance = misfit * misfit;
-      const Eigen::LLT<Eigen::MatrixXd> factor{
-          Eigen::MatrixXd::Identity(information.rows(), information.rows()) + variance * information};
-      sum.log_misfit += 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-      const Eigen::VectorXd moved = factor.solve(weighted);
-      constant -= variance * weighted.dot(moved);
-      weighted = moved;
-      information = factor.solve(information).eval();
-      information = 0.5 * (information + information.transpose().eval());
-    }
-    sum.constant += constant;
-    sum.normal += rows[l].expansion * lines[l].noise.expansion_information * rows[l].expansion.transpose();
-    sum.right += lines[l].noise.expansion_information * lines[l].noise.expansion * rows[l].expansion;
-    const Eigen::MatrixXd product = information * rows[l].rows;
+    const Eigen::MatrixXd product = line.information * rows[l].rows;
     const Eigen::MatrixXd normal = rows[l].rows.transpose() * product;
-    const Eigen::VectorXd right = rows[l].rows.transpose() * weighted;
+    const Eigen::VectorXd right = rows[l].rows.transpose() * line.weighted;
     const auto& columns = rows[l].unknowns;
     for (std::size_t i = 0; i < columns.size(); ++i) {
       sum.right[columns[i]] += right[static_cast<Eigen::Index>(i)];
@@ -170,6 +182,27 @@ Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& bas
   posterior.mean = system.mean;
   posterior.log_evidence = system.log_evidence;
   return posterior;
+}
+
+Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, double misfit,
+                               const Eigen::VectorXd& points, const Posterior& posterior) {
+  // Without the line's own A'G A and A'w: (H - A'G A) theta = b - A'w. Its rows p = A theta then follow from the posterior
+  // with it, S = A H^-1 A':  (I - S G) p = A theta_all - S w. The expansion that the line tells of is one more row.
+  const LineInformation own = information_of(line, rows, misfit, &points);
+  const Eigen::Index n = rows.rows.rows();
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(n + 1, posterior.mean.size());
+  for (std::size_t i = 0; i < rows.unknowns.size(); ++i)
+    all.col(rows.unknowns[i]).head(n) = rows.rows.col(static_cast<Eigen::Index>(i));
+  all.row(n) = rows.expansion.transpose();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n + 1, n + 1);
+  information.topLeftCorner(n, n) = own.information;
+  information(n, n) = line.noise.expansion_information;
+  Eigen::VectorXd weighted(n + 1);
+  weighted << own.weighted, line.noise.expansion_information * line.noise.expansion;
+  const Eigen::MatrixXd spread = all * posterior.covariance * all.transpose();
+  const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n + 1, n + 1) - spread * information;
+  const Eigen::VectorXd told = left.partialPivLu().solve(all * posterior.mean - spread * weighted);
+  return told.head(n);
 }
 
 Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,

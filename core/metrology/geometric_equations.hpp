@@ -19,17 +19,28 @@ struct LineRows {
 };
 LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const Squareness& squareness);
 
+/// What a line says of its rows * unknowns once `misfit` [m], the sd of what repeats at a point but no smooth model explains
+/// (encoder counts, pitch errors finer than the data), and points that do not fit are counted in:
+/// -2 log likelihood = constant - 2 weighted'e + e' information e + log_misfit.
+struct LineInformation {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd weighted;
+  double constant = 0.0;
+  double log_misfit = 0.0;  // log|I + misfit^2 G|
+};
+/// `points` [0..1], by point, weakens points that do not fit; nullptr: all fit.
+LineInformation information_of(const CondensedLine& line, const LineRows& rows, double misfit,
+                               const Eigen::VectorXd* points);
+
 /// Normal equations: -2 log likelihood = constant - 2 right'theta + theta' normal theta (+ the part of the misfit).
 struct NormalEquations {
   Eigen::MatrixXd normal;
   Eigen::VectorXd right;
   double constant = 0.0;
-  double log_misfit = 0.0;  // sum of log|I + misfit^2 G|
+  double log_misfit = 0.0;  // sum over the lines
 };
 
-/// Adds up all lines. `misfit` [m] is the sd of what repeats at a point share but no smooth model explains (encoder
-/// counts, pitch errors finer than the data). `points` [0..1], by line and point, weakens points that do not fit; may be
-/// empty.
+/// Adds up all lines, each as `information_of` has it; `points` by line, may be empty.
 NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
                          int unknowns, double misfit, const std::vector<Eigen::VectorXd>& points = {});
 
@@ -46,6 +57,10 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
 /// The same without the covariances, which cost most.
 Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
                      const GeometricPrior& prior);
+
+/// What the other lines alone, at the same prior, say of a line that was among those solved: its rows * unknowns, m.
+Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, double misfit,
+                               const Eigen::VectorXd& points, const Posterior& posterior);
 
 /// Log evidence of a prior, its gradient by the log strengths, and what the readings are expected to tell about these
 /// (Fisher's information).

@@ -1,12 +1,12 @@
 #include "core/metrology/geometric_identification.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/base/contract.hpp"
+#include "core/metrology/geometric_field.hpp"
 #include "core/metrology/geometric_stages.hpp"
 
 namespace invar::metrology {
@@ -73,31 +73,32 @@ double misfit_score(double misfit, double expected, const Identification& work) 
   return solve_mean(equations, work.basis, work.prior).log_evidence - 0.5 * z * z;
 }
 
-/// Golden section over the log of the misfit: it is one number and the score has one top.
-double most_evident_misfit(const Identification& work, double expected) {
-  double low = std::log(5e-9);
-  double high = std::log(5e-6);
-  const double ratio = 0.618;
-  double a = high - ratio * (high - low);
-  double b = low + ratio * (high - low);
-  double at_a = misfit_score(std::exp(a), expected, work);
-  double at_b = misfit_score(std::exp(b), expected, work);
-  for (int i = 0; i < 6; ++i) {
-    if (at_a > at_b) {
-      high = b;
-      b = a;
-      at_b = at_a;
-      a = high - ratio * (high - low);
-      at_a = misfit_score(std::exp(a), expected, work);
-    } else {
-      low = a;
-      a = b;
-      at_a = at_b;
-      b = low + ratio * (high - low);
-      at_b = misfit_score(std::exp(b), expected, work);
-    }
+/// The top of the score over the log of the misfit, which has one: three places `step` apart are moved until the middle
+/// one is the highest, then a parabola is laid through them.
+double most_evident_misfit(const Identification& work, double expected, double step) {
+  const double lowest = std::log(5e-9);
+  const double highest = std::log(5e-6);
+  const auto score = [&](double log_misfit) { return misfit_score(std::exp(log_misfit), expected, work); };
+  double middle = std::clamp(std::log(work.misfit), lowest + step, highest - step);
+  double at = score(middle);
+  double below = score(middle - step);
+  double above = score(middle + step);
+  while (below > at && middle - 2.0 * step >= lowest) {
+    middle -= step;
+    above = at;
+    at = below;
+    below = score(middle - step);
   }
-  return std::exp(at_a > at_b ? a : b);
+  while (above > at && middle + 2.0 * step <= highest) {
+    middle += step;
+    below = at;
+    at = above;
+    above = score(middle + step);
+  }
+  const double bend = below - 2.0 * at + above;
+  const double top = bend < 0.0 ? std::clamp(0.5 * (below - above) / bend, -1.0, 1.0)
+                                : (above > below ? 1.0 : -1.0);  // at an end of the range
+  return std::exp(middle + top * step);
 }
 
 /// Points that stand off by more than four sigma are weakened; true when any weight moved.
@@ -185,6 +186,7 @@ void fill_sigma(Identification& work) {
   }
   const RigidPart rigid =
       rigid_part(work.basis, model.squareness, volume_grid(model.chain, model.travel, 5), model.tool);
+  const FieldVariance variance{work.basis, model.squareness, rigid, all};
   grid.values.clear();
   for (Eigen::Vector3d position : volume_grid(model.chain, model.travel, nodes)) {
     // Beside the node, where no reading stands: on a measured point the model is surer than anywhere else.
@@ -194,14 +196,10 @@ void fill_sigma(Identification& work) {
       position[k] +=
           (position[k] < r.lower + 0.5 * r.width() ? 0.35 : -0.35) * model.splines[index(k)].spacing();
     }
-    const Eigen::MatrixXd map = shape_map(work.basis, model.squareness, rigid, position, model.tool);
-    Eigen::Vector3d sigma;
-    const Eigen::MatrixXd moved = map * all;
+    // What repeats but no smooth model explains is error of the machine too, at every point.
+    Eigen::Vector3d sigma = (variance.at(position, model.tool).array() + work.misfit * work.misfit).sqrt();
     for (int k = 0; k < 3; ++k)
-      // What repeats but no smooth model explains is error of the machine too, at every point.
-      sigma[k] = model.chain.has(k)
-                     ? std::hypot(std::sqrt(std::max(moved.row(k).dot(map.row(k)), 0.0)), work.misfit)
-                     : std::numeric_limits<double>::infinity();
+      if (!model.chain.has(k)) sigma[k] = std::numeric_limits<double>::infinity();
     grid.values.push_back(sigma);
   }
 }
@@ -251,76 +249,6 @@ void make_rows(Identification& work, const Squareness& squareness) {
 }
 
 }  // namespace
-
-std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count) {
-  std::vector<Eigen::Vector3d> grid;
-  const auto nodes = [&](int axis) { return chain.has(axis) ? count : 1; };
-  const auto at = [&](int axis, int i) {
-    const Range r = travel[index(axis)];
-    return chain.has(axis) ? r.lower + r.width() * i / (count - 1) : 0.0;
-  };
-  for (int k = 0; k < nodes(2); ++k)
-    for (int j = 0; j < nodes(1); ++j)
-      for (int i = 0; i < nodes(0); ++i) grid.emplace_back(at(0, i), at(1, j), at(2, k));
-  return grid;
-}
-
-std::vector<VolumeNode> volume_nodes(const Chain& chain, const std::array<Range, 3>& travel) {
-  constexpr std::array<double, 6> place{0.033765243, 0.169395307, 0.380690407,
-                                        0.619309593, 0.830604693, 0.966234757};
-  constexpr std::array<double, 6> weight{0.085662246, 0.180380787, 0.233956967,
-                                         0.233956967, 0.180380787, 0.085662246};
-  std::vector<VolumeNode> nodes{{Eigen::Vector3d::Zero(), 1.0}};
-  for (int axis = 0; axis < 3; ++axis) {
-    if (!chain.has(axis)) continue;
-    std::vector<VolumeNode> more;
-    for (const VolumeNode& node : nodes) {
-      for (std::size_t i = 0; i < place.size(); ++i) {
-        VolumeNode one = node;
-        one.position[axis] = travel[index(axis)].lower + place[i] * travel[index(axis)].width();
-        one.weight *= weight[i];
-        more.push_back(one);
-      }
-    }
-    nodes = std::move(more);
-  }
-  return nodes;
-}
-
-Eigen::MatrixXd RigidPart::rigid(const Chain& chain, const Eigen::Vector3d& p) {
-  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(3, 6);
-  modes.leftCols<3>().setIdentity();
-  modes.col(3) = Eigen::Vector3d{0.0, -p.z(), p.y()};
-  modes.col(4) = Eigen::Vector3d{p.z(), 0.0, -p.x()};
-  modes.col(5) = Eigen::Vector3d{-p.y(), p.x(), 0.0};
-  for (int k = 0; k < 3; ++k) {
-    if (chain.has(k)) continue;
-    modes.row(k).setZero();  // an axis that is not there: no error along it, no rotation out of the plane
-    for (int about = 0; about < 3; ++about)
-      if (about != k) modes.col(3 + about).setZero();
-  }
-  return modes;
-}
-
-RigidPart rigid_part(const GeometricBasis& basis, const Squareness& squareness,
-                     const std::vector<Eigen::Vector3d>& grid, const Eigen::Vector3d& tool) {
-  Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(6, basis.size);
-  for (const auto& position : grid) {
-    const Eigen::MatrixXd modes = RigidPart::rigid(basis.chain, position);
-    Eigen::MatrixXd field = field_map(basis, squareness, position, tool);
-    for (int k = 0; k < 3; ++k)
-      if (!basis.chain.has(k)) field.row(k).setZero();
-    normal += modes.transpose() * modes;
-    right += modes.transpose() * field;
-  }
-  return {normal.completeOrthogonalDecomposition().solve(right)};
-}
-
-Eigen::MatrixXd shape_map(const GeometricBasis& basis, const Squareness& squareness, const RigidPart& rigid,
-                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool) {
-  return field_map(basis, squareness, position, tool) - RigidPart::rigid(basis.chain, position) * rigid.map;
-}
 
 Eigen::VectorXd predicted_readings(const GeometricModel& model, const CondensedLine& line) {
   Eigen::VectorXd result(static_cast<Eigen::Index>(line.points.size()));
@@ -376,7 +304,7 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
     const EvidentPrior found = most_evident(work.equations, work.basis, expected, work.prior);
     work.prior = found.prior;
     work.strengths = found.covariance;
-    work.misfit = most_evident_misfit(work, options.misfit);
+    work.misfit = most_evident_misfit(work, options.misfit, round == 0 ? 0.8 : 0.4);
     work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
     const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
     if (!weaken_outlying_points(work, mean) && round > 0) break;

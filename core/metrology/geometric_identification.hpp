@@ -52,27 +52,4 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
 /// Beam-wise error [m] that a model says a line reads at its points, zero at its start.
 Eigen::VectorXd predicted_readings(const GeometricModel& model, const CondensedLine& line);
 
-/// Nodes [m] that fill the travels: `count` along each axis.
-std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count);
-
-/// Nodes and weights that average over the travels: Gauss-Legendre, so that they do not fall on the measured points.
-struct VolumeNode {
-  Eigen::Vector3d position;  // m
-  double weight;             // their sum is 1
-};
-std::vector<VolumeNode> volume_nodes(const Chain& chain, const std::array<Range, 3>& travel);
-
-/// The part of a field that is no rigid motion: e - R a, with R the rigid motions (translations, rotations) that best fit
-/// it over `grid`. `map` gives a = map * unknowns; `rigid` the columns of R at a position.
-struct RigidPart {
-  Eigen::MatrixXd map;
-  [[nodiscard]] static Eigen::MatrixXd rigid(const Chain& chain, const Eigen::Vector3d& position);
-};
-RigidPart rigid_part(const GeometricBasis& basis, const Squareness& squareness,
-                     const std::vector<Eigen::Vector3d>& grid, const Eigen::Vector3d& tool);
-
-/// V(P) less the rigid part: 3 x unknowns.
-Eigen::MatrixXd shape_map(const GeometricBasis& basis, const Squareness& squareness, const RigidPart& rigid,
-                          const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
-
 }  // namespace invar::metrology

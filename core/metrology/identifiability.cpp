@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/metrology/geometric_field.hpp"
+
 namespace invar::metrology {
 
 namespace {
@@ -28,15 +30,12 @@ Eigen::MatrixXd at_knots(const GeometricBasis& basis, const GeometricBasis::Bloc
 double volumetric(const GeometricBasis& basis, const Eigen::MatrixXd& covariance,
                   const Squareness& squareness, const std::array<Range, 3>& travel,
                   const Eigen::Vector3d& tool) {
-  const auto nodes = volume_nodes(basis.chain, travel);
   const RigidPart rigid = rigid_part(basis, squareness, volume_grid(basis.chain, travel, 5), tool);
-  Eigen::MatrixXd all(3 * static_cast<Eigen::Index>(nodes.size()), basis.size);
-  for (std::size_t g = 0; g < nodes.size(); ++g)
-    all.middleRows<3>(3 * static_cast<Eigen::Index>(g)) =
-        std::sqrt(nodes[g].weight) * shape_map(basis, squareness, rigid, nodes[g].position, tool);
-  for (Eigen::Index r = 0; r < all.rows(); ++r)
-    if (!basis.chain.has(static_cast<int>(r % 3))) all.row(r).setZero();
-  return std::sqrt((all * covariance).cwiseProduct(all).sum());
+  const FieldVariance variance{basis, squareness, rigid, covariance};
+  double sum = 0.0;
+  for (const auto& node : volume_nodes(basis.chain, travel))
+    sum += node.weight * variance.at(node.position, tool).sum();
+  return std::sqrt(sum);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/metrology/geometric_field.hpp"
+
 namespace invar::metrology {
 
 namespace {
@@ -51,20 +53,6 @@ PlannedLine line(const Machine& machine, const std::array<double, 3>& from, cons
 
 PlannedLine line_between(const Machine& machine, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return {name_of(machine, from, to), from, to, machine.tool};
-}
-
-Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
-                             const std::array<Range, 3>& travel, const Eigen::Vector3d& tool) {
-  const auto nodes = volume_nodes(basis.chain, travel);
-  const RigidPart rigid = rigid_part(basis, squareness, volume_grid(basis.chain, travel, 5), tool);
-  Eigen::MatrixXd all(3 * static_cast<Eigen::Index>(nodes.size()), basis.size);
-  for (std::size_t g = 0; g < nodes.size(); ++g) {
-    Eigen::MatrixXd map = shape_map(basis, squareness, rigid, nodes[g].position, tool);
-    for (int k = 0; k < 3; ++k)
-      if (!basis.chain.has(k)) map.row(k).setZero();
-    all.middleRows<3>(3 * static_cast<Eigen::Index>(g)) = std::sqrt(nodes[g].weight) * map;
-  }
-  return all.transpose() * all;
 }
 
 std::vector<PlannedLine> recipe_lines(const Machine& machine, int level) {

@@ -52,11 +52,6 @@ struct Expectation {
 Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
                    const GeometricPrior& prior, double misfit = 5e-8);
 
-/// Weight of the field's shape: its trace with a covariance of the unknowns is the mean square of the error vector [m^2]
-/// over the travels, rigid motion removed.
-Eigen::MatrixXd shape_weight(const GeometricBasis& basis, const Squareness& squareness,
-                             const std::array<Range, 3>& travel, const Eigen::Vector3d& tool);
-
 /// A line not yet measured and what it would leave of the expected volumetric error.
 struct NextLine {
   PlannedLine line;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/metrology/geometric_field.hpp"
+
 namespace invar::metrology {
 
 namespace {

@@ -193,8 +193,8 @@ std::optional<std::string> compare_branches(const ThermalReadings& readings, con
   }
   if (count[0] < 2.0 || count[1] < 2.0) return std::nullopt;
   return text(
-      "heating and cooling differ by %.3f um on average after the fit (%.0f readings on both branches)",
-      1e6 * (sum[1] / count[1] - sum[0] / count[0]), count[0] + count[1]);
+      "heating and cooling differ by %.1f nm on average after the fit (%.0f readings on both branches)",
+      1e9 * (sum[1] / count[1] - sum[0] / count[0]), count[0] + count[1]);
 }
 
 }  // namespace

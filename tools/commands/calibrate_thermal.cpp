@@ -3,13 +3,13 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <set>
 
 #include "core/compensation/thermal_file.hpp"
 #include "core/metrology/components.hpp"
 #include "core/metrology/thermal_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/thermal/thermal_page.hpp"
 
 namespace invar::tools {
 
@@ -22,10 +22,6 @@ using report::si;
 
 Eigen::VectorXd vector_of(const std::vector<double>& values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-double rms(const Eigen::VectorXd& values) {
-  return std::sqrt(values.squaredNorm() / static_cast<double>(std::max<Eigen::Index>(values.size(), 1)));
 }
 
 /// The columns as vectors; rows in which any of them is empty or nan are left out.
@@ -108,200 +104,6 @@ ThermalReadings read_readings(const recording::Table& table) {
   return readings;
 }
 
-/// Indices of the readings nearest to a temperature: the third of them closest to it.
-std::vector<Eigen::Index> near(const ThermalReadings& readings, double temperature, double within) {
-  std::vector<Eigen::Index> rows;
-  for (Eigen::Index i = 0; i < readings.x.size(); ++i)
-    if (std::abs(readings.temperature(i) - temperature) <= within) rows.push_back(i);
-  return rows;
-}
-
-report::Plot surface_plot(const ThermalFit& fit) {
-  report::Plot plot;
-  plot.title = "Error over position and temperature";
-  plot.x_label = "x [mm]";
-  plot.y_label = "temperature [degC]";
-  report::Series heat;
-  heat.style = report::Series::Style::heat;
-  heat.label = "error [um]";
-  for (int i = 0; i <= 60; ++i)
-    for (int j = 0; j <= 30; ++j) {
-      const double x = fit.model.x.lower + fit.model.x.width() * i / 60.0;
-      const double t = fit.model.temperature.lower + fit.model.temperature.width() * j / 30.0;
-      heat.x.push_back(1e3 * x);
-      heat.y.push_back(t);
-      heat.u.push_back(1e6 * fit.model.value(fit.model.typical(x, t)));
-    }
-  plot.series.push_back(std::move(heat));
-  return plot;
-}
-
-report::Plot levels_plot(const ThermalReadings& readings, const ThermalFit& fit) {
-  report::Plot plot;
-  plot.title = "Readings and model at four temperatures";
-  plot.x_label = "x [mm]";
-  plot.y_label = "error [um]";
-  const char* colours[] = {"#1f6fb4", "#2a9d5c", "#e09f1f", "#d1495b"};
-  const Range& range = fit.model.temperature;
-  for (int level = 0; level < (range.width() > 0.0 ? 4 : 1); ++level) {
-    const double t = range.lower + range.width() * (level + 0.5 * (range.width() <= 0.0)) / 3.0;
-    report::Series points;
-    points.style = report::Series::Style::points;
-    points.colour = colours[level];
-    for (const Eigen::Index i : near(readings, t, std::max(0.12 * range.width(), 1e-9)))
-      if (fit.kept(i) > 0.0) {
-        points.x.push_back(1e3 * readings.x(i));
-        points.y.push_back(1e6 * readings.error(i));
-      }
-    report::Series line;
-    line.label = number(t, 4) + " degC";
-    line.colour = colours[level];
-    report::Series band;
-    band.style = report::Series::Style::band;
-    band.colour = colours[level];
-    for (int k = 0; k <= 200; ++k) {
-      const double x = fit.model.x.lower + fit.model.x.width() * k / 200.0;
-      const double value = fit.model.value(fit.model.typical(x, t));
-      const double sigma = fit.model.sigma(fit.model.typical(x, t));
-      line.x.push_back(1e3 * x);
-      line.y.push_back(1e6 * value);
-      band.x.push_back(1e3 * x);
-      band.y.push_back(1e6 * (value - 2.0 * sigma));
-      band.u.push_back(1e6 * (value + 2.0 * sigma));
-    }
-    plot.series.push_back(std::move(band));
-    plot.series.push_back(std::move(points));
-    plot.series.push_back(std::move(line));
-  }
-  return plot;
-}
-
-/// Figures 3.9 and 3.10 of the seed: what is left with the model of the coldest readings (room temperature),
-/// and with the whole one; along x at mid temperature, and in the order of measurement.
-std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const ThermalFit& fit) {
-  report::Plot fixed;
-  report::Plot varying;
-  const Range& range = fit.model.temperature;
-  fixed.title = "Residual near " + number(range.lower + 0.5 * range.width(), 4) + " degC";
-  fixed.x_label = "x [mm]";
-  varying.title = "Residual over the whole recording";
-  varying.x_label = readings.time ? "t [s]" : "reading";
-  report::Series cold;
-  cold.label = "with the room-temperature model";
-  cold.style = report::Series::Style::points;
-  report::Series whole = cold;
-  whole.label = "with the position-temperature model";
-  report::Series cold_all = cold;
-  report::Series whole_all = whole;
-  const double middle = range.lower + 0.5 * range.width();
-  for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
-    if (fit.kept(i) <= 0.0) continue;
-    const double at_cold = 1e6 * (readings.error(i) - fit.model.value({readings.x(i), range.lower, 0.0}));
-    const double left = 1e6 * (readings.error(i) - fit.predicted(i));
-    const double t = readings.time ? (*readings.time)(i) : static_cast<double>(i);
-    cold_all.x.push_back(t);
-    cold_all.y.push_back(at_cold);
-    whole_all.x.push_back(t);
-    whole_all.y.push_back(left);
-    if (std::abs(readings.temperature(i) - middle) > 0.2 * range.width() + 1e-9) continue;
-    cold.x.push_back(1e3 * readings.x(i));
-    cold.y.push_back(at_cold);
-    whole.x.push_back(1e3 * readings.x(i));
-    whole.y.push_back(left);
-  }
-  fixed.y_label = varying.y_label = "residual [um]";
-  fixed.series = {std::move(cold), std::move(whole)};
-  varying.series = {std::move(cold_all), std::move(whole_all)};
-  return {std::move(fixed), std::move(varying)};
-}
-
-struct Figures {
-  double before = 0.0;  // readings against the model of the coldest temperature
-  double after = 0.0;   // left-out RMS
-  double spread = 0.0;  // peak to peak after
-  double sigma = 0.0;   // mean sigma of the systematic value
-  int rejected = 0;
-};
-
-Figures figures_of(const ThermalReadings& readings, const ThermalFit& fit) {
-  Figures figures;
-  std::vector<double> before;
-  std::vector<double> after;
-  for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
-    if (fit.kept(i) <= 0.0) {
-      ++figures.rejected;
-      continue;
-    }
-    before.push_back(readings.error(i) - fit.model.value({readings.x(i), fit.model.temperature.lower, 0.0}));
-    after.push_back(readings.error(i) - fit.predicted(i));
-    figures.sigma += fit.model.sigma(fit.model.typical(readings.x(i), readings.temperature(i)));
-  }
-  figures.sigma /= static_cast<double>(std::max<std::size_t>(after.size(), 1));
-  figures.before = rms(vector_of(before));
-  for (const auto& candidate : fit.candidates)
-    if (candidate.chosen) figures.after = candidate.left_out_rms;
-  const auto [low, high] = std::minmax_element(after.begin(), after.end());
-  figures.spread = after.empty() ? 0.0 : *high - *low;
-  return figures;
-}
-
-report::Page page_of(const std::filesystem::path& file, const ThermalReadings& readings,
-                     const ThermalFit& fit, const Figures& figures) {
-  report::Page page{"Thermal calibration",
-                    file.filename().string() + ", " + std::to_string(readings.x.size()) + " readings"};
-  page.callout("RMS " + si(figures.before, "m") + " with the room-temperature model, " +
-                   si(figures.after, "m") +
-                   " on readings left out of the fit; the systematic error is known to " +
-                   si(figures.sigma, "m") + " (1 sigma)",
-               "good");
-  for (const auto& what : fit.unidentified) page.callout("Not identified: " + what, "warn");
-  for (const auto& note : fit.notes) page.paragraph(note);
-  page.heading("Models tried");
-  std::vector<std::vector<std::string>> rows;
-  for (const auto& candidate : fit.candidates)
-    rows.push_back({candidate.name + (candidate.lag > 0.0 ? " (" + number(candidate.lag, 3) + " s)" : ""),
-                    number(candidate.log_evidence, 6), si(candidate.left_out_rms, "m"),
-                    si(candidate.held_out_rms, "m"), candidate.verdict});
-  page.table({"model", "log evidence", "RMS of left-out readings", "of left-out passes", "verdict"}, rows);
-  page.heading("Error");
-  page.plots({levels_plot(readings, fit), surface_plot(fit)},
-             "Bands are two standard deviations of the curve.");
-  page.heading("Residual");
-  page.plots(residual_plots(readings, fit), "In the form of figures 3.9 and 3.10 of the seed.");
-  report::Plot growth;
-  growth.title = "Standard deviation over temperature";
-  growth.x_label = "temperature [degC]";
-  growth.y_label = "sigma at mid travel [um]";
-  report::Series line;
-  const Range& range = fit.model.temperature;
-  const double margin = std::max(1.0, 0.5 * range.width());
-  for (int k = 0; k <= 200; ++k) {
-    const double t = range.lower - margin + (range.width() + 2.0 * margin) * k / 200.0;
-    line.x.push_back(t);
-    line.y.push_back(1e6 *
-                     fit.model.sigma(fit.model.typical(fit.model.x.lower + 0.5 * fit.model.x.width(), t)));
-  }
-  growth.series = {std::move(line)};
-  report::Plot histogram;
-  histogram.title = "Residuals";
-  histogram.x_label = "residual [um]";
-  histogram.y_label = "readings";
-  report::Series bars;
-  bars.style = report::Series::Style::bars;
-  const double width = fit.model.noise * 0.4;
-  for (int k = -12; k <= 12; ++k) {
-    bars.x.push_back(1e6 * width * k);
-    double count = 0.0;
-    for (Eigen::Index i = 0; i < readings.x.size(); ++i)
-      if (std::lround((readings.error(i) - fit.predicted(i)) / width) == k) count += 1.0;
-    bars.y.push_back(count);
-  }
-  histogram.series = {std::move(bars)};
-  page.plots({std::move(growth), std::move(histogram)},
-             "Outside the calibrated temperatures the value is held and its sigma grows with the slope.");
-  return page;
-}
-
 struct Options {
   std::filesystem::path recording;
   std::filesystem::path out;
@@ -331,7 +133,7 @@ void calibrate(const Options& options) {
     const Progress progress{"identifying the surface over position and temperature"};
     return metrology::identify_thermal(readings);
   }();
-  const Figures figures = figures_of(readings, fit);
+  const ThermalFigures figures = thermal_figures(readings, fit);
 
   compensation::ModelText text{"thermal", {file}};
   compensation::write_place(text, place);
@@ -355,7 +157,7 @@ void calibrate(const Options& options) {
                                 {"lag_s", candidate.lag},
                                 {"chosen", candidate.chosen},
                                 {"verdict", candidate.verdict}});
-  write_calibration(folder, text, report, page_of(file, readings, fit, figures));
+  write_calibration(folder, text, report, thermal_page(file, readings, fit, figures));
 
   std::cout << "thermal error from " << readings.x.size() << " readings, " << figures.rejected
             << " rejected as outliers, noise " << si(fit.model.noise, "m") << '\n';

@@ -30,12 +30,10 @@ double largest(const Eigen::VectorXd& values) {
   return result;
 }
 
-/// Measured deviation less its prediction from `unknowns`, zero at its mean over the line's good points: where the laser
-/// was zeroed is no property of the machine. NaN where no reading is left or the point does not fit.
-Eigen::VectorXd rest_of(const Identification& found, std::size_t l, const Eigen::VectorXd& unknowns) {
-  Eigen::VectorXd rest = found.lines[l].deviation - found.rows[l].remainder;
-  for (Eigen::Index i = 0; i < found.rows[l].rows.cols(); ++i)
-    rest -= found.rows[l].rows.col(i) * unknowns[found.rows[l].unknowns[static_cast<std::size_t>(i)]];
+/// Measured deviation less what is `told` of it, zero at its mean over the line's good points: where the laser was zeroed is
+/// no property of the machine. NaN where no reading is left or the point does not fit.
+Eigen::VectorXd rest_of(const Identification& found, std::size_t l, const Eigen::VectorXd& told) {
+  Eigen::VectorXd rest = found.lines[l].deviation - found.rows[l].remainder - told;
   double mean = 0.0;
   double count = 0.0;
   for (Eigen::Index j = 0; j < rest.size(); ++j) {
@@ -47,19 +45,24 @@ Eigen::VectorXd rest_of(const Identification& found, std::size_t l, const Eigen:
   return rest.array() - mean / std::max(count, 1.0);
 }
 
-/// The unknowns from all lines but one, at the same prior.
-Eigen::VectorXd without(const Identification& found, std::size_t l) {
-  const auto own = metrology::assemble({found.lines[l]}, {found.rows[l]}, found.basis.size, found.misfit,
-                                       {found.point_weights[l]});
-  auto others = found.equations;
-  others.normal -= own.normal;
-  others.right -= own.right;
-  return metrology::solve_mean(others, found.basis, found.prior).mean;
+/// With the line among those fitted.
+Eigen::VectorXd rest_fitted(const Identification& found, std::size_t l, const Eigen::VectorXd& unknowns) {
+  const auto& rows = found.rows[l];
+  return rest_of(found, l, rows.rows * unknowns(rows.unknowns));
 }
 
-std::string micro(double value) { return report::number(1e6 * value, 3); }
+/// Told by all lines but this one, at the same prior.
+Eigen::VectorXd rest_unseen(const Identification& found, std::size_t l) {
+  return rest_of(found, l,
+                 metrology::told_by_others(found.lines[l], found.rows[l], found.misfit,
+                                           found.point_weights[l], found.posterior));
+}
 
 }  // namespace
+
+std::string micro(double value, int digits) {
+  return std::abs(value) < 0.5e-9 ? "0" : report::number(1e6 * value, digits);
+}
 
 void evaluate(GeometricResult& result) {
   const Identification& found = result.found;
@@ -70,14 +73,14 @@ void evaluate(GeometricResult& result) {
   for (std::size_t l = 0; l < found.lines.size(); ++l) {
     LineFigures figures;
     const Eigen::VectorXd& raw = found.lines[l].deviation;
-    const Eigen::VectorXd fitted = rest_of(found, l, found.posterior.mean);
+    const Eigen::VectorXd fitted = rest_fitted(found, l, found.posterior.mean);
     const bool full = result.method == "full" && found.lines.size() > 1;
     figures.before_rms = rms(raw);
     figures.before_max = largest(raw);
     figures.after_rms = rms(fitted);
     figures.after_max = largest(fitted);
     result.rest.push_back(fitted);
-    result.unseen.push_back(full ? rest_of(found, l, without(found, l)) : Eigen::VectorXd{});
+    result.unseen.push_back(full ? rest_unseen(found, l) : Eigen::VectorXd{});
     figures.unseen_rms = rms(result.unseen.back());
     figures.unseen_max = largest(result.unseen.back());
     result.figures.push_back(figures);

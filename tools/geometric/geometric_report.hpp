@@ -49,6 +49,9 @@ struct GeometricResult {
   double before_rms = 0.0, after_rms = 0.0, unseen_rms = 0.0, unseen_max = 0.0;  // m, over all lines
 };
 
+/// In millionths (um, urad), to a thousandth of one: what is less than that is "0".
+std::string micro(double value, int digits = 3);
+
 /// Fills the figures from `found`: each line also predicted from the others alone.
 void evaluate(GeometricResult& result);
 

@@ -48,6 +48,13 @@ std::string base64(const std::vector<unsigned char>& bytes) {
   return out;
 }
 
+/// A number, perhaps with its unit: stands right in its column.
+bool numeric(const std::string& cell) {
+  const std::size_t digit = cell.starts_with('-') ? 1 : 0;
+  return cell.size() > digit && cell[digit] >= '0' && cell[digit] <= '9' &&
+         std::count(cell.begin(), cell.end(), ' ') <= 1;
+}
+
 constexpr const char* style = R"(
 :root{--ink:#1c2733;--soft:#5b6875;--line:#dfe4ea;--good:#1d7a46;--bad:#b3261e;--warn:#9a6700}
 body{font:16px/1.5 system-ui,-apple-system,"Segoe UI",Helvetica,Arial,sans-serif;color:var(--ink);max-width:1180px;
@@ -57,7 +64,7 @@ h1{font-size:1.7rem;margin:0}h2{font-size:1.2rem;margin:2.2rem 0 .6rem;border-bo
 margin:.8rem 0;font-size:1.06rem}.callout.good{border-color:var(--good)}.callout.bad{border-color:var(--bad)}
 .callout.warn{border-color:var(--warn)}table{border-collapse:collapse;margin:.6rem 0;font-size:.93rem}
 th,td{padding:.28rem .8rem;text-align:left;border-bottom:1px solid var(--line);font-variant-numeric:tabular-nums}
-th{color:var(--soft);font-weight:600}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0;max-width:760px}
+th{color:var(--soft);font-weight:600}.n{text-align:right}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0;max-width:760px}
 figure svg,figure img{max-width:100%;height:auto}figcaption{color:var(--soft);font-size:.9rem}
 table.bars{width:100%;max-width:760px;margin:.4rem 0 1.2rem}table.bars caption{text-align:left;font-weight:600;padding-bottom:.2rem}
 .bars th,.bars td{border:0;padding:.12rem .6rem .12rem 0}.bars th{width:13rem;font-weight:400}.bars td:nth-child(2){width:55%}.bars td{white-space:nowrap}
@@ -79,11 +86,15 @@ void Page::html(const std::string& text) { parts_.push_back({text, {}, ""}); }
 
 void Page::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
   std::string out = "<table><thead><tr>";
-  for (const auto& cell : header) out += "<th>" + escaped(cell) + "</th>";
+  for (std::size_t c = 0; c < header.size(); ++c) {
+    const bool right = !rows.empty() && c < rows.front().size() && numeric(rows.front()[c]);
+    out += (right ? "<th class=\"n\">" : "<th>") + escaped(header[c]) + "</th>";
+  }
   out += "</tr></thead><tbody>";
   for (const auto& row : rows) {
     out += "<tr>";
-    for (const auto& cell : row) out += "<td>" + escaped(cell) + "</td>";
+    for (const auto& cell : row)
+      out += (numeric(cell) ? "<td class=\"n\">" : "<td>") + escaped(cell) + "</td>";
     out += "</tr>";
   }
   html(out + "</tbody></table>");

@@ -117,7 +117,7 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
   script << "set terminal svg size " << plot.width << "," << plot.height
          << " dynamic noenhanced font 'Helvetica,12' background rgb 'white'\nset output "
          << quoted(file.string()) << "\nset title " << quoted(plot.title) << "\nset xlabel "
-         << quoted(plot.x_label) << "\nset ylabel " << quoted(plot.y_label)
+         << quoted(plot.x_label) << " offset 0,0.4\nset ylabel " << quoted(plot.y_label)
          << "\nset grid lc rgb '#dddddd'\nset border 3 lc rgb '#888888'\nset tics nomirror\n"
          << "set key outside bottom center horizontal samplen 2\nset boxwidth 0.9 relative\n"
          << (plot.equal_axes ? "set size ratio -1\n" : "set size noratio\n")
@@ -132,8 +132,13 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
       script << "*:*";
     script << "]\n";
   };
+  script << "set autoscale\n";
   range('x', plot.x_range);
   range('y', plot.y_range);
+  // A grid of values fills its frame; other curves end at round numbers.
+  const bool heat = std::any_of(plot.series.begin(), plot.series.end(),
+                                [](const Series& s) { return s.style == Series::Style::heat; });
+  if (heat && !plot.x_range && !plot.y_range) script << "set autoscale xfix\nset autoscale yfix\n";
   script << "plot ";
   std::size_t colour = 0;
   bool any = false;

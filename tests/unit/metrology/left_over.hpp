@@ -4,7 +4,8 @@
 #include <Eigen/QR>
 #include <cmath>
 
-#include "core/metrology/geometric_identification.hpp"
+#include "core/metrology/geometric_field.hpp"
+#include "core/metrology/geometric_model.hpp"
 #include "core/metrology/machine.hpp"
 
 namespace invar::metrology::testing {

@@ -1,0 +1,17 @@
+// What the page of a geometric calibration draws.
+#pragma once
+
+#include "tools/geometric/geometric_report.hpp"
+
+namespace invar::tools {
+
+/// A component over its axis with its two-sigma band and what the readings say of it.
+report::Plot component_plot(const GeometricResult& result, int component);
+/// Measured, fitted and predicted deviation along one line.
+report::Plot line_plot(const GeometricResult& result, std::size_t line);
+/// The error vectors over every plane of two axes, at the middle of the third, less the plane's rigid motion.
+std::vector<report::Plot> field_plots(const metrology::GeometricModel& model);
+/// What is left of the points, beside a normal distribution.
+report::Plot residual_histogram(const GeometricResult& result);
+
+}  // namespace invar::tools
