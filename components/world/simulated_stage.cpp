@@ -66,6 +66,7 @@ SimulatedStage::SimulatedStage(const Parameters& parameters)
 SimulatedStage::~SimulatedStage() = default;
 
 void SimulatedStage::activate() {
+  last_.reset();
   random_.seed(static_cast<std::uint64_t>(parameters_.seed));
   normal_.reset();
   moving_.setZero();
@@ -88,7 +89,22 @@ void SimulatedStage::change(Device& device) noexcept {
   device.is_changed = true;
 }
 
+/// A machine does not stand still while its controller misses cycles: the drive holds its current, and lets go after
+/// the watchdog.
+void SimulatedStage::move(Device& device, const Tick& tick, int periods) const noexcept {
+  const auto* command = device.motor.latest();
+  for (int i = periods; i-- > 0;) {
+    const Duration age = device.motor.age(tick.now) - Duration::seconds(tick.period * i);
+    const bool held =
+        command != nullptr && command->enabled() && age < Duration::seconds(parameters_.watchdog);
+    device.plant.step(held ? command->current() : 0.0, tick.period);
+  }
+}
+
 void SimulatedStage::step(const Tick& tick) noexcept {
+  const double since = last_ ? (tick.now - *last_).in_seconds() : tick.period;
+  const int periods = std::clamp(static_cast<int>(std::lround(since / tick.period)), 1, most_missed);
+  last_ = tick.now;
   const auto* slide = slide_.latest();
   const auto* base = base_.latest();
   const double temperature = slide != nullptr ? slide->temperature() : parameters_.temperature;
@@ -107,7 +123,7 @@ void SimulatedStage::step(const Tick& tick) noexcept {
         device->plant.time() >= device->parameters.change_at)
       change(*device);
     device->plant.set_temperature(temperature);
-    device->plant.step(enabled ? command->current() : 0.0, tick.period);
+    move(*device, tick, periods);
 
     const double velocity = device->plant.velocity();
     if (velocity != 0.0) moving_[device->axis] = velocity > 0.0 ? 1.0 : -1.0;

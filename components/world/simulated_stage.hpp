@@ -55,6 +55,8 @@ class SimulatedStage final : public Component {
  private:
   struct Device;
   static void change(Device& device) noexcept;
+  void move(Device& device, const Tick& tick, int periods) const noexcept;
+  static constexpr int most_missed = 500;  // cycles of a stall that are made up for
   const Parameters& parameters_;
   metrology::Machine machine_;
   Eigen::Matrix3d directions_;
@@ -67,6 +69,7 @@ class SimulatedStage final : public Component {
   double scale_temperature_ = 0.0;  // follows the slide with the machine's lag
   double slide_temperature_ = 0.0;
   std::optional<Instant> began_;  // when it was active first
+  std::optional<Instant> last_;   // when it stepped last
   bool warm_ = false;             // the slide's temperature has arrived
   Output<sensing::ToolPosition> tool_{*this, "tool"};
 };

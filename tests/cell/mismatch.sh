@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The cell finds out what its model leaves out. Three ways: as jobs in simulated time, on a running cell with `invar record` and
 # `invar job apply`, and with nothing hidden, where nothing may be claimed or applied.
-# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals     live is run by hand: by the wall clock a starved host skips cycles
+# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals     live is by the wall clock, the others in simulated time
 set -euo pipefail
 invar=$1 source=$2 part=$3
 folder=$(mktemp -d); cell_pid=
@@ -23,6 +23,15 @@ hide() {
 rms() {
   awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i ~ /^following_error/) c = i; next }
     { sum += $c; squares += $c * $c; n++ } END { printf "%.4f\n", 1e6 * sqrt(squares / n - (sum / n) ^ 2) }' "$1"
+}
+# What nine of ten following errors stay below [um], their median taken out: a host that stalls for once does not count.
+spread() {
+  python3 - "$1" <<'PYTHON'
+import csv, statistics, sys
+errors = [float(v) for row in csv.DictReader(open(sys.argv[1])) for k, v in row.items() if k.startswith("following_error")]
+middle = statistics.median(errors)
+print(f"{1e6 * sorted(abs(e - middle) for e in errors)[int(0.9 * len(errors))]:.4f}")
+PYTHON
 }
 # falls BEFORE AFTER SHARE: AFTER is at most SHARE of BEFORE.
 falls() {
@@ -66,13 +75,16 @@ case $part in
     [[ ! -e out/mismatch/motion_after.csv ]] || fail "there is a motion after nothing"
     ;;
   live)
+    sed -i "s/^        control:/        following_error: 0.05  # a host that stalls must not trip the axis\n        control:/" $cell
+    grep -q "following_error" $cell || fail "the cell file has no \`control\` to put the following error before"
+    sed -i "s/velocities: \[0.03, 0.08, 0.15\]/velocities: [0.06, 0.15]/" $cell # short
     "$invar" run $cell --real-time >cell.log 2>&1 &
     cell_pid=$!
     "$invar" status $cell --wait 60 >/dev/null || { cat cell.log; fail "the cell does not come up"; }
     "$invar" record $cell --out run.mcap --topic stage_x.state --wait 60 >recorded 2>&1 &
     record_pid=$!
     for _ in $(seq 100); do ! grep -q "^recording into" recorded || break; sleep 0.2; done
-    "$invar" job run $cell excite --wait 60
+    "$invar" job run $cell excite --wait 60 || { cat cell.log; fail "the axis did not move"; }
     cp out/mismatch/motion_before.csv first.csv
     kill -INT $record_pid
     wait $record_pid || { cat recorded; fail "the recording failed"; }
@@ -81,10 +93,10 @@ case $part in
     finds_the_truth diagnosis/report.json
     "$invar" job apply $cell stage_x --model diagnosis/patched.yaml --wait 60 --partly # whatever else it found
     "$invar" job run $cell excite --wait 60
-    falls "$(rms first.csv)" "$(rms out/mismatch/motion_before.csv)" 0.25
+    falls "$(spread first.csv)" "$(spread out/mismatch/motion_before.csv)" 0.25
     "$invar" job apply $cell stage_x --rollback --wait 60
     "$invar" job run $cell excite --wait 60
-    falls "$(rms out/mismatch/motion_before.csv)" "$(rms first.csv)" 1.1 # as it was
+    falls "$(spread out/mismatch/motion_before.csv)" "$(spread first.csv)" 1.1 # as it was
     kill -INT $cell_pid
     wait $cell_pid || { cat cell.log; fail "the cell did not end in order"; }
     cell_pid=
