@@ -1,7 +1,9 @@
 // `invar status`: how the processes and components of a running cell are.
+#include <chrono>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "tools/live/commands.hpp"
 #include "tools/live/live_cell.hpp"
@@ -20,11 +22,15 @@ struct Options {
 int status(Options& options) {
   options.call.resolve();
   LiveCell cell{options.call};
-  CellStatus status{.cell = cell.name(), .processes = {}, .components = {}, .missing = {}, .silent = {}};
+  CellStatus status{
+      .cell = cell.name(), .processes = {}, .components = {}, .missing = {}, .silent = {}, .notices = {}};
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
     status.processes = cell.client().processes();
     status.components = cell.client().components();
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds{100});  // what was said before arrives behind the state
+    status.notices = cell.client().take_notices();
   }
   if (options.json)
     std::cout << to_json(status).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';

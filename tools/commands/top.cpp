@@ -95,6 +95,8 @@ void show(const CellStatus& status, const std::map<std::string, Rate>& rates, bo
   table.print(out);
 }
 
+constexpr std::ptrdiff_t notices_kept = 20;
+
 int top(Options& options) {
   options.call.resolve();
   (void)interrupted();
@@ -119,6 +121,9 @@ int top(Options& options) {
     if (!sleep_for(Duration::seconds(options.interval))) break;
     status.processes = cell.client().processes();
     status.components = cell.client().components();
+    for (auto& notice : cell.client().take_notices()) status.notices.push_back(std::move(notice));
+    if (std::ssize(status.notices) > notices_kept)
+      status.notices.erase(status.notices.begin(), status.notices.end() - notices_kept);
     status.silent = silence.of(status.processes);
     std::erase_if(status.missing, [&](const std::string& name) {
       return std::any_of(status.processes.begin(), status.processes.end(),

@@ -137,6 +137,9 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::unknown_physics:
     case Verdict::partly_explained:
+      if (over == "time")
+        return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
+               "back.";
       return "Record again with " + (over.empty() ? "one input" : over) +
              " varied on its own and all else held: what has no name yet goes with it, or with something "
              "that "

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "tools/live/text_table.hpp"
@@ -24,6 +25,22 @@ std::string clock_text(const lifecycle::ProcessStatus& process) {
   if (process.simulated()) return "simulated";
   if (!process.realtime_asked()) return "not asked";
   return process.realtime_granted() ? "granted" : "not granted";
+}
+
+std::string level_text(event::Severity level) {
+  constexpr std::array words{"note", "warning", "fault", "trip"};
+  const auto index = static_cast<std::size_t>(level);
+  return index < words.size() ? words[index] : "?";
+}
+
+/// UTC to the second; in simulated time the seconds since the start.
+std::string time_text(std::int64_t ns) {
+  const std::time_t seconds = ns / 1'000'000'000;
+  if (seconds < 1'000'000'000) return number_text(static_cast<double>(ns) * 1e-9) + " s";
+  std::tm utc{};
+  gmtime_r(&seconds, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%F %T", &utc)};
 }
 
 }  // namespace
@@ -85,6 +102,16 @@ void print(const CellStatus& status, std::ostream& out) {
     if (p.realtime_asked() && !p.realtime_granted() && !p.simulated())
       out << '\n' << p.process_name().c_str() << ": " << p.realtime_text().c_str() << '\n';
   }
+
+  auto warnings = status.notices;
+  std::erase_if(warnings, [](const auto& notice) { return notice.level() < event::SEVERITY_WARNING; });
+  std::stable_sort(warnings.begin(), warnings.end(),
+                   [](const auto& a, const auto& b) { return a.at().time_ns() < b.at().time_ns(); });
+  constexpr std::size_t most = 5;
+  if (!warnings.empty()) out << "\nlast warnings\n";
+  for (std::size_t i = warnings.size() > most ? warnings.size() - most : 0; i < warnings.size(); ++i)
+    out << time_text(warnings[i].at().time_ns()) << "  " << level_text(warnings[i].level()) << "  "
+        << warnings[i].source().c_str() << ": " << warnings[i].text().c_str() << '\n';
 }
 
 nlohmann::ordered_json to_json(const CellStatus& status) {
@@ -132,6 +159,12 @@ nlohmann::ordered_json to_json(const CellStatus& status) {
                                   {"compute", json_of(c.compute())},
                                   {"inputs", std::move(inputs)}});
   }
+  json["notices"] = nlohmann::ordered_json::array();
+  for (const auto& notice : status.notices)
+    json["notices"].push_back({{"time_ns", notice.at().time_ns()},
+                               {"level", level_text(notice.level())},
+                               {"source", notice.source().c_str()},
+                               {"text", notice.text().c_str()}});
   return json;
 }
 

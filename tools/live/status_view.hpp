@@ -15,8 +15,9 @@ struct CellStatus {
   std::string cell;
   std::vector<lifecycle::ProcessStatus> processes;
   std::vector<lifecycle::ComponentStatus> components;
-  std::vector<std::string> missing;  // processes that should be there and say nothing
-  std::set<std::string> silent;      // processes that were there and fell silent
+  std::vector<std::string> missing;    // processes that should be there and say nothing
+  std::set<std::string> silent;        // processes that were there and fell silent
+  std::vector<event::Notice> notices;  // what the cell said last, oldest first
 
   /// Nothing is missing, silent, tripped or in error.
   [[nodiscard]] bool healthy() const;
