@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The cell finds out what its model leaves out. Three ways: as jobs in simulated time, on a running cell with `invar record` and
 # `invar job apply`, and with nothing hidden, where nothing may be claimed or applied.
-# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals     live is by the wall clock, the others in simulated time
+# mismatch.sh INVAR SOURCE_DIR jobs|live|nothing|refusals     live is run by hand: on a starved host a diagnosis may add a curve over time
 set -euo pipefail
 invar=$1 source=$2 part=$3
 folder=$(mktemp -d); cell_pid=

@@ -54,12 +54,16 @@ double rms(const std::vector<double>& values) {
   return n > 0.0 ? std::sqrt(sum / n) : 0.0;
 }
 
+/// An output of which the recording holds no more than a start value.
+bool is_bare(const FitRow& row) { return row.before == 0.0 && row.after == 0.0; }
+
 /// Mean of y in cells of x.
 Series averaged(const std::string& label, const std::vector<double>& x, const std::vector<double>& y,
                 std::size_t cells) {
   double low = 1e300, high = -1e300;
   for (double v : x)
     if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  cells = std::clamp<std::size_t>(x.size() / 8, 4, cells);
   std::vector<double> sum(cells, 0.0), count(cells, 0.0);
   for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i) {
     if (!std::isfinite(x[i]) || !std::isfinite(y[i]) || !(high > low)) continue;
@@ -102,10 +106,12 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
     sure += (sure.empty() ? "" : "; ") + readable(finding.term.info->name) + " " +
             report::number(100.0 * finding.probability) + " %";
   }
-  for (const auto& row : d.heldout)
+  for (const auto& row : d.heldout) {
+    if (is_bare(row)) continue;
     fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + ", refitted " +
            report::si(row.retuned, row.unit) + ", now " + report::si(row.after, row.unit) + " (noise " +
            report::si(row.noise_floor, row.unit) + ")";
+  }
   const std::string rest = report::number(d.unexplained, 3) + " times the noise";
   Names rows{{"what is missing", missing.empty() ? "nothing that this recording shows" : missing}};
   if (!sure.empty()) rows.push_back({"how sure", sure});
@@ -272,7 +278,8 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
   in_short(page, data, d);
 
   page.heading("Error on data that no fit saw");
-  for (const auto& row : d.heldout) add_bars(page, row);
+  for (const auto& row : d.heldout)
+    if (!is_bare(row)) add_bars(page, row);
   page.paragraph(
       "RMS of measured - simulated on every third stretch of the recording, which the fits did not see. "
       "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added. `Noise` "
@@ -283,6 +290,7 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
   const auto time = over(data, "time");
   std::vector<Plot> residuals;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    if (o < d.heldout.size() && is_bare(d.heldout[o])) continue;
     Plot plot;
     plot.title = data.outputs[o] + ": what the model leaves";
     plot.x_label = data.is_time_series ? "time [s]" : "time of the droplet [s]";

@@ -31,9 +31,11 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
 void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& title,
              const std::vector<FitRow>& fit) {
   rows.push_back({title, "before", "retuned", "after", "noise"});
-  for (const auto& row : fit)
+  for (const auto& row : fit) {
+    if (row.before == 0.0 && row.after == 0.0) continue;  // no more than a start value was recorded
     rows.push_back({row.signal, report::si(row.before, row.unit), report::si(row.retuned, row.unit),
                     report::si(row.after, row.unit), report::si(row.noise_floor, row.unit)});
+  }
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ th,td{padding:.28rem .8rem;text-align:left;border-bottom:1px solid var(--line);f
 th{color:var(--soft);font-weight:600}.n{text-align:right}.row{display:flex;flex-wrap:wrap;gap:1rem}figure{margin:.6rem 0;flex:1 1 430px;min-width:0;max-width:760px}
 figure svg,figure img{max-width:100%;height:auto}figcaption{color:var(--soft);font-size:.9rem}
 table.bars{width:100%;max-width:760px;margin:.4rem 0 1.2rem}table.bars caption{text-align:left;font-weight:600;padding-bottom:.2rem}
-.bars th,.bars td{border:0;padding:.12rem .6rem .12rem 0}.bars th{width:13rem;font-weight:400}.bars td:nth-child(2){width:55%}.bars td{white-space:nowrap}
+.bars th,.bars td{border:0;padding:.12rem .6rem .12rem 0}.bars th{width:13rem;font-weight:400}.bars td:nth-child(2){width:55%}.bars th,.bars td{white-space:nowrap}
 .bars div{height:1rem;border-radius:2px}
 pre{background:#f5f7f9;padding:.8rem;overflow-x:auto;font-size:.86rem})";
 
