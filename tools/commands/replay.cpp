@@ -109,7 +109,7 @@ int replay(Options& options) {
 
   LiveCell cell{options.call, LiveCell::Need::nobody};
   std::map<std::string, Channel> channels;
-  cell.settle();
+  cell.settle(std::chrono::seconds{3});  // on a busy PC a writer may be late to say that it is there
   if (const auto taken = written_already(cell, selection.topics); !taken.empty() && !options.beside) {
     std::cerr << "invar replay: `" << taken.front() << "` is written already"
               << (taken.size() > 1 ? " (and " + std::to_string(taken.size() - 1) + " more)" : "")

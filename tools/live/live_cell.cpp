@@ -205,7 +205,7 @@ bool LiveCell::knows_all(const dds::Snapshot& snapshot) const {
                      });
 }
 
-void LiveCell::settle() {
+void LiveCell::settle(std::chrono::seconds silence) {
   std::size_t known = 0;
   auto since = Clock::now();
   wait_until(patience_, [&] {
@@ -213,8 +213,7 @@ void LiveCell::settle() {
     const std::size_t now = snapshot.participants.size() + snapshot.endpoints.size();
     if (now != known) since = Clock::now();
     known = now;
-    return Clock::now() - since > std::chrono::seconds{1} ||
-           (knows_all(snapshot) && Clock::now() - since > quiet);
+    return Clock::now() - since > silence || (knows_all(snapshot) && Clock::now() - since > quiet);
   });
 }
 
