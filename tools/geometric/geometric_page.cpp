@@ -15,18 +15,8 @@ using report::Plot;
 using report::Series;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
-std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
-
 std::string place(const Eigen::Vector3d& p) {
   return "(" + number(1e3 * p.x(), 4) + ", " + number(1e3 * p.y(), 4) + ", " + number(1e3 * p.z(), 4) + ")";
-}
-
-Series series(const std::string& label, Series::Style style, const std::string& colour) {
-  Series result;
-  result.label = label;
-  result.style = style;
-  result.colour = colour;
-  return result;
 }
 
 void write_machine(report::Page& page, const GeometricResult& result) {

@@ -14,15 +14,6 @@ using report::Plot;
 using report::Series;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
-std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
-
-Series series(const std::string& label, Series::Style style, const std::string& colour) {
-  Series result;
-  result.label = label;
-  result.style = style;
-  result.colour = colour;
-  return result;
-}
 
 /// What the readings say of a component: its fit plus what is left of each reading, over the component's share in it. Only
 /// readings in which it weighs at least half as much as it can.
@@ -121,6 +112,16 @@ Plot field_plot(const GeometricModel& model, int a, int b) {
 }
 
 }  // namespace
+
+std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
+
+Series series(const std::string& label, Series::Style style, const std::string& colour) {
+  Series result;
+  result.label = label;
+  result.style = style;
+  result.colour = colour;
+  return result;
+}
 
 Plot component_plot(const GeometricResult& result, int component) {
   const GeometricModel& model = result.found.model;

@@ -5,6 +5,10 @@
 
 namespace invar::tools {
 
+/// X, Y or Z.
+std::string letter(int axis);
+/// One without points yet.
+report::Series series(const std::string& label, report::Series::Style style, const std::string& colour);
 /// A component over its axis with its two-sigma band and what the readings say of it.
 report::Plot component_plot(const GeometricResult& result, int component);
 /// Measured, fitted and predicted deviation along one line.
