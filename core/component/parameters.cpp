@@ -4,6 +4,17 @@
 
 namespace invar {
 
+namespace {
+
+template <typename Value, typename Show>
+std::string bracketed(const std::vector<Value>& values, const Show& show) {
+  std::string text;
+  for (const Value& value : values) text += (text.empty() ? "" : ", ") + show(value);
+  return "[" + text + "]";
+}
+
+}  // namespace
+
 void ParameterReader::operator()(std::filesystem::path& value, std::string_view name, std::string_view) {
   if (!node_.has(name)) return;
   const config::Node node = node_[name];
@@ -67,8 +78,7 @@ void ParameterLister::operator()(std::vector<double>& values, std::string_view n
                                  std::string_view description) {
   ParameterInfo& info = add(name, "list", description);
   info.unit = unit;
-  for (const double value : values) info.otherwise += (info.otherwise.empty() ? "[" : ", ") + shown(value);
-  info.otherwise += info.otherwise.empty() ? "[]" : "]";
+  info.otherwise = bracketed(values, [](double value) { return shown(value); });
 }
 void ParameterLister::operator()(Range& value, std::string_view name, std::string_view unit,
                                  std::string_view description) {
@@ -78,9 +88,8 @@ void ParameterLister::operator()(Range& value, std::string_view name, std::strin
 }
 void ParameterLister::operator()(std::vector<std::string>& values, std::string_view name,
                                  std::string_view description) {
-  ParameterInfo& info = add(name, "list", description);
-  for (const std::string& value : values) info.otherwise += (info.otherwise.empty() ? "[" : ", ") + value;
-  info.otherwise += info.otherwise.empty() ? "[]" : "]";
+  add(name, "list", description).otherwise =
+      bracketed(values, [](const std::string& value) { return value; });
 }
 
 }  // namespace invar

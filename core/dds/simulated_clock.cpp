@@ -13,13 +13,27 @@ namespace invar::dds {
 namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
-constexpr std::size_t part_size = 1U << 20U;  // the bound of TimeReached.samples
+constexpr std::size_t part_size = 1U << 20U;  // the bound of samples in one message
 
 SteadyTime after(Duration patience) {
   return std::chrono::steady_clock::now() + std::chrono::nanoseconds{patience.ns};
 }
 
-/// An answer stays available to those who connect late; a window needs no more than these parts.
+/// Sends `message` in as many parts as `bytes` need, one at least.
+template <typename Message>
+void write_in_parts(Writer<Message>& writer, Message& message, const std::vector<std::uint8_t>& bytes) {
+  std::size_t begin = 0;
+  do {
+    const std::size_t end = std::min(bytes.size(), begin + part_size);
+    message.samples().assign(bytes.begin() + static_cast<std::ptrdiff_t>(begin),
+                             bytes.begin() + static_cast<std::ptrdiff_t>(end));
+    message.last(end == bytes.size());
+    writer.write(message);
+    begin = end;
+  } while (begin < bytes.size());
+}
+
+/// An answer stays available to a master that connects late; a window needs no more than these parts.
 Profile answers_profile() {
   Profile p;
   p.name = "lockstep";
@@ -60,18 +74,14 @@ void ReachedBoard::put(const lockstep::TimeReached& part) {
   if (!part.last()) return;
   window.complete.insert_or_assign(part.process_id(), std::move(entry));
   window.partial.erase(part.process_id());
-  news_.notify_all();
-}
-
-void ReachedBoard::clear() {
-  const std::lock_guard lock{mutex_};
-  windows_.clear();
+  if (window.complete.size() >= awaited_) news_.notify_all();
 }
 
 std::optional<std::vector<ReachedBoard::Entry>> ReachedBoard::wait(
     std::uint64_t run, std::uint64_t sequence, const std::vector<std::uint32_t>& processes, Duration patience,
     const std::function<bool()>& given_up) {
   std::unique_lock lock{mutex_};
+  awaited_ = processes.size();
   const std::pair key{run, sequence};
   const auto complete = [&] {
     const auto& there = windows_[key].complete;
@@ -119,7 +129,14 @@ void SimulatedClockMaster::grant(lockstep::GrantKind kind, Instant until) {
   sample.from_ns(now_.ns);
   sample.until_ns(until.ns);
   sample.processes(numbers_);
-  writer_.write(sample);
+  write_in_parts(writer_, sample,
+                 kind == lockstep::GRANT_JOIN ? std::vector<std::uint8_t>{} : answered_.bytes());
+}
+
+void SimulatedClockMaster::keep(const std::vector<ReachedBoard::Entry>& answers) {
+  answered_.clear();
+  for (std::uint32_t i = 0; i < answers.size(); ++i)
+    answered_.add(i, std::as_bytes(std::span{answers[i].samples}));
 }
 
 std::string SimulatedClockMaster::names_of(const std::vector<std::uint32_t>& numbers) const {
@@ -134,7 +151,10 @@ std::string SimulatedClockMaster::wait_for_all(Duration patience, const std::fun
   const auto end = after(patience);
   while (std::chrono::steady_clock::now() < end && !(given_up && given_up())) {
     grant(lockstep::GRANT_JOIN, now_);
-    if (board_.wait(run_, 0, numbers_, Duration::milliseconds(20), given_up)) return "";
+    if (const auto answers = board_.wait(run_, 0, numbers_, Duration::milliseconds(20), given_up)) {
+      keep(*answers);
+      return "";
+    }
   }
   return "these processes did not join simulated time: " + names_of(board_.missing(run_, 0, numbers_));
 }
@@ -145,12 +165,14 @@ Advance SimulatedClockMaster::advance_to(Instant until, Duration patience,
     const Instant next = std::min(until, now_ + window_);
     ++sequence_;
     grant(lockstep::GRANT_RUN, next);
+    answered_.clear();
     const auto answers = board_.wait(run_, sequence_, numbers_, patience, given_up);
     if (!answers)
       return {now_, false,
               "these processes did not reach " + std::to_string(next.in_seconds()) +
                   " s of simulated time: " + names_of(board_.missing(run_, sequence_, numbers_))};
     now_ = next;
+    keep(*answers);
     for (std::size_t i = 0; i < answers->size(); ++i)
       if (!(*answers)[i].failure.empty()) return {now_, false, names_[i] + ": " + (*answers)[i].failure};
     if (std::all_of(answers->begin(), answers->end(), [](const auto& a) { return a.finished; }))
@@ -169,16 +191,17 @@ SimulatedClockClient::SimulatedClockClient(Node& node)
       number_{name_number(node.options().process)},
       writer_{node.writer<lockstep::TimeReached>(topic_of(node, "reached"), answers_profile())} {
   membership_.process = node.options().process;
-  reached_reader_ = node.reader<lockstep::TimeReached>(topic_of(node, "reached"), answers_profile(),
-                                                       [this](const lockstep::TimeReached& part) {
-                                                         if (part.process_id() != number_) board_.put(part);
-                                                       });
-  grant_reader_ = node.reader<lockstep::TimeGrant>(topic_of(node, "grant"), grants_profile(),
-                                                   [this](const lockstep::TimeGrant& grant) {
-                                                     const std::lock_guard lock{mutex_};
-                                                     grants_.push_back(grant);
-                                                     news_.notify_one();
-                                                   });
+  reader_ = node.reader<lockstep::TimeGrant>(topic_of(node, "grant"), grants_profile(),
+                                             [this](const lockstep::TimeGrant& grant) { put(grant); });
+}
+
+void SimulatedClockClient::put(const lockstep::TimeGrant& part) {
+  const std::lock_guard lock{mutex_};
+  part_.insert(part_.end(), part.samples().begin(), part.samples().end());
+  if (!part.last()) return;
+  grants_.push_back({part, std::move(part_)});
+  part_.clear();
+  news_.notify_one();
 }
 
 void SimulatedClockClient::bind(OutputPort& port, Duration separation) {
@@ -218,8 +241,8 @@ void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) 
   membership_.wanted.emplace_back("*");
 }
 
-std::optional<lockstep::TimeGrant> SimulatedClockClient::next_grant(const std::atomic<bool>& stop,
-                                                                    Duration patience) {
+std::optional<SimulatedClockClient::Grant> SimulatedClockClient::next_grant(const std::atomic<bool>& stop,
+                                                                            Duration patience) {
   std::unique_lock lock{mutex_};
   const auto end = after(patience);
   while (grants_.empty()) {
@@ -237,20 +260,21 @@ SimulatedClockClient::Run SimulatedClockClient::run(const std::function<std::str
   for (;;) {
     const auto grant = next_grant(stop, patience);
     if (!grant) return {false, stop ? "" : "no simulated time was granted for too long"};
-    switch (grant->kind()) {
+    const bool of_this_run = grant->head.run() == run_;
+    switch (grant->head.kind()) {
       case lockstep::GRANT_JOIN:
-        if (grant->run() != run_) join(*grant);
+        if (!of_this_run) join(grant->head);
         break;
       case lockstep::GRANT_END:
-        if (grant->run() != run_) break;
+        if (!of_this_run) break;
         // Ports get nothing any more, but a recorder wants the last window too.
-        if (tap_ && grant->sequence_number() > 0)
-          return {true, deliver_all(*grant, grant->sequence_number(), stop, patience)};
-        return {true, ""};
+        return {true, tap_ && grant->head.sequence_number() > 0 ? deliver_all(*grant) : ""};
       case lockstep::GRANT_RUN: {
-        if (grant->run() != run_) break;
-        const std::string failure = carry_out(*grant, advance, stop, patience);
-        answer(*grant, previous_, is_finished(), failure);
+        if (!of_this_run) break;
+        bundle_.clear();
+        std::string failure = deliver_all(*grant);
+        if (failure.empty()) failure = advance({grant->head.until_ns()});
+        answer(grant->head, bundle_.bytes(), is_finished(), failure);
         break;
       }
     }
@@ -260,8 +284,7 @@ SimulatedClockClient::Run SimulatedClockClient::run(const std::function<std::str
 void SimulatedClockClient::join(const lockstep::TimeGrant& grant) {
   run_ = grant.run();
   peers_.clear();
-  previous_.clear();
-  learn(number_, membership_);
+  std::fill(wanted_.begin(), wanted_.end(), false);
   answer(grant, write_membership(membership_), false, "");
 }
 
@@ -271,14 +294,11 @@ void SimulatedClockClient::learn(std::uint32_t process, const Membership& member
   peer.topics = membership.written;
   peer.counts.assign(peer.topics.size(), 0);
   peer.inlets.assign(peer.topics.size(), {});
-  // Signals of one process are joined by its executor and not bound here; an inbox hears its own process as any other.
+  // Signals of one process are joined by its executor and not bound here; an inbox, or the tap, hears its own process
+  // as any other.
   for (std::size_t i = 0; i < peer.topics.size(); ++i)
     for (const auto& input : inputs_)
       if (input.topic == peer.topics[i].topic) peer.inlets[i].push_back(input.inlet.get());
-  if (process == number_) {
-    for (std::size_t i = 0; i < wanted_.size(); ++i) wanted_[i] = tap_ != nullptr || !peer.inlets[i].empty();
-    return;
-  }
   for (const auto& topic : membership.wanted)
     for (std::size_t i = 0; i < membership_.written.size(); ++i)
       if (topic == "*" || topic == membership_.written[i].topic) wanted_[i] = true;
@@ -299,36 +319,23 @@ bool SimulatedClockClient::deliver(std::uint32_t process, std::span<const std::u
   return good;
 }
 
-std::string SimulatedClockClient::deliver_all(const lockstep::TimeGrant& grant, std::uint64_t window,
-                                              const std::atomic<bool>& stop, Duration patience) {
-  std::vector<std::uint32_t> others = grant.processes();
-  std::erase(others, number_);
-  const auto answers = board_.wait(run_, window, others, patience, [&stop] { return stop.load(); });
-  if (!answers) return stop ? "was stopped" : "the samples of another process did not arrive";
-  std::size_t next = 0;
-  for (const auto process : grant.processes()) {
-    if (process == number_) {
-      if (!deliver(number_, previous_, {grant.from_ns()})) return "malformed samples of its own";
-      continue;
+std::string SimulatedClockClient::deliver_all(const Grant& grant) {
+  const auto& processes = grant.head.processes();
+  // Before the first window everybody said who they are.
+  const bool members = grant.head.kind() == lockstep::GRANT_RUN && grant.head.sequence_number() == 1;
+  bool good = true;
+  good &= read_bundle(grant.samples, [&](std::uint32_t position, std::span<const std::byte> answer) {
+    if (position >= processes.size()) {
+      good = false;
+      return;
     }
-    const auto& samples = (*answers)[next++].samples;
-    if (window == 0)
-      learn(process, read_membership(samples));
-    else if (!deliver(process, samples, {grant.from_ns()}))
-      return "malformed samples of another process";
-  }
-  return "";
-}
-
-std::string SimulatedClockClient::carry_out(const lockstep::TimeGrant& grant,
-                                            const std::function<std::string(Instant)>& advance,
-                                            const std::atomic<bool>& stop, Duration patience) {
-  std::string failure = deliver_all(grant, grant.sequence_number() - 1, stop, patience);
-  if (!failure.empty()) return failure;
-  bundle_.clear();
-  failure = advance({grant.until_ns()});
-  previous_ = bundle_.bytes();
-  return failure;
+    const std::span bytes{reinterpret_cast<const std::uint8_t*>(answer.data()), answer.size()};
+    if (members)
+      learn(processes[position], read_membership({bytes.begin(), bytes.end()}));
+    else
+      good &= deliver(processes[position], bytes, {grant.head.from_ns()});
+  });
+  return good ? "" : "malformed samples of another process";
 }
 
 void SimulatedClockClient::answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples,
@@ -340,16 +347,7 @@ void SimulatedClockClient::answer(const lockstep::TimeGrant& grant, const std::v
   part.sequence_number(grant.sequence_number());
   part.finished(finished);
   part.failure(failure);
-  std::size_t begin = 0;
-  do {
-    const std::size_t end = std::min(samples.size(), begin + part_size);
-    part.samples().assign(samples.begin() + static_cast<std::ptrdiff_t>(begin),
-                          samples.begin() + static_cast<std::ptrdiff_t>(end));
-    part.last(end == samples.size());
-    writer_.write(part);
-    part.part(part.part() + 1);
-    begin = end;
-  } while (begin < samples.size());
+  write_in_parts(writer_, part, samples);
 }
 
 }  // namespace invar::dds

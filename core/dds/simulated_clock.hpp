@@ -1,10 +1,11 @@
 // Simulated time over several processes, in lock-step and repeatable bit for bit.
 //
-// A master grants windows of time. In each, every process first delivers to its ports what the others wrote in the
-// window before - process by process in one fixed order, each in the order written - then runs its cycles, then
-// hands all that it wrote in one bundle to everybody. So what a component sees depends on nothing but its inputs:
-// neither on scheduling nor on how long a message took. A sample written in window k is seen elsewhere in window
-// k + 1; inside a process as always.
+// A master grants windows of time. In each, every process first delivers to its ports what all wrote in the window
+// before - process by process in one fixed order, each in the order written - then runs its cycles, then hands all
+// that it wrote in one bundle to the master, whose next grant carries the bundles of all: two messages a process and
+// window, however many take part. So what a component sees depends on nothing but its inputs: neither on scheduling
+// nor on how long a message took. A sample written in window k is seen elsewhere in window k + 1; inside a process as
+// always.
 #pragma once
 
 #include <atomic>
@@ -41,7 +42,6 @@ class ReachedBoard {
     std::string failure;
   };
   void put(const lockstep::TimeReached& part);
-  void clear();
   /// Waits until all of `processes` answered `sequence` of `run`, and takes their answers, in that order; nothing when
   /// that takes longer than `patience` or `given_up` says so.
   std::optional<std::vector<Entry>> wait(std::uint64_t run, std::uint64_t sequence,
@@ -57,6 +57,7 @@ class ReachedBoard {
   };
   mutable std::mutex mutex_;
   std::condition_variable news_;
+  std::size_t awaited_ = 0;  // nobody is woken for less
   std::map<std::pair<std::uint64_t, std::uint64_t>, Window> windows_;
 };
 
@@ -84,6 +85,7 @@ class SimulatedClockMaster {
 
  private:
   void grant(lockstep::GrantKind kind, Instant until);
+  void keep(const std::vector<ReachedBoard::Entry>& answers);
   [[nodiscard]] std::string names_of(const std::vector<std::uint32_t>& numbers) const;
 
   std::vector<std::string> names_;
@@ -91,6 +93,7 @@ class SimulatedClockMaster {
   Duration window_;
   std::uint64_t run_, sequence_ = 0;
   Instant now_;
+  Bundle answered_;  // by all in the window before
   ReachedBoard board_;
   Writer<lockstep::TimeGrant> writer_;
   std::unique_ptr<Connection> reader_;
@@ -139,13 +142,15 @@ class SimulatedClockClient {
     std::vector<std::uint64_t> counts;
     std::vector<std::vector<Inlet*>> inlets;  // by topic number
   };
-  std::optional<lockstep::TimeGrant> next_grant(const std::atomic<bool>& stop, Duration patience);
+  struct Grant {
+    lockstep::TimeGrant head;           // its last part
+    std::vector<std::uint8_t> samples;  // of all its parts
+  };
+  void put(const lockstep::TimeGrant& part);
+  std::optional<Grant> next_grant(const std::atomic<bool>& stop, Duration patience);
   void join(const lockstep::TimeGrant& grant);
-  /// Takes what all wrote in a window to ports and tap. Empty: done.
-  std::string deliver_all(const lockstep::TimeGrant& grant, std::uint64_t window,
-                          const std::atomic<bool>& stop, Duration patience);
-  std::string carry_out(const lockstep::TimeGrant& grant, const std::function<std::string(Instant)>& advance,
-                        const std::atomic<bool>& stop, Duration patience);
+  /// Takes what all wrote in the window before to ports and tap. Empty: done.
+  std::string deliver_all(const Grant& grant);
   void answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples, bool finished,
               const std::string& failure);
   void learn(std::uint32_t process, const Membership& membership);
@@ -158,16 +163,15 @@ class SimulatedClockClient {
   Membership membership_;
   std::deque<bool> wanted_;  // by the number of our own topics; the addresses stay
   Bundle bundle_;
-  std::vector<std::uint8_t> previous_;  // our own bundle of the window before, for the tap
   std::vector<Binding> inputs_;
   std::map<std::uint32_t, Peer> peers_;
   std::function<void(const LockstepSample&)> tap_;
-  ReachedBoard board_;
   std::mutex mutex_;
   std::condition_variable news_;
+  std::vector<std::uint8_t> part_;  // of a grant whose last part is on its way
   std::deque<lockstep::TimeGrant> grants_;
   Writer<lockstep::TimeReached> writer_;
-  std::unique_ptr<Connection> reached_reader_, grant_reader_;
+  std::unique_ptr<Connection> reader_;
 };
 
 }  // namespace invar::dds

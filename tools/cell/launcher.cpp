@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "core/base/temporary_folder.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/loaded_cell.hpp"
@@ -121,31 +122,10 @@ bool keep_alive(std::vector<Child>& children, const LaunchOptions& options,
   return true;
 }
 
-/// Where the processes leave their last words; gone with its owner.
-class Folder {
- public:
-  Folder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "invar-run-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr)
-      throw InputError{pattern, "a folder cannot be made there",
-                       "see that TMPDIR names one that takes files"};
-    path_ = pattern;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] std::string text(const std::string& file) const {
-    std::ifstream stream{path_ / file};
-    return {std::istreambuf_iterator<char>{stream}, {}};
-  }
-
- private:
-  std::filesystem::path path_;
-};
+std::string text_of(const std::filesystem::path& file) {
+  std::ifstream stream{file};
+  return {std::istreambuf_iterator<char>{stream}, {}};
+}
 
 /// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
 bool keeps_time(const LaunchOptions& options, const config::Cell& cell) {
@@ -244,7 +224,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
   announce(options, cell, outcome.simulated);
 
-  const Folder folder;
+  const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
   std::vector<Child> children;
   for (const auto& process : cell.processes)
     if (options.host.empty() || process.host == options.host)
@@ -264,7 +244,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   stop_in_order(children, folder.path());
   for (std::size_t i = 0; i < children.size(); ++i) {
     const Child& child = children[i];
-    outcome.processes.push_back({child.name, child.status, folder.text(child.name + ".json")});
+    outcome.processes.push_back({child.name, child.status, text_of(folder / (child.name + ".json"))});
     if (by_itself[i] && child.status != 0 && outcome.failure.empty())
       outcome.failure = "process `" + child.name + "` ended with status " + std::to_string(child.status);
     if (!by_itself[i] && child.status == 128 + SIGKILL && outcome.failure.empty())

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -69,7 +70,7 @@ class LiveCell {
   /// Returns the processes that did not.
   std::vector<std::string> wait_for_processes();
   /// Waits until all writers and readers of the cell's processes have been discovered; where others take part, whom nobody
-  /// can ask how many they have, until nothing new has been for a second.
+  /// can ask how many they have, until nothing new has been for so long.
   void settle(std::chrono::seconds silence = std::chrono::seconds{1});
   /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.
   std::vector<dds::Endpoint> wait_for_writers(const std::string& text);

@@ -1,7 +1,5 @@
 #include "tools/report/plot.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +10,8 @@
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
+
+#include "core/base/temporary_folder.hpp"
 
 namespace invar::report {
 
@@ -159,10 +159,7 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
 
 std::vector<std::string> draw(const std::vector<Plot>& plots) {
   if (plots.empty()) return {};
-  std::string pattern = (std::filesystem::temp_directory_path() / "invar-plots-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr)
-    throw std::runtime_error{"no temporary folder for the plots can be made"};
-  const std::filesystem::path folder = pattern;
+  const TemporaryFolder folder{"invar-plots"};
   const auto file = [&](std::size_t i) { return folder / (std::to_string(i) + ".svg"); };
   {
     std::ofstream script{folder / "script"};
@@ -193,7 +190,6 @@ std::vector<std::string> draw(const std::vector<Plot>& plots) {
     std::ifstream stream{folder / "errors"};
     std::getline(stream, errors, '\0');
   }
-  std::filesystem::remove_all(folder);
   if (status != 0) throw std::runtime_error{"gnuplot failed: " + errors + " (is gnuplot-nox installed?)"};
   return drawings;
 }

@@ -200,6 +200,42 @@ TEST(SimulatedTime, AnInboxHearsItsOwnProcessInTheNextWindow) {
   }
 }
 
+TEST(SimulatedTime, AWindowMayHoldMoreThanOneMessage) {
+  Node keeper{testing::local("master"), standard_profiles()};
+  Node node{testing::local("alone"), standard_profiles()};
+  Commander component;
+  component.command.topic = "cell/test/alone/command";
+  SimulatedClockClient client{node};
+  client.bind(component.command);
+  std::uint64_t seen = 0, bytes = 0;
+  bool in_order = true;
+  client.tap([&](const LockstepSample& sample) {
+    in_order &= sample.sequence == ++seen;
+    bytes += sample.cdr.size();
+  });
+  const std::atomic<bool> stop{false};
+  SimulatedClockClient::Run run;
+  std::uint64_t cycle = 0;
+  constexpr std::uint64_t a_window = 40'000;
+  std::thread life{[&] {
+    run = client.run(
+        [&](Instant until) {
+          for (std::uint64_t k = 0; k < a_window; ++k, ++cycle) component.step({until, 1e-3, cycle});
+          return std::string{};
+        },
+        [] { return false; }, stop, Duration::milliseconds(30'000));
+  }};
+  SimulatedClockMaster master{keeper, {"alone"}, Duration::milliseconds(10)};
+  EXPECT_EQ(master.wait_for_all(Duration::milliseconds(30'000)), "");
+  EXPECT_EQ(master.advance_to({30'000'000}, Duration::milliseconds(30'000)).failure, "");
+  master.end();
+  life.join();
+  EXPECT_EQ(run.failure, "");
+  EXPECT_EQ(seen, 3 * a_window);
+  EXPECT_TRUE(in_order);
+  EXPECT_GT(bytes, 3U << 21U) << "the windows fit into two messages each: the test sees too little";
+}
+
 TEST(SimulatedTime, SaysWhoIsMissing) {
   Node node{testing::local("master"), standard_profiles()};
   SimulatedClockMaster master{node, {"absent", "gone"}, Duration::milliseconds(10)};
