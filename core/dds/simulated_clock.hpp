@@ -169,7 +169,7 @@ class SimulatedClockClient {
   std::mutex mutex_;
   std::condition_variable news_;
   std::vector<std::uint8_t> part_;  // of a grant whose last part is on its way
-  std::deque<lockstep::TimeGrant> grants_;
+  std::deque<Grant> grants_;
   Writer<lockstep::TimeReached> writer_;
   std::unique_ptr<Connection> reader_;
 };
