@@ -133,44 +133,88 @@ Found refine(const std::vector<OutlinePoint>& points, Found at) {
   return at;
 }
 
+// Votes for centres, over the box of a blob and a margin.
+class Votes {
+ public:
+  Votes(const Blob& blob, double radius)
+      : radius_{static_cast<float>(radius)},
+        reach_{std::max(1, static_cast<int>(0.15 * radius))},
+        margin_{static_cast<int>(std::ceil(radius)) + 1},
+        left_{blob.left - margin_},
+        top_{blob.top - margin_},
+        columns_{blob.right - blob.left + 1 + 2 * margin_},
+        rows_{blob.bottom - blob.top + 1 + 2 * margin_},
+        cells_(static_cast<std::size_t>(columns_ * rows_)),
+        across_(cells_.size()),
+        down_(static_cast<std::size_t>(columns_)) {}
+
+  /// An outline point votes, or takes its votes back (-1): along its normal, as its radius is known to some percent.
+  void add(const OutlinePoint& p, int votes) {
+    for (int k = -3; k <= 3; ++k) {
+      const float r = radius_ * (1.0F + 0.08F * static_cast<float>(k));
+      const int x = cvRound(p.x + r * p.nx) - left_, y = cvRound(p.y + r * p.ny) - top_;
+      if (x >= 0 && y >= 0 && x < columns_ && y < rows_) cells_[index(x, y)] += votes;
+    }
+  }
+  /// Where a small square holds the most votes, and how many.
+  struct Peak {
+    int x, y;  // px of the reduced image
+    double height;
+  };
+  Peak peak() {
+    for (int y = 0; y < rows_; ++y) {
+      int sum = 0;
+      for (int x = -reach_; x < columns_; ++x) {
+        if (x + reach_ < columns_) sum += cells_[index(x + reach_, y)];
+        if (x - reach_ - 1 >= 0) sum -= cells_[index(x - reach_ - 1, y)];
+        if (x >= 0) across_[index(x, y)] = sum;
+      }
+    }
+    int most = -1, at_x = 0, at_y = 0;
+    std::fill(down_.begin(), down_.end(), 0);
+    for (int y = -reach_; y < rows_; ++y) {
+      for (int x = 0; x < columns_ && y + reach_ < rows_; ++x)
+        down_[index(x, 0)] += across_[index(x, y + reach_)];
+      for (int x = 0; x < columns_ && y - reach_ - 1 >= 0; ++x)
+        down_[index(x, 0)] -= across_[index(x, y - reach_ - 1)];
+      if (y < 0) continue;
+      const auto highest = std::max_element(down_.begin(), down_.end());
+      if (*highest > most) most = *highest, at_x = static_cast<int>(highest - down_.begin()), at_y = y;
+    }
+    return {at_x + left_, at_y + top_, static_cast<double>(most)};
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
+  float radius_;
+  int reach_, margin_, left_, top_, columns_, rows_;
+  std::vector<int> cells_, across_, down_;
+};
+
 // Takes a blob apart: every outline point votes for centres along its normal; the best circle is taken, its points
 // are removed, and so on.
 std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Side& side, double radius) {
   std::vector<Found> found;
   auto points = outline_of(blob, image, side);
-  const int margin = static_cast<int>(std::ceil(radius)) + 1;
-  const int left = blob.left - margin, top = blob.top - margin;
-  cv::Mat1f votes(blob.bottom - blob.top + 1 + 2 * margin, blob.right - blob.left + 1 + 2 * margin);
-  cv::Mat1f smooth;
+  Votes votes{blob, radius};
+  for (const OutlinePoint& p : points) votes.add(p, 1);
   const double whole = 2.0 * std::numbers::pi * radius;
   auto unused = static_cast<double>(points.size());
   for (int circles = 0; circles < 200 && unused >= least_support * whole; ++circles) {
-    votes.setTo(0.0F);
-    for (const OutlinePoint& p : points) {
-      if (p.used) continue;
-      for (int k = -3; k <= 3; ++k) {
-        const float r = static_cast<float>(radius) * (1.0F + 0.08F * static_cast<float>(k));
-        const int x = cvRound(p.x + r * p.nx) - left, y = cvRound(p.y + r * p.ny) - top;
-        if (x >= 0 && y >= 0 && x < votes.cols && y < votes.rows) votes(y, x) += 1.0F;
-      }
-    }
-    const int size = 2 * std::max(1, static_cast<int>(0.15 * radius)) + 1;
-    cv::boxFilter(votes, smooth, CV_32F, {size, size}, {-1, -1}, false, cv::BORDER_CONSTANT);
-    cv::Point peak;
-    double height = 0.0;
-    cv::minMaxLoc(smooth, nullptr, &height, nullptr, &peak);
-    if (height < 0.15 * whole) break;
-    Found at = refine(
-        points, {static_cast<double>(peak.x + left), static_cast<double>(peak.y + top), radius - 0.4, 0});
+    const Votes::Peak peak = votes.peak();
+    if (peak.height < 0.15 * whole) break;
+    Found at = refine(points, {static_cast<double>(peak.x), static_cast<double>(peak.y), radius - 0.4, 0});
     const double reach = std::max(1.2, 0.22 * at.radius);
     int removed = 0;
     for (OutlinePoint& p : points) {
       if (p.used) continue;
       const double r = length_of(static_cast<double>(p.x) - at.x, static_cast<double>(p.y) - at.y);
       // The votes that made the peak go, too, so that the same peak never comes twice.
-      const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x - left;
-      const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y - top;
-      if (std::abs(r - at.radius) < reach || length_of(vx, vy) < 0.25 * radius) p.used = true, ++removed;
+      const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x;
+      const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y;
+      if (std::abs(r - at.radius) >= reach && length_of(vx, vy) >= 0.25 * radius) continue;
+      p.used = true, ++removed;
+      votes.add(p, -1);
     }
     if (removed == 0) break;
     unused -= removed;
@@ -193,15 +237,23 @@ struct Level {
   int halvings = 0;
 };
 
-Detection detect_at(const Level& level, const DetectionOptions& options) {
+struct Seen {
+  Detection found;
+  bool polarity_is_sure = false;
+};
+
+Seen detect_at(const Level& level, const DetectionOptions& options) {
   const cv::Mat1b& image = level.image;
   const double scale = 1 << level.halvings;
-  Detection out;
-  const Partition parts = partition(image, options.window);
+  Seen seen;
+  Detection& out = seen.found;
+  const Partition parts = partition(image, options.window, options.polarity);
   out.noise = parts.noise * scale;
-  if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return out;
+  if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return seen;
   const double smallest = 3.0;
-  Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
+  Side light, dark;
+  if (options.polarity >= 0) light = make_side(image, parts.light, +1, smallest);
+  if (options.polarity <= 0) dark = make_side(image, parts.dark, -1, smallest);
   // Things are round, what lies between them is not.
   Side* side = light.round_area >= dark.round_area ? &light : &dark;
   if (options.polarity != 0) {
@@ -216,6 +268,8 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
     };
     side = inner(light) >= inner(dark) ? &light : &dark;
   }
+  seen.polarity_is_sure = std::max(light.round_area, dark.round_area) >
+                          4.0 * std::min(light.round_area, dark.round_area) + 0.02 * image.size().area();
   out.polarity = side->polarity;
   out.contrast = side->polarity > 0 ? parts.light_contrast : parts.dark_contrast;
 
@@ -226,7 +280,7 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
     for (const Blob& blob : side->found.blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
   const double radius = weighted_median(radii);
   out.radius = radius * scale;
-  if (!(radius > 0.0)) return out;
+  if (!(radius > 0.0)) return seen;
 
   const auto full = [&](double v) { return (v + 0.5) * scale - 0.5; };
   for (const Blob& blob : side->found.blobs) {
@@ -240,7 +294,7 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
             {full(f.x), full(f.y), f.radius * scale, parts_of.size() == 1 && !at_border(blob, image)});
     }
   }
-  return out;
+  return seen;
 }
 
 }  // namespace
@@ -257,12 +311,14 @@ Detection detect(const cv::Mat& image, const DetectionOptions& options) {
     }
     return levels[static_cast<std::size_t>(halvings)];
   };
-  if (options.level >= 0) return detect_at(halve_to(options.level), options);
+  if (options.level >= 0) return detect_at(halve_to(options.level), options).found;
   // Coarse first: it is cheap and sees through noise. Finer where the things turn out small there.
   int halvings = 0;
   while (std::min(image.cols, image.rows) >> (halvings + 1) >= 96) ++halvings;
+  DetectionOptions known = options;
   for (;;) {
-    Detection found = detect_at(halve_to(halvings), options);
+    const auto [found, polarity_is_sure] = detect_at(halve_to(halvings), known);
+    if (polarity_is_sure) known.polarity = found.polarity;  // the finer image has four times as many pixels
     if (halvings == 0 || (found.radius >= finest * (1 << halvings) && !found.candidates.empty()))
       return found;
     --halvings;

@@ -76,10 +76,18 @@ void weigh_by_tukey(const Values& rest, const Values& usable, float factor, std:
   }
 }
 
+INVAR_WIDE_VECTORS
 double largest_of(const Values& values, std::size_t count) {
-  float largest = 0.0F;
-  for (std::size_t k = 0; k < count; ++k) largest = std::max(largest, std::abs(values[k]));
-  return static_cast<double>(largest);
+  Lanes largest{};
+  for (std::size_t k = 0; k < count; k += lanes) {
+    Lanes v;
+    load(values.data() + k, v);
+    v = v < 0.0F ? -v : v;
+    largest = v > largest ? v : largest;
+  }
+  float most = 0.0F;
+  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
+  return static_cast<double>(most);
 }
 
 // Sum of the weights, of weight * rest^2, and how many weigh more than 0.2.
@@ -267,7 +275,8 @@ bool fit_shape(Rays& rays, const Values& usable, double floor, OutlineFit& fit) 
     for (int round = near ? 4 : 0; round < 14; ++round) {
       leave(d, rays.offset, usable, p, count, rest);
       const double previous = scale;
-      scale = std::max(floor, normal * median_of(sizes, sizes_of(rest)));
+      if (round < 6)  // then it stands, and the weights settle soon
+        scale = std::max(floor, normal * median_of(sizes, sizes_of(rest)));
       if (round < 4)
         weigh_by_cauchy(rest, usable, static_cast<float>(1.0 / std::pow(2.4 * scale, 2)), count, rays.weight);
       else

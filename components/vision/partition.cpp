@@ -119,12 +119,10 @@ double median(std::vector<float>& values) {
   return static_cast<double>(*middle);
 }
 
-// 255 where a pixel lies above `high`, and where it lies below `low`.
+// 255 where `larger` lies above `smaller`.
 INVAR_WIDE_VECTORS
-void classify(const std::uint8_t* p, const std::uint8_t* high, const std::uint8_t* low, int width,
-              std::uint8_t* light, std::uint8_t* dark) {
-  for (int x = 0; x < width; ++x) light[x] = p[x] > high[x] ? 255 : 0;
-  for (int x = 0; x < width; ++x) dark[x] = p[x] < low[x] ? 255 : 0;
+void classify(const std::uint8_t* larger, const std::uint8_t* smaller, int width, std::uint8_t* mask) {
+  for (int x = 0; x < width; ++x) mask[x] = larger[x] > smaller[x] ? 255 : 0;
 }
 
 // Pixels of a tile's row, or sums of such down the tile.
@@ -174,7 +172,7 @@ double noise_of(const cv::Mat1b& image) {
   int count = 0;
   for (int y = first_row; y < image.rows; y += histogram_step(image)) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    for (int x = 2; x < image.cols; x += 2, ++count)
+    for (int x = 2; x < image.cols; x += 4, ++count)
       ++histogram[static_cast<std::size_t>(std::abs(p[x - 2] - 2 * p[x - 1] + p[x]) & 511)];
   }
   int below = 0;
@@ -227,10 +225,13 @@ double set_thresholds(const TileSums& things, const TileSums& things_n, const Ti
 
 }  // namespace
 
-Partition partition(const cv::Mat1b& image, int window) {
+Partition partition(const cv::Mat1b& image, int window, int polarity) {
   const int width = image.cols, height = image.rows;
   const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
-  Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, 0.0, noise_of(image)};
+  const bool want_light = polarity >= 0, want_dark = polarity <= 0;
+  Partition out{{}, {}, 0.0, 0.0, noise_of(image)};
+  if (want_light) out.light.create(height, width);
+  if (want_dark) out.dark.create(height, width);
 
   // Every tile's sampled rows, against thresholds along its middle.
   const auto for_each_tile = [&](TileField& high, TileField& low, const auto& take) {
@@ -286,9 +287,12 @@ Partition partition(const cv::Mat1b& image, int window) {
       above.at(i, j) = tile_counts.above, above_n.at(i, j) = tile_counts.above_count;
       below.at(i, j) = tile_counts.below, below_n.at(i, j) = tile_counts.below_count;
     });
-    out.light_contrast =
-        set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
-    out.dark_contrast = set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
+    if (want_light)
+      out.light_contrast =
+          set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
+    if (want_dark)
+      out.dark_contrast =
+          set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
   }
   // What does not stand out from the noise is none.
   const double least = std::max(4.0 * out.noise, 2.0);
@@ -297,11 +301,11 @@ Partition partition(const cv::Mat1b& image, int window) {
   out.dark_contrast = -out.dark_contrast;
   for (int y = 0; y < height; ++y) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
-    std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
-    const std::uint8_t* down = (y % 4 == 0 ? low.row(y + 2) : low.last()).data();  // four rows hardly differ
-    const std::uint8_t* up = (y % 4 == 0 ? high.row(y + 2) : high.last()).data();
-    classify(p, up, down, width, light, dark);
+    const auto at = [y](TileField& threshold) {  // four rows hardly differ
+      return (y % 4 == 0 ? threshold.row(y + 2) : threshold.last()).data();
+    };
+    if (want_light) classify(p, at(high), width, out.light.ptr<std::uint8_t>(y));
+    if (want_dark) classify(at(low), p, width, out.dark.ptr<std::uint8_t>(y));
   }
   if (!(out.light_contrast > 0.0)) out.light.setTo(0);
   if (!(out.dark_contrast > 0.0)) out.dark.setTo(0);
@@ -332,7 +336,8 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
         x = static_cast<int>(static_cast<const std::uint8_t*>(next) - p);
       }
       const int start = x;
-      while (x < mask.cols && p[x] != 0) ++x;
+      const void* end = std::memchr(p + x, 0, static_cast<std::size_t>(mask.cols - x));
+      x = end == nullptr ? mask.cols : static_cast<int>(static_cast<const std::uint8_t*>(end) - p);
       const int id = static_cast<int>(runs.size());
       runs.push_back({y, start, x, 0});
       parent.push_back(id);
