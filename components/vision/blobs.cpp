@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "components/vision/partition.hpp"
+#include "components/vision/wide_vectors.hpp"
 
 namespace invar::vision {
 
@@ -133,6 +135,9 @@ Found refine(const std::vector<OutlinePoint>& points, Found at) {
   return at;
 }
 
+constexpr auto plus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a + b); };
+constexpr auto minus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a - b); };
+
 // Votes for centres, over the box of a blob and a margin.
 class Votes {
  public:
@@ -153,7 +158,8 @@ class Votes {
     for (int k = -3; k <= 3; ++k) {
       const float r = radius_ * (1.0F + 0.08F * static_cast<float>(k));
       const int x = cvRound(p.x + r * p.nx) - left_, y = cvRound(p.y + r * p.ny) - top_;
-      if (x >= 0 && y >= 0 && x < columns_ && y < rows_) cells_[index(x, y)] += votes;
+      if (x >= 0 && y >= 0 && x < columns_ && y < rows_)
+        cells_[index(x, y)] = static_cast<std::int16_t>(cells_[index(x, y)] + votes);
     }
   }
   /// Where a small square holds the most votes, and how many.
@@ -167,19 +173,24 @@ class Votes {
       for (int x = -reach_; x < columns_; ++x) {
         if (x + reach_ < columns_) sum += cells_[index(x + reach_, y)];
         if (x - reach_ - 1 >= 0) sum -= cells_[index(x - reach_ - 1, y)];
-        if (x >= 0) across_[index(x, y)] = sum;
+        if (x >= 0) across_[index(x, y)] = static_cast<std::int16_t>(sum);
       }
     }
-    int most = -1, at_x = 0, at_y = 0;
-    std::fill(down_.begin(), down_.end(), 0);
+    std::int16_t most = -1;
+    int at_x = 0, at_y = 0;
+    std::fill(down_.begin(), down_.end(), std::int16_t{0});
+    const auto row = [&](int y) { return across_.begin() + static_cast<std::ptrdiff_t>(y) * columns_; };
     for (int y = -reach_; y < rows_; ++y) {
-      for (int x = 0; x < columns_ && y + reach_ < rows_; ++x)
-        down_[index(x, 0)] += across_[index(x, y + reach_)];
-      for (int x = 0; x < columns_ && y - reach_ - 1 >= 0; ++x)
-        down_[index(x, 0)] -= across_[index(x, y - reach_ - 1)];
+      if (y + reach_ < rows_)
+        std::transform(down_.begin(), down_.end(), row(y + reach_), down_.begin(), plus);
+      if (y - reach_ - 1 >= 0)
+        std::transform(down_.begin(), down_.end(), row(y - reach_ - 1), down_.begin(), minus);
       if (y < 0) continue;
-      const auto highest = std::max_element(down_.begin(), down_.end());
-      if (*highest > most) most = *highest, at_x = static_cast<int>(highest - down_.begin()), at_y = y;
+      std::int16_t highest = 0;
+      for (const std::int16_t votes : down_) highest = std::max(highest, votes);
+      if (highest <= most) continue;
+      most = highest, at_y = y;
+      at_x = static_cast<int>(std::find(down_.begin(), down_.end(), highest) - down_.begin());
     }
     return {at_x + left_, at_y + top_, static_cast<double>(most)};
   }
@@ -188,7 +199,7 @@ class Votes {
   [[nodiscard]] std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
   float radius_;
   int reach_, margin_, left_, top_, columns_, rows_;
-  std::vector<int> cells_, across_, down_;
+  std::vector<std::int16_t> cells_, across_, down_;
 };
 
 // Takes a blob apart: every outline point votes for centres along its normal; the best circle is taken, its points
@@ -230,6 +241,22 @@ double inscribed_radius(const Blob& blob, const Side& side) {
   double largest = 0.0;
   cv::minMaxLoc(distance, nullptr, &largest);
   return largest;
+}
+
+// The mean of each two by two pixels.
+INVAR_WIDE_VECTORS
+void halve_row(const std::uint8_t* upper, const std::uint8_t* lower, int width, std::uint8_t* out) {
+  for (int x = 0; x < width; ++x)
+    out[x] = static_cast<std::uint8_t>(
+        (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2);
+}
+
+cv::Mat1b halved(const cv::Mat1b& image) {
+  cv::Mat1b out(image.rows / 2, image.cols / 2);
+  for (int y = 0; y < out.rows; ++y)
+    halve_row(image.ptr<std::uint8_t>(2 * y), image.ptr<std::uint8_t>(2 * y + 1), out.cols,
+              out.ptr<std::uint8_t>(y));
+  return out;
 }
 
 struct Level {
@@ -280,7 +307,7 @@ Seen detect_at(const Level& level, const DetectionOptions& options) {
     for (const Blob& blob : side->found.blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
   const double radius = weighted_median(radii);
   out.radius = radius * scale;
-  if (!(radius > 0.0)) return seen;
+  if (!(radius > 0.0) || (level.halvings > 0 && options.level < 0 && radius < finest)) return seen;
 
   const auto full = [&](double v) { return (v + 0.5) * scale - 0.5; };
   for (const Blob& blob : side->found.blobs) {
@@ -302,13 +329,8 @@ Seen detect_at(const Level& level, const DetectionOptions& options) {
 Detection detect(const cv::Mat& image, const DetectionOptions& options) {
   std::vector<Level> levels{{image, 0}};
   const auto halve_to = [&](int halvings) {
-    while (levels.back().halvings < halvings) {
-      Level next{{}, levels.back().halvings + 1};
-      const cv::Mat1b& from = levels.back().image;
-      cv::resize(from(cv::Rect(0, 0, from.cols & ~1, from.rows & ~1)), next.image,
-                 {from.cols / 2, from.rows / 2}, 0, 0, cv::INTER_AREA);
-      levels.push_back(next);
-    }
+    while (levels.back().halvings < halvings)
+      levels.push_back({halved(levels.back().image), levels.back().halvings + 1});
     return levels[static_cast<std::size_t>(halvings)];
   };
   if (options.level >= 0) return detect_at(halve_to(options.level), options).found;
