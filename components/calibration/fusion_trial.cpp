@@ -41,18 +41,19 @@ void keep_zero(std::vector<metrology::FusionRun>& runs) {
   for (auto& run : runs) run.reference.array() += off / count;
 }
 
-/// Of the errors of each part, the mean of all taken out.
-std::vector<double> mean_squares(const std::vector<double>& errors, const std::vector<std::size_t>& part_of,
-                                 std::size_t parts) {
+/// Logarithm of the mean square of the errors of each part, the mean of all taken out: so that no one part decides.
+std::vector<double> sizes_of_parts(const std::vector<double>& errors, const std::vector<std::size_t>& part_of,
+                                   std::size_t parts) {
   double mean = 0.0;
   for (const double error : errors) mean += error / static_cast<double>(errors.size());
-  std::vector<double> squares(parts), counts(parts);
+  std::vector<double> sizes(parts), counts(parts);
   for (std::size_t i = 0; i < errors.size(); ++i) {
-    squares[part_of[i]] += std::pow(errors[i] - mean, 2);
+    sizes[part_of[i]] += std::pow(errors[i] - mean, 2);
     counts[part_of[i]] += 1.0;
   }
-  for (std::size_t k = 0; k < parts; ++k) squares[k] /= std::max(1.0, counts[k]);
-  return squares;
+  for (std::size_t k = 0; k < parts; ++k)
+    sizes[k] = std::log(std::max(1e-20, sizes[k] / std::max(1.0, counts[k])));
+  return sizes;
 }
 
 /// As `invar calibrate fusion` reads it.
@@ -207,7 +208,7 @@ Task FusionTrial::verify(const FusionJob& job, const std::string& when, Verified
   }
   if (of_fused.size() < 100) throw std::runtime_error{"nothing fused arrives: connect `fused`"};
   table.write(std::filesystem::absolute(job.out) / ("fusion_" + when + ".csv"));
-  found = {size_of(of_fused), size_of(of_axis), mean_squares(of_fused, part_of, first_part)};
+  found = {size_of(of_fused), size_of(of_axis), sizes_of_parts(of_fused, part_of, first_part)};
 }
 
 Task FusionTrial::run(const FusionJob& job) {
@@ -251,7 +252,7 @@ Task FusionTrial::run(const FusionJob& job) {
   const std::string fused = "fused position of runs not fitted " + millimetres(before.fused.rms) + " to " +
                             millimetres(after.fused.rms) + " RMS by the laser";
   progress_ = 1.0;
-  if (!metrology::surely_less(after.parts, before.parts, 2.0)) {
+  if (after.fused.rms >= before.fused.rms || !metrology::surely_less(after.parts, before.parts, 2.0)) {
     co_await move(job.from, 0.0, nullptr);
     co_await command_model(compensation::MODEL_ROLLBACK, file.string());
     report(job::JOB_DONE, fused + ": no more than chance gives; the fusion is as it was before");

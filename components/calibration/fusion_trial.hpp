@@ -77,8 +77,9 @@ class FusionTrial final : public AxisRunner {
   Task swing(const FusionJob& job, double period);
   /// What sinusoids that are not fitted showed.
   struct Verified {
-    Size fused, tracked;        // errors by the laser: of the fused position, and of the axis that follows it
-    std::vector<double> parts;  // mean square of the fused position's error in each part of each sinusoid [m2]
+    Size fused, tracked;  // errors by the laser: of the fused position, and of the axis that follows it
+    std::vector<double>
+        parts;  // how large the fused position's error is in each part of each sinusoid (logarithm)
   };
   Task verify(const FusionJob& job, const std::string& when, Verified& found);
   [[nodiscard]] metrology::FusionRun run_of_rows() const;

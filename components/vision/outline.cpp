@@ -145,8 +145,8 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   std::array<RayProducts, Rays::most / lanes> products;
   std::array<Lanes, EdgeFilter::most> f;
   EightRays block;
-  HarmonicSums by_lane;  // level, cosine, sine: over the rays
-  for (auto& sums : by_lane) std::fill_n(sums.begin(), length, Lanes{});
+  constexpr std::size_t common_rows = EdgeFilter::rows - EdgeFilter::to_slope_in;
+  std::array<std::array<Lanes, 3>, common_rows> by_lane{};  // products over the rays, by 1, c, s
   std::array<Lanes, 6> weights{};  // over the rays: their sum, by c, s, c c, c s, s s
   for (std::size_t first = 0; first < count; first += lanes) {
     const bool any = prepare(samples, shape, d, first, filter.half, filter.half, whole, rays, block);
@@ -162,7 +162,10 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
     for (std::size_t m = 0; m < 3; ++m) weights[m] += harmonic[m];
     weights[3] += harmonic[1] * c, weights[4] += harmonic[1] * s, weights[5] += harmonic[2] * s;
     samples.read(block, length, f.data());
-    take_products(f.data(), filter, harmonic, products[first / lanes], by_lane);
+    take_products(f.data(), filter, products[first / lanes]);
+    for (std::size_t row = 0; row < common_rows; ++row)
+      for (std::size_t m = 0; m < 3; ++m)
+        by_lane[row][m] += harmonic[m] * products[first / lanes].rows[EdgeFilter::to_slope_in + row];
   }
   Eigen::Matrix3d normal;
   normal(0, 0) = sum_of(weights[0]), normal(0, 1) = sum_of(weights[1]), normal(0, 2) = sum_of(weights[2]);
@@ -172,30 +175,22 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   if (!(normal(0, 0) > 5.0)) return fit;
   normal(1, 0) = normal(0, 1), normal(2, 0) = normal(0, 2), normal(2, 1) = normal(1, 2);
 
-  // Slopes: the profile at each sample over the angle as constant and first harmonic, then the sloped step on each.
+  // What the drop has in common: the profile over the angle as constant and first harmonic, its slopes by the sloped step, and
+  // its mean, less the slopes, as a step of another blur. All of it is linear in the samples, so in their products.
   const Eigen::Matrix3d inverse = normal.inverse();
-  std::array<Eigen::Matrix<double, 5, 1>, 3> sloped{Eigen::Matrix<double, 5, 1>::Zero(),
-                                                    Eigen::Matrix<double, 5, 1>::Zero(),
-                                                    Eigen::Matrix<double, 5, 1>::Zero()};
-  EdgeFilter::Profile mean(static_cast<Eigen::Index>(length));
-  for (std::size_t j = 0; j < length; ++j) {
-    const auto column = static_cast<Eigen::Index>(j);
-    Eigen::Vector3d sums;
-    for (std::size_t m = 0; m < 3; ++m) {
-      sums(static_cast<Eigen::Index>(m)) = sum_of(by_lane[m][j]);
-    }
-    const Eigen::Vector3d harmonic = inverse * sums;
-    for (std::size_t m = 0; m < 3; ++m)
-      sloped[m] += harmonic(static_cast<Eigen::Index>(m)) * filter.sloped.col(column);
-    mean(column) = harmonic(0);
-  }
-  const Eigen::Vector3d inside{sloped[0](3), sloped[1](3), sloped[2](3)},
-      outside{sloped[0](4), sloped[1](4), sloped[2](4)};
-  mean -= inside(0) * filter.inner + outside(0) * filter.outer;
-  const Eigen::Vector4d common = filter.spread * mean;
-  fit.contrast = polarity * common(1);
+  const auto over_the_angle = [&](EdgeFilter::Row row) -> Eigen::Vector3d {
+    const auto& sums = by_lane[row - EdgeFilter::to_slope_in];
+    return inverse * Eigen::Vector3d{sum_of(sums[0]), sum_of(sums[1]), sum_of(sums[2])};
+  };
+  const Eigen::Vector3d inside = over_the_angle(EdgeFilter::to_slope_in),
+                        outside = over_the_angle(EdgeFilter::to_slope_out);
+  const Eigen::Vector2d spread = Eigen::Vector2d{over_the_angle(EdgeFilter::to_spread_height)(0),
+                                                 over_the_angle(EdgeFilter::to_spread_blur)(0)} -
+                                 inside(0) * filter.spread_inner - outside(0) * filter.spread_outer;
+  const double height = spread(0), wider = spread(1) / spread(0);
+  fit.contrast = polarity * height;
   if (!(fit.contrast > 0.0)) return fit;
-  fit.blur = std::clamp(filter.blur + common(3) / common(1), 0.5 * filter.blur, 2.0 * filter.blur);
+  fit.blur = std::clamp(filter.blur + wider, 0.5 * filter.blur, 2.0 * filter.blur);
 
   const auto number = [](double value) { return static_cast<float>(value); };
   const EdgeRule rule{{number(inside(0)), number(inside(1)), number(inside(2))},

@@ -69,21 +69,17 @@ void RaySamples::read(const EightRays& rays, std::size_t count, Lanes* out) cons
 
 // Every ray has a lane of its own, so that each CPU gets the same digits however wide its vectors are.
 INVAR_WIDE_VECTORS
-void take_products(const Lanes* samples, const EdgeFilter& filter, const std::array<Lanes, 3>& harmonic,
-                   RayProducts& products, HarmonicSums& sums) {
+void take_products(const Lanes* samples, const EdgeFilter& filter, RayProducts& products) {
   const auto length = static_cast<std::size_t>(2 * filter.half + 1);
-  Lanes ground{}, height{}, shift{}, inner{}, outer{}, square{};
+  std::array<Lanes, EdgeFilter::rows> sums{};
+  Lanes square{};
   for (std::size_t j = 0; j < length; ++j) {
     const Lanes value = samples[j];
-    ground += filter.products[EdgeFilter::to_ground][j] * value;
-    height += filter.products[EdgeFilter::to_height][j] * value;
-    shift += filter.products[EdgeFilter::to_shift][j] * value;
-    inner += filter.products[EdgeFilter::to_inner][j] * value;
-    outer += filter.products[EdgeFilter::to_outer][j] * value;
+#pragma GCC unroll 16
+    for (std::size_t row = 0; row < EdgeFilter::rows; ++row) sums[row] += filter.products[row][j] * value;
     square += value * value;
-    for (std::size_t m = 0; m < 3; ++m) sums[m][j] += harmonic[m] * value;
   }
-  products = {{ground, height, shift, inner, outer}, square};
+  products = {sums, square};
 }
 
 INVAR_WIDE_VECTORS

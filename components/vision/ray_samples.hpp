@@ -70,11 +70,5 @@ void place_edges(const RayProducts& products, const EdgeFilter& filter, const Ed
 void find_steps(const Lanes* samples, std::size_t length, float polarity, float expected, float reach,
                 Lanes* slope, std::array<std::int32_t, lanes>& at);
 
-/// Sums over rays of what they show at each sample, by three weights a ray (1, cosine, sine of its angle).
-using HarmonicSums = std::array<std::array<Lanes, EdgeFilter::most>, 3>;
-
-/// Also adds the samples to `sums`, by the weights of `harmonic`.
-void take_products(const Lanes* samples, const EdgeFilter& filter, const std::array<Lanes, 3>& harmonic,
-                   RayProducts& products, HarmonicSums& sums);
-
+void take_products(const Lanes* samples, const EdgeFilter& filter, RayProducts& products);
 }  // namespace invar::vision

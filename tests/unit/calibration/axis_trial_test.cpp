@@ -18,7 +18,8 @@ using support::machines;
 
 class Cell : public support::TrialCell<AxisTrial> {
  public:
-  Cell(world::SimulatedStage::Parameters of_world, stage::Stage::Parameters of_stage, AxisTrial::Parameters of)
+  Cell(world::SimulatedStage::Parameters of_world, stage::Stage::Parameters of_stage,
+       AxisTrial::Parameters of)
       : TrialCell{std::move(of_world), std::move(of_stage), std::move(of)} {
     wired.join(axis.stage, "model_status", trial, "model_status");
     wired.join(trial, "model", axis.stage, "model");

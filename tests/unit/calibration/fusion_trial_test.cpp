@@ -70,6 +70,16 @@ TEST_F(FusionTrialTest, FindsTheSensorsInTheCellAndLessensTheErrorOfRunsNotFitte
   EXPECT_LT(fused_rms("after"), 0.8 * fused_rms("before"));
 }
 
+TEST_F(FusionTrialTest, LeavesAFusionThatKnowsItsSensorsAsItWas) {
+  pair.of_tachometer.gain = 1.0;  // as it was described
+  pair.of_tachometer.gain_droop = 0.0;
+  pair.of_tachometer.latency = 0.0;
+  const auto status = run();
+  EXPECT_EQ(status.phase(), job::JOB_DONE);
+  EXPECT_THAT(status.text().c_str(), ::testing::HasSubstr("the fusion is as it was before"));
+  EXPECT_LT(fused_rms("before"), 0.15e-3);  // an encoder of 2 mm alone: 0.58 mm
+}
+
 TEST_F(FusionTrialTest, SaysWhatIsMissing) {
   const auto status = run(false);
   EXPECT_EQ(status.phase(), job::JOB_FAILED);
