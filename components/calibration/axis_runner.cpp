@@ -109,11 +109,11 @@ Task AxisRunner::command_model(compensation::ModelCommandKind kind, const std::s
     const auto* status = model_status_.latest();
     if (status != nullptr && status->command_id() == command.id()) {
       if (status->state() == compensation::MODEL_REFUSED)
-        throw std::runtime_error{"the stage refused the model: " + std::string{status->text().c_str()}};
+        throw std::runtime_error{"the model was refused: " + std::string{status->text().c_str()}};
       co_return;
     }
     if (now() > give_up)
-      throw std::runtime_error{"the stage does not answer: connect `model` and `model_status`"};
+      throw std::runtime_error{"nobody answers to the model: connect `model` and `model_status`"};
   }
 }
 

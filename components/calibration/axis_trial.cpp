@@ -53,20 +53,14 @@ std::vector<double> following(const recording::Table& table) {
 }  // namespace
 
 std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
-  const auto named = [&](const auto& jobs) {
-    return std::find_if(jobs.begin(), jobs.end(), [&](const auto& job) { return job.name == wanted; });
-  };
   const auto begin = [&](const auto& job) {
     std::filesystem::create_directories(job.out);
     began_ = now();
     return Job{run(job), job.out};
   };
-  if (const auto ripple = named(parameters_.ripple); ripple != parameters_.ripple.end())
-    return begin(*ripple);
-  if (const auto tracking = named(parameters_.tracking); tracking != parameters_.tracking.end())
-    return begin(*tracking);
-  if (const auto motion = named(parameters_.motion); motion != parameters_.motion.end())
-    return begin(*motion);
+  if (const auto* ripple = named(parameters_.ripple, wanted)) return begin(*ripple);
+  if (const auto* tracking = named(parameters_.tracking, wanted)) return begin(*tracking);
+  if (const auto* motion = named(parameters_.motion, wanted)) return begin(*motion);
   return std::nullopt;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "components/calibration/axis_runner.hpp"
+#include "components/calibration/job_specs.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 
@@ -15,65 +16,56 @@ namespace invar::calibration {
 
 /// Slow runs forth and back, the ripple identified from current and position, given to the stage, and faster runs that were
 /// not fitted before and after.
-struct RippleJob {
-  std::string name;
+struct RippleJob : JobSpec {
   std::filesystem::path model;
   double from = 0.0;
   double to = 0.0;
   double velocity = 0.02;
   double verify_velocity = 0.03;
   std::int64_t passes = 2;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(model, "model", "model.yaml of the axis without ripple");
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
     p(velocity, "velocity", "m/s", Range{1e-4, 1.0}, "of the runs to identify from");
     p(verify_velocity, "verify_velocity", "m/s", Range{1e-4, 1.0}, "of those before and after");
     p(passes, "passes", 1, 100, "forth and back so often");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
   }
 };
 
 /// Sinusoids, followed by the servo and watched by the laser.
-struct TrackingJob {
-  std::string name;
+struct TrackingJob : JobSpec {
   double from = 0.0;
   double amplitude = 0.1;
   std::vector<double> periods{3.0, 4.0, 5.0, 1.05};
   std::int64_t cycles = 2;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
     p(periods, "periods", "s", "one sinusoid each");
     p(cycles, "cycles", 1, 1000, "periods of each");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
   }
 };
 
 /// Forth and back at several speeds, the same each time: what a diagnosis records, and what tells whether it was right.
 /// With `apply`, once more after that model was given to the stage - unless it says nothing that `model` does not.
-struct MotionJob {
-  std::string name;
+struct MotionJob : JobSpec {
   double from = 0.0;
   double to = 0.0;
   std::vector<double> velocities{0.02, 0.05, 0.1};
   std::int64_t passes = 1;
   std::filesystem::path model;
   std::string apply;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
     p(velocities, "velocities", "m/s", "one after the other");
     p(passes, "passes", 1, 100, "forth and back so often, at each velocity");
     p(model, "model", "with apply: model.yaml of the axis as it was believed to be");
     p(apply, "apply", "model.yaml that `invar diagnose` writes; relative to where the cell was started");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
   }
 };
 

@@ -41,15 +41,9 @@ void Calibration::make_safe() {
 }
 
 std::optional<JobComponent::Job> Calibration::find(const std::string& wanted) {
-  const auto named = [&](const auto& jobs) {
-    return std::find_if(jobs.begin(), jobs.end(), [&](const auto& job) { return job.name == wanted; });
-  };
-  if (const auto job = named(parameters_.jobs); job != parameters_.jobs.end())
-    return Job{run(*job), job->out};
-  if (const auto job = named(parameters_.thermal_jobs); job != parameters_.thermal_jobs.end())
-    return Job{run(*job), job->out};
-  if (const auto job = named(parameters_.prints); job != parameters_.prints.end())
-    return Job{run(*job), job->out};
+  if (const auto* job = named(parameters_.jobs, wanted)) return Job{run(*job), job->out};
+  if (const auto* job = named(parameters_.thermal_jobs, wanted)) return Job{run(*job), job->out};
+  if (const auto* job = named(parameters_.prints, wanted)) return Job{run(*job), job->out};
   return std::nullopt;
 }
 

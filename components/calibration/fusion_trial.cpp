@@ -8,12 +8,14 @@
 #include <stdexcept>
 
 #include "core/compensation/fusion_file.hpp"
+#include "core/metrology/sure_gain.hpp"
 
 namespace invar::calibration {
 
 namespace {
 
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t parts_of_run = 8;  // of a sinusoid: longer than the fused position's error remembers
 
 using Readings = std::array<double, metrology::most_sensors>;
 
@@ -37,6 +39,21 @@ void keep_zero(std::vector<metrology::FusionRun>& runs) {
       if (std::isfinite(run.positions(i, 0))) off += run.positions(i, 0) - run.reference(i), ++count;
   if (count < 100.0) throw std::runtime_error{"the first position sensor does not read: connect it"};
   for (auto& run : runs) run.reference.array() += off / count;
+}
+
+/// Logarithm of the mean square of the errors of each part, the mean of all taken out: so that no one part decides.
+std::vector<double> sizes_of_parts(const std::vector<double>& errors, const std::vector<std::size_t>& part_of,
+                                   std::size_t parts) {
+  double mean = 0.0;
+  for (const double error : errors) mean += error / static_cast<double>(errors.size());
+  std::vector<double> sizes(parts), counts(parts);
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    sizes[part_of[i]] += std::pow(errors[i] - mean, 2);
+    counts[part_of[i]] += 1.0;
+  }
+  for (std::size_t k = 0; k < parts; ++k)
+    sizes[k] = std::log(std::max(1e-20, sizes[k] / std::max(1.0, counts[k])));
+  return sizes;
 }
 
 /// As `invar calibrate fusion` reads it.
@@ -95,9 +112,8 @@ FusionTrial::FusionTrial(const Parameters& parameters)
 FusionTrial::~FusionTrial() = default;
 
 std::optional<JobComponent::Job> FusionTrial::find(const std::string& wanted) {
-  const auto job = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
-                                [&](const FusionJob& one) { return one.name == wanted; });
-  if (job == parameters_.jobs.end()) return std::nullopt;
+  const auto* job = named(parameters_.jobs, wanted);
+  if (job == nullptr) return std::nullopt;
   std::filesystem::create_directories(job->out);
   return Job{run(*job), job->out};
 }
@@ -168,26 +184,31 @@ metrology::FusionRun FusionTrial::run_of_rows() const {
   return run;
 }
 
-/// The errors by the laser of sinusoids that are not fitted: of the fused position, and of the axis that follows it.
-Task FusionTrial::verify(const FusionJob& job, const std::string& when, Size& fused, Size& tracked) {
+Task FusionTrial::verify(const FusionJob& job, const std::string& when, Verified& found) {
   std::vector<double> of_fused, of_axis;
+  std::vector<std::size_t> part_of;  // each error of the fused position
   recording::Table table;
   for (const char* time : {"period", "t"}) table.add(time, "s", {});
   for (const char* place : {"reference", "fused", "setpoint"}) table.add(place, "m", {});
+  std::size_t first_part = 0;
   for (const double period : job.verify_periods) {
     co_await swing(job, period);
     for (const auto& [stamp, row] : rows_) {
-      if (std::isfinite(row.fused)) of_fused.push_back(row.fused - row.laser);
+      const double t = static_cast<double>(stamp - rows_.begin()->first) * 1e-9;
+      if (std::isfinite(row.fused)) {
+        of_fused.push_back(row.fused - row.laser);
+        const auto part = static_cast<std::size_t>(t / period * parts_of_run);
+        part_of.push_back(first_part + std::min(part, parts_of_run - 1));
+      }
       if (std::isfinite(row.setpoint)) of_axis.push_back(row.laser - row.setpoint);
-      const double cells[] = {period, static_cast<double>(stamp - rows_.begin()->first) * 1e-9, row.laser,
-                              row.fused, row.setpoint};
+      const double cells[] = {period, t, row.laser, row.fused, row.setpoint};
       for (std::size_t c = 0; c < table.columns.size(); ++c) table.columns[c].values.push_back(cells[c]);
     }
+    first_part += parts_of_run;
   }
   if (of_fused.size() < 100) throw std::runtime_error{"nothing fused arrives: connect `fused`"};
   table.write(std::filesystem::absolute(job.out) / ("fusion_" + when + ".csv"));
-  fused = size_of(of_fused);
-  tracked = size_of(of_axis);
+  found = {size_of(of_fused), size_of(of_axis), sizes_of_parts(of_fused, part_of, first_part)};
 }
 
 Task FusionTrial::run(const FusionJob& job) {
@@ -196,8 +217,8 @@ Task FusionTrial::run(const FusionJob& job) {
   co_await move(job.from, 0.0, nullptr);
   co_await wait(settle);
   co_await align(job.from);
-  Size fused_before, tracked_before, fused_after, tracked_after;
-  co_await verify(job, "before", fused_before, tracked_before);
+  Verified before, after;
+  co_await verify(job, "before", before);
   progress_ = 0.2;
   report(job::JOB_RUNNING, "sinusoids beside the laser");
   std::vector<metrology::FusionRun> runs;
@@ -227,17 +248,18 @@ Task FusionTrial::run(const FusionJob& job) {
   co_await command_model(compensation::MODEL_ACTIVATE, file.string());
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the model is in use; verifying");
-  co_await verify(job, "after", fused_after, tracked_after);
-  const std::string fused = "fused position of runs not fitted " + millimetres(fused_before.rms) + " to " +
-                            millimetres(fused_after.rms) + " RMS by the laser";
-  if (fused_after.rms > fused_before.rms) {
+  co_await verify(job, "after", after);
+  const std::string fused = "fused position of runs not fitted " + millimetres(before.fused.rms) + " to " +
+                            millimetres(after.fused.rms) + " RMS by the laser";
+  progress_ = 1.0;
+  if (after.fused.rms >= before.fused.rms || !metrology::surely_less(after.parts, before.parts, 2.0)) {
     co_await move(job.from, 0.0, nullptr);
     co_await command_model(compensation::MODEL_ROLLBACK, file.string());
-    throw std::runtime_error{fused + ": no better; rolled back"};
+    report(job::JOB_DONE, fused + ": no more than chance gives; the fusion is as it was before");
+    co_return;
   }
-  progress_ = 1.0;
-  report(job::JOB_DONE, fused + ", the axis that follows it " + millimetres(tracked_before.rms) + " to " +
-                            millimetres(tracked_after.rms) + "; method " +
+  report(job::JOB_DONE, fused + ", the axis that follows it " + millimetres(before.tracked.rms) + " to " +
+                            millimetres(after.tracked.rms) + "; method " +
                             (observer ? "observer" : "weights"));
 }
 

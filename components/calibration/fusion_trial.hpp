@@ -10,26 +10,24 @@
 #include <vector>
 
 #include "components/calibration/axis_runner.hpp"
+#include "components/calibration/job_specs.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/fusion_identification.hpp"
 
 namespace invar::calibration {
 
 /// Sinusoids to identify from, and others before and after, which are not fitted.
-struct FusionJob {
-  std::string name;
+struct FusionJob : JobSpec {
   double from = 0.0;
   double amplitude = 0.1;
   std::vector<double> periods{1.3, 2.0, 2.6, 3.5, 4.5, 6.0};
   std::vector<double> verify_periods{3.0, 5.0};
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
     p(periods, "periods", "s", "one sinusoid each, to identify from");
     p(verify_periods, "verify_periods", "s", "those before and after");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
     if constexpr (requires { p.node(); }) {
       if (periods.size() < 3)
         p.node()["periods"].fault("fewer than three sinusoids: none could be held out", "give three or more");
@@ -39,7 +37,9 @@ struct FusionJob {
 };
 
 /// One axis; `model` is its fusion's, `fused` what that says, and each sensor of the fusion has a port `sensor_<name>`, or is the
-/// position or velocity of `feedback`. A model that does not lessen the error of the runs that were not fitted is taken back.
+/// position or velocity of `feedback`. A model is taken back unless it lessens the error of the runs that were not fitted by more
+/// than chance: by two standard errors over the parts of these runs. Where the observer finds the sensors out by itself while it
+/// runs, a model brings no more than that.
 class FusionTrial final : public AxisRunner {
  public:
   struct Sensor {
@@ -75,7 +75,13 @@ class FusionTrial final : public AxisRunner {
   void take_down(recording::Table& record) override;
   Task run(const FusionJob& job);
   Task swing(const FusionJob& job, double period);
-  Task verify(const FusionJob& job, const std::string& when, Size& fused, Size& tracked);
+  /// What sinusoids that are not fitted showed.
+  struct Verified {
+    Size fused, tracked;  // errors by the laser: of the fused position, and of the axis that follows it
+    std::vector<double>
+        parts;  // how large the fused position's error is in each part of each sinusoid (logarithm)
+  };
+  Task verify(const FusionJob& job, const std::string& when, Verified& found);
   [[nodiscard]] metrology::FusionRun run_of_rows() const;
 
   const Parameters& parameters_;

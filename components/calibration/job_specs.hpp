@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -11,6 +12,24 @@
 #include "core/base/range.hpp"
 
 namespace invar::calibration {
+
+/// What every job says.
+struct JobSpec {
+  std::string name;
+  std::string out = "out";
+  void describe(auto& p) {
+    p(name, "name", "what `invar job run` calls it");
+    p(out, "out", "folder for the files, created; relative to where the cell was started");
+  }
+};
+
+/// The job of this name; nullptr: there is none.
+template <class Spec>
+const Spec* named(const std::vector<Spec>& jobs, const std::string& wanted) {
+  const auto job =
+      std::find_if(jobs.begin(), jobs.end(), [&](const Spec& one) { return one.name == wanted; });
+  return job == jobs.end() ? nullptr : &*job;
+}
 
 /// A displacement line to measure.
 struct LineSpec {
@@ -38,8 +57,7 @@ struct LineSpec {
 };
 
 /// One geometric calibration as a transaction: lines to fit, lines to verify before and after.
-struct GeometricJob {
-  std::string name;
+struct GeometricJob : JobSpec {
   std::filesystem::path machine;
   std::vector<LineSpec> lines;
   std::vector<LineSpec> verify;
@@ -47,9 +65,8 @@ struct GeometricJob {
   double verify_interval = 0.005;
   std::int64_t cycles = 1;
   std::int64_t readings = 4;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(machine, "machine", "machine.yaml: chain and travel");
     p(lines, "lines", "displacement lines to identify the error from");
     p(verify, "verify", "lines not fitted, measured before and after");
@@ -57,7 +74,6 @@ struct GeometricJob {
     p(verify_interval, "verify_interval", "m", Range{1e-4, 1.0}, "between the points of a verification line");
     p(cycles, "cycles", 1, 100, "each line forth and back so often");
     p(readings, "readings", 1, 10'000, "averaged at each point");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
   }
 };
 
@@ -88,8 +104,7 @@ struct TraceSpec {
 /// The error of one axis over position and temperature as a transaction: a line is read at room temperature and again and
 /// again while the heater follows a trace; the model is then compared with that of room temperature at points and
 /// temperatures that were not fitted.
-struct ThermalJob {
-  std::string name;
+struct ThermalJob : JobSpec {
   LineSpec line;
   double interval = 0.005;
   std::int64_t readings = 4;
@@ -102,9 +117,8 @@ struct ThermalJob {
   double tolerance = 0.1;
   double soak = 300.0;
   double steady_timeout = 7200.0;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(line, "line", "along the axis to calibrate, from where the laser is zeroed");
     p(interval, "interval", "m", Range{1e-4, 1.0}, "between the points of the line");
     p(readings, "readings", 1, 10'000, "averaged at each point");
@@ -117,7 +131,6 @@ struct ThermalJob {
     p(tolerance, "tolerance", "K", Range{1e-3, 10.0}, "around a setpoint that counts as reached");
     p(soak, "soak", "s", Range{0.0, 36000.0}, "at a setpoint before the line is read");
     p(steady_timeout, "steady_timeout", "s", Range{1.0, 1e6}, "the job fails when it takes longer");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
     if constexpr (requires { p.node(); }) {
       int moving = 0;
       for (std::size_t i = 0; i < line.from.size() && i < line.to.size(); ++i)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "components/calibration/job_host.hpp"
+#include "components/calibration/job_specs.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/droplet_trajectory.hpp"
@@ -36,8 +37,7 @@ struct DriftWatch {
   }
 };
 
-struct PrintJob {
-  std::string name;
+struct PrintJob : JobSpec {
   std::string first;
   std::string pattern;
   std::vector<double> heights{2e-3, 20e-3};
@@ -47,9 +47,8 @@ struct PrintJob {
   double jerk = 60.0;
   double reach = 9e-4;
   DriftWatch drift;
-  std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    JobSpec::describe(p);
     p(first, "first", "a job of `jobs` that is done before");
     p(pattern, "pattern", "of the dispenser, printed at each height");
     p(heights, "heights", "m", "from nozzle to substrate, in the order of printing");
@@ -61,7 +60,6 @@ struct PrintJob {
     p(reach, "reach", "m", Range{1e-6, 1e-1},
       "a droplet lies within this of its target, or it is none of this pattern");
     p(drift, "drift", "prints after the calibration");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
     if constexpr (requires { p.node(); }) {
       for (const double height : heights)
         if (!(height > 0.0))

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "components/vision/partition.hpp"
+#include "components/vision/wide_vectors.hpp"
 
 namespace invar::vision {
 
@@ -133,44 +136,97 @@ Found refine(const std::vector<OutlinePoint>& points, Found at) {
   return at;
 }
 
+constexpr auto plus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a + b); };
+constexpr auto minus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a - b); };
+
+// Votes for centres, over the box of a blob and a margin.
+class Votes {
+ public:
+  Votes(const Blob& blob, double radius)
+      : radius_{static_cast<float>(radius)},
+        reach_{std::max(1, static_cast<int>(0.15 * radius))},
+        margin_{static_cast<int>(std::ceil(radius)) + 1},
+        left_{blob.left - margin_},
+        top_{blob.top - margin_},
+        columns_{blob.right - blob.left + 1 + 2 * margin_},
+        rows_{blob.bottom - blob.top + 1 + 2 * margin_},
+        cells_(static_cast<std::size_t>(columns_ * rows_)),
+        across_(cells_.size()),
+        down_(static_cast<std::size_t>(columns_)) {}
+
+  /// An outline point votes, or takes its votes back (-1): along its normal, as its radius is known to some percent.
+  void add(const OutlinePoint& p, int votes) {
+    for (int k = -3; k <= 3; ++k) {
+      const float r = radius_ * (1.0F + 0.08F * static_cast<float>(k));
+      const int x = cvRound(p.x + r * p.nx) - left_, y = cvRound(p.y + r * p.ny) - top_;
+      if (x >= 0 && y >= 0 && x < columns_ && y < rows_)
+        cells_[index(x, y)] = static_cast<std::int16_t>(cells_[index(x, y)] + votes);
+    }
+  }
+  /// Where a small square holds the most votes, and how many.
+  struct Peak {
+    int x, y;  // px of the reduced image
+    double height;
+  };
+  Peak peak() {
+    for (int y = 0; y < rows_; ++y) {
+      int sum = 0;
+      for (int x = -reach_; x < columns_; ++x) {
+        if (x + reach_ < columns_) sum += cells_[index(x + reach_, y)];
+        if (x - reach_ - 1 >= 0) sum -= cells_[index(x - reach_ - 1, y)];
+        if (x >= 0) across_[index(x, y)] = static_cast<std::int16_t>(sum);
+      }
+    }
+    std::int16_t most = -1;
+    int at_x = 0, at_y = 0;
+    std::fill(down_.begin(), down_.end(), std::int16_t{0});
+    const auto row = [&](int y) { return across_.begin() + static_cast<std::ptrdiff_t>(y) * columns_; };
+    for (int y = -reach_; y < rows_; ++y) {
+      if (y + reach_ < rows_)
+        std::transform(down_.begin(), down_.end(), row(y + reach_), down_.begin(), plus);
+      if (y - reach_ - 1 >= 0)
+        std::transform(down_.begin(), down_.end(), row(y - reach_ - 1), down_.begin(), minus);
+      if (y < 0) continue;
+      std::int16_t highest = 0;
+      for (const std::int16_t votes : down_) highest = std::max(highest, votes);
+      if (highest <= most) continue;
+      most = highest, at_y = y;
+      at_x = static_cast<int>(std::find(down_.begin(), down_.end(), highest) - down_.begin());
+    }
+    return {at_x + left_, at_y + top_, static_cast<double>(most)};
+  }
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
+  float radius_;
+  int reach_, margin_, left_, top_, columns_, rows_;
+  std::vector<std::int16_t> cells_, across_, down_;
+};
+
 // Takes a blob apart: every outline point votes for centres along its normal; the best circle is taken, its points
 // are removed, and so on.
 std::vector<Found> take_apart(const Blob& blob, const cv::Mat1b& image, const Side& side, double radius) {
   std::vector<Found> found;
   auto points = outline_of(blob, image, side);
-  const int margin = static_cast<int>(std::ceil(radius)) + 1;
-  const int left = blob.left - margin, top = blob.top - margin;
-  cv::Mat1f votes(blob.bottom - blob.top + 1 + 2 * margin, blob.right - blob.left + 1 + 2 * margin);
-  cv::Mat1f smooth;
+  Votes votes{blob, radius};
+  for (const OutlinePoint& p : points) votes.add(p, 1);
   const double whole = 2.0 * std::numbers::pi * radius;
   auto unused = static_cast<double>(points.size());
   for (int circles = 0; circles < 200 && unused >= least_support * whole; ++circles) {
-    votes.setTo(0.0F);
-    for (const OutlinePoint& p : points) {
-      if (p.used) continue;
-      for (int k = -3; k <= 3; ++k) {
-        const float r = static_cast<float>(radius) * (1.0F + 0.08F * static_cast<float>(k));
-        const int x = cvRound(p.x + r * p.nx) - left, y = cvRound(p.y + r * p.ny) - top;
-        if (x >= 0 && y >= 0 && x < votes.cols && y < votes.rows) votes(y, x) += 1.0F;
-      }
-    }
-    const int size = 2 * std::max(1, static_cast<int>(0.15 * radius)) + 1;
-    cv::boxFilter(votes, smooth, CV_32F, {size, size}, {-1, -1}, false, cv::BORDER_CONSTANT);
-    cv::Point peak;
-    double height = 0.0;
-    cv::minMaxLoc(smooth, nullptr, &height, nullptr, &peak);
-    if (height < 0.15 * whole) break;
-    Found at = refine(
-        points, {static_cast<double>(peak.x + left), static_cast<double>(peak.y + top), radius - 0.4, 0});
+    const Votes::Peak peak = votes.peak();
+    if (peak.height < 0.15 * whole) break;
+    Found at = refine(points, {static_cast<double>(peak.x), static_cast<double>(peak.y), radius - 0.4, 0});
     const double reach = std::max(1.2, 0.22 * at.radius);
     int removed = 0;
     for (OutlinePoint& p : points) {
       if (p.used) continue;
       const double r = length_of(static_cast<double>(p.x) - at.x, static_cast<double>(p.y) - at.y);
       // The votes that made the peak go, too, so that the same peak never comes twice.
-      const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x - left;
-      const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y - top;
-      if (std::abs(r - at.radius) < reach || length_of(vx, vy) < 0.25 * radius) p.used = true, ++removed;
+      const double vx = static_cast<double>(p.x) + radius * static_cast<double>(p.nx) - peak.x;
+      const double vy = static_cast<double>(p.y) + radius * static_cast<double>(p.ny) - peak.y;
+      if (std::abs(r - at.radius) >= reach && length_of(vx, vy) >= 0.25 * radius) continue;
+      p.used = true, ++removed;
+      votes.add(p, -1);
     }
     if (removed == 0) break;
     unused -= removed;
@@ -188,20 +244,55 @@ double inscribed_radius(const Blob& blob, const Side& side) {
   return largest;
 }
 
+// The mean of each two by two pixels.
+INVAR_WIDE_VECTORS
+void halve_row(const std::uint8_t* upper, const std::uint8_t* lower, int width, std::uint8_t* out) {
+  using Words [[gnu::vector_size(32)]] = std::uint16_t;  // two pixels each
+  using Bytes [[gnu::vector_size(16)]] = std::uint8_t;
+  constexpr int lanes = 16;
+  int x = 0;
+  for (; x + lanes <= width; x += lanes) {
+    Words a, b;
+    std::memcpy(&a, upper + 2 * x, sizeof a);
+    std::memcpy(&b, lower + 2 * x, sizeof b);
+    const Bytes mean = __builtin_convertvector(((a & 255) + (a >> 8) + (b & 255) + (b >> 8) + 2) >> 2, Bytes);
+    std::memcpy(out + x, &mean, sizeof mean);
+  }
+  for (; x < width; ++x)
+    out[x] = static_cast<std::uint8_t>(
+        (upper[2 * x] + upper[2 * x + 1] + lower[2 * x] + lower[2 * x + 1] + 2) >> 2);
+}
+
+cv::Mat1b halved(const cv::Mat1b& image) {
+  cv::Mat1b out(image.rows / 2, image.cols / 2);
+  for (int y = 0; y < out.rows; ++y)
+    halve_row(image.ptr<std::uint8_t>(2 * y), image.ptr<std::uint8_t>(2 * y + 1), out.cols,
+              out.ptr<std::uint8_t>(y));
+  return out;
+}
+
 struct Level {
   cv::Mat1b image;
   int halvings = 0;
 };
 
-Detection detect_at(const Level& level, const DetectionOptions& options) {
+struct Seen {
+  Detection found;
+  bool polarity_is_sure = false;
+};
+
+Seen detect_at(const Level& level, const DetectionOptions& options) {
   const cv::Mat1b& image = level.image;
   const double scale = 1 << level.halvings;
-  Detection out;
-  const Partition parts = partition(image, options.window);
+  Seen seen;
+  Detection& out = seen.found;
+  const Partition parts = partition(image, options.window, options.polarity);
   out.noise = parts.noise * scale;
-  if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return out;
+  if (!(parts.light_contrast > 0.0) && !(parts.dark_contrast > 0.0)) return seen;
   const double smallest = 3.0;
-  Side light = make_side(image, parts.light, +1, smallest), dark = make_side(image, parts.dark, -1, smallest);
+  Side light, dark;
+  if (options.polarity >= 0) light = make_side(image, parts.light, +1, smallest);
+  if (options.polarity <= 0) dark = make_side(image, parts.dark, -1, smallest);
   // Things are round, what lies between them is not.
   Side* side = light.round_area >= dark.round_area ? &light : &dark;
   if (options.polarity != 0) {
@@ -216,6 +307,8 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
     };
     side = inner(light) >= inner(dark) ? &light : &dark;
   }
+  seen.polarity_is_sure = std::max(light.round_area, dark.round_area) >
+                          4.0 * std::min(light.round_area, dark.round_area) + 0.02 * image.size().area();
   out.polarity = side->polarity;
   out.contrast = side->polarity > 0 ? parts.light_contrast : parts.dark_contrast;
 
@@ -226,7 +319,7 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
     for (const Blob& blob : side->found.blobs) radii.emplace_back(inscribed_radius(blob, *side), blob.area);
   const double radius = weighted_median(radii);
   out.radius = radius * scale;
-  if (!(radius > 0.0)) return out;
+  if (!(radius > 0.0) || (level.halvings > 0 && options.level < 0 && radius < finest)) return seen;
 
   const auto full = [&](double v) { return (v + 0.5) * scale - 0.5; };
   for (const Blob& blob : side->found.blobs) {
@@ -240,7 +333,7 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
             {full(f.x), full(f.y), f.radius * scale, parts_of.size() == 1 && !at_border(blob, image)});
     }
   }
-  return out;
+  return seen;
 }
 
 }  // namespace
@@ -248,25 +341,22 @@ Detection detect_at(const Level& level, const DetectionOptions& options) {
 Detection detect(const cv::Mat& image, const DetectionOptions& options) {
   std::vector<Level> levels{{image, 0}};
   const auto halve_to = [&](int halvings) {
-    while (levels.back().halvings < halvings) {
-      Level next{{}, levels.back().halvings + 1};
-      const cv::Mat1b& from = levels.back().image;
-      cv::resize(from(cv::Rect(0, 0, from.cols & ~1, from.rows & ~1)), next.image,
-                 {from.cols / 2, from.rows / 2}, 0, 0, cv::INTER_AREA);
-      levels.push_back(next);
-    }
+    while (levels.back().halvings < halvings)
+      levels.push_back({halved(levels.back().image), levels.back().halvings + 1});
     return levels[static_cast<std::size_t>(halvings)];
   };
-  if (options.level >= 0) return detect_at(halve_to(options.level), options);
+  if (options.level >= 0) return detect_at(halve_to(options.level), options).found;
   // Coarse first: it is cheap and sees through noise. Finer where the things turn out small there.
   int halvings = 0;
   while (std::min(image.cols, image.rows) >> (halvings + 1) >= 96) ++halvings;
+  DetectionOptions known = options;
   for (;;) {
-    Detection found = detect_at(halve_to(halvings), options);
+    const auto [found, polarity_is_sure] = detect_at(halve_to(halvings), known);
+    if (polarity_is_sure) known.polarity = found.polarity;  // the finer image has four times as many pixels
     if (halvings == 0 || (found.radius >= finest * (1 << halvings) && !found.candidates.empty()))
       return found;
     --halvings;
-    while (halvings > 0 && found.radius > 0.0 && found.radius < 0.8 * finest * (1 << halvings)) --halvings;
+    while (halvings > 0 && found.radius > 0.0 && found.radius < finest * (1 << halvings)) --halvings;
   }
 }
 

@@ -23,8 +23,9 @@ struct Detection {
 
 struct DetectionOptions {
   int polarity = 0;  // +1 light things, -1 dark ones; 0: found out
-  int level = -1;    // the image is halved so many times first; -1: chosen from what is found
-  int window = 2;    // light is taken as even within this many tiles of 16 reduced px each way
+  int level =
+      -1;  // the image is halved so many times first; -1: as often as leaves 3 px of the typical radius
+  int window = 2;  // light is taken as even within this many tiles of 16 reduced px each way
 };
 
 /// The light is followed by local means of both classes (after Ridler and Calvard's iteration, in windows), so

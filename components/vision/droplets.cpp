@@ -42,22 +42,48 @@ double circularity_of(const Measured& drop) {
   return std::min(1.0, 4.0 * std::numbers::pi * area / (perimeter * perimeter));
 }
 
+// Each pair of drops whose outlines come nearer than `gap` along x, once.
+template <class Visit>
+void visit_neighbours(std::vector<Measured>& drops, double gap, const Visit& visit) {
+  std::vector<std::pair<double, Measured*>> by_x;
+  by_x.reserve(drops.size());
+  double largest = 0.0;
+  for (Measured& drop : drops) {
+    by_x.emplace_back(drop.shape.x, &drop);
+    largest = std::max(largest, drop.shape.radius);
+  }
+  std::sort(by_x.begin(), by_x.end());
+  for (auto one = by_x.begin(); one != by_x.end(); ++one) {
+    const Shape& a = one->second->shape;
+    for (auto other = one + 1; other != by_x.end() && other->first - a.x < a.radius + largest + gap;
+         ++other) {
+      const Shape& b = other->second->shape;
+      const double dx = a.x - b.x, dy = a.y - b.y, near = a.radius + b.radius + gap;
+      if (dx * dx + dy * dy < near * near) visit(*one->second, *other->second);
+    }
+  }
+}
+
+double clarity(const Measured& drop) { return drop.fit.coverage * drop.shape.radius; }
+
 // Of two fits of one drop the better stays.
 void drop_doubles(std::vector<Measured>& drops) {
-  std::vector<Measured*> order;
-  for (Measured& drop : drops) order.push_back(&drop);
-  std::sort(order.begin(), order.end(), [](const Measured* a, const Measured* b) {
-    return a->fit.coverage * a->shape.radius > b->fit.coverage * b->shape.radius;
+  std::vector<std::pair<Measured*, Measured*>> doubles;  // the better one, the worse one
+  visit_neighbours(drops, 0.0, [&](Measured& one, Measured& other) {
+    const Shape &a = one.shape, &b = other.shape;
+    const double dx = a.x - b.x, dy = a.y - b.y, least = 0.6 * std::max(a.radius, b.radius);
+    if (dx * dx + dy * dy >= least * least) return;
+    if (clarity(one) >= clarity(other))
+      doubles.emplace_back(&one, &other);
+    else
+      doubles.emplace_back(&other, &one);
   });
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = 0; j < i && order[i]->alive; ++j) {
-      if (!order[j]->alive) continue;
-      const Shape &a = order[i]->shape, &b = order[j]->shape;
-      const double dx = a.x - b.x, dy = a.y - b.y, least = 0.6 * std::max(a.radius, b.radius);
-      if (dx * dx + dy * dy < least * least) order[i]->alive = false;
-    }
-  if (std::any_of(drops.begin(), drops.end(), [](const Measured& drop) { return !drop.alive; }))
-    std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
+  if (doubles.empty()) return;
+  std::sort(doubles.begin(), doubles.end(),
+            [](const auto& a, const auto& b) { return clarity(*a.second) > clarity(*b.second); });
+  for (const auto& [better, worse] : doubles)
+    if (better->alive) worse->alive = false;
+  std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
 }
 
 // The `most` drops whose outline was seen best.
@@ -65,21 +91,19 @@ std::vector<const Measured*> clearest(const std::vector<Measured>& drops, std::s
   std::vector<const Measured*> order;
   for (const Measured& drop : drops) order.push_back(&drop);
   const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(most, order.size()));
-  std::partial_sort(order.begin(), end, order.end(), [](const Measured* a, const Measured* b) {
-    return a->fit.coverage * a->shape.radius > b->fit.coverage * b->shape.radius;
-  });
+  std::partial_sort(order.begin(), end, order.end(),
+                    [](const Measured* a, const Measured* b) { return clarity(*a) > clarity(*b); });
   order.erase(end, order.end());
   return order;
 }
 
 // What hides part of a drop's edge: its neighbours.
 void close_rays(std::vector<Measured>& drops, double reach, double guard) {
-  for (std::size_t i = 0; i < drops.size(); ++i)
-    for (std::size_t j = 0; j < drops.size(); ++j)
-      if (i != j) {
-        const Shape& other = drops[j].shape;
-        drops[i].rays.close(drops[i].shape, reach, other.x, other.y, other.radius, guard);
-      }
+  visit_neighbours(drops, reach + guard, [&](Measured& one, Measured& other) {
+    const Shape &a = one.shape, &b = other.shape;
+    one.rays.close(a, reach, b.x, b.y, b.radius, guard);
+    other.rays.close(b, reach, a.x, a.y, a.radius, guard);
+  });
 }
 
 double outside_share(const Shape& shape, const cv::Mat& image) {
@@ -112,7 +136,7 @@ std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filter
   drops.reserve(found.candidates.size());
   for (const Candidate& candidate : found.candidates) {
     if (candidate.radius < 1.5) continue;
-    Measured drop;
+    Measured& drop = drops.emplace_back();
     const Shape start{candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
     bool done = false;
     if (candidate.alone) {
@@ -132,10 +156,12 @@ std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filter
       drop.rays.choose(std::max(10.0, 0.6 * candidate.radius));
       const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
       drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
-      if (!drop.fit.valid || drop.fit.coverage < 0.2) continue;
+      if (!drop.fit.valid || drop.fit.coverage < 0.2) {
+        drops.pop_back();
+        continue;
+      }
       drop.shape = drop.fit.shape;
     }
-    drops.push_back(drop);
   }
   return drops;
 }

@@ -12,7 +12,7 @@ namespace invar::vision {
 EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_px} {
   INVAR_EXPECTS(blur > 0.0 && half >= 3 && half <= most_half, blur, half);
   const int n = 2 * half + 1;
-  inner.resize(n), outer.resize(n);
+  Profile inner(n), outer(n);    // the ramps of slope inside and outside
   Eigen::MatrixXd design(n, 6);  // 1, S, g, inner, outer, dS/dblur
   for (int i = 0; i < n; ++i) {
     const double k = i - half, u = k / blur;
@@ -25,13 +25,14 @@ EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_p
   const auto inverse = [](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
     return (a.transpose() * a).ldlt().solve(a.transpose());
   };
-  step = inverse(design.leftCols(3));
-  sloped = inverse(design.leftCols(5));
+  // Samples to ground, contrast, contrast * offset; to these and the slopes; to these and the change of blur.
+  const Eigen::MatrixXd step = inverse(design.leftCols(3)), sloped = inverse(design.leftCols(5));
   Eigen::MatrixXd with_blur(n, 4);
   with_blur << design.leftCols(3), design.col(5);
-  spread = inverse(with_blur);
+  const Eigen::MatrixXd spread = inverse(with_blur);
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double row[] = {step(0, i), step(1, i), step(2, i), inner(i), outer(i)};
+    const std::array<double, rows> row{step(0, i),   step(1, i),   step(2, i),   inner(i),    outer(i),
+                                       sloped(3, i), sloped(4, i), spread(1, i), spread(3, i)};
     for (std::size_t r = 0; r < rows; ++r)
       products[r][static_cast<std::size_t>(i)] = static_cast<float>(row[r]);
   }
@@ -41,6 +42,8 @@ EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_p
   inner_inner = inner.squaredNorm();
   inner_outer = inner.dot(outer);
   outer_outer = outer.squaredNorm();
+  spread_inner = {spread.row(1).dot(inner), spread.row(3).dot(inner)};
+  spread_outer = {spread.row(1).dot(outer), spread.row(3).dot(outer)};
 }
 
 int EdgeFilter::half_for(double blur, double radius) {

@@ -15,23 +15,27 @@ struct EdgeFilter {
 
   double blur;  // px
   int half;     // px
-  Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, most>
-      step;  // samples -> ground, contrast, contrast * offset
-  Eigen::Matrix<double, 5, Eigen::Dynamic, 0, 5, most>
-      sloped;  // the same and the slopes inside and outside [1/px]
-  Eigen::Matrix<double, 4, Eigen::Dynamic, 0, 4, most>
-      spread;            // the same as step and contrast * (change of blur)
-  Profile inner, outer;  // the ramps of slope inside and outside
-
-  // In single precision for the loop over rays: what a sample adds to ground, contrast, contrast * offset, and to its
-  // product with the two ramps.
-  enum Row : std::size_t { to_ground, to_height, to_shift, to_inner, to_outer, rows };
+  // In single precision for the loop over rays: what a sample adds to ground, contrast, contrast * offset, to its product
+  // with the two ramps; and, of the sloped step, to the slopes, of the spread one to contrast and contrast * (change of blur).
+  enum Row : std::size_t {
+    to_ground,
+    to_height,
+    to_shift,
+    to_inner,
+    to_outer,
+    to_slope_in,
+    to_slope_out,
+    to_spread_height,
+    to_spread_blur,
+    rows
+  };
   std::array<std::array<float, most>, rows> products{};
   // What the ramps themselves add to ground, contrast, contrast * offset; the products of the columns 1, S, g with one
   // another, and of the ramps: with them the misfit of a ray follows from its products alone.
   Eigen::Vector3d from_inner, from_outer;
   Eigen::Matrix3d columns;
   double inner_inner = 0.0, inner_outer = 0.0, outer_outer = 0.0;
+  Eigen::Vector2d spread_inner, spread_outer;  // what the ramps add to contrast, contrast * (change of blur)
 
   /// `half`: at least 3. Set-up only, or once a frame (some microseconds).
   EdgeFilter(double blur, int half);

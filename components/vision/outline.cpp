@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "components/vision/outline_curve.hpp"
@@ -12,26 +13,46 @@ namespace invar::vision {
 
 namespace {
 
-// The samples of the open rays of a block of eight; those that leave the image are closed. True where any is open.
-struct Block {
-  std::array<double, lanes> open{};  // 1 or 0
-  EightRays rays;
-};
+// Where the samples of eight rays lie, from `inward` px inside the shape to `outward` px outside; rays that leave the image are
+// closed. `whole`: none does. False where no ray is open.
 bool prepare(const RaySamples& samples, const Shape& shape, const Directions& d, std::size_t first,
-             double inward, double outward, Rays& rays, Block& block) {
+             double inward, double outward, bool whole, Rays& rays, EightRays& block) {
+  if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; }))
+    return false;
+  std::memcpy(block.step_u.data(), &d.step_u[first], sizeof block.step_u);
+  std::memcpy(block.step_v.data(), &d.step_v[first], sizeof block.step_v);
+  const auto x = static_cast<std::int32_t>(shape.x * EightRays::unit),
+             y = static_cast<std::int32_t>(shape.y * EightRays::unit);
+  const auto mean = static_cast<float>((shape.radius - inward) * EightRays::unit),
+             cos2 = static_cast<float>(shape.cos2 * EightRays::unit),
+             sin2 = static_cast<float>(shape.sin2 * EightRays::unit);
+  for (std::size_t lane = 0; lane < lanes; ++lane) {
+    const std::size_t k = first + lane;
+    const float begin = mean + cos2 * d.c2[k] + sin2 * d.s2[k];
+    block.u[lane] = x + static_cast<std::int32_t>(begin * d.c[k]);
+    block.v[lane] = y + static_cast<std::int32_t>(begin * d.s[k]);
+  }
+  if (whole) return true;
   bool any = false;
   for (std::size_t lane = 0; lane < lanes; ++lane) {
     const std::size_t k = first + lane;
-    if (!rays.open[k]) continue;
-    const double r = radius_at(shape, d, k), begin = r - inward, end = r + outward;
-    const double x = shape.x + begin * d.c[k], y = shape.y + begin * d.s[k];
-    rays.open[k] = samples.holds(x, y) && samples.holds(shape.x + end * d.c[k], shape.y + end * d.s[k]);
-    if (!rays.open[k]) continue;
-    block.rays.set(lane, x, y, d.c[k], d.s[k]);
-    block.open[lane] = 1.0;
-    any = true;
+    const double u = block.u[lane] / EightRays::unit, v = block.v[lane] / EightRays::unit,
+                 length = inward + outward;
+    rays.open[k] =
+        rays.open[k] && samples.holds(u, v) &&
+        samples.holds(u + length * static_cast<double>(d.c[k]), v + length * static_cast<double>(d.s[k]));
+    any = any || rays.open[k];
+    if (rays.open[k]) continue;
+    rays.weight[k] = 0.0F;
+    block.u[lane] = block.v[lane] = block.step_u[lane] = block.step_v[lane] = 0;
   }
   return any;
+}
+
+// Whether all rays stay inside the image.
+bool stays_inside(const RaySamples& samples, const Shape& shape, double outward) {
+  const double largest = shape.radius + std::abs(shape.cos2) + std::abs(shape.sin2) + outward + 0.1;
+  return samples.holds(shape.x, shape.y, largest);
 }
 
 }  // namespace
@@ -47,8 +68,8 @@ double Shape::axis_ratio() const {
 
 void Rays::choose(double radius) {
   count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 1, most / 16);
-  open.fill(true);
-  weight.fill(1.0);
+  std::fill_n(open.begin(), count, true);
+  std::fill_n(weight.begin(), count, 1.0F);
 }
 
 double ray_angle(const Rays& rays, int i) { return 2.0 * std::numbers::pi * (i + 0.5) / rays.count; }
@@ -61,9 +82,10 @@ void Rays::close(const Shape& shape, double reach, double x, double y, double ra
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const double r = radius_at(shape, d, i);
     // The nearest point of the ray's piece to the disc's centre.
-    const double along = std::clamp(dx * d.c[i] + dy * d.s[i], r - 0.5 * reach, r + reach);
-    const double away_x = dx - along * d.c[i], away_y = dy - along * d.s[i];
-    if (away_x * away_x + away_y * away_y < limit * limit) open[i] = false;
+    const auto c = static_cast<double>(d.c[i]), s = static_cast<double>(d.s[i]);
+    const double along = std::clamp(dx * c + dy * s, r - 0.5 * reach, r + reach);
+    const double away_x = dx - along * c, away_y = dy - along * s;
+    if (away_x * away_x + away_y * away_y < limit * limit) open[i] = false, weight[i] = 0.0F;
   }
 }
 
@@ -72,49 +94,42 @@ OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, 
   const Directions& d = directions(rays.count);
   const int half = std::clamp(static_cast<int>(std::ceil(reach)), 3, 30);
   const int inward = std::min(half, static_cast<int>(shape.radius - std::hypot(shape.cos2, shape.sin2)));
-  const int length = inward + half + 5;
-  std::array<Lanes, 65> f;
-  Values heights{}, sorted{};
-  std::array<bool, Rays::most> usable{};
+  const auto length = static_cast<std::size_t>(inward + half + 5);
+  const bool whole = stays_inside(samples, shape, half + 2);
+  std::array<Lanes, 65> f, slope;
+  EightRays block;
+  std::array<std::int32_t, lanes> steepest;
+  Values heights, sorted, usable;  // written before they are read
   int n = 0;
-  for (std::size_t k = 0; k < static_cast<std::size_t>(rays.count); ++k) {
-    const std::size_t lane = k % lanes;
-    if (lane == 0) {
-      Block block;
-      if (prepare(samples, shape, d, k, inward + 2, half + 2, rays, block))
-        samples.read(block.rays, static_cast<std::size_t>(length), f.data());
+  for (std::size_t first = 0; first < static_cast<std::size_t>(rays.count); first += lanes) {
+    std::fill_n(&usable[first], lanes, 0.0F);
+    if (!prepare(samples, shape, d, first, inward + 2, half + 2, whole, rays, block)) continue;
+    samples.read(block, length, f.data());
+    find_steps(f.data(), length, static_cast<float>(polarity), static_cast<float>(inward + 2),
+               static_cast<float>(reach), slope.data(), steepest);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::size_t k = first + lane;
+      if (!rays.open[k] || steepest[lane] < 0) continue;
+      const auto at = static_cast<std::size_t>(steepest[lane]);
+      const float height = slope[at][lane];
+      float fraction = 0.0F;
+      if (at > 2 && at + 3 < length) {
+        const float before = slope[at - 1][lane], after = slope[at + 1][lane],
+                    bend = before - 2.0F * height + after;
+        if (bend < 0.0F) fraction = std::clamp(0.5F * (before - after) / bend, -0.5F, 0.5F);
+      }
+      rays.offset[k] = static_cast<float>(steepest[lane] - 2 - inward) + fraction;
+      heights[k] = sorted[static_cast<std::size_t>(n++)] = height;
+      usable[k] = 1.0F;
     }
-    if (!rays.open[k]) continue;
-    // Differences of two samples each side; an edge nearer to where it is expected wins over an equal one farther off.
-    double best = 0.0, height = 0.0;
-    int at = -1;
-    const auto difference = [&](int j) {
-      const auto m = static_cast<std::size_t>(j);
-      return 0.5 * polarity *
-             static_cast<double>(f[m - 2][lane] + f[m - 1][lane] - f[m + 1][lane] - f[m + 2][lane]);
-    };
-    for (int j = 2; j < length - 2; ++j) {
-      const double away = (j - 2 - inward) / (reach + 1.0), value = difference(j) * (1.0 - 0.3 * away * away);
-      if (value > best) best = value, at = j;
-    }
-    if (at < 0) continue;
-    height = difference(at);
-    double fraction = 0.0;
-    if (at > 2 && at < length - 3) {
-      const double before = difference(at - 1), after = difference(at + 1),
-                   bend = before - 2.0 * height + after;
-      if (bend < 0.0) fraction = std::clamp(0.5 * (before - after) / bend, -0.5, 0.5);
-    }
-    rays.offset[k] = at - 2 - inward + fraction;
-    heights[k] = sorted[static_cast<std::size_t>(n++)] = height;
-    usable[k] = true;
   }
   OutlineFit fit;
   fit.shape = shape;
   if (n < 8) return fit;
   fit.contrast = median_of(sorted, n);
+  const auto least = static_cast<float>(0.35 * fit.contrast);
   for (std::size_t k = 0; k < static_cast<std::size_t>(rays.count); ++k)
-    if (usable[k] && heights[k] < 0.35 * fit.contrast) usable[k] = false;
+    if (usable[k] > 0.0F && heights[k] < least) usable[k] = 0.0F;
   fit.valid = fit_shape(rays, usable, 0.35, fit);
   return fit;
 }
@@ -125,93 +140,89 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   const Directions& d = directions(rays.count);
   const auto count = static_cast<std::size_t>(rays.count);
   const auto length = static_cast<std::size_t>(2 * filter.half + 1);
-  std::array<bool, Rays::most> usable{};
-  std::array<RayProducts, Rays::most / lanes> products;  // written before they are read
+  const bool whole = stays_inside(samples, shape, filter.half);
+  Values usable;  // written before they are read, as the next three
+  std::array<RayProducts, Rays::most / lanes> products;
   std::array<Lanes, EdgeFilter::most> f;
-  HarmonicSums by_lane;  // level, cosine, sine: over the rays
-  for (auto& sums : by_lane) std::fill_n(sums.begin(), length, Lanes{});
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  EightRays block;
+  constexpr std::size_t common_rows = EdgeFilter::rows - EdgeFilter::to_slope_in;
+  std::array<std::array<Lanes, 3>, common_rows> by_lane{};  // products over the rays, by 1, c, s
+  std::array<Lanes, 6> weights{};  // over the rays: their sum, by c, s, c c, c s, s s
   for (std::size_t first = 0; first < count; first += lanes) {
-    Block block;
-    if (!prepare(samples, shape, d, first, filter.half, filter.half, rays, block)) continue;
+    const bool any = prepare(samples, shape, d, first, filter.half, filter.half, whole, rays, block);
+    for (std::size_t k = first; k < first + lanes; ++k) usable[k] = rays.open[k] ? 1.0F : 0.0F;
+    if (!any) continue;
     std::array<Lanes, 3> harmonic;
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const std::size_t k = first + lane;
-      usable[k] = block.open[lane] > 0.0;
-      const double w = block.open[lane] * rays.weight[k], c = d.c[k], s = d.s[k];
-      harmonic[0][lane] = static_cast<float>(w);
-      harmonic[1][lane] = static_cast<float>(w * c);
-      harmonic[2][lane] = static_cast<float>(w * s);
-      normal(0, 0) += w, normal(0, 1) += w * c, normal(0, 2) += w * s;
-      normal(1, 1) += w * c * c, normal(1, 2) += w * c * s, normal(2, 2) += w * s * s;
-    }
-    samples.read(block.rays, length, f.data());
-    take_products(f.data(), filter, harmonic, products[first / lanes], by_lane);
+    Lanes c, s;
+    std::memcpy(&harmonic[0], &rays.weight[first], sizeof c);
+    std::memcpy(&c, &d.c[first], sizeof c);
+    std::memcpy(&s, &d.s[first], sizeof s);
+    harmonic[1] = harmonic[0] * c;
+    harmonic[2] = harmonic[0] * s;
+    for (std::size_t m = 0; m < 3; ++m) weights[m] += harmonic[m];
+    weights[3] += harmonic[1] * c, weights[4] += harmonic[1] * s, weights[5] += harmonic[2] * s;
+    samples.read(block, length, f.data());
+    take_products(f.data(), filter, products[first / lanes]);
+    for (std::size_t row = 0; row < common_rows; ++row)
+      for (std::size_t m = 0; m < 3; ++m)
+        by_lane[row][m] += harmonic[m] * products[first / lanes].rows[EdgeFilter::to_slope_in + row];
   }
+  Eigen::Matrix3d normal;
+  normal(0, 0) = sum_of(weights[0]), normal(0, 1) = sum_of(weights[1]), normal(0, 2) = sum_of(weights[2]);
+  normal(1, 1) = sum_of(weights[3]), normal(1, 2) = sum_of(weights[4]), normal(2, 2) = sum_of(weights[5]);
   OutlineFit fit;
   fit.shape = shape;
   if (!(normal(0, 0) > 5.0)) return fit;
   normal(1, 0) = normal(0, 1), normal(2, 0) = normal(0, 2), normal(2, 1) = normal(1, 2);
 
-  // Slopes: the profile at each sample over the angle as constant and first harmonic, then the sloped step on each.
+  // What the drop has in common: the profile over the angle as constant and first harmonic, its slopes by the sloped step, and
+  // its mean, less the slopes, as a step of another blur. All of it is linear in the samples, so in their products.
   const Eigen::Matrix3d inverse = normal.inverse();
-  std::array<Eigen::Matrix<double, 5, 1>, 3> sloped{Eigen::Matrix<double, 5, 1>::Zero(),
-                                                    Eigen::Matrix<double, 5, 1>::Zero(),
-                                                    Eigen::Matrix<double, 5, 1>::Zero()};
-  EdgeFilter::Profile mean(static_cast<Eigen::Index>(length));
-  for (std::size_t j = 0; j < length; ++j) {
-    const auto column = static_cast<Eigen::Index>(j);
-    Eigen::Vector3d sums;
-    for (std::size_t m = 0; m < 3; ++m) {
-      const Lanes& part = by_lane[m][j];
-      sums(static_cast<Eigen::Index>(m)) = static_cast<double>(((part[0] + part[4]) + (part[1] + part[5])) +
-                                                               ((part[2] + part[6]) + (part[3] + part[7])));
-    }
-    const Eigen::Vector3d harmonic = inverse * sums;
-    for (std::size_t m = 0; m < 3; ++m)
-      sloped[m] += harmonic(static_cast<Eigen::Index>(m)) * filter.sloped.col(column);
-    mean(column) = harmonic(0);
-  }
-  const Eigen::Vector3d inside{sloped[0](3), sloped[1](3), sloped[2](3)},
-      outside{sloped[0](4), sloped[1](4), sloped[2](4)};
-  mean -= inside(0) * filter.inner + outside(0) * filter.outer;
-  const Eigen::Vector4d common = filter.spread * mean;
-  fit.contrast = polarity * common(1);
+  const auto over_the_angle = [&](EdgeFilter::Row row) -> Eigen::Vector3d {
+    const auto& sums = by_lane[row - EdgeFilter::to_slope_in];
+    return inverse * Eigen::Vector3d{sum_of(sums[0]), sum_of(sums[1]), sum_of(sums[2])};
+  };
+  const Eigen::Vector3d inside = over_the_angle(EdgeFilter::to_slope_in),
+                        outside = over_the_angle(EdgeFilter::to_slope_out);
+  const Eigen::Vector2d spread = Eigen::Vector2d{over_the_angle(EdgeFilter::to_spread_height)(0),
+                                                 over_the_angle(EdgeFilter::to_spread_blur)(0)} -
+                                 inside(0) * filter.spread_inner - outside(0) * filter.spread_outer;
+  const double height = spread(0), wider = spread(1) / spread(0);
+  fit.contrast = polarity * height;
   if (!(fit.contrast > 0.0)) return fit;
-  fit.blur = std::clamp(filter.blur + common(3) / common(1), 0.5 * filter.blur, 2.0 * filter.blur);
+  fit.blur = std::clamp(filter.blur + wider, 0.5 * filter.blur, 2.0 * filter.blur);
 
-  int n = 0;
-  Values misfit, sorted;                         // written before they are read
-  const double reach = 2.0 * filter.blur + 0.5;  // the linear step reaches no farther
-  for (std::size_t k = 0; k < count; ++k) {
-    if (!usable[k]) continue;
-    const double in = inside(0) + inside(1) * d.c[k] + inside(2) * d.s[k];
-    const double out = outside(0) + outside(1) * d.c[k] + outside(2) * d.s[k];
-    const RayProducts& p = products[k / lanes];
-    const auto row = [&](EdgeFilter::Row which) { return static_cast<double>(p.rows[which][k % lanes]); };
-    // Least squares is linear: what the slopes give is taken off the result instead of off every sample.
-    const Eigen::Vector3d levels =
-        Eigen::Vector3d{row(EdgeFilter::to_ground), row(EdgeFilter::to_height), row(EdgeFilter::to_shift)} -
-        in * filter.from_inner - out * filter.from_outer;
-    const double height = levels(1), shift = levels(2), contrast = polarity * height;
-    if (contrast < 0.4 * fit.contrast || contrast > 2.5 * fit.contrast) {
-      usable[k] = false;
-      continue;
+  const auto number = [](double value) { return static_cast<float>(value); };
+  const EdgeRule rule{{number(inside(0)), number(inside(1)), number(inside(2))},
+                      {number(outside(0)), number(outside(1)), number(outside(2))},
+                      static_cast<float>(polarity),
+                      number(0.4 * fit.contrast),
+                      number(2.5 * fit.contrast),
+                      number(2.0 * filter.blur + 0.5)};  // the linear step reaches no farther
+  std::size_t n = 0;
+  Values misfit, sorted;  // written before they are read
+  for (std::size_t first = 0; first < count; first += lanes) {
+    if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; })) continue;
+    RayEdges edges;
+    place_edges(products[first / lanes], filter, rule, &d.c[first], &d.s[first], edges);
+    for (std::size_t lane = 0; lane < lanes; ++lane) {
+      const std::size_t k = first + lane;
+      usable[k] *= edges.sound[lane];
+      rays.offset[k] = edges.offset[lane];
+      misfit[k] = sorted[n] = edges.misfit[lane];
+      n += usable[k] > 0.0F;
     }
-    const double square = static_cast<double>(p.square[k % lanes]) -
-                          2.0 * (in * row(EdgeFilter::to_inner) + out * row(EdgeFilter::to_outer)) +
-                          in * in * filter.inner_inner + 2.0 * in * out * filter.inner_outer +
-                          out * out * filter.outer_outer - levels.dot(filter.columns * levels);
-    rays.offset[k] = std::clamp(shift / height, -reach, reach);
-    misfit[k] = std::sqrt(std::max(0.0, square));
-    sorted[static_cast<std::size_t>(n++)] = misfit[k];
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.
-  const double most = n > 0 ? *std::max_element(sorted.begin(), sorted.begin() + n) : 0.0;
-  if (!half_reach(sorted, n, (most - 0.03 * fit.contrast) / 2.5)) {
-    const double limit = 2.5 * median_of(sorted, n) + 0.03 * fit.contrast;
+  const float most =
+      n > 0 ? *std::max_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n)) : 0.0F;
+  const double typical = (static_cast<double>(most) - 0.03 * fit.contrast) / 2.5;
+  const auto reached = std::count_if(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n),
+                                     [&](float value) { return value >= number(typical); });
+  if (2 * static_cast<std::size_t>(reached) < n) {  // else the median is beyond `typical`
+    const auto limit = number(2.5 * median_of(sorted, static_cast<int>(n)) + 0.03 * fit.contrast);
     for (std::size_t k = 0; k < count; ++k)
-      if (usable[k] && misfit[k] > limit) usable[k] = false;
+      if (usable[k] > 0.0F && misfit[k] > limit) usable[k] = 0.0F;
   }
   fit.valid = fit_shape(rays, usable, 0.015, fit);
   return fit;

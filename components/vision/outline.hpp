@@ -21,9 +21,9 @@ struct Shape {
 struct Rays {
   static constexpr int most = 256;
   int count = 64;
-  std::array<bool, most> open{};      // false: a neighbour or the border hides the edge there
-  std::array<double, most> offset{};  // px; the edge found, outward from the shape it was sought at
-  std::array<double, most> weight{};  // 0..1; 0: no edge there, or one that is not the drop's
+  std::array<bool, most> open{};     // false: a neighbour or the border hides the edge there
+  std::array<float, most> offset{};  // px; the edge found, outward from the shape it was sought at
+  std::array<float, most> weight{};  // 0..1; 0: closed, no edge there, or one that is not the drop's
 
   /// As many rays as the drop's size deserves, all open.
   void choose(double radius);

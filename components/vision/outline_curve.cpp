@@ -6,12 +6,108 @@
 #include <cstring>
 #include <numbers>
 
+#include "components/vision/ray_samples.hpp"
+#include "components/vision/wide_vectors.hpp"
+
 namespace invar::vision {
 
 namespace {
 
 using Vector5 = Eigen::Matrix<double, 5, 1>;
 using Matrix5 = Eigen::Matrix<double, 5, 5>;
+
+void load(const float* from, Lanes& to) { std::memcpy(&to, from, sizeof to); }
+
+// Sums over rays of the weights and of weight * r, each by the harmonics of the angle.
+struct HarmonicMoments {
+  enum : std::size_t { one, c1, s1, c2, s2, c3, s3, c4, s4, of_weights };
+  std::array<double, of_weights> weights;
+  std::array<double, c3> values;  // up to the double angle
+};
+
+INVAR_WIDE_VECTORS
+void add_up(const Directions& d, const Values& weight, const Values& r, std::size_t count,
+            HarmonicMoments& moments) {
+  constexpr std::size_t of_values = HarmonicMoments::c3;
+  std::array<Lanes, HarmonicMoments::of_weights> of_weight{};
+  std::array<Lanes, of_values> of_value{};
+  const std::array<const Values*, HarmonicMoments::of_weights> harmonics{nullptr, &d.c,  &d.s,  &d.c2, &d.s2,
+                                                                         &d.c3,   &d.s3, &d.c4, &d.s4};
+  for (std::size_t k = 0; k < count; k += lanes) {
+    Lanes w, v, h;
+    load(weight.data() + k, w);
+    load(r.data() + k, v);
+    v *= w;
+    of_weight[0] += w;
+    of_value[0] += v;
+    for (std::size_t m = 1; m < HarmonicMoments::of_weights; ++m) {
+      load(harmonics[m]->data() + k, h);
+      of_weight[m] += w * h;
+      if (m < of_values) of_value[m] += v * h;
+    }
+  }
+  for (std::size_t m = 0; m < of_weight.size(); ++m) moments.weights[m] = sum_of(of_weight[m]);
+  for (std::size_t m = 0; m < of_values; ++m) moments.values[m] = sum_of(of_value[m]);
+}
+
+// What the curve leaves of the usable offsets; 0 elsewhere.
+INVAR_WIDE_VECTORS
+void leave(const Directions& d, const Values& offset, const Values& usable, const Vector5& curve,
+           std::size_t count, Values& rest) {
+  std::array<float, 5> p;
+  for (std::size_t m = 0; m < 5; ++m) p[m] = static_cast<float>(curve(static_cast<Eigen::Index>(m)));
+  for (std::size_t k = 0; k < count; ++k)
+    rest[k] =
+        usable[k] * (offset[k] - (p[0] + p[1] * d.c[k] + p[2] * d.s[k] + p[3] * d.c2[k] + p[4] * d.s2[k]));
+}
+
+// Cauchy's weights while far off keep every ray's say; Tukey's drop what does not belong.
+INVAR_WIDE_VECTORS
+void weigh_by_cauchy(const Values& rest, const Values& usable, float factor, std::size_t count,
+                     Values& weight) {
+  for (std::size_t k = 0; k < count; ++k) weight[k] = usable[k] / (1.0F + factor * rest[k] * rest[k]);
+}
+INVAR_WIDE_VECTORS
+void weigh_by_tukey(const Values& rest, const Values& usable, float factor, std::size_t count,
+                    Values& weight) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const float share = 1.0F - factor * rest[k] * rest[k];
+    weight[k] = share > 0.0F ? usable[k] * share * share : 0.0F;
+  }
+}
+
+INVAR_WIDE_VECTORS
+double largest_of(const Values& values, std::size_t count) {
+  Lanes largest{};
+  for (std::size_t k = 0; k < count; k += lanes) {
+    Lanes v;
+    load(values.data() + k, v);
+    v = v < 0.0F ? -v : v;
+    largest = v > largest ? v : largest;
+  }
+  float most = 0.0F;
+  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
+  return static_cast<double>(most);
+}
+
+// Sum of the weights, of weight * rest^2, and how many weigh more than 0.2.
+struct Agreement {
+  double weight, square;
+  int agree;
+};
+INVAR_WIDE_VECTORS
+Agreement agreement_of(const Values& weight, const Values& rest, std::size_t count) {
+  Lanes sum{}, square{}, agree{};
+  for (std::size_t k = 0; k < count; k += lanes) {
+    Lanes w, r;
+    load(weight.data() + k, w);
+    load(rest.data() + k, r);
+    sum += w;
+    square += w * r * r;
+    agree += w > 0.2F ? Lanes{} + 1.0F : Lanes{};
+  }
+  return {sum_of(sum), sum_of(square), static_cast<int>(sum_of(agree))};
+}
 
 // Weighted least squares of a + b cos + c sin + d cos2 + e sin2; without the last two where an arc is too short to tell an
 // ellipse from a shift.
@@ -20,23 +116,9 @@ class HarmonicFit {
   /// False where the rays do not determine the curve.
   [[nodiscard]] bool fit(const Directions& d, const Values& weight, const Values& r, std::size_t count,
                          bool ellipse) {
-    using Eight [[gnu::vector_size(64)]] = double;
-    using Four [[gnu::vector_size(32)]] = double;
-    Eight sums{};  // of the weights by cosine and sine of the angle, its double, triple and fourfold
-    Four products{};
-    double w0 = 0.0, r0 = 0.0;
-    for (std::size_t k = 0; k < count; ++k) {
-      const double w = weight[k], wr = w * r[k];
-      Eight eight;
-      Four four;
-      std::memcpy(&eight, d.powers[k].data(), sizeof eight);
-      std::memcpy(&four, d.powers[k].data(), sizeof four);
-      sums += w * eight;
-      products += wr * four;
-      w0 += w, r0 += wr;
-    }
-    const double c1 = sums[0], s1 = sums[1], c2 = sums[2], s2 = sums[3], c3 = sums[4], s3 = sums[5],
-                 c4 = sums[6], s4 = sums[7];
+    HarmonicMoments moments;
+    add_up(d, weight, r, count, moments);
+    const auto& [w0, c1, s1, c2, s2, c3, s3, c4, s4] = moments.weights;
     // Products of harmonics are harmonics of sum and difference.
     Matrix5 normal;
     normal.row(0) << w0, 0.0, 0.0, 0.0, 0.0;
@@ -47,7 +129,7 @@ class HarmonicFit {
     size_ = ellipse ? 5 : 3;
     if (!factor(normal)) return false;
     Vector5 right;
-    right << r0, products[0], products[1], products[2], products[3];
+    for (Eigen::Index m = 0; m < 5; ++m) right(m) = moments.values[static_cast<std::size_t>(m)];
     solution = solve(right);
     return solution.allFinite();
   }
@@ -100,12 +182,15 @@ const Directions& directions(int count) {
         const double angle =
             2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(16 * sixteens);
         Directions& d = all[sixteens];
-        d.c[i] = std::cos(angle), d.s[i] = std::sin(angle);
-        d.c2[i] = std::cos(2.0 * angle), d.s2[i] = std::sin(2.0 * angle);
+        const std::array<std::pair<Values*, Values*>, 4> multiples{
+            {{&d.c, &d.s}, {&d.c2, &d.s2}, {&d.c3, &d.s3}, {&d.c4, &d.s4}}};
         for (std::size_t m = 0; m < 4; ++m) {
           const double multiple = static_cast<double>(m + 1) * angle;
-          d.powers[i][2 * m] = std::cos(multiple), d.powers[i][2 * m + 1] = std::sin(multiple);
+          (*multiples[m].first)[i] = static_cast<float>(std::cos(multiple));
+          (*multiples[m].second)[i] = static_cast<float>(std::sin(multiple));
         }
+        d.step_u[i] = static_cast<std::int32_t>(std::lround(65536.0 * std::cos(angle)));
+        d.step_v[i] = static_cast<std::int32_t>(std::lround(65536.0 * std::sin(angle)));
       }
     return all;
   }();
@@ -113,7 +198,7 @@ const Directions& directions(int count) {
 }
 
 double radius_at(const Shape& shape, const Directions& d, std::size_t i) {
-  return shape.radius + shape.cos2 * d.c2[i] + shape.sin2 * d.s2[i];
+  return shape.radius + shape.cos2 * static_cast<double>(d.c2[i]) + shape.sin2 * static_cast<double>(d.s2[i]);
 }
 
 double median_of(Values& values, int count) {
@@ -125,100 +210,88 @@ double median_of(Values& values, int count) {
   }
   const auto middle = values.begin() + count / 2;
   std::nth_element(values.begin(), middle, values.begin() + count);
-  return *middle;
+  return static_cast<double>(*middle);
 }
 
-bool half_reach(const Values& values, int count, double limit) {
-  int reached = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) reached += values[i] >= limit;
-  return 2 * reached >= count;
+INVAR_WIDE_VECTORS
+int reaching(const Values& values, int count, double limit) {
+  const auto least = static_cast<float>(limit);
+  Lanes reached{};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); k += lanes) {
+    Lanes v;
+    load(values.data() + k, v);
+    reached += (v < 0.0F ? -v : v) >= least ? Lanes{} + 1.0F : Lanes{};
+  }
+  return static_cast<int>(sum_of(reached));
 }
 
-bool fit_shape(Rays& rays, const std::array<bool, Rays::most>& usable, double floor, OutlineFit& fit) {
+bool fit_shape(Rays& rays, const Values& usable, double floor, OutlineFit& fit) {
   const Directions& d = directions(rays.count);
   const auto count = static_cast<std::size_t>(rays.count);
-  int open = 0, used = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    open += rays.open[k];
-    used += usable[k];
-    rays.weight[k] = usable[k] ? 1.0 : 0.0;
-    if (!usable[k]) rays.offset[k] = 0.0;
-  }
+  int open = 0;
+  for (std::size_t k = 0; k < count; ++k) open += rays.open[k];
+  const int used = reaching(usable, rays.count, 0.5);
   if (used < 8) return false;
+  std::copy_n(usable.begin(), count, rays.weight.begin());
   const bool ellipse = used >= 0.6 * rays.count, all = used == rays.count;
-  Values sizes, rest;
-  const auto residuals = [&](const Vector5& p) {
-    for (std::size_t k = 0; k < count; ++k)
-      rest[k] = rays.offset[k] - (p(0) + p(1) * d.c[k] + p(2) * d.s[k] + p(3) * d.c2[k] + p(4) * d.s2[k]);
+  Values sizes, rest;  // written before they are read
+  const auto sizes_of = [&](const Values& values) {
     std::size_t n = 0;
     for (std::size_t k = 0; k < count; ++k) {
-      sizes[n] = std::abs(rest[k]);
-      n += usable[k];
+      sizes[n] = std::abs(values[k]);
+      n += usable[k] > 0.0F;
     }
     return static_cast<int>(n);
   };
   HarmonicFit harmonic;
-  Vector5 p;
+  Vector5 p = Vector5::Zero();
   bool solved = true;
   if (all) {  // over the full circle the harmonics are orthogonal
-    p.setZero();
-    for (std::size_t k = 0; k < count; ++k) {
-      const double r = rays.offset[k];
-      p(0) += 0.5 * r, p(1) += r * d.c[k], p(2) += r * d.s[k], p(3) += r * d.c2[k], p(4) += r * d.s2[k];
-    }
-    p *= 2.0 / used;
+    HarmonicMoments moments;
+    add_up(d, usable, rays.offset, count, moments);
+    for (Eigen::Index m = 0; m < 5; ++m)
+      p(m) = (m == 0 ? 1.0 : 2.0) / used * moments.values[static_cast<std::size_t>(m)];
   } else {
     solved = harmonic.fit(d, rays.weight, rays.offset, count, ellipse);
     p = harmonic.solution;
   }
-  int n = residuals(p);
-  const double largest = *std::max_element(sizes.begin(), sizes.begin() + n);
   constexpr double normal = 1.4826;  // deviation over the median of the sizes
+  leave(d, rays.offset, usable, p, count, rest);
+  const double largest = largest_of(rest, count);
   const bool foreign =
-      !solved || !p.allFinite() || (largest > 3.7 * floor && !half_reach(sizes, n, largest / (3.7 * normal)));
+      !solved || !p.allFinite() ||
+      (largest > 3.7 * floor && 2 * reaching(rest, rays.count, largest / (3.7 * normal)) < used);
   if (foreign) {
     p.setZero();
-    n = residuals(p);
-    double scale = std::max(floor, normal * median_of(sizes, n));
+    double scale = std::max(floor, normal * median_of(sizes, sizes_of(rays.offset)));
     const bool near =
         scale < 0.2;  // px; as from the second fit of a drop on: what does not belong shows at once
     if (!near) {      // the median is a safe start
-      n = 0;
+      std::size_t n = 0;
       for (std::size_t k = 0; k < count; ++k)
-        if (usable[k]) sizes[static_cast<std::size_t>(n++)] = rays.offset[k];
-      p(0) = median_of(sizes, n);
+        if (usable[k] > 0.0F) sizes[n++] = rays.offset[k];
+      p(0) = median_of(sizes, used);
     }
     for (int round = near ? 4 : 0; round < 14; ++round) {
-      n = residuals(p);
+      leave(d, rays.offset, usable, p, count, rest);
       const double previous = scale;
-      scale = std::max(floor, normal * median_of(sizes, n));
-      // Cauchy's weight while far off keeps every ray's say; Tukey's drops what does not belong.
-      const double cauchy = 1.0 / std::pow(2.4 * scale, 2), tukey = 1.0 / std::pow(4.7 * scale, 2);
+      if (round < 6)  // then it stands, and the weights settle soon
+        scale = std::max(floor, normal * median_of(sizes, sizes_of(rest)));
       if (round < 4)
-        for (std::size_t k = 0; k < count; ++k)
-          rays.weight[k] = (usable[k] ? 1.0 : 0.0) / (1.0 + cauchy * rest[k] * rest[k]);
+        weigh_by_cauchy(rest, usable, static_cast<float>(1.0 / std::pow(2.4 * scale, 2)), count, rays.weight);
       else
-        for (std::size_t k = 0; k < count; ++k) {
-          const double share = std::max(0.0, 1.0 - tukey * rest[k] * rest[k]);
-          rays.weight[k] = (usable[k] ? 1.0 : 0.0) * share * share;
-        }
+        weigh_by_tukey(rest, usable, static_cast<float>(1.0 / std::pow(4.7 * scale, 2)), count, rays.weight);
       if (!harmonic.fit(d, rays.weight, rest, count, ellipse)) return false;
       p += harmonic.solution;
       if (round >= 5 && harmonic.solution.norm() < 3e-3 && std::abs(scale - previous) < 0.1 * scale) break;
     }
-    residuals(p);
+    leave(d, rays.offset, usable, p, count, rest);
   }
-  double sum = 0.0, square = 0.0;
-  int agree = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    sum += rays.weight[k];
-    square += rays.weight[k] * rest[k] * rest[k];
-    agree += rays.weight[k] > 0.2;
-  }
-  if (!(sum > 5.0)) return false;
-  fit.residual = std::sqrt(square / (sum - 5.0 + 1e-9));
-  fit.support = agree / static_cast<double>(std::max(1, open));
-  fit.coverage = agree / static_cast<double>(rays.count);
+  const Agreement found = agreement_of(rays.weight, rest, count);
+  if (!(found.weight > 5.0)) return false;
+  fit.residual = std::sqrt(found.square / (found.weight - 5.0 + 1e-9));
+  fit.support = found.agree / static_cast<double>(std::max(1, open));
+  fit.coverage = found.agree / static_cast<double>(rays.count);
   fit.moved = std::abs(p(0)) + p.segment<2>(1).norm() + p.tail<2>().norm();
   fit.sigma = fit.residual * std::sqrt(all && !foreign ? 2.0 / used : harmonic.variance());
   fit.shape.x += p(1);

@@ -119,12 +119,10 @@ double median(std::vector<float>& values) {
   return static_cast<double>(*middle);
 }
 
-// 255 where a pixel lies above `high`, and where it lies below `low`.
+// 255 where `larger` lies above `smaller`.
 INVAR_WIDE_VECTORS
-void classify(const std::uint8_t* p, const std::uint8_t* high, const std::uint8_t* low, int width,
-              std::uint8_t* light, std::uint8_t* dark) {
-  for (int x = 0; x < width; ++x) light[x] = p[x] > high[x] ? 255 : 0;
-  for (int x = 0; x < width; ++x) dark[x] = p[x] < low[x] ? 255 : 0;
+void classify(const std::uint8_t* larger, const std::uint8_t* smaller, int width, std::uint8_t* mask) {
+  for (int x = 0; x < width; ++x) mask[x] = larger[x] > smaller[x] ? 255 : 0;
 }
 
 // Pixels of a tile's row, or sums of such down the tile.
@@ -168,24 +166,61 @@ TileCounts count_tile(const std::uint8_t* first, std::size_t stride, int rows, i
           total(below), total(below_count)};
 }
 
-double noise_of(const cv::Mat1b& image) {
-  // Second differences along rows: blind to slopes.
-  std::array<int, 512> histogram{};
+// How many of the values are at least `limit`.
+INVAR_WIDE_VECTORS
+int count_from(const std::vector<std::uint8_t>& values, std::uint8_t limit) {
+  constexpr std::size_t part = 255;  // what a byte can count
   int count = 0;
-  for (int y = first_row; y < image.rows; y += histogram_step(image)) {
-    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    for (int x = 2; x < image.cols; x += 2, ++count)
-      ++histogram[static_cast<std::size_t>(std::abs(p[x - 2] - 2 * p[x - 1] + p[x]) & 511)];
+  for (std::size_t begin = 0; begin < values.size();) {
+    // Sixteen or more lanes of a byte each, added up before one of them is full.
+    const std::size_t end = std::min(values.size(), begin + part);
+    std::uint8_t few = 0;
+    for (std::size_t i = begin; i < end; ++i)
+      few = static_cast<std::uint8_t>(few + (values[i] >= limit ? 1 : 0));
+    count += few;
+    begin = end;
   }
-  int below = 0;
-  for (std::size_t value = 0; value < histogram.size(); ++value) {
-    if (2 * (below + histogram[value]) >= count) {
-      const double share = (0.5 * count - below) / std::max(1, histogram[value]);
-      return std::max(0.0, static_cast<double>(value) - 0.5 + share) * 1.4826 / std::sqrt(6.0);
-    }
-    below += histogram[value];
+  return count;
+}
+
+// The largest value that at least so many of the values reach.
+int value_reached_by(const std::vector<std::uint8_t>& values, int so_many) {
+  int least = 0, beyond = 256;
+  while (beyond - least > 1) {
+    const int middle = (least + beyond) / 2;
+    (count_from(values, static_cast<std::uint8_t>(middle)) >= so_many ? least : beyond) = middle;
   }
-  return 0.0;
+  return least;
+}
+
+// |second difference| along a row, at most 255: blind to slopes.
+INVAR_WIDE_VECTORS
+void bend_of(const std::uint8_t* p, int count, std::uint8_t* out) {
+  for (int x = 0; x < count; ++x) {
+    const auto bend = static_cast<std::int16_t>(p[x] - 2 * p[x + 1] + p[x + 2]);
+    const auto size = static_cast<std::int16_t>(bend < 0 ? -bend : bend);
+    out[x] = static_cast<std::uint8_t>(size < 255 ? size : 255);
+  }
+}
+
+INVAR_WIDE_VECTORS
+void distance_of(const std::uint8_t* a, const std::uint8_t* b, int count, std::uint8_t* out) {
+  for (int x = 0; x < count; ++x) out[x] = static_cast<std::uint8_t>(a[x] > b[x] ? a[x] - b[x] : b[x] - a[x]);
+}
+
+double noise_of(const cv::Mat1b& image) {
+  std::vector<std::uint8_t> bends;
+  const int step = 4 * histogram_step(image), width = image.cols - 2;
+  bends.resize(static_cast<std::size_t>(width * (1 + (image.rows - 1 - first_row) / step)));
+  std::uint8_t* out = bends.data();
+  for (int y = first_row; y < image.rows; y += step, out += width)
+    bend_of(image.ptr<std::uint8_t>(y), width, out);
+  const auto count = static_cast<int>(bends.size());
+  const int middle = value_reached_by(bends, (count + 1) / 2);
+  const int from = count_from(bends, static_cast<std::uint8_t>(middle)),
+            beyond = middle < 255 ? count_from(bends, static_cast<std::uint8_t>(middle + 1)) : 0;
+  const double share = (from - 0.5 * count) / std::max(1, from - beyond);
+  return std::max(0.0, middle - 0.5 + share) * 1.4826 / std::sqrt(6.0);
 }
 
 // The threshold between the things and the rest of each window, halfway between their levels; returns the median
@@ -227,10 +262,13 @@ double set_thresholds(const TileSums& things, const TileSums& things_n, const Ti
 
 }  // namespace
 
-Partition partition(const cv::Mat1b& image, int window) {
+Partition partition(const cv::Mat1b& image, int window, int polarity) {
   const int width = image.cols, height = image.rows;
   const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
-  Partition out{cv::Mat1b(height, width), cv::Mat1b(height, width), 0.0, 0.0, noise_of(image)};
+  const bool want_light = polarity >= 0, want_dark = polarity <= 0;
+  Partition out{{}, {}, 0.0, 0.0, noise_of(image)};
+  if (want_light) out.light.create(height, width);
+  if (want_dark) out.dark.create(height, width);
 
   // Every tile's sampled rows, against thresholds along its middle.
   const auto for_each_tile = [&](TileField& high, TileField& low, const auto& take) {
@@ -258,17 +296,14 @@ Partition partition(const cv::Mat1b& image, int window) {
     for (int j = 0; j < rows; ++j)
       for (int i = 0; i < columns; ++i) mean.at(i, j) = s.at(i, j) / n.at(i, j);
   }
-  std::array<int, 256> histogram{};
-  int counted = 0;
-  for (int y = first_row; y < height; y += histogram_step(image)) {
-    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    const auto& level = mean.row(y);
-    counted += (width + 1) / 2;
-    for (int x = 0; x < width; x += 2)
-      ++histogram[static_cast<std::size_t>(std::abs(p[x] - level[static_cast<std::size_t>(x)]))];
-  }
-  int left = static_cast<int>(0.001 * counted), extreme = 255;
-  while (extreme > 0 && (left -= histogram[static_cast<std::size_t>(extreme)]) > 0) --extreme;
+  const int step = 2 * histogram_step(image);
+  std::vector<std::uint8_t> distances(
+      static_cast<std::size_t>(width * (1 + std::max(0, height - 1 - first_row) / step)));
+  std::uint8_t* to = distances.data();
+  for (int y = first_row; y < height; y += step, to += width)
+    distance_of(image.ptr<std::uint8_t>(y), mean.row(y).data(), width, to);
+  const int extreme = value_reached_by(
+      distances, std::max(1, static_cast<int>(0.001 * static_cast<double>(distances.size()))));
   const double margin = std::max(5.0 * out.noise + 1.0, 0.2 * extreme);
   if (extreme <= margin) return out.light.setTo(0), out.dark.setTo(0), out;
 
@@ -286,9 +321,12 @@ Partition partition(const cv::Mat1b& image, int window) {
       above.at(i, j) = tile_counts.above, above_n.at(i, j) = tile_counts.above_count;
       below.at(i, j) = tile_counts.below, below_n.at(i, j) = tile_counts.below_count;
     });
-    out.light_contrast =
-        set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
-    out.dark_contrast = set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
+    if (want_light)
+      out.light_contrast =
+          set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
+    if (want_dark)
+      out.dark_contrast =
+          set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
   }
   // What does not stand out from the noise is none.
   const double least = std::max(4.0 * out.noise, 2.0);
@@ -297,11 +335,11 @@ Partition partition(const cv::Mat1b& image, int window) {
   out.dark_contrast = -out.dark_contrast;
   for (int y = 0; y < height; ++y) {
     const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    std::uint8_t* light = out.light.ptr<std::uint8_t>(y);
-    std::uint8_t* dark = out.dark.ptr<std::uint8_t>(y);
-    const std::uint8_t* down = (y % 4 == 0 ? low.row(y + 2) : low.last()).data();  // four rows hardly differ
-    const std::uint8_t* up = (y % 4 == 0 ? high.row(y + 2) : high.last()).data();
-    classify(p, up, down, width, light, dark);
+    const auto at = [y](TileField& threshold) {  // four rows hardly differ
+      return (y % 4 == 0 ? threshold.row(y + 2) : threshold.last()).data();
+    };
+    if (want_light) classify(p, at(high), width, out.light.ptr<std::uint8_t>(y));
+    if (want_dark) classify(at(low), p, width, out.dark.ptr<std::uint8_t>(y));
   }
   if (!(out.light_contrast > 0.0)) out.light.setTo(0);
   if (!(out.dark_contrast > 0.0)) out.dark.setTo(0);
@@ -312,6 +350,8 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
   Blobs out;
   auto& runs = out.runs;
   std::vector<int> parent;
+  runs.reserve(4096);
+  parent.reserve(4096);
   const auto root = [&](int i) {
     while (parent[static_cast<std::size_t>(i)] != i) {
       parent[static_cast<std::size_t>(i)] =
@@ -332,7 +372,8 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
         x = static_cast<int>(static_cast<const std::uint8_t*>(next) - p);
       }
       const int start = x;
-      while (x < mask.cols && p[x] != 0) ++x;
+      const void* end = std::memchr(p + x, 0, static_cast<std::size_t>(mask.cols - x));
+      x = end == nullptr ? mask.cols : static_cast<int>(static_cast<const std::uint8_t*>(end) - p);
       const int id = static_cast<int>(runs.size());
       runs.push_back({y, start, x, 0});
       parent.push_back(id);
@@ -349,10 +390,17 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
     double n = 0, x = 0, y = 0, xx = 0, yy = 0;
     int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
   };
-  std::vector<Sums> sums(runs.size());
+  std::vector<int> set(runs.size(), -1);  // which blob a root is, counted as they come
+  std::vector<Sums> sums;
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const BlobRun& run = runs[i];
-    Sums& s = sums[static_cast<std::size_t>(root(static_cast<int>(i)))];
+    BlobRun& run = runs[i];
+    int& which = set[static_cast<std::size_t>(root(static_cast<int>(i)))];
+    if (which < 0) {
+      which = static_cast<int>(sums.size());
+      sums.emplace_back();
+    }
+    run.label = which;
+    Sums& s = sums[static_cast<std::size_t>(which)];
     const double n = run.end - run.begin, middle = 0.5 * (run.begin + run.end - 1), y = run.y;
     s.n += n;
     s.x += n * middle;
@@ -364,7 +412,7 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
     s.top = std::min(s.top, run.y);
     s.bottom = std::max(s.bottom, run.y);
   }
-  std::vector<int> label(runs.size(), -1);
+  std::vector<int> label(sums.size(), -1);
   auto& blobs = out.blobs;
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const Sums& s = sums[i];
@@ -376,8 +424,7 @@ Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
     blobs.push_back({label[i], s.n, x, y, s.n * s.n / (2.0 * std::numbers::pi * moment), s.left, s.top,
                      s.right, s.bottom});
   }
-  for (std::size_t i = 0; i < runs.size(); ++i)
-    runs[i].label = label[static_cast<std::size_t>(root(static_cast<int>(i)))] + 1;
+  for (BlobRun& run : runs) run.label = label[static_cast<std::size_t>(run.label)] + 1;
   return out;
 }
 

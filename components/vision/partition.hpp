@@ -17,8 +17,9 @@ struct Partition {
   double noise = 0.0;          // grey levels of this image, standard deviation from pixel to pixel
 };
 
-/// `image`: CV_8UC1, small. `window`: tiles each way within which the light is taken as even.
-Partition partition(const cv::Mat1b& image, int window);
+/// `image`: CV_8UC1, small. `window`: tiles each way within which the light is taken as even. `polarity`: +1 only light things
+/// are wanted, -1 only dark ones, 0 both; the other mask stays empty.
+Partition partition(const cv::Mat1b& image, int window, int polarity);
 
 /// A connected set of pixels (8-neighbours) of one image.
 struct Blob {

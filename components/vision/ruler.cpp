@@ -37,8 +37,9 @@ Circle make_circle(const Shape& sought, const OutlineFit& fit, const Rays& rays)
     const double radius =
         sought.radius + sought.cos2 * std::cos(2.0 * angle) + sought.sin2 * std::sin(2.0 * angle);
     const auto k = static_cast<std::size_t>(i);
-    circle.edges.col(i) = Vector2d{sought.x, sought.y} + (radius + rays.offset[k] + push) * direction;
-    circle.weights(i) = rays.open[k] ? rays.weight[k] : 0.0;
+    circle.edges.col(i) =
+        Vector2d{sought.x, sought.y} + (radius + static_cast<double>(rays.offset[k]) + push) * direction;
+    circle.weights(i) = rays.open[k] ? static_cast<double>(rays.weight[k]) : 0.0;
   }
   return circle;
 }

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/metrology/fusion_observer.hpp"
+#include "core/metrology/sure_gain.hpp"
 
 namespace invar::metrology {
 
@@ -27,18 +28,6 @@ double rms_of(const Squares& squares) {
   double sum = 0.0;
   for (const double value : squares) sum += value;
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(squares.size(), 1)));
-}
-
-/// True where `other` is better by more than the uncertainty of the difference (one standard error over the runs).
-bool surely_better(const Squares& other, const Squares& than) {
-  const auto n = static_cast<double>(than.size());
-  if (n < 3) return false;
-  double mean = 0.0;
-  for (std::size_t i = 0; i < than.size(); ++i) mean += (than[i] - other[i]) / n;
-  double variance = 0.0;
-  for (std::size_t i = 0; i < than.size(); ++i)
-    variance += std::pow(than[i] - other[i] - mean, 2) / (n - 1.0);
-  return mean > std::sqrt(variance / n);
 }
 
 void describe_run(HeldOut& held, const FusionRun& run) {
@@ -105,12 +94,12 @@ FusionFit identify_fusion(const std::vector<FusionRun>& given, const std::vector
   fit.observer_rms = rms_of(observer_squares);
   fit.weights_rms = rms_of(squares[0]);
   if (by_speed > 0) fit.noise_by_speed_rms = rms_of(squares[by_speed]);
-  std::size_t best = by_speed > 0 && surely_better(squares[by_speed], squares[0]) ? by_speed : 0;
+  std::size_t best = by_speed > 0 && surely_less(squares[by_speed], squares[0]) ? by_speed : 0;
   WeightOptions chosen = ways[best];
   for (std::size_t w = orders; w < ways.size(); ++w) {
     const double rms = rms_of(squares[w]);
     if (fit.polynomial_rms == 0.0 || rms < fit.polynomial_rms) fit.polynomial_rms = rms;
-    if (!surely_better(squares[w], squares[0]) || rms >= rms_of(squares[best])) continue;
+    if (!surely_less(squares[w], squares[0]) || rms >= rms_of(squares[best])) continue;
     best = w;
     chosen = ways[w];
   }
