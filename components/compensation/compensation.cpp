@@ -48,8 +48,8 @@ void Compensation::configure() {
     start_with_kept();
   else
     start_with_named();
-  loader_.open();
   kept_.open(keeps ? parameters_.state : "");
+  loader_.open([this] { kept_.write_waiting(); });
 }
 
 /// Puts a sound model into its layer; why not, if not.
@@ -98,8 +98,7 @@ void Compensation::cleanup() noexcept {
   active_ = before_ = transaction_start_ = {};
   staged_ = nullptr;
   transaction_ = 0;
-  kept_.close();  // before the models go
-  loader_.close();
+  loader_.close();  // what is waiting is kept first
 }
 
 void Compensation::activate() {

@@ -152,8 +152,8 @@ class Compensation final : public Component {
   double temperature_before_ = 0.0;  // at the last step of the lags
   Instant lags_at_;
 
-  ModelLoader<LiveModel> loader_;
   KeptModels kept_{*this};
+  ModelLoader<LiveModel> loader_;  // its thread writes what is to be kept
   bool keeps_ = true;
   bool begins_ = false;       // the first step says what stands
   std::string kept_refusal_;  // why the kept models are not in use

@@ -1,6 +1,5 @@
 #include "components/compensation/kept_models.hpp"
 
-#include <chrono>
 #include <cstdio>
 #include <fstream>
 #include <set>
@@ -67,23 +66,9 @@ void KeptModels::write(const std::filesystem::path& folder, const Selection& mod
   }
 }
 
-void KeptModels::open(const std::filesystem::path& folder) {
-  folder_ = folder;
-  ending_ = false;
-  if (folder_.empty() || owner_.simulated_time) return;
-  thread_ = std::thread{[this] {
-    Selection models;
-    for (bool last = false; !last;) {
-      last = ending_;
-      while (waiting_.pop(models)) put(models);
-      if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    }
-  }};
-}
-
-void KeptModels::close() noexcept {
-  ending_ = true;
-  if (thread_.joinable()) thread_.join();
+void KeptModels::write_waiting() noexcept {
+  Selection models;
+  while (waiting_.pop(models)) put(models);
 }
 
 void KeptModels::keep(const Selection& models) noexcept {

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "components/compensation/live_model.hpp"
@@ -15,7 +14,7 @@ namespace invar::compensation {
 
 /// The folder holds a copy of each model, its checksum in its name, and `models.yaml`, sealed, which lists those in use. That
 /// list is renamed into place after the copies, so a cut of power leaves either the old models or the new ones. Writing
-/// happens on a thread of its own, never in the loop (in simulated time at once, so that runs repeat).
+/// is left to a thread of the owner's, never done in the loop (in simulated time at once, so that runs repeat).
 class KeptModels {
  public:
   /// The geometric model, then those of position and temperature by axis; nullptr: none.
@@ -34,16 +33,13 @@ class KeptModels {
   static void write(const std::filesystem::path& folder, const Selection& models);
 
   explicit KeptModels(const Component& owner) : owner_{owner} {}
-  ~KeptModels() { close(); }
-  KeptModels(const KeptModels&) = delete;
-  KeptModels& operator=(const KeptModels&) = delete;
 
   /// Set-up: from the component's configure; an empty folder keeps nothing.
-  void open(const std::filesystem::path& folder);
-  /// From the component's cleanup, while the models still stand: what is waiting is written.
-  void close() noexcept;
+  void open(const std::filesystem::path& folder) { folder_ = folder; }
   /// Real-time where time is real.
   void keep(const Selection& models) noexcept;
+  /// What the loop left to be kept, if anything. On one thread, while the models stand. Not real-time.
+  void write_waiting() noexcept;
   /// True once after models could not be written. Real-time.
   [[nodiscard]] bool failed() noexcept { return failed_.exchange(false); }
 
@@ -54,8 +50,6 @@ class KeptModels {
   std::filesystem::path folder_;
   Ring<Selection> waiting_{8};  // loop to thread
   std::atomic<bool> failed_{false};
-  std::atomic<bool> ending_{false};
-  std::thread thread_;
 };
 
 }  // namespace invar::compensation

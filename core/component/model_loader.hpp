@@ -38,15 +38,22 @@ class ModelLoader {
   ModelLoader(const ModelLoader&) = delete;
   ModelLoader& operator=(const ModelLoader&) = delete;
 
-  /// Set-up: from the component's configure.
-  void open() {
+  /// Set-up: from the component's configure. `also` is done in each turn of the thread, and a last time while the models
+  /// still stand: what else the loop leaves to a thread. It must not throw.
+  void open(std::function<void()> also = {}) {
     ending_ = false;
-    if (!owner_.simulated_time) thread_ = std::thread{[this] { run(); }};
+    if (!owner_.simulated_time) thread_ = std::thread{[this, also = std::move(also)] { run(also); }};
   }
   /// From the component's cleanup: the loop holds no model any more.
   void close() noexcept {
     ending_ = true;
     if (thread_.joinable()) thread_.join();
+    Request request;
+    while (requests_.pop(request)) {
+    }
+    Loaded loaded;
+    while (loaded_.pop(loaded)) {  // the next start must not find one that is gone
+    }
     models_.clear();
   }
   /// Set-up, before `open`. Never throws for a bad file: that is a model with a refusal.
@@ -77,11 +84,13 @@ class ModelLoader {
     std::uint64_t command = 0;
     std::array<char, 1025> path{};
   };
-  void run() {
+  void run(const std::function<void()>& also) {
     Request request;
-    while (!ending_) {
-      while (requests_.pop(request)) loaded_.push({request.command, load(request.path.data())});
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    for (bool last = false; !last;) {
+      last = ending_;
+      while (!last && requests_.pop(request)) loaded_.push({request.command, load(request.path.data())});
+      if (also) also();
+      if (!last) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
   }
 

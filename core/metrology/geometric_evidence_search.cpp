@@ -13,7 +13,8 @@ namespace {
 Strengths spread() {
   Strengths sd;
   sd.head<first_relative>() << 1.5, 1.5, 1.5, 0.5, 0.5, 0.5, 1.5, 1.5, 0.4;
-  sd.tail<component_count>().setConstant(0.3);
+  sd.segment<component_count>(first_relative).setConstant(0.3);
+  sd.tail<3>().setConstant(0.3);
   return sd;
 }
 

@@ -58,14 +58,6 @@ std::vector<Eigen::Vector3d> tools_of(const Machine& machine, const std::vector<
   return tools;
 }
 
-GeometricPrior expected_prior(const GeometricPrior& given, const std::array<Range, 3>& ranges) {
-  GeometricPrior prior = given;
-  const double longest = std::max({ranges[0].width(), ranges[1].width(), ranges[2].width()});
-  for (double& length : prior.length)
-    if (!(length > 0.0)) length = longest / 3.0;
-  return prior;
-}
-
 /// Log posterior of the misfit at the present prior: evidence plus a weak expectation about `expected`.
 double misfit_score(double misfit, double expected, const Identification& work) {
   const auto equations = assemble(work.lines, work.rows, work.basis.size, misfit, work.point_weights);
@@ -281,7 +273,8 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
     warm_lines += 1.0;
   }
   if (warm_lines > 0.0) work.basis.add_expansion(warmth / warm_lines);
-  work.prior = expected_prior(options.prior, ranges);
+  work.prior = options.prior;
+  if (options.search_prior) work.prior.stretch = expected_stretch(ranges);
   work.misfit = options.misfit;
   double squares = 0.0;
   for (const auto& line : work.lines) {

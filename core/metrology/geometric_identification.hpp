@@ -24,7 +24,7 @@ struct IdentificationOptions {
   int most_intervals = 24;   // and at most
   bool search_prior = true;  // by evidence; false keeps `prior`, `strengths` and `misfit`
   StrengthMatrix strengths = StrengthMatrix::Zero();  // how well the prior's log strengths are known
-  GeometricPrior prior;  // expected beforehand; lengths of zero mean a third of the longest travel
+  GeometricPrior prior;  // expected beforehand; a search begins with the `stretch` of the travels
   double misfit = 5e-8;  // m
   std::function<void(double part, const std::string& what)> progress;  // may be empty
 };

@@ -1,6 +1,8 @@
 #include "core/metrology/geometric_prior.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace invar::metrology {
 
@@ -40,6 +42,8 @@ Strengths log_strengths(const GeometricPrior& prior) {
   logs[8] = std::log(prior.fine_length);
   for (int c = 0; c < component_count; ++c)
     logs[first_relative + c] = std::log(prior.relative[static_cast<std::size_t>(c)]);
+  for (int axis = 0; axis < 3; ++axis)
+    logs[first_stretch + axis] = std::log(prior.stretch[static_cast<std::size_t>(axis)]);
   return logs;
 }
 
@@ -54,7 +58,17 @@ GeometricPrior with_log_strengths(const GeometricPrior& prior, const Strengths& 
   result.fine_length = std::exp(logs[8]);
   for (int c = 0; c < component_count; ++c)
     result.relative[static_cast<std::size_t>(c)] = std::exp(logs[first_relative + c]);
+  for (int axis = 0; axis < 3; ++axis)
+    result.stretch[static_cast<std::size_t>(axis)] = std::exp(logs[first_stretch + axis]);
   return result;
+}
+
+std::array<double, 3> expected_stretch(const std::array<Range, 3>& travel) {
+  const double longest = std::max({travel[0].width(), travel[1].width(), travel[2].width()});
+  std::array<double, 3> stretch{1.0, 1.0, 1.0};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    if (travel[axis].width() > 0.0) stretch[axis] = std::sqrt(travel[axis].width() / longest);
+  return stretch;
 }
 
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior,
@@ -74,7 +88,7 @@ Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const Geomet
       const double gi = (spline.place(i) - basis.origin[axis]) / width;
       const double gj = (spline.place(j) - basis.origin[axis]) / width;
       const double distance = spline.place(i) - spline.place(j);
-      double value = variance * (matern52(distance, prior.length[index(kind)]).value + offset * offset) +
+      double value = variance * (matern52(distance, prior.length_of(component)).value + offset * offset) +
                      slope * slope * gi * gj;
       if (fine > 0.0) value += fine * matern52(distance, prior.fine_length).value;
       covariance(i, j) = covariance(j, i) = value;
@@ -97,16 +111,17 @@ std::vector<CovarianceSlope> coefficient_covariance_slopes(const GeometricBasis&
   coarse.positioning_slope = 0.0;
   std::vector<CovarianceSlope> slopes;
   slopes.push_back({{k, first_relative + component}, 2.0 * coefficient_covariance(basis, coarse, component)});
-  const auto fill = [&](int strength, auto entry) {
+  const auto fill = [&](std::vector<int> strengths, auto entry) {
     Eigen::MatrixXd matrix(spline.size(), spline.size());
     for (int i = 0; i < spline.size(); ++i)
       for (int j = 0; j <= i; ++j) matrix(i, j) = matrix(j, i) = entry(spline.place(i) - spline.place(j));
-    slopes.push_back({{strength}, std::move(matrix)});
+    slopes.push_back({std::move(strengths), std::move(matrix)});
   };
-  fill(3 + k, [&](double d) { return variance * matern52(d, prior.length[index(kind)]).slope; });
+  fill({3 + k, first_stretch + axis_of(component)},
+       [&](double d) { return variance * matern52(d, prior.length_of(component)).slope; });
   if (kind == MotionKind::angle) return slopes;
-  fill(6 + k, [&](double d) { return 2.0 * fine * matern52(d, prior.fine_length).value; });
-  fill(8, [&](double d) { return fine * matern52(d, prior.fine_length).slope; });
+  fill({6 + k}, [&](double d) { return 2.0 * fine * matern52(d, prior.fine_length).value; });
+  fill({8}, [&](double d) { return fine * matern52(d, prior.fine_length).slope; });
   return slopes;
 }
 

@@ -31,20 +31,32 @@ struct GeometricPrior {
     ones.fill(1.0);
     return ones;
   }();
+  /// Of the length of its kind, by axis: rails that bow over their length have waves in proportion to the travel, bolts and
+  /// screws the same waves whatever the travel.
+  std::array<double, 3> stretch{1.0, 1.0, 1.0};
+  [[nodiscard]] double length_of(int component) const {
+    return length[static_cast<std::size_t>(kind_of(component))] *
+           stretch[static_cast<std::size_t>(axis_of(component))];
+  }
   [[nodiscard]] double amplitude_of(int component) const {
     return amplitude[static_cast<std::size_t>(kind_of(component))] *
            relative[static_cast<std::size_t>(component)];
   }
 };
 
+/// What to expect of `stretch` before measuring: half way, in the log, between waves in proportion to the travel and waves
+/// that do not care for it.
+std::array<double, 3> expected_stretch(const std::array<Range, 3>& travel);
+
 /// The prior's covariance of the spline coefficients of one component: Matern 5/2 at their places + diffuse slope
 /// and offset (the gauge removes the latter).
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior,
                                        int component);
-/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length, and
-/// how much stronger each component is than its kind.
+/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length, how
+/// much stronger each component is than its kind, and how much longer each axis' waves are.
 inline constexpr int first_relative = 9;
-inline constexpr int strength_count = first_relative + component_count;
+inline constexpr int first_stretch = first_relative + component_count;
+inline constexpr int strength_count = first_stretch + 3;
 using Strengths = Eigen::Matrix<double, strength_count, 1>;
 using StrengthMatrix = Eigen::Matrix<double, strength_count, strength_count>;
 Strengths log_strengths(const GeometricPrior& prior);

@@ -45,6 +45,13 @@ std::string name_of(const Machine& machine, const Eigen::Vector3d& from, const E
   return moving + beside;
 }
 
+/// Whether two lines have the same ends, whichever way round, within a tenth of a millimetre.
+bool same_place(const PlannedLine& a, const PlannedLine& b) {
+  constexpr double near = 1e-4;
+  return ((a.from - b.from).norm() < near && (a.to - b.to).norm() < near) ||
+         ((a.from - b.to).norm() < near && (a.to - b.from).norm() < near);
+}
+
 PlannedLine line(const Machine& machine, const std::array<double, 3>& from, const std::array<double, 3>& to) {
   return line_between(machine, at(machine, from[0], from[1], from[2]), at(machine, to[0], to[1], to[2]));
 }
@@ -118,10 +125,7 @@ std::vector<PlannedLine> candidate_lines(const Machine& machine) {
   }
   std::vector<PlannedLine> unique;
   for (auto& one : lines)
-    if (std::none_of(unique.begin(), unique.end(), [&](const PlannedLine& u) {
-          return ((u.from - one.from).norm() < 1e-9 && (u.to - one.to).norm() < 1e-9) ||
-                 ((u.from - one.to).norm() < 1e-9 && (u.to - one.from).norm() < 1e-9);
-        }))
+    if (std::none_of(unique.begin(), unique.end(), [&](const PlannedLine& u) { return same_place(u, one); }))
       unique.push_back(std::move(one));
   return unique;
 }
@@ -159,11 +163,13 @@ GeometricPrior assumed_prior(const Machine& machine, double motions, double angl
   for (int k = 0; k < 3; ++k)
     if (machine.chain.has(k)) longest = std::max(longest, machine.travel[index(k)].width());
   prior.length.fill(longest / 3.0);
+  prior.stretch = expected_stretch(machine.travel);
   // The share of a curve's variance that is left about its best line, over the longest axis.
   GeometricBasis basis;
   basis.splines.fill(numerics::CubicBSpline{Range{0.0, longest}, 20});
   GeometricPrior waves = prior;
   waves.angle_slope = 0.0;
+  waves.stretch.fill(1.0);
   const Eigen::MatrixXd covariance = coefficient_covariance(basis, waves, rotation(0, 0));
   const auto n = covariance.rows();
   Eigen::MatrixXd line(n, 2);
@@ -177,22 +183,18 @@ GeometricPrior assumed_prior(const Machine& machine, double motions, double angl
 }
 
 Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
-                   const GeometricPrior& given, double misfit) {
+                   const GeometricPrior& prior, double misfit) {
   Expectation result;
-  GeometricPrior prior = given;
-  double longest = 0.0;
   std::array<int, 3> intervals{1, 1, 1};
   for (int k = 0; k < 3; ++k) {
     if (!machine.chain.has(k)) continue;
     const double width = machine.travel[index(k)].width();
-    longest = std::max(longest, width);
     intervals[index(k)] = std::clamp(static_cast<int>(std::lround(width / effort.interval)), 8, 20);
   }
-  for (double& length : prior.length)
-    if (!(length > 0.0)) length = longest / 3.0;
   std::vector<Eigen::Vector3d> tools{machine.tool};
   for (const auto& one : lines) tools.push_back(one.tool);
-  const GeometricBasis basis = make_basis(machine.chain, machine.travel, intervals, tools);
+  result.basis = make_basis(machine.chain, machine.travel, intervals, tools);
+  const GeometricBasis& basis = result.basis;
   std::vector<CondensedLine> equations;
   std::vector<LineRows> rows;
   for (const auto& one : lines) {
@@ -200,9 +202,24 @@ Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines
     rows.push_back(rows_of(equations.back(), basis, {}));
     result.readings += equations.back().noise.readings;
   }
-  const Posterior posterior = solve(assemble(equations, rows, basis.size, misfit), basis, prior);
+  Posterior posterior = solve(assemble(equations, rows, basis.size, misfit), basis, prior);
   result.knowledge = identifiability(basis, posterior, {}, machine.travel, machine.tool);
+  result.covariance = std::move(posterior.covariance);
   return result;
+}
+
+double expected_left(const Expectation& expected, const PlannedLine& planned, double interval) {
+  const LineRows rows = rows_of(planned_equations(planned, {interval, 1, 1e-6}), expected.basis, {});
+  const Eigen::MatrixXd covariance = rows.rows * expected.covariance(rows.unknowns, rows.unknowns);
+  return std::sqrt(covariance.cwiseProduct(rows.rows).sum() / static_cast<double>(rows.rows.rows()));
+}
+
+std::vector<PlannedLine> other_lines(const Machine& machine, const std::vector<PlannedLine>& lines) {
+  std::vector<PlannedLine> others;
+  for (PlannedLine& one : candidate_lines(machine))
+    if (std::none_of(lines.begin(), lines.end(), [&](const PlannedLine& l) { return same_place(l, one); }))
+      others.push_back(std::move(one));
+  return others;
 }
 
 std::vector<NextLine> next_lines(const Machine& machine, const Identification& found, std::size_t count) {
@@ -221,15 +238,12 @@ std::vector<NextLine> next_lines(const Machine& machine, const Identification& f
   constexpr int coarse = 12;  // points are enough to rank; each stands for its share of the readings
   const double per_point = readings / points * (points / static_cast<double>(found.lines.size())) / coarse;
   const double variance = found.noise * found.noise / per_point + found.misfit * found.misfit;
+  std::vector<PlannedLine> measured;
+  for (const CondensedLine& known : found.lines)
+    measured.push_back(
+        {known.name, known.beam.start, known.beam.start + known.beam.length * known.beam.direction});
   std::vector<NextLine> result;
-  for (PlannedLine& candidate : candidate_lines(machine)) {
-    const bool measured =
-        std::any_of(found.lines.begin(), found.lines.end(), [&](const CondensedLine& known) {
-          const Eigen::Vector3d end = known.beam.start + known.beam.length * known.beam.direction;
-          return ((known.beam.start - candidate.from).norm() < 1e-4 && (end - candidate.to).norm() < 1e-4) ||
-                 ((known.beam.start - candidate.to).norm() < 1e-4 && (end - candidate.from).norm() < 1e-4);
-        });
-    if (measured) continue;
+  for (PlannedLine& candidate : other_lines(machine, measured)) {
     Effort effort;
     effort.interval = (candidate.to - candidate.from).norm() / (coarse - 1);
     const LineRows rows = rows_of(planned_equations(candidate, effort), basis, found.model.squareness);

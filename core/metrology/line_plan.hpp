@@ -48,9 +48,17 @@ GeometricPrior assumed_prior(const Machine& machine, double motions, double angl
 struct Expectation {
   Identifiability knowledge;
   int readings = 0;
+  GeometricBasis basis;
+  Eigen::MatrixXd covariance;  // of the basis' unknowns once the lines are measured
 };
 Expectation expect(const Machine& machine, const std::vector<PlannedLine>& lines, const Effort& effort,
                    const GeometricPrior& prior, double misfit = 5e-8);
+
+/// RMS over a line, measured or not, of what its readings will show after compensation, without their noise [m].
+double expected_left(const Expectation& expected, const PlannedLine& line, double interval);
+
+/// The candidates that are not among `lines`, whichever way round.
+std::vector<PlannedLine> other_lines(const Machine& machine, const std::vector<PlannedLine>& lines);
 
 /// A line not yet measured and what it would leave of the expected volumetric error.
 struct NextLine {

@@ -36,13 +36,8 @@ std::vector<PlannedLine> grid_lines(const Machine& machine) {
 
 class Search {
  public:
-  Search(const Machine& machine, const Effort& effort, const GeometricPrior& given, double misfit)
+  Search(const Machine& machine, const Effort& effort, const GeometricPrior& prior, double misfit)
       : machine_{machine}, effort_{effort}, misfit_{misfit} {
-    GeometricPrior prior = given;
-    double longest = 0.0;
-    for (const Range& r : machine.travel) longest = std::max(longest, r.width());
-    for (double& length : prior.length)
-      if (!(length > 0.0)) length = longest / 3.0;
     basis_ = make_basis(machine.chain, machine.travel, {coarse_intervals, coarse_intervals, coarse_intervals},
                         {machine.tool});
     NormalEquations nothing;

@@ -1,8 +1,9 @@
 // Random calibrations of every kind, judged against an oracle: machines of any chain, travel and roughness, line sets from
 // too few to plenty, lasers with reversal, drift, outliers, beam breaks and missing rows.
 //
-//     build/bin/bench_geometric_cases [cases] [first seed]
+//     build/bin/bench_geometric_cases [cases] [first seed] [--same-waves]
 //
+// Waves are harmonics of the axis' own travel (rails that bow), with --same-waves of 0.25 m whatever the travel (bolts).
 // The oracle solves the same equations with the very covariance that the curves were drawn from, which nobody has.
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
@@ -37,7 +38,9 @@ double log_uniform(Random& random, double low, double high) {
 double normal(Random& random) { return std::normal_distribution<double>{}(random); }
 bool chance(Random& random, double p) { return uniform(random, 0.0, 1.0) < p; }
 
-/// A family of curves: harmonics of twice the travel with amplitudes falling as h^-power, a straight line, a pitch error.
+bool same_waves = false;
+
+/// A family of curves: harmonics of twice the travel (or of 0.5 m) with amplitudes falling as h^-power, a straight line, a pitch error.
 struct Family {
   int harmonics = 6;
   double power = 2.0;
@@ -49,6 +52,7 @@ struct Family {
 
 std::vector<double> draw(const Family& family, double travel, const std::vector<double>& places,
                          Random& random) {
+  if (same_waves) travel = 0.25;
   double power = 0.0;
   for (int h = 1; h <= family.harmonics; ++h) power += std::pow(h, -2.0 * family.power);
   const double scale = family.amplitude / std::sqrt(power);
@@ -303,6 +307,7 @@ void print(const Tally& tally) {
 int main(int argc, char** argv) {
   using namespace invar::metrology;
   const int cases = argc > 1 ? std::atoi(argv[1]) : 100;
+  same_waves = argc > 3 && std::string{argv[3]} == "--same-waves";
   const unsigned first = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 5000;
   std::vector<Tally> tallies;
   Tally all{"all", {}, {}, {}, {}, {}};

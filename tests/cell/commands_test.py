@@ -405,6 +405,37 @@ class OnThisHost(unittest.TestCase):
         self.assertIn("realtime", names)
 
 
+class Planning(unittest.TestCase):
+    def setUp(self):
+        (FOLDER / "machine.yaml").write_text(
+            "invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.3], y: [0, 0.2]}\ntool: {z: -0.03}\n")
+
+    def test_a_plan_is_a_table_and_a_page_to_take_to_the_machine(self):
+        status, out, err = invar("calibrate", "plan", "--machine", "machine.yaml", "--accuracy", "1.5e-6",
+                                 "--output", "plan.csv", "--report", "plan.html")
+        self.assertEqual((status, err), (0, ""), out)
+        page = (FOLDER / "plan.html").read_text()
+        header, *lines = (FOLDER / "plan.csv").read_text().splitlines()
+        self.assertIn(f"measure {len(lines)} lines", out)
+        columns = header.split(",")
+        for line in lines:
+            row = dict(zip(columns, line.split(",")))
+            self.assertIn(f"<td>{row['line']}</td>", page)
+            length = sum((float(row[f"to_{k} [m]"]) - float(row[f"from_{k} [m]"])) ** 2 for k in "xyz") ** 0.5
+            self.assertAlmostEqual(length / float(row["interval [m]"]), round(length / float(row["interval [m]"])), 6)
+        for words in ("expected without it", "line,x [m],y [m],z [m],displacement [m]", "What to expect, and what is not seen",
+                      "Check the result on a line that was not used", "(0, 0, -30) mm", "EC0Y", "<svg", "proposed"):
+            self.assertIn(words, page)
+        self.assertNotRegex(page, r'(src|href)="http')
+
+    def test_what_is_out_of_reach_is_said_and_nothing_is_written(self):
+        status, out, _ = invar("calibrate", "plan", "--machine", "machine.yaml", "--accuracy", "1e-9",
+                               "--output", "none.csv", "--report", "none.html")
+        self.assertEqual(status, 1)
+        self.assertIn("is out of reach with these lines", out)
+        self.assertFalse((FOLDER / "none.csv").exists() or (FOLDER / "none.html").exists())
+
+
 class WrongCalls(unittest.TestCase):
     def test_wrong_calls_end_with_status_2_and_say_why(self):
         (FOLDER / "broken.yaml").write_text("invar_cell: 1\nname: [\n")

@@ -1,34 +1,35 @@
 // `invar calibrate plan`: the lines, interval and passes to measure for a wanted accuracy, and what to expect of them.
 #include <unistd.h>
 
-#include <cmath>
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/line_plan.hpp"
 #include "core/metrology/line_search.hpp"
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/geometric/measuring_plan.hpp"
 #include "tools/positive.hpp"
-#include "tools/report/page.hpp"
 
 namespace invar::tools {
 
 namespace {
 
-using metrology::Effort;
 using metrology::PlannedLine;
 
 struct Options {
   std::filesystem::path machine;
   std::filesystem::path pilot;
   std::filesystem::path output;
+  std::filesystem::path report;
   double accuracy = 0.0;
   double noise = 1e-6;
   double motions = 2e-6;
@@ -38,17 +39,9 @@ struct Options {
   bool search = false;
 };
 
-struct Choice {
-  bool searched = false;
-  std::vector<PlannedLine> lines;
-  Effort effort;
-  metrology::Expectation expectation;
-  double minutes = 0.0;
-};
-
 std::string um(double value) { return report::number(1e6 * value, 3) + " um"; }
 
-void write_lines(const Choice& choice, const std::filesystem::path& file) {
+void write_lines(const PlanChoice& choice, const std::filesystem::path& file) {
   recording::Table table;
   std::vector<std::string> names;
   std::array<std::vector<double>, 9> columns;
@@ -74,20 +67,33 @@ void write_lines(const Choice& choice, const std::filesystem::path& file) {
   table.write(file);
 }
 
-void plan(const Options& options) {
-  metrology::Machine machine = machine::load_machine(options.machine);
-  metrology::GeometricPrior prior = metrology::assumed_prior(machine, options.motions, options.angles);
-  double noise = options.noise;
-  double misfit = 5e-8;
-  if (!options.pilot.empty()) {
-    const auto pilot = metrology::identify(machine, read_lines(options.pilot, machine).lines);
-    prior = pilot.prior;
-    noise = pilot.noise;
-    misfit = pilot.misfit;
-    std::cout << "pilot " << options.pilot.filename().string() << ": noise " << um(noise)
-              << ", error motions " << um(prior.amplitude[0]) << ", " << um(prior.amplitude[1]) << ", "
-              << report::number(1e6 * prior.amplitude[2], 3) << " urad\n";
-  }
+/// Machine, and what is known or assumed of it.
+MeasuringPlan begin(const Options& options) {
+  MeasuringPlan plan;
+  plan.machine_file = options.machine;
+  plan.pilot = options.pilot;
+  plan.machine = machine::load_machine(options.machine);
+  plan.accuracy = options.accuracy;
+  plan.setup_minutes = options.setup_minutes;
+  plan.reading_seconds = options.reading_seconds;
+  plan.noise = options.noise;
+  plan.motions = options.motions;
+  plan.angles = options.angles;
+  plan.prior = metrology::assumed_prior(plan.machine, options.motions, options.angles);
+  if (options.pilot.empty()) return plan;
+  const auto pilot = metrology::identify(plan.machine, read_lines(options.pilot, plan.machine).lines);
+  plan.prior = pilot.prior;
+  plan.noise = pilot.noise;
+  plan.misfit = pilot.misfit;
+  std::cout << "pilot " << options.pilot.filename().string() << ": noise " << um(plan.noise)
+            << ", error motions " << um(plan.prior.amplitude[0]) << ", " << um(plan.prior.amplitude[1])
+            << ", " << report::number(1e6 * plan.prior.amplitude[2], 3) << " urad\n";
+  return plan;
+}
+
+/// Line sets, intervals and passes, each with what to expect of it.
+void weigh(MeasuringPlan& plan, bool search) {
+  const auto& machine = plan.machine;
   double longest = 0.0;
   for (int k = 0; k < 3; ++k)
     if (machine.chain.has(k))
@@ -98,63 +104,81 @@ void plan(const Options& options) {
   };
   std::vector<Set> sets;
   for (int level = 0; level < 3; ++level) sets.push_back({false, metrology::recipe_lines(machine, level)});
-  for (int level = 0; level < 3 && options.search; ++level) {
+  for (int level = 0; level < 3 && search; ++level) {
     const bool watched = isatty(STDERR_FILENO) != 0;
     const auto progress = [&](double part) {
       if (watched)
         std::cerr << "\r\033[K" << static_cast<int>(100.0 * (level + part) / 3.0) << " % searching lines"
                   << std::flush;
     };
-    sets.push_back({true, metrology::search_lines(machine, metrology::recipe_lines(machine, level),
-                                                  {longest / 20.0, 6, noise}, prior, misfit, progress)});
+    sets.push_back(
+        {true, metrology::search_lines(machine, metrology::recipe_lines(machine, level),
+                                       {longest / 20.0, 6, plan.noise}, plan.prior, plan.misfit, progress)});
     if (watched) std::cerr << "\r\033[K" << std::flush;
   }
-  std::vector<Choice> choices;
   for (const Set& set : sets) {
     for (const double pieces : {10.0, 20.0, 40.0}) {
       for (const int passes : {2, 6}) {
-        Choice choice;
+        PlanChoice choice;
         choice.searched = set.searched;
         choice.lines = set.lines;
-        choice.effort = {longest / pieces, passes, noise};
-        choice.expectation = metrology::expect(machine, choice.lines, choice.effort, prior, misfit);
-        choice.minutes = static_cast<double>(choice.lines.size()) * options.setup_minutes +
-                         choice.expectation.readings * options.reading_seconds / 60.0;
-        choices.push_back(std::move(choice));
+        choice.effort = {longest / pieces, passes, plan.noise};
+        choice.expectation = metrology::expect(machine, choice.lines, choice.effort, plan.prior, plan.misfit);
+        choice.minutes = static_cast<double>(choice.lines.size()) * plan.setup_minutes +
+                         choice.expectation.readings * plan.reading_seconds / 60.0;
+        plan.choices.push_back(std::move(choice));
       }
     }
   }
-  const Choice* best = nullptr;
-  const Choice* finest = &choices.front();
+  for (const PlanChoice& choice : plan.choices)
+    if (choice.expected_rms() <= plan.accuracy &&
+        (plan.best == nullptr || choice.minutes < plan.best->minutes))
+      plan.best = &choice;
+}
+
+void print_choices(const MeasuringPlan& plan) {
   std::printf("%6s %-8s %10s %7s %9s %8s %12s\n", "lines", "", "interval", "passes", "readings", "minutes",
               "expected RMS");
-  for (const Choice& choice : choices) {
-    const double expected = choice.expectation.knowledge.volumetric_rms;
+  for (const PlanChoice& choice : plan.choices)
     std::printf("%6zu %-8s %7.1f mm %7d %9d %8.0f %9.2f um\n", choice.lines.size(),
                 choice.searched ? "searched" : "recipe", 1e3 * choice.effort.interval, choice.effort.passes,
-                choice.expectation.readings, choice.minutes, 1e6 * expected);
-    if (expected < finest->expectation.knowledge.volumetric_rms) finest = &choice;
-    if (expected <= options.accuracy && (best == nullptr || choice.minutes < best->minutes)) best = &choice;
-  }
+                choice.expectation.readings, choice.minutes, 1e6 * choice.expected_rms());
   std::fflush(stdout);
-  if (best == nullptr) {
+}
+
+void print_best(const PlanChoice& best) {
+  std::cout << "\nmeasure " << best.lines.size() << " lines every "
+            << report::number(1e3 * best.effort.interval, 3) << " mm in " << best.effort.passes
+            << " passes (forward and backward in turn): expect " << um(best.expected_rms())
+            << " over the volume (RMS of the vector)\n";
+  for (const PlannedLine& line : best.lines)
+    std::printf("  %-16s (%g, %g, %g) to (%g, %g, %g) mm, %d points\n", line.name.c_str(),
+                1e3 * line.from.x(), 1e3 * line.from.y(), 1e3 * line.from.z(), 1e3 * line.to.x(),
+                1e3 * line.to.y(), 1e3 * line.to.z(), metrology::points_of(line, best.effort.interval));
+  std::fflush(stdout);
+  for (const auto& open : best.expectation.knowledge.unidentified)
+    std::cout << "left open: " << open.words() << '\n';
+}
+
+void propose(const Options& options) {
+  MeasuringPlan plan = begin(options);
+  weigh(plan, options.search);
+  print_choices(plan);
+  if (plan.best == nullptr) {
+    const auto finest = std::min_element(
+        plan.choices.begin(), plan.choices.end(),
+        [](const PlanChoice& a, const PlanChoice& b) { return a.expected_rms() < b.expected_rms(); });
     std::cout << um(options.accuracy) << " is out of reach with these lines: the best is "
-              << um(finest->expectation.knowledge.volumetric_rms) << "; "
+              << um(finest->expected_rms()) << "; "
               << (options.search ? "" : "--search looks for better lines; else ")
               << "a quieter laser, more passes or a machine that repeats better would be needed\n";
     throw CLI::RuntimeError(1);
   }
-  std::cout << "\nmeasure " << best->lines.size() << " lines every "
-            << report::number(1e3 * best->effort.interval, 3) << " mm in " << best->effort.passes
-            << " passes (forward and backward in turn): expect "
-            << um(best->expectation.knowledge.volumetric_rms) << " over the volume (RMS of the vector)\n";
-  for (const PlannedLine& line : best->lines)
-    std::printf("  %-16s (%g, %g, %g) to (%g, %g, %g) mm, %d points\n", line.name.c_str(),
-                1e3 * line.from.x(), 1e3 * line.from.y(), 1e3 * line.from.z(), 1e3 * line.to.x(),
-                1e3 * line.to.y(), 1e3 * line.to.z(), metrology::points_of(line, best->effort.interval));
-  for (const auto& open : best->expectation.knowledge.unidentified)
-    std::cout << "left open: " << open.words() << '\n';
-  if (!options.output.empty()) write_lines(*best, options.output);
+  print_best(*plan.best);
+  if (!options.output.empty()) write_lines(*plan.best, options.output);
+  if (options.report.empty()) return;
+  plan_page(plan).write(options.report);
+  std::cout << "report: " << options.report.string() << '\n';
 }
 
 }  // namespace
@@ -163,7 +187,8 @@ void add_calibrate_plan(CLI::App& group) {
   auto* command =
       group.add_subcommand("plan", "Propose the displacement lines to measure for a wanted accuracy");
   command->footer(
-      "Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --search --output plan.csv");
+      "Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --search --output plan.csv "
+      "--report plan.html");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
@@ -191,7 +216,9 @@ void add_calibrate_plan(CLI::App& group) {
   command->add_option("--reading", options->reading_seconds, "time a reading takes [s]")
       ->capture_default_str();
   command->add_option("--output", options->output, "table of the lines to measure, .csv");
-  command->callback([options] { plan(*options); });
+  command->add_option("--report", options->report,
+                      "page to take to the machine, .html: lines, set-up, what to expect, what stays open");
+  command->callback([options] { propose(*options); });
 }
 
 }  // namespace invar::tools

@@ -20,10 +20,6 @@ using metrology::ThermalReadings;
 using report::number;
 using report::si;
 
-Eigen::VectorXd vector_of(const std::vector<double>& values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
 /// The columns as vectors; rows in which any of them is empty or nan are left out.
 ThermalReadings read_readings(const recording::Table& table) {
   struct Wanted {

@@ -25,10 +25,6 @@ struct Options {
   double base_temperature = 25.0;
 };
 
-Eigen::VectorXd vector_of(const std::vector<double>& values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
 ThermistorFit fit_of(const Options& options, const std::vector<double>& temperature,
                      const std::vector<double>& resistance) {
   const std::string file = options.readings.string();

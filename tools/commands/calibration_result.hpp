@@ -1,6 +1,7 @@
 // What every calibration leaves: compensation.yaml, report.json, report.html - all three or none.
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -28,6 +29,11 @@ void write_calibration(const std::filesystem::path& folder, const compensation::
 /// The same with a model of another kind, under the name that it has.
 void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
                        const nlohmann::json& report, const report::Page& page);
+
+/// A column as a vector.
+inline Eigen::VectorXd vector_of(const std::vector<double>& values) {
+  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
 
 /// Throws InputError naming the file, the column and the row (of the file's data, from 1) of the first value
 /// that is missing, infinite or beyond `largest` in size.

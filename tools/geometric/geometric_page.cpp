@@ -15,9 +15,6 @@ using report::Plot;
 using report::Series;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
-std::string place(const Eigen::Vector3d& p) {
-  return "(" + number(1e3 * p.x(), 4) + ", " + number(1e3 * p.y(), 4) + ", " + number(1e3 * p.z(), 4) + ")";
-}
 
 void write_machine(report::Page& page, const GeometricResult& result) {
   const auto& machine = result.machine;

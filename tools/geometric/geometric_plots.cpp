@@ -115,6 +115,12 @@ Plot field_plot(const GeometricModel& model, int a, int b) {
 
 std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
 
+std::string place(const Eigen::Vector3d& position) {
+  std::string text = "(";
+  for (int k = 0; k < 3; ++k) text += report::number(1e3 * position[k], 5) + (k < 2 ? ", " : ")");
+  return text;
+}
+
 Series series(const std::string& label, Series::Style style, const std::string& colour) {
   Series result;
   result.label = label;

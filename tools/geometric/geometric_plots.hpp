@@ -1,4 +1,4 @@
-// What the page of a geometric calibration draws.
+// What the pages of geometric calibrations and measuring plans draw and how they name places.
 #pragma once
 
 #include "tools/geometric/geometric_report.hpp"
@@ -7,6 +7,8 @@ namespace invar::tools {
 
 /// X, Y or Z.
 std::string letter(int axis);
+/// "(x, y, z)" in mm.
+std::string place(const Eigen::Vector3d& position);
 /// One without points yet.
 report::Series series(const std::string& label, report::Series::Style style, const std::string& colour);
 /// A component over its axis with its two-sigma band and what the readings say of it.

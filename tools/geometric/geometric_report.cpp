@@ -302,6 +302,7 @@ void describe_identification(const GeometricResult& result, compensation::ModelT
   text.number("misfit", result.found.misfit);
   text.numbers("prior_amplitude", result.found.prior.amplitude.data(), 3);
   text.numbers("prior_length", result.found.prior.length.data(), 3);
+  text.numbers("prior_stretch", result.found.prior.stretch.data(), 3);
   text.close();
 }
 

@@ -19,7 +19,7 @@ double rms(const std::vector<double>& values) {
   return std::sqrt(square / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
 }
 
-/// Indices of the readings nearest to a temperature: the third of them closest to it.
+/// Indices of the readings within so many kelvin of a temperature.
 std::vector<Eigen::Index> near(const ThermalReadings& readings, double temperature, double within) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < readings.x.size(); ++i)

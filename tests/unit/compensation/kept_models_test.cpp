@@ -1,7 +1,9 @@
 // Models that outlive the process: kept when committed, used at the next start, refused when they are not what was kept.
 #include <gmock/gmock.h>
 
+#include <chrono>
 #include <fstream>
+#include <thread>
 
 #include "tests/unit/compensation/live_cell.hpp"
 
@@ -132,6 +134,17 @@ TEST(KeptModels, RefusesWhatIsDamagedOrOfAnotherMachineAndSaysSo) {
   longer.bring_up();
   longer.cycle_once();
   starts_without(longer, "of another machine: its axis x has another travel");
+}
+
+TEST(ModelLoader, WhatWasLoadedWhileTheComponentEndedIsNotStagedAtTheNextStart) {
+  KeptCell cell;
+  const auto model = write(cell.folder, "model.yaml", geometry(5e-5, 0.0));
+  cell.bring_up(false);  // loading takes its time on a thread
+  cell.tell(MODEL_STAGE, model);
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  cell.start_again();
+  EXPECT_EQ(cell.tell(MODEL_ACTIVATE).state(), MODEL_REFUSED);
+  EXPECT_EQ(cell.geometric(), 0U);
 }
 
 TEST(KeptModels, AFolderThatCannotBeWrittenIsAFault) {

@@ -241,12 +241,11 @@ TEST(LinePlan, SearchedLinesBeatTheRecipeOnMachinesThatTheSearchDidNotKnow) {
 
 TEST(LinePlan, TheRecipeLeavesNothingOpenForAnyChain) {
   std::array<int, 3> order{0, 1, 2};
-  GeometricPrior prior;
-  prior.length = {0.0, 0.0, 0.0};
   do {
     Machine machine;
     machine.chain = {order, 3};
     machine.travel = {Range{0, 0.3}, Range{0, 0.2}, Range{0, 0.15}};
+    const GeometricPrior prior = assumed_prior(machine, 2e-6, 8e-6);
     const auto fourteen = expect(machine, recipe_lines(machine, 0), {0.02, 6, 5e-7}, prior);
     const auto seventeen = expect(machine, recipe_lines(machine, 1), {0.02, 6, 5e-7}, prior);
     EXPECT_LT(seventeen.knowledge.volumetric_rms, fourteen.knowledge.volumetric_rms);

@@ -1,0 +1,49 @@
+// LineFit: one displacement line while its repeats are being told from drift, reversal, jumps and outliers.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+
+namespace invar::metrology {
+
+inline constexpr int drift_terms = 4;              // Legendre polynomials 1..4 of the time within a line
+inline constexpr int nuisances = 1 + drift_terms;  // reversal first
+inline constexpr double wide = 1e-3;  // m, sd of what is not known beforehand: offset, reversal, steps
+inline constexpr double expansion_sd = 2e-5;  // 1/K, beforehand: steel 1.2e-5, aluminium 2.3e-5
+
+/// y = mean of its point + regressors * nuisance + noise.
+struct LineFit {
+  const DisplacementLine* line = nullptr;
+  Beam beam;
+  std::vector<int> point_of;
+  std::vector<int> first_row;  // of each point
+  Eigen::VectorXd y;           // reading minus nominal
+  Eigen::MatrixXd regressors;  // rows x (reversal, drift, steps)
+  std::vector<int> breaks;
+  bool expanding = false;  // expansion is a regressor, after the drift
+  double temperature = std::numeric_limits<double>::quiet_NaN();
+  Eigen::VectorXd weights;
+  Eigen::VectorXd nuisance;
+  Eigen::MatrixXd nuisance_covariance;  // per unit noise variance
+  Eigen::VectorXd residual;
+  double scale = 0.0;
+  double degrees = 0.0;
+
+  [[nodiscard]] int rows() const { return static_cast<int>(y.size()); }
+  [[nodiscard]] int points() const { return static_cast<int>(first_row.size()); }
+};
+
+/// Weighted least squares with a prior on the nuisance, from the weights and the scale as they stand.
+void fit(LineFit& work, const Eigen::VectorXd& prior_variance);
+/// Weights of Tukey's biweight at six scales: what lies further off counts nothing.
+void tukey_weights(LineFit& work);
+/// Of the regressors; `drift` [m^2] by its polynomials.
+Eigen::VectorXd prior_variances(const LineFit& work, const std::array<double, drift_terms>& drift);
+/// Scale, weights and nuisance from the line alone; jumps of the count become regressors. `floor` [m] bounds the scale.
+void fit_robustly(LineFit& work, const std::array<double, drift_terms>& drift, double floor);
+
+}  // namespace invar::metrology
