@@ -248,11 +248,21 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   }
   const auto* kind = physics::equations_kind(*term.info);
   const bool is_rate =
-      kind != nullptr && (kind->rate != nullptr || kind->memory == physics::EquationsMemory::dry_friction);
+      kind != nullptr && (kind->rate != nullptr || kind->memory == physics::EquationsMemory::dry_friction ||
+                          !term.curve.knots.empty());
   if (is_rate && !on_state) {
     node.fault("`" + name + "` changes a rate, and `" + term.on + "` is no state", "name a state under `on`");
     node.accept_all();
     return false;
+  }
+  if (const auto& over = term.curve.over; !over.empty() && over != "t") {
+    std::vector<std::string> symbols;
+    for (const auto& state : model.equations.states) symbols.push_back(state.name);
+    for (const auto& input : model.equations.inputs) symbols.push_back(input.symbol);
+    if (std::find(symbols.begin(), symbols.end(), over) == symbols.end()) {
+      node["over"].fault("`" + over + "` is no state, no input and not t", "name one of them");
+      return false;
+    }
   }
   return true;
 }

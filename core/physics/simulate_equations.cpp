@@ -113,6 +113,7 @@ class Machine {
     State d{};
     for (std::size_t i = 0; i < states_; ++i) d[i] = compiled_.rates[i].Eval();
     for (const auto& term : rate_terms_) d[term.on] += term.kind->rate(compiled_.symbols[term.with], term.p);
+    for (const auto& [on, with, curve] : curves_) d[on] += (*curve)(compiled_.symbols[with]);
     for (std::size_t h = 0; h < hidden_.size(); ++h) {
       const auto& term = hidden_[h];
       const double difference = s[states_ + h] - s[term.on];
@@ -183,6 +184,10 @@ class Machine {
     const EquationsTermKind* kind;
     std::size_t on, with;
     const double* p;
+  };
+  struct Course {
+    std::size_t on, with;
+    const Curve* curve;
   };
   struct Friction {
     Use use;
@@ -287,6 +292,11 @@ class Machine {
     const std::size_t on = compiled_.place(term.on),
                       with = term.with.empty() ? on : compiled_.place(term.with);
     if (on >= states_) return;  // at an input or output: the simulation bends those
+    if (!term.curve.knots.empty()) {
+      curves_.push_back(
+          {on, std::min(compiled_.place(term.curve.over), compiled_.symbols.size() - 1), &term.curve});
+      return;
+    }
     const Use use{kind, on, std::min(with, compiled_.symbols.size() - 1), term.values.data()};
     if (kind->rate != nullptr) rate_terms_.push_back(use);
     switch (kind->memory) {
@@ -323,6 +333,7 @@ class Machine {
   std::size_t states_, controlled_;
   std::vector<Friction> frictions_;
   std::vector<Delay> delays_;
+  std::vector<Course> curves_;
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
   double shortest_lag_ = 0.0;
 };

@@ -274,7 +274,8 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   return starts;
 }
 
-std::vector<Start> unmodelled_starts(const Case& data, const Fit& /*fitted*/) {
+std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
+  if (data.model.plant == Plant::equations) return equation_curves(data, fitted.model);
   struct Choice {
     const char* site;
     const char* over;

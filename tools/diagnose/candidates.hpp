@@ -19,6 +19,7 @@ struct Start {
     bool quadrature = false;  // of a periodic term: the cosine
   };
   std::vector<Direction> directions;
+  double step = 0.0;  // of a curve's values, for its slopes; 0: the plant's usual
 };
 
 /// All named terms that the signals of the case allow, on top of `fitted`, but those in `without`.
@@ -29,6 +30,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
 
 /// Those of a model in the user's own equations.
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted);
+/// Curves of each rate over each state, input and the time.
+std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted);
 /// From where to where a state, input, output or the time goes in a model of equations.
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// How far apart the middle four fifths of its rows lie.

@@ -30,16 +30,6 @@ bool brings_energy(const physics::Model& model, const Term& term) {
                      [&](const auto& state) { return state.derivative == term.on; });
 }
 
-/// Are there rows enough for this many numbers? What a few rows leave is the curve of their scale as much as physics.
-bool is_affordable(const Case& data, const Fit& fit) {
-  constexpr double rows_a_number = 14.0;
-  double rows = 0.0;
-  for (const auto& recording : data.recordings)
-    for (const auto& measured : recording.measured)
-      for (double v : measured) rows += std::isfinite(v) ? 1.0 : 0.0;
-  return rows >= rows_a_number * static_cast<double>(fit.free.size());
-}
-
 /// Did the recording let the term show what sets it apart?
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const auto [low, high] = span_of(data, model, term.with.empty() ? term.on : term.with);
@@ -81,6 +71,53 @@ bool repeats(const Case& data, const Term& term) {
   std::sort(all.begin(), all.end());
   const double span = all[all.size() - 1 - all.size() / 200] - all[all.size() / 200];
   return span * (in_place ? 1.0 / term.values[pitch] : term.values[frequency]) >= 2.0;
+}
+
+/// The frequency of a term that is a wave in time [Hz]; 0: it is none.
+double wave_of(const physics::Model& model, const Term& term) {
+  if (term.info->index_of("phase") == physics::most_parameters) return 0.0;
+  if (const auto at = term.info->index_of("frequency"); at < physics::most_parameters) return term.values[at];
+  const auto period = term.info->index_of("period");
+  return model.plant == physics::Plant::equations && term.with == "t" && period < physics::most_parameters
+             ? 1.0 / term.values[period]
+             : 0.0;
+}
+
+/// Does the machine swing with this wave already without it? Then any wrong number of its laws leaves such a wave, and
+/// nothing that comes from outside can be told from that.
+bool is_its_own(const Case& data, const physics::Model& model, std::size_t term) {
+  constexpr double turns = 5.0;  // of the wave in a block: a tenth of its frequency is one band
+  const double frequency = wave_of(model, model.terms[term]);
+  if (!(frequency > 0.0)) return false;
+  auto free = model;
+  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  const auto without = simulate(data, free);
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    double blocks = 0.0, own = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& time = data.recordings[r].inputs.time;
+      const auto& x = without[r][o];
+      for (std::size_t i = 0; i < time.size();) {
+        const double until = time[i] + turns / frequency;
+        const std::size_t begin = i;
+        double mean = 0.0;
+        for (; i < time.size() && time[i] < until; ++i) mean += x[i];
+        const auto n = static_cast<double>(i - begin);
+        double all = 0.0;
+        std::complex<double> sum;
+        for (std::size_t k = begin; k < i; ++k) {
+          const double e = x[k] - mean / n;
+          all += e * e;
+          sum += e * std::polar(1.0, -2.0 * std::numbers::pi * frequency * time[k]);
+        }
+        blocks += 1.0;
+        if (all > 0.0 && 2.0 * std::norm(sum) / n > 0.7 * all) own += 1.0;
+      }
+    }
+    if (own >= 0.25 * blocks)
+      return true;  // a swing that decays has its small one's frequency for a part alone
+  }
+  return false;
 }
 
 /// Is what a sine in time explains a line, with one phase from beginning to end? A hum of the noise has a band, however
@@ -140,6 +177,15 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
 
 }  // namespace
 
+bool is_affordable(const Case& data, const Fit& fit) {
+  constexpr double rows_a_number = 14.0;
+  double rows = 0.0;
+  for (const auto& recording : data.recordings)
+    for (const auto& measured : recording.measured)
+      for (double v : measured) rows += std::isfinite(v) ? 1.0 : 0.0;
+  return rows >= rows_a_number * static_cast<double>(fit.free.size());
+}
+
 bool stands(const Case& data, const Fit& fit, std::size_t term) {
   const auto& info = *fit.model.terms[term].info;
   const auto& values = fit.model.terms[term].values;
@@ -157,7 +203,9 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       (brings_energy(fit.model, fit.model.terms[term]) || !is_affordable(data, fit) ||
        !acts(data, fit.model, fit.model.terms[term])))
     return false;
-  if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term)) return false;
+  if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term) ||
+      is_its_own(data, fit.model, term))
+    return false;
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
 

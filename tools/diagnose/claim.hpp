@@ -10,6 +10,9 @@ namespace invar::diagnose {
 /// "overflow@x1+x2"
 std::string label(const physics::Term& term);
 
+/// Are there rows enough for this many numbers? What a few rows leave is the curve of their scale as much as physics.
+bool is_affordable(const Case& data, const Fit& fit);
+
 /// A claim must have a strength that is possible and clearly not zero.
 bool stands(const Case& data, const Fit& fit, std::size_t term);
 

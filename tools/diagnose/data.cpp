@@ -110,6 +110,66 @@ void give_start(Case& data, Recording& recording) {
   }
 }
 
+/// The reference at `t` by the cubic through the values and slopes on both sides of the gap before row `i`.
+double across(const physics::Record& inputs, const std::vector<double>& values, std::size_t i, double t) {
+  const auto& time = inputs.time;
+  const double h = time[i] - time[i - 1], s = (t - time[i - 1]) / h;
+  const double before = i > 1 ? (values[i - 1] - values[i - 2]) / (time[i - 1] - time[i - 2]) * h : 0.0;
+  const double after =
+      i + 1 < values.size() ? (values[i + 1] - values[i]) / (time[i + 1] - time[i]) * h : 0.0;
+  const double d = values[i] - values[i - 1];
+  return values[i - 1] + s * (before + s * (3.0 * d - 2.0 * before - after + s * (before + after - 2.0 * d)));
+}
+
+/// In a gap nobody knows what the reference did, and the loop goes on to feel it for a while. What its bridge by a cubic
+/// and by a straight line make different in the simulation shows where: there nothing is compared.
+void bridge_gaps(const physics::Model& model, Recording& recording, double step) {
+  constexpr double longest_bridge = 500.0, until_forgotten = 300.0;  // rows
+  auto& inputs = recording.inputs;
+  const auto reference = physics::bridged(inputs.time, inputs.signals.at("reference"));
+  physics::Record whole;
+  std::vector<std::size_t> place;  // of each row among those of `whole`
+  for (std::size_t i = 0; i < inputs.rows(); ++i) {
+    const double gap = i > 0 ? inputs.time[i] - inputs.time[i - 1] : 0.0;
+    if (gap > longest_bridge * step)  // a pause: the loop starts anew behind it
+      for (std::size_t k = i; k < inputs.rows() && inputs.time[k] < inputs.time[i] + until_forgotten * step;
+           ++k)
+        for (auto& values : recording.measured) values[k] = nothing;
+    else if (gap > 2.5 * step)
+      for (double t = inputs.time[i - 1] + step; t < inputs.time[i] - 0.5 * step; t += step) {
+        whole.time.push_back(t);
+        whole.signals["reference"].push_back(across(inputs, reference, i, t));
+      }
+    place.push_back(whole.time.size());
+    whole.time.push_back(inputs.time[i]);
+    whole.signals["reference"].push_back(reference[i]);
+  }
+  if (whole.time.size() == inputs.rows()) return;
+  const auto spread_out = [&](const std::vector<double>& values) {
+    std::vector<double> all(whole.time.size(), nothing);
+    for (std::size_t i = 0; i < place.size(); ++i) all[place[i]] = values[i];
+    return all;
+  };
+  for (const auto& [name, values] : inputs.signals)
+    if (name != "reference") whole.signals[name] = spread_out(values);
+  std::vector<std::vector<double>> measured;
+  for (const auto& values : recording.measured) measured.push_back(spread_out(values));
+  std::shared_ptr<const physics::Simulation> by_cubic = physics::prepare(model, whole);
+  physics::Outputs straight, cubic;
+  recording.simulation->run(model, straight);
+  by_cubic->run(model, cubic);
+  for (std::size_t o = 0; o < measured.size(); ++o) {
+    // The cubic is nearer than the line by far; a fifth of what parts them is a fair bound of its own error.
+    const double noise = spread_of_differences(recording.measured[o]);
+    for (std::size_t i = 0; i < place.size(); ++i)
+      if (!(0.2 * std::abs(cubic[o][place[i]] - straight[o][i]) < 0.3 * noise))
+        for (auto& values : measured) values[place[i]] = nothing;
+  }
+  recording.inputs = std::move(whole);
+  recording.measured = std::move(measured);
+  recording.simulation = std::move(by_cubic);
+}
+
 Case empty_case(const physics::Model& model) {
   Case data;
   data.model = model;
@@ -135,22 +195,15 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
       if (!std::isfinite(v)) ++data.count.missing;
   }
   const double step = median_step(recording.inputs.time);
-  for (std::size_t i = 1; i < recording.inputs.rows(); ++i) {
-    const double gap = recording.inputs.time[i] - recording.inputs.time[i - 1];
-    if (!data.is_time_series || gap < 2.5 * step) continue;
-    ++data.count.gaps;
-    // Behind a long gap in a loop nobody knows what the reference did; the loop needs a while to forget.
-    if (model.plant == physics::Plant::axis && gap > 20.0 * step)
-      for (std::size_t j = i;
-           j < recording.inputs.rows() && recording.inputs.time[j] < recording.inputs.time[i] + 150.0 * step;
-           ++j)
-        for (auto& column : recording.measured) column[j] = nothing;
-  }
+  for (std::size_t i = 1; i < recording.inputs.rows(); ++i)
+    data.count.gaps +=
+        data.is_time_series && recording.inputs.time[i] - recording.inputs.time[i - 1] > 2.5 * step ? 1U : 0U;
   give_start(data, recording);
   if (model.plant == physics::Plant::axis) give_start_of_sum(data, recording);
   for (auto& column : recording.measured)
     std::fill_n(column.begin(), std::min(forget, column.size()), nothing);
   recording.simulation = physics::prepare(model, recording.inputs);
+  if (model.plant == physics::Plant::axis && model.controller) bridge_gaps(model, recording, step);
   data.recordings.push_back(std::move(recording));
 }
 
@@ -214,9 +267,11 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       }
       const double scale = robust_sigma(off);
       const double limit = (data.is_time_series ? 6.0 : 5.0) * scale;
-      // A neighbour that is off to the same side makes it a narrow effect, not a lone value.
+      // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
+      // lone value.
       const auto beside = [&](std::size_t i, std::size_t j) {
-        return data.is_time_series && j < off.size() && off[j] * std::copysign(1.0, off[i]) > 0.5 * limit;
+        return data.is_time_series && j < off.size() &&
+               off[j] * std::copysign(1.0, off[i]) > std::max(0.5 * limit, 0.2 * std::abs(off[i]));
       };
       for (std::size_t i = 0; i < off.size(); ++i)
         if (scale > 0.0 && std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) {

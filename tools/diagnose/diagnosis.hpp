@@ -1,6 +1,7 @@
 // Diagnosis: what was found, what it stands on, and what was turned down.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,12 @@ struct Finding {
 struct Rejection {
   std::string term, why;
   double gain = 0.0;  // log evidence
+};
+
+/// Where an unknown cause sits, as far as the recording tells.
+struct Suspect {
+  std::string site, place;  // "axis.force"; in words
+  std::vector<std::string> depends_on;
 };
 
 struct Detectable {
@@ -62,10 +69,11 @@ struct Diagnosis {
   std::vector<OtherRun> other_runs;
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
-  double still_follows = 0.0;  // share of the mismatch that is left and follows what was recorded
-  bool is_unnamed = false;     // the finding is a curve alone
-  bool is_partial = false;     // stopped before all was tried
-  bool has_rest = false;       // the last finding is a curve beside named ones
+  std::optional<Suspect> suspect;  // of unknown physics that has no curve either
+  double still_follows = 0.0;      // share of the mismatch that is left and follows what was recorded
+  bool is_unnamed = false;         // the finding is a curve alone
+  bool is_partial = false;         // stopped before all was tried
+  bool has_rest = false;           // the last finding is a curve beside named ones
 
   /// Remembers the best showing of a term that is not claimed.
   void reject(const std::string& term, const std::string& why, double gain);

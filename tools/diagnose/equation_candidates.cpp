@@ -108,6 +108,12 @@ std::vector<double> residual_periods(const Case& data, const physics::Model& fit
   return periods;
 }
 
+/// A state whose rate is only another state (x' = v): nothing can be missing there.
+bool is_kinematic(const physics::Equations& equations, const physics::Equations::State& state) {
+  return std::any_of(equations.states.begin(), equations.states.end(),
+                     [&](const auto& other) { return state.derivative == other.name; });
+}
+
 class Candidates {
  public:
   Candidates(const Case& data, const physics::Model& fitted)
@@ -116,11 +122,8 @@ class Candidates {
   std::vector<Start> all() {
     const double step = spans_.duration / static_cast<double>(spans_.rows);
     for (const auto& state : equations_.states) {
-      // A state whose rate is only another state (x' = v) is kinematics; nothing can be missing there.
-      const bool kinematic = std::any_of(equations_.states.begin(), equations_.states.end(),
-                                         [&](const auto& other) { return state.derivative == other.name; });
       add_felt(state.name, step);
-      if (kinematic) continue;
+      if (is_kinematic(equations_, state)) continue;
       add_rates(state.name);
       add_stores(state.name);
     }
@@ -240,6 +243,38 @@ class Candidates {
 };
 
 }  // namespace
+
+std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted) {
+  const Spans spans{data, fitted};
+  const std::size_t knots = std::clamp<std::size_t>(spans.rows / 20, 4, 8);
+  const auto& equations = data.model.equations;
+  std::vector<std::string> symbols;
+  for (const auto& state : equations.states) symbols.push_back(state.name);
+  for (const auto& input : equations.inputs) symbols.push_back(input.symbol);
+  symbols.emplace_back("t");
+  std::vector<Start> starts;
+  for (const auto& state : equations.states) {
+    if (is_kinematic(equations, state)) continue;
+    const auto& own = spans.of(state.name);
+    for (const auto& symbol : symbols) {
+      const auto& span = spans.of(symbol);
+      if (!(span.width() > 1e-9 * span.size())) continue;
+      Start start;
+      start.term.info = physics::unmodelled(Plant::equations, "state");
+      start.term.on = state.name;
+      start.term.curve.over = symbol;
+      start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration);
+      for (std::size_t k = 0; k < knots; ++k) {
+        start.term.curve.knots.push_back(span.low + span.width() * static_cast<double>(k) /
+                                                        static_cast<double>(knots - 1));
+        start.term.curve.values.push_back(0.0);
+        start.directions.push_back({physics::most_parameters, k, false});
+      }
+      starts.push_back(std::move(start));
+    }
+  }
+  return starts;
+}
 
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name) {
   const auto& span = Spans{data, model}.of(name);

@@ -62,7 +62,7 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
       Freedom f;
       f.where = Freedom::Where::curve, f.term = t, f.index = i;
       f.scale = std::max(0.1 * size, 1e-12);
-      f.sigma = 10.0 * std::max(size, 1e-11);  // keeps knots where they are that no row visits
+      f.sigma = 30.0 * std::max(size, 1e-11);
       free.push_back(f);
     }
     for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
@@ -107,6 +107,17 @@ double prior_cost(const Freedom& f, double value) {
 double prior_weight(const Freedom& f, double value) {
   const double z = (value - f.center) / f.sigma;
   return (f.where == Freedom::Where::curve ? 1.0 : (tail + 1.0) / (tail + z * z)) / (f.sigma * f.sigma);
+}
+
+/// A knot that no row visits lies between its neighbours: how far two of them may part, against the prior of one alone.
+constexpr double beside = 0.1;
+/// Calls f(k) for every two neighbours k and k + 1 of a curve.
+template <class F>
+void for_neighbours(const std::vector<Freedom>& free, F f) {
+  for (std::size_t k = 0; k + 1 < free.size(); ++k)
+    if (free[k].where == Freedom::Where::curve && free[k + 1].where == Freedom::Where::curve &&
+        free[k].term == free[k + 1].term)
+      f(k);
 }
 
 }  // namespace
@@ -289,6 +300,12 @@ Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorX
 
 }  // namespace
 
+double price_of_current(double frequency) {
+  for (const double hum : {50.0, 60.0, 100.0, 120.0, 150.0, 180.0, 300.0, 360.0})
+    if (std::abs(frequency - hum) < 0.003 * hum) return 0.0;
+  return 4.0;
+}
+
 Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
         const Fit* near) {
   Fit best;
@@ -299,6 +316,10 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
     double sum = 0.0;
     for (const auto& f : best.free)
       if (f.sigma > 0.0) sum += prior_cost(f, get(model, f));
+    for_neighbours(best.free, [&](std::size_t k) {
+      const double apart = get(model, best.free[k + 1]) - get(model, best.free[k]);
+      sum += 0.5 * std::pow(apart / (beside * best.free[k].sigma), 2);
+    });
     return sum;
   };
   const auto filtered = [&](const Eigen::VectorXd& r) {
@@ -327,6 +348,14 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       hessian(k, k) += weight;
       gradient(k) += (get(best.model, f) - f.center) * weight;
     }
+    for_neighbours(best.free, [&](std::size_t at) {
+      const auto k = static_cast<Eigen::Index>(at);
+      const double weight = 1.0 / std::pow(beside * best.free[at].sigma, 2);
+      const double pull = weight * (get(best.model, best.free[at + 1]) - get(best.model, best.free[at]));
+      gradient(k) -= pull, gradient(k + 1) += pull;
+      hessian(k, k) += weight, hessian(k + 1, k + 1) += weight;
+      hessian(k, k + 1) -= weight, hessian(k + 1, k) -= weight;
+    });
   };
   derive();
   double damping = 1e-3;
@@ -400,17 +429,10 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       if (best.model.terms[t].info->index_of(scanned) < physics::most_parameters &&
           best.model.terms[t].info->index_of("phase") < physics::most_parameters)
         complexity += 0.7 * std::log(observations);
-  // A sine in the current cannot be told from one in the force; hum sits at the mains' frequencies, shaking anywhere.
-  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t) {
-    const auto& term = best.model.terms[t];
-    if (term.info->name != "additive_disturbance" || term.values[term.info->index_of("squareness")] > 0.5)
-      continue;
-    const double f = term.values[term.info->index_of("frequency")];
-    bool mains = false;
-    for (const double hum : {50.0, 60.0, 100.0, 120.0, 150.0, 180.0, 300.0, 360.0})
-      mains = mains || std::abs(f - hum) < 0.003 * hum;
-    if (!mains) complexity += 4.0;
-  }
+  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
+    if (const auto& term = best.model.terms[t];
+        term.info->name == "additive_disturbance" && term.values[term.info->index_of("squareness")] < 0.5)
+      complexity += price_of_current(term.values[term.info->index_of("frequency")]);
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
     complexity += rarity(best.model, best.model.terms[t]);
   best.evidence = -best.cost - complexity;

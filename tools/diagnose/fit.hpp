@@ -66,6 +66,10 @@ struct Fit {
   Eigen::MatrixXd columns;   // sensitivities at or near the solution, not whitened
 };
 
+/// What it costs (log) to call a sine in time a current and not a force: one recording shows both alike. Hum sits at the
+/// mains' frequencies, shaking anywhere.
+double price_of_current(double frequency);
+
 /// From the numbers in `start`. `iterations` 0 only evaluates. The sensitivities of freedoms that `near` has too are
 /// taken from there and then kept up to date by Broyden's rule; they are found anew where a step fails.
 Fit fit(const Case& data, const Weighing& weighing, const physics::Model& start,

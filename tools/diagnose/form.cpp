@@ -8,9 +8,18 @@ namespace invar::diagnose {
 
 namespace {
 
+/// Over what a term in the user's equations goes; empty: over nothing.
+std::string variable_of(const physics::Term& term) {
+  if (!term.curve.over.empty()) return term.curve.over;
+  if (term.info->name == "constant") return "";
+  return term.with.empty() ? term.on : term.with;
+}
+
 /// Do two terms act at one place over one variable? Then the one is a course of the other, and one with a name.
 bool are_kin(const physics::Term& one, const physics::Term& other) {
   const auto &a = one.info->depends_on, &b = other.info->depends_on;
+  if (one.info->plant == physics::Plant::equations)
+    return one.on == other.on && variable_of(one) == variable_of(other);
   return one.info->site == other.info->site && one.on == other.on &&
          std::any_of(a.begin(), a.end(), [&](std::string_view name) {
            return !name.empty() && std::find(b.begin(), b.end(), name) != b.end();
@@ -35,6 +44,8 @@ Start coarser(Start start, std::size_t knots) {
 
 bool is_course_of(const physics::Term& curve, const physics::Term& term) {
   const auto& info = *term.info;
+  if (info.plant == physics::Plant::equations)
+    return curve.on == term.on && variable_of(curve) == variable_of(term);
   const auto site = info.site == "disturbance" ? std::string_view{"force"} : info.site;
   if (curve.info->site != site || (!curve.on.empty() && curve.on != term.on)) return false;
   return std::find(info.depends_on.begin(), info.depends_on.end(), curve.curve.over) != info.depends_on.end();
@@ -43,7 +54,10 @@ bool is_course_of(const physics::Term& curve, const physics::Term& term) {
 std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,
                                     const Fit& further) {
   // What goes with nothing, a steady force, is no course of what does: a curve would merely hold it as well.
-  if (further.model.terms.back().info->depends_on.front().empty()) return std::nullopt;
+  const auto& added = further.model.terms.back();
+  if (data.model.plant == physics::Plant::equations ? variable_of(added).empty()
+                                                    : added.info->depends_on.front().empty())
+    return std::nullopt;
   std::vector<Start> starts;
   for (const auto& start : unmodelled_starts(data, base))
     for (std::size_t t = data.model.terms.size(); t < base.model.terms.size(); ++t)

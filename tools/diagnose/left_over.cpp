@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "tools/diagnose/candidates.hpp"
 
@@ -47,8 +48,27 @@ std::vector<Series> causes(const Case& data, const physics::Outputs& simulated, 
   return all;
 }
 
-/// Orthonormal columns of the surface over all rows of all recordings; constants and copies drop out.
-Eigen::MatrixXd surface(const Case& data, const std::vector<physics::Outputs>& simulated) {
+/// Appends the columns, orthonormal to all before (Gram and Schmidt, twice): what hardly differs from them says nothing.
+void append(Eigen::MatrixXd& basis, std::vector<Eigen::VectorXd>& columns) {
+  Eigen::Index used = basis.cols();
+  basis.conservativeResize(Eigen::NoChange, used + static_cast<Eigen::Index>(columns.size()));
+  for (auto& column : columns) {
+    const double size = column.norm();
+    for (int pass = 0; pass < 2; ++pass)
+      column -= basis.leftCols(used) * (basis.leftCols(used).transpose() * column);
+    if (!(column.norm() > 1e-4 * size) || used * 6 > basis.rows()) continue;
+    basis.col(used++) = column.normalized();
+  }
+  basis.conservativeResize(Eigen::NoChange, used);
+}
+
+/// What is recorded of the causes, and what surfaces over them.
+struct Surface {
+  std::vector<Eigen::VectorXd> causes;  // standardised, over all rows of all recordings
+  Eigen::MatrixXd basis;                // orthonormal; constants and copies drop out
+};
+
+Surface surface(const Case& data, const std::vector<physics::Outputs>& simulated) {
   Eigen::Index rows = 0;
   for (const auto& recording : data.recordings) rows += static_cast<Eigen::Index>(recording.inputs.rows());
   std::vector<Eigen::VectorXd> direct, past;
@@ -82,58 +102,182 @@ Eigen::MatrixXd surface(const Case& data, const std::vector<physics::Outputs>& s
   for (std::size_t i = 0; i < direct.size(); ++i)
     for (std::size_t k = i; k < direct.size(); ++k) all.emplace_back(direct[i].cwiseProduct(direct[k]));
   all.insert(all.end(), past.begin(), past.end());
-  Eigen::MatrixXd basis(rows, 0);
-  for (auto& column : all) {  // Gram and Schmidt, twice: what hardly differs from the others says nothing
-    const double size = column.norm();
-    for (int pass = 0; pass < 2; ++pass) column -= basis * (basis.transpose() * column);
-    if (!(column.norm() > 1e-4 * size) || basis.cols() * 6 > rows) continue;
-    basis.conservativeResize(Eigen::NoChange, basis.cols() + 1);
-    basis.rightCols(1) = column.normalized();
+  Surface made{std::move(direct), Eigen::MatrixXd{rows, 0}};
+  append(made.basis, all);
+  return made;
+}
+
+/// What each named term does to an output, were its strength or its place to change with time or with a cause: a law has
+/// the same numbers everywhere, and a name that is not the right one needs others here than there.
+std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, std::size_t output,
+                                              const std::vector<Eigen::VectorXd>& causes) {
+  Eigen::Index rows = 0;
+  for (const auto& recording : data.recordings) rows += static_cast<Eigen::Index>(recording.inputs.rows());
+  std::vector<Eigen::VectorXd> all;
+  for (std::size_t k = 0; k < fit.free.size() && fit.columns.rows() > 0; ++k) {
+    const auto& f = fit.free[k];
+    if (f.where != Freedom::Where::term || f.term < data.model.terms.size()) continue;
+    Eigen::VectorXd effect(rows);
+    Eigen::Index from = 0, to = 0;
+    for (const auto& recording : data.recordings) {
+      const auto n = static_cast<Eigen::Index>(recording.inputs.rows());
+      const auto o = static_cast<Eigen::Index>(output),
+                 outputs = static_cast<Eigen::Index>(data.outputs.size());
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const double v = fit.columns(from + o * n + i, static_cast<Eigen::Index>(k));
+        effect(to + i) = std::isfinite(v) ? v : 0.0;
+      }
+      from += outputs * n, to += n;
+    }
+    all.push_back(effect);
+    for (const auto& cause : causes) {
+      all.emplace_back(effect.cwiseProduct(cause));
+      all.emplace_back(effect.cwiseProduct(cause).cwiseProduct(cause));
+    }
   }
-  return basis;
+  return all;
 }
 
 }  // namespace
 
-std::vector<double> followed_share(const Case& data, const physics::Model& model) {
-  const auto simulated = simulate(data, model);
-  const Eigen::MatrixXd basis = surface(data, simulated);
+namespace {
+
+/// measured - simulated of one output, recording by recording; values off by more than six sigma are brought nearer.
+std::vector<Series> left_of(const Case& data, const std::vector<physics::Outputs>& simulated,
+                            std::size_t output) {
+  std::vector<Series> left;
+  Series values;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    left.push_back(data.recordings[r].measured[output]);
+    for (std::size_t i = 0; i < left[r].size(); ++i) left[r][i] -= simulated[r][output][i];
+    values.insert(values.end(), left[r].begin(), left[r].end());
+  }
+  const double level = median(values), most = 6.0 * robust_sigma(values);
+  for (auto& one : left)
+    for (double& v : one) v = std::clamp(v - level, -most, most);
+  return left;
+}
+
+/// A share of the power that something explains, beyond what it explains of the same series shifted against the
+/// recording; each recording is turned round by the share of itself that `share_at` is given. 0: no more than chance.
+template <class ShareAt>
+double beyond_chance(ShareAt share_at) {
+  constexpr int shifts = 30;
+  double mean = 0.0, square = 0.0, largest = 0.0;
+  for (int k = 0; k < shifts; ++k) {
+    const double by_chance = share_at(0.1 + 0.8 * (k + 0.5) / shifts);
+    mean += by_chance / shifts, square += by_chance * by_chance / shifts;
+    largest = std::max(largest, by_chance);
+  }
+  const double spread = std::sqrt(std::max(0.0, square - mean * mean)), now = share_at(0.0);
+  return now > std::max(largest, mean + 4.0 * spread) && mean < 1.0 ? (now - mean) / (1.0 - mean) : 0.0;
+}
+
+/// The series one behind the other, each turned round; the mean taken away, 0 where nothing was measured.
+Eigen::VectorXd turned(const std::vector<Series>& left, double shift) {
+  Series all;
+  for (const auto& one : left) {
+    const std::size_t n = one.size(), by = static_cast<std::size_t>(shift * static_cast<double>(n));
+    for (std::size_t i = 0; i < n; ++i) all.push_back(one[(i + by) % n]);
+  }
+  Eigen::VectorXd column = Eigen::Map<Eigen::VectorXd>(all.data(), static_cast<Eigen::Index>(all.size()));
+  column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
+  column.array() -= column.mean();
+  return column;
+}
+
+/// The share that a smooth surface takes.
+double share_on(const Eigen::MatrixXd& basis, const Eigen::VectorXd& column) {
+  const double all = column.squaredNorm();
+  return all > 0.0 ? (basis.transpose() * column).squaredNorm() / all : 0.0;
+}
+
+/// The share that goes with a variable in whatever way, as fine as it may be: rows that are neighbours in its order are
+/// alike, though recorded at other times (von Neumann's ratio).
+double share_along(const std::vector<Eigen::Index>& order, const Eigen::VectorXd& column) {
+  const double all = 2.0 * column.squaredNorm();
+  double apart = 0.0;
+  for (std::size_t i = 1; i < order.size(); ++i)
+    apart += std::pow(column(order[i]) - column(order[i - 1]), 2);
+  return all > 0.0 ? 1.0 - apart / all : 0.0;
+}
+
+}  // namespace
+
+std::vector<double> followed_share(const Case& data, const Fit& fit) {
+  const auto simulated = simulate(data, fit.model);
+  auto [causes, common] = surface(data, simulated);
+  std::vector<std::vector<Eigen::Index>> orders;
+  for (const auto& cause : causes) {
+    auto& order = orders.emplace_back(static_cast<std::size_t>(cause.size()));
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&c = cause](auto a, auto b) { return c(a) < c(b); });
+  }
+  if (data.is_time_series) {
+    Eigen::VectorXd time(common.rows());
+    Eigen::Index at = 0;
+    for (const auto& recording : data.recordings)
+      for (double t : recording.inputs.time) time(at++) = t;
+    time.array() -= time.mean();
+    causes.emplace_back(time / std::max(1e-300, time.cwiseAbs().maxCoeff()));
+  }
   std::vector<double> shares;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    std::vector<Series> left;
-    Series values;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      left.push_back(data.recordings[r].measured[o]);
-      for (std::size_t i = 0; i < left[r].size(); ++i) left[r][i] -= simulated[r][o][i];
-      values.insert(values.end(), left[r].begin(), left[r].end());
-    }
-    const double level = median(values), most = 6.0 * robust_sigma(values);
-    const auto share_at = [&](double shift) {  // each recording turned round by that share of itself
-      Eigen::VectorXd column(basis.rows());
-      Eigen::Index at = 0;
-      for (const auto& one : left) {
-        const std::size_t n = one.size(), by = static_cast<std::size_t>(shift * static_cast<double>(n));
-        for (std::size_t i = 0; i < n; ++i) {
-          const double v = one[(i + by) % n] - level;
-          column(at++) = std::isfinite(v) ? std::clamp(v, -most, most) : 0.0;
-        }
-      }
-      column.array() -= column.mean();
-      const double all = column.squaredNorm();
-      return all > 0.0 ? (basis.transpose() * column).squaredNorm() / all : 0.0;
-    };
-    constexpr int shifts = 30;
-    double mean = 0.0, square = 0.0, largest = 0.0;
-    for (int k = 0; k < shifts; ++k) {
-      const double by_chance = share_at(0.1 + 0.8 * (k + 0.5) / shifts);
-      mean += by_chance / shifts, square += by_chance * by_chance / shifts;
-      largest = std::max(largest, by_chance);
-    }
-    const double spread = std::sqrt(std::max(0.0, square - mean * mean)), now = share_at(0.0);
-    shares.push_back(now > std::max(largest, mean + 4.0 * spread) && mean < 1.0 ? (now - mean) / (1.0 - mean)
-                                                                                : 0.0);
+    Eigen::MatrixXd basis = common;
+    auto changing = changing_effects(data, fit, o, causes);
+    append(basis, changing);
+    const auto left = left_of(data, simulated, o);
+    double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
+    for (const auto& order : orders)
+      share = std::max(share,
+                       beyond_chance([&](double shift) { return share_along(order, turned(left, shift)); }));
+    shares.push_back(share);
   }
   return shares;
+}
+
+bool is_louder_in_motion(const Case& data, const Fit& fit) {
+  constexpr double least = 5.0;  // coarse steps of a reading make it half as loud again at most
+  const auto simulated = simulate(data, fit.model);
+  const auto basis = surface(data, simulated).basis;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    auto power = left_of(data, simulated, o);
+    for (auto& one : power)
+      for (double& v : one) v *= v;
+    if (!(beyond_chance([&](double shift) { return share_on(basis, turned(power, shift)); }) > 0.0)) continue;
+    const Eigen::VectorXd now = turned(power, 0.0), expected = basis * (basis.transpose() * now);
+    Series sorted(expected.data(), expected.data() + expected.size());
+    std::sort(sorted.begin(), sorted.end());
+    const double low = sorted[sorted.size() / 5], high = sorted[sorted.size() * 4 / 5];
+    double quiet = 0.0, quiet_rows = 0.0, loud = 0.0, loud_rows = 0.0;
+    Eigen::Index at = 0;
+    for (const auto& one : power)
+      for (double v : one) {
+        const double e = expected(at++);
+        if (!std::isfinite(v)) continue;
+        if (e <= low) quiet += v, quiet_rows += 1.0;
+        if (e >= high) loud += v, loud_rows += 1.0;
+      }
+    if (loud * quiet_rows > least * quiet * loud_rows) return true;
+  }
+  return false;
+}
+
+bool is_above_noise(const Case& data, const Fit& fit) {
+  const auto simulated = simulate(data, fit.model);
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    const auto left = left_of(data, simulated, o);
+    double sum = 0.0, rows = 0.0;
+    for (const auto& one : left)
+      for (double v : one)
+        if (std::isfinite(v)) sum += v * v, rows += 1.0;
+    // A loop repeats the noise of its reading, at some frequencies more than once; and what is white may be a worse
+    // instrument than believed.
+    if (data.is_time_series && rows > 200.0 && std::sqrt(sum / rows) > 2.0 * data.given_noise[o] &&
+        independent_share(left) < 0.3)
+      return true;
+  }
+  return false;
 }
 
 }  // namespace invar::diagnose

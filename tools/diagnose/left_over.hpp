@@ -6,8 +6,15 @@
 namespace invar::diagnose {
 
 /// By output, the share of the power of measured - simulated that a surface of second order over all inputs, their
-/// motion and their past explains beyond what it explains of the same series shifted against the recording: chance and
-/// the colour of the noise are in both. 0 where it is no more than chance.
-std::vector<double> followed_share(const Case& data, const physics::Model& model);
+/// motion and their past, the named terms' own effects with numbers that change, or any course over one of the inputs
+/// explain beyond what they explain of the same series shifted against the recording: chance and the colour of the noise
+/// are in both. 0 where it is no more than chance.
+std::vector<double> followed_share(const Case& data, const Fit& fit);
+
+/// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
+bool is_louder_in_motion(const Case& data, const Fit& fit);
+
+/// Is it more than twice the noise that the user gave, and related from row to row?
+bool is_above_noise(const Case& data, const Fit& fit);
 
 }  // namespace invar::diagnose

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/screen.hpp"
 
@@ -52,6 +53,16 @@ double lead(const Case& data, const Fit& one, const Fit& other) {
                    std::log(std::max(10.0, independent));
 }
 
+double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other) {
+  const double evidence = one.evidence - other.evidence;
+  const bool whitened =
+      !data.is_time_series || std::any_of(weighing.filters.begin(), weighing.filters.end(),
+                                          [](const Whitening& filter) { return !filter.a.empty(); });
+  if (whitened) return evidence;
+  const double counted = lead(data, one, other);
+  return std::abs(counted) < std::abs(evidence) ? counted : evidence;
+}
+
 namespace {
 
 /// Of what `course` explains of the residual of `base`, the share of the power that `named` leaves. Terms are idealised:
@@ -81,6 +92,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::si
   for (const auto& s : instead) {
     if (s.merit < claim_margin || s.columns.size() == 0) break;
     const Fit start = with_columns(data, base, s);
+    if (data.model.plant == physics::Plant::equations && !is_affordable(data, start)) continue;
     OtherCause one;
     one.fit = fit(data, plain, start.model, data.model, 4, &start);
     one.lead = lead(data, one.fit, named);

@@ -11,6 +11,10 @@ namespace invar::diagnose {
 /// of the numbers that it has more: says which is right whatever the colour of the noise.
 double lead(const Case& data, const Fit& one, const Fit& other);
 
+/// The evidence of `one` over `other`, both under `weighing`; where its filters could not be fitted (too few rows), not
+/// more of it than independent rows give.
+double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
+
 struct OtherCause {
   Fit fit;
   double lead = 0.0;  // over the named model

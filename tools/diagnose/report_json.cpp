@@ -97,6 +97,14 @@ std::string report_json(const Case& data, const Diagnosis& d) {
           {"over", term.curve.over}, {"knots", term.curve.knots}, {"values", term.curve.values}};
     report["findings"].push_back(entry);
   }
+  if (d.suspect)
+    report["location"].push_back(
+        {{"site", d.suspect->site},
+         {"depends_on", d.suspect->depends_on},
+         {"where", json::object()},
+         {"share", d.still_follows},
+         {"why",
+          "what is left over follows what was recorded, most of all by way of the " + d.suspect->place}});
   report["parameter_corrections"] = json::array();
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];
@@ -120,12 +128,13 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   }
   json other_runs = json::object();
   for (const auto& run : d.other_runs) other_runs[run.name] = fit_json(run.fit);
-  report["fit"] = {{"heldout", fit_json(d.heldout)},
-                   {"train", fit_json(d.train)},
-                   {"other_recordings", other_runs},
-                   {"split",
-                    "every third of 18 stretches of each recording was kept from the fit; simulated without "
-                    "restart over the whole recording"}};
+  report["fit"] = {
+      {"heldout", fit_json(d.heldout)},
+      {"train", fit_json(d.train)},
+      {"other_recordings", other_runs},
+      {"split",
+       "each third of 18 stretches of each recording was kept from a fit in turn; simulated without "
+       "restart over the whole recording"}};
   report["unexplained"] = {{"residual_over_noise", d.unexplained}, {"depends_on", d.unexplained_over}};
   report["detectable"] = json::array();
   for (const auto& entry : d.detectable)

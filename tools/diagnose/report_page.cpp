@@ -281,7 +281,7 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
   for (const auto& row : d.heldout)
     if (!is_bare(row)) add_bars(page, row);
   page.paragraph(
-      "RMS of measured - simulated on every third stretch of the recording, which the fits did not see. "
+      "RMS of measured - simulated on each third of the recording in turn, which its fit did not see. "
       "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added. `Noise` "
       "is what the model file says, or the part of the residual that is not related from row to row.");
   for (const auto& run : d.other_runs) add_other_run(page, data, run);

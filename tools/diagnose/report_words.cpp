@@ -29,7 +29,8 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity", 0) == 0) names.emplace_back("velocity");
   }
-  if (data.model.plant == physics::Plant::equations) names.push_back(term.with.empty() ? term.on : term.with);
+  if (data.model.plant == physics::Plant::equations && term.curve.over.empty())
+    names.push_back(term.with.empty() ? term.on : term.with);
   return names;
 }
 
@@ -137,7 +138,7 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
   switch (d.verdict) {
     case Verdict::unknown_physics:
     case Verdict::partly_explained:
-      if (over == "time")
+      if (over == "time" || over == "t")
         return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
                "back.";
       return "Record again with " + (over.empty() ? "one input" : over) +
@@ -220,7 +221,10 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       if (d.findings.empty())
         return "Unknown physics: what the model leaves over follows what was recorded and its past, and "
                "neither a known "
-               "term nor a curve describes it.";
+               "term nor a curve describes it" +
+               (d.suspect && !d.suspect->place.empty() ? "; it looks most like the " + d.suspect->place
+                                                       : std::string{}) +
+               ".";
       return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
              " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
   }

@@ -49,6 +49,7 @@ Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::Vecto
       if (term.info->site == "actuator" || term.info->site == "thermal" || term.info->site == "measurement")
         by = 1e-3;
       if (data.model.plant == physics::Plant::sensor) by = 1e-7;
+      if (start.step > 0.0) by = start.step;
       term.curve.values[direction.knot] = by;
     } else if (direction.amplitude < none) {
       for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {

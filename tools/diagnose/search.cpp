@@ -144,7 +144,7 @@ bool Search::add_named(double round) {
       if (least_ratio(data_, settled, with_term) < 0.9)
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
-      const double gain = with_term.evidence - without.evidence;
+      const double gain = advantage(data_, own, with_term, without);
       // A further claim must be one that an engineer would see in the residual.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
       if (gain > best_gain &&
@@ -208,7 +208,7 @@ void Search::prune() {
     for (std::size_t t = given(); t < without.model.terms.size(); ++t)
       possible = possible && stands(data_, without, t);
     if (!possible) continue;
-    if (without.evidence < d_.best.evidence - claim_margin_of(d_.weighing) &&
+    if (advantage(data_, d_.weighing, d_.best, without) > claim_margin_of(d_.weighing) &&
         least_ratio(data_, d_.best, without) < 0.95)
       continue;
     d_.reject(std::string{removed.info->name}, "the others explain it without",
@@ -235,7 +235,7 @@ void Search::weigh_alternatives() {
         Model model = d_.best.model;
         model.terms[place] = rival;
         auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
-        const double odds = f.evidence - d_.best.evidence;
+        const double odds = advantage(data_, d_.weighing, f, d_.best);
         if (odds > 0.5 && stands(data_, f, place)) {  // better after all, beside the other terms
           kept.push_back(d_.best.model.terms[place]);
           finding.alternatives.push_back({d_.best.model.terms[place], -odds});

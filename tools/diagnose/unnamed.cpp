@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/screen.hpp"
 
@@ -67,6 +68,7 @@ void add_unnamed(const Case& data, Diagnosis& d) {
     for (const auto& s : screened) {
       if (tried++ >= 3 || s.merit < claim_margin) break;
       const Fit near = with_columns(data, under_plain, s);
+      if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) continue;
       auto rough = fit(data, plain, near.model, data.model, 2, &near);
       const Weighing own = weigh(data, simulate(data, rough.model));
       auto curved = fit(data, own, rough.model, data.model, 3, &rough);
@@ -77,8 +79,8 @@ void add_unnamed(const Case& data, Diagnosis& d) {
       const double gain = curved.evidence - without.evidence;
       // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
       // independent rows.
-      if (s.start.term.curve.over == "time" && least_ratio(data, rough, under_plain) > 0.9 &&
-          lead(data, rough, under_plain) < 2.0 * claim_margin)
+      if ((s.start.term.curve.over == "time" || s.start.term.curve.over == "t") &&
+          least_ratio(data, rough, under_plain) > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)
         continue;
       // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
       if (gain > claim_margin && rough.evidence > best.plain)

@@ -6,7 +6,7 @@
 
 namespace invar::diagnose {
 
-/// Fits without every third stretch and compares there; takes findings back that do not help on it.
+/// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them.
 void hold_out(const Case& data, Diagnosis& d, bool refuses = true);
 /// What of each screened term would just have been seen.
 void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d);

@@ -277,6 +277,10 @@ Machine make_axis(const Wish& wish, Draw& draw) {
         draw = as_begun;
         Wish less = wish;
         less.size *= 0.5;
+        if (wish.effects.empty() || less.size < 0.01) {  // it is not the effect: another machine
+          less.size = wish.size;
+          (void)draw.normal();
+        }
         return make_axis(less, draw);
       }
     machine.recordings.push_back(table(reference, &temperature, &trace));
