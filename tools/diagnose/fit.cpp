@@ -112,6 +112,7 @@ double prior_weight(const Freedom& f, double value) {
 }  // namespace
 
 std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
+  if (data.stopped && data.stopped()) throw Stopped{};
   std::vector<physics::Outputs> all(data.recordings.size());
   for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
   return all;
