@@ -41,9 +41,9 @@ struct Known {
   unsigned seed;
   std::size_t rows = 0;
 };
-constexpr Known known[] = {{"thermal", "sensor_lag", 3},      {"error_map", "periodic_error", 5},
-                           {"droplet", "lens_distortion", 4}, {"sensor", "latency", 8},
-                           {"axis", "coulomb_friction", 3},   {"equations", "cubic", 3}};
+constexpr Known known[] = {{"thermal", "sensor_lag", 3},         {"error_map", "periodic_error", 5},
+                           {"droplet", "lens_distortion", 4},    {"sensor", "latency", 8},
+                           {"axis", "force_ripple", 3001, 4000}, {"equations", "cubic", 3}};
 
 /// A unit and another of the same quantity: other = factor * value + offset.
 struct OtherUnit {
