@@ -2,7 +2,9 @@
 
 #include <cmath>
 
+#include "core/compensation/droplet_model.hpp"
 #include "core/compensation/trajectory_file.hpp"
+#include "core/model/model_file.hpp"
 
 namespace invar::dispenser {
 
@@ -76,8 +78,18 @@ void Dispenser::obey(const PressureCommand& command) noexcept {
 
 /// Why this model must not move targets; empty: it may.
 std::string Dispenser::load(const std::filesystem::path& file, Staged::Model& model) const {
-  model.content = compensation::load_trajectory(file);
-  model.checksum = compensation::check_seal(config::Yaml::load(file));
+  const auto yaml = config::Yaml::load(file);
+  if (yaml.root().has("invar_model")) {
+    const auto diagnosed = model::read(yaml);
+    yaml.finish();
+    if (diagnosed.plant != physics::Plant::droplet)
+      return "it is a model of plant " + std::string{physics::name_of(diagnosed.plant)} + ", not of a head";
+    model.content = compensation::trajectory_of(diagnosed);
+    model.checksum = compensation::checksum_number(compensation::checksum(yaml.text()));
+  } else {
+    model.content = compensation::load_trajectory(file);
+    model.checksum = compensation::check_seal(yaml);
+  }
   for (const double height : {model.content.least_height, model.content.most_height})
     if (!(model.content.offset(height).norm() <= parameters_.bound))
       return "it moves targets by more than the bound of " + std::to_string(parameters_.bound * 1e6) + " um";

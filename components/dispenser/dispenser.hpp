@@ -21,7 +21,8 @@ namespace invar::dispenser {
 /// The slow half of a dispenser, for a worker; `valve` in the motion loop is the fast one. Keeps pressure and purge pressure at
 /// their setpoints, lets go of both on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
 /// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use
-/// (compensation.yaml of kind dispenser; a StagedModel as the stage's is). Not real-time (Modbus).
+/// (compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet; a StagedModel as the stage's is). Not
+/// real-time (Modbus).
 class Dispenser final : public Component {
  public:
   struct Parameters {
@@ -41,7 +42,8 @@ class Dispenser final : public Component {
       p(band, "band", "Pa", Range{10.0, 5e4}, "in band: pressure no farther from its setpoint");
       p(pressurise, "pressurise", "from the start; otherwise by command");
       p(model, "model",
-        "compensation.yaml (dispenser) in use from the start; none: targets stay as they are");
+        "compensation.yaml (dispenser) or model.yaml (droplet) in use from the start; none: targets stay as "
+        "they are");
       p(bound, "bound", "m", Range{0.0, 0.1}, "a model that moves a target farther is refused");
       p(largest_sigma, "largest_sigma", "m", Range{0.0, 0.1},
         "a pattern at a height where the model is less certain is refused");

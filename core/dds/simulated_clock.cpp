@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <random>
+#include <set>
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
@@ -232,8 +234,43 @@ void SimulatedClockClient::bind(InputPort& port) {
   const WireType* type = WireTypes::all().find(port.type());
   if (type == nullptr)
     throw InputError{"topic `" + port.topic + "`", "carries a type that no IDL describes", "add it to idl/"};
-  inputs_.push_back({port.topic, type->attach(port, false)});
+  inputs_.push_back({port.topic, type->attach(port, false), type->name(), port.profile,
+                     port.direction() == Port::Direction::inbox});
   membership_.wanted.push_back(port.topic);
+}
+
+void SimulatedClockClient::listen_outside() {
+  std::set<std::string> heard;
+  for (const auto& input : inputs_) {
+    if (!input.is_inbox || !heard.insert(input.topic).second) continue;
+    outside_readers_.push_back(node_.raw_reader(
+        input.topic, input.type, node_.profile(input.profile),
+        [this, topic = input.topic](const RawSample& sample) {
+          const std::lock_guard lock{mutex_};
+          for (const auto& one : inputs_)
+            if (one.topic == topic)
+              outside_.push_back(
+                  {std::string{sample.writer}, one.inlet.get(), {sample.cdr.begin(), sample.cdr.end()}});
+        }));
+  }
+}
+
+/// What the cell's own processes write comes in bundles; by DDS they are heard a second time, and not listened to.
+void SimulatedClockClient::deliver_outside(Instant at) {
+  std::vector<FromOutside> came;
+  {
+    const std::lock_guard lock{mutex_};
+    came.swap(outside_);
+  }
+  if (came.empty()) return;
+  const std::string own = "invar/" + node_.options().cell + "/";
+  std::map<std::string, std::string> participants;  // by writer
+  for (auto& endpoint : node_.snapshot().endpoints)
+    participants[endpoint.id] = std::move(endpoint.participant);
+  for (const auto& sample : came)
+    if (const auto found = participants.find(sample.writer);
+        found != participants.end() && !found->second.starts_with(own))
+      (void)sample.inlet->deliver(sample.cdr, at);  // what is malformed is a stranger's
 }
 
 void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) {
@@ -273,6 +310,7 @@ SimulatedClockClient::Run SimulatedClockClient::run(const std::function<std::str
         if (!of_this_run) break;
         bundle_.clear();
         std::string failure = deliver_all(*grant);
+        deliver_outside({grant->head.from_ns()});
         if (failure.empty()) failure = advance({grant->head.until_ns()});
         answer(grant->head, bundle_.bytes(), is_finished(), failure);
         break;

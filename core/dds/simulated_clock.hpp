@@ -119,6 +119,9 @@ class SimulatedClockClient {
   void bind(OutputPort& port, Duration separation = {});
   /// Several may be bound to one topic.
   void bind(InputPort& port);
+  /// Set-up, after the ports are bound: inboxes also hear writers that belong to no process of the cell, such as
+  /// `invar job apply`. What they say arrives with the window after it came, so such a run repeats only as they do.
+  void listen_outside();
   /// Set-up. Sees every sample of every process, this one included, in one fixed order.
   void tap(std::function<void(const LockstepSample&)> sink);
 
@@ -135,6 +138,14 @@ class SimulatedClockClient {
   struct Binding {
     std::string topic;
     std::shared_ptr<Inlet> inlet;
+    std::string type, profile;
+    bool is_inbox = false;
+  };
+  /// A sample that came by DDS.
+  struct FromOutside {
+    std::string writer;
+    Inlet* inlet = nullptr;
+    std::vector<std::byte> cdr;
   };
   struct Peer {
     std::string name;
@@ -154,6 +165,7 @@ class SimulatedClockClient {
   void answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples, bool finished,
               const std::string& failure);
   void learn(std::uint32_t process, const Membership& membership);
+  void deliver_outside(Instant at);
   /// False: malformed.
   bool deliver(std::uint32_t process, std::span<const std::uint8_t> bundle, Instant at);
 
@@ -172,6 +184,8 @@ class SimulatedClockClient {
   std::deque<Grant> grants_;
   Writer<lockstep::TimeReached> writer_;
   std::unique_ptr<Connection> reader_;
+  std::vector<FromOutside> outside_;
+  std::vector<std::unique_ptr<Connection>> outside_readers_;
 };
 
 }  // namespace invar::dds

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
+#include <type_traits>
 
 #include "core/model/record_file.hpp"
 #include "core/recording/cdr.hpp"
@@ -81,11 +84,33 @@ std::string names_of(const recording::Type& type) {
   return list;
 }
 
-/// One message: its stamp and the values of the columns that are read from its topic.
-struct Sample {
-  std::int64_t time = 0, cycle = 0;
-  bool enabled = true;
-  std::vector<double> values;
+/// The messages of a topic: their stamps and what the model wants of them. In columns, since an hour of a loop is millions.
+struct Samples {
+  std::vector<std::int64_t> time, cycle;
+  std::vector<bool> enabled;
+  std::vector<std::vector<double>> values;  // by source of the topic
+
+  [[nodiscard]] std::size_t size() const { return time.size(); }
+  /// By stamp, one each.
+  void put_in_order() {
+    if (std::adjacent_find(time.begin(), time.end(), std::greater_equal<>{}) == time.end()) return;
+    std::vector<std::size_t> order(size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [this](auto a, auto b) { return time[a] < time[b]; });
+    const auto twice =
+        std::unique(order.begin(), order.end(), [this](auto a, auto b) { return time[a] == time[b]; });
+    order.erase(twice, order.end());
+    const auto reorder = [&](auto& column) {
+      std::remove_reference_t<decltype(column)> ordered;
+      ordered.reserve(order.size());
+      for (const auto i : order) ordered.push_back(column[i]);
+      column = std::move(ordered);
+    };
+    for (auto& column : values) reorder(column);
+    reorder(enabled);
+    reorder(cycle);
+    reorder(time);  // last: the order is by it
+  }
 };
 
 /// A topic of the recording with what the model wants of it.
@@ -95,7 +120,7 @@ struct Topic {
   std::vector<Source> sources;
   std::vector<std::pair<std::string, double>> instance;
   std::vector<std::string> units;
-  std::vector<Sample> samples;  // by stamp
+  Samples samples;
 };
 
 class Reader {
@@ -112,10 +137,10 @@ class Reader {
     std::size_t begin = 0;
     while (begin < clock.samples.size()) {
       std::size_t end = begin + 1;
-      while (end < clock.samples.size() && clock.samples[end].enabled == clock.samples[begin].enabled &&
-             clock.samples[end].cycle > clock.samples[end - 1].cycle)
+      while (end < clock.samples.size() && clock.samples.enabled[end] == clock.samples.enabled[begin] &&
+             clock.samples.cycle[end] > clock.samples.cycle[end - 1])
         ++end;
-      if (clock.samples[begin].enabled) {
+      if (clock.samples.enabled[begin]) {
         auto rows = table(begin, end);
         tables.push_back(begin == 0 && has_enabled_ ? from_standstill(std::move(rows)) : std::move(rows));
       }
@@ -241,25 +266,24 @@ class Reader {
           !is_new && known->second != key)
         refuse("`" + topic.name + "` carries several instances",
                "say which, such as `stage_x.state[axis=0].position`");
-      Sample sample;
-      sample.time = static_cast<std::int64_t>(std::get<std::int64_t>(value.at("at.time_ns")->content));
-      sample.cycle = static_cast<std::int64_t>(std::get<std::uint64_t>(value.at("at.cycle")->content));
+      Samples& samples = topic.samples;
+      samples.time.push_back(std::get<std::int64_t>(value.at("at.time_ns")->content));
+      samples.cycle.push_back(
+          static_cast<std::int64_t>(std::get<std::uint64_t>(value.at("at.cycle")->content)));
+      samples.enabled.push_back(true);
       if (const auto* enabled = value.at("enabled"); enabled != nullptr && enabled->number())
-        sample.enabled = *enabled->number() != 0.0, has_enabled_ = has_enabled_ || &topic == clock_;
-      for (const auto& source : topic.sources) {
+        samples.enabled.back() = *enabled->number() != 0.0, has_enabled_ = has_enabled_ || &topic == clock_;
+      samples.values.resize(topic.sources.size());
+      for (std::size_t k = 0; k < topic.sources.size(); ++k) {
         double sum = 0.0;
-        for (const auto& field : source.fields) sum += value.at(field)->number().value_or(nothing);
-        sample.values.push_back(sum);
+        for (const auto& field : topic.sources[k].fields) sum += value.at(field)->number().value_or(nothing);
+        samples.values[k].push_back(sum);
       }
-      topic.samples.push_back(std::move(sample));
     }
     for (auto& [name, topic] : topics_) {
-      if (topic.samples.empty()) refuse("`" + name + "` holds no sample", "record it while the cell runs");
-      std::stable_sort(topic.samples.begin(), topic.samples.end(),
-                       [](const auto& a, const auto& b) { return a.time < b.time; });
-      const auto twice = std::unique(topic.samples.begin(), topic.samples.end(),
-                                     [](const auto& a, const auto& b) { return a.time == b.time; });
-      topic.samples.erase(twice, topic.samples.end());
+      if (topic.samples.size() == 0)
+        refuse("`" + name + "` holds no sample", "record it while the cell runs");
+      topic.samples.put_in_order();
     }
   }
 
@@ -269,13 +293,15 @@ class Reader {
     std::vector<std::int64_t> steps;
     std::vector<double> periods;
     for (std::size_t i = 1; i < samples.size(); ++i) {
-      steps.push_back(samples[i].cycle - samples[i - 1].cycle);
+      steps.push_back(samples.cycle[i] - samples.cycle[i - 1]);
       if (steps.back() > 0)
-        periods.push_back(1e-9 * static_cast<double>(samples[i].time - samples[i - 1].time) /
+        periods.push_back(1e-9 * static_cast<double>(samples.time[i] - samples.time[i - 1]) /
                           static_cast<double>(steps.back()));
     }
     if (periods.size() < 8) refuse("`" + clock.name + "` holds hardly a sample", "record for longer");
-    const auto middle = [](auto values) {
+    std::int64_t missing = 0;
+    for (const auto step : steps) missing += std::max<std::int64_t>(0, step - 1);
+    const auto middle = [](auto& values) {
       std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
                        values.end());
       return values[values.size() / 2];
@@ -292,8 +318,6 @@ class Reader {
                     1.0 / period_, model_.controller->rate);
       refuse(text, "write the loop's rate into `controller`");
     }
-    std::int64_t missing = 0;
-    for (const auto step : steps) missing += std::max<std::int64_t>(0, step - 1);
     const auto all = static_cast<std::int64_t>(samples.size()) + missing;
     if (static_cast<double>(missing) > most_lost * static_cast<double>(all))
       refuse("lacks " + std::to_string(missing) + " of " + std::to_string(all) + " cycles of `" + clock.name +
@@ -307,15 +331,15 @@ class Reader {
     std::vector<double> time;
     const auto& rows = clock_->samples;
     for (std::size_t row = begin; row < end; ++row)
-      time.push_back(period_ * static_cast<double>(rows[row].cycle - rows[begin].cycle));
+      time.push_back(period_ * static_cast<double>(rows.cycle[row] - rows.cycle[begin]));
     table.add(model_.signal("time")->column, "s", std::move(time));
     for (const auto& [name, topic] : topics_)
       for (std::size_t k = 0; k < topic.sources.size(); ++k) {
         std::vector<double> values;
         std::size_t next = 0;
         for (std::size_t row = begin; row < end; ++row) {
-          while (next < topic.samples.size() && topic.samples[next].time <= rows[row].time) ++next;
-          values.push_back(next == 0 ? nothing : topic.samples[next - 1].values[k]);
+          while (next < topic.samples.size() && topic.samples.time[next] <= rows.time[row]) ++next;
+          values.push_back(next == 0 ? nothing : topic.samples.values[k][next - 1]);
         }
         table.add(topic.sources[k].text, topic.units[k], std::move(values));
       }

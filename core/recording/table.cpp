@@ -19,25 +19,60 @@ namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
-std::string read_all(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) throw InputError{file.string(), "is a folder", "name a CSV file"};
-  const std::unique_ptr<gzFile_s, int (*)(gzFile)> stream{gzopen(file.c_str(), "rb"),
-                                                          gzclose};  // reads plain files too
-  if (!stream) throw InputError{file.string(), "cannot be read", "check the path and its permissions"};
-  std::string text;
-  std::string block(1U << 18U, '\0');
-  for (;;) {
-    const int got = gzread(stream.get(), block.data(), static_cast<unsigned>(block.size()));
-    if (got < 0) throw InputError{file.string(), "is damaged (gzip cannot unpack it)", "copy the file again"};
-    if (got == 0) break;
-    text.append(block, 0, static_cast<std::size_t>(got));
+/// The lines of a text file, plain or gzip, unpacked block by block: an hour at 1 kHz is hundreds of megabytes of text.
+class Lines {
+ public:
+  explicit Lines(const std::filesystem::path& file) : file_{file.string()} {
+    if (std::filesystem::is_directory(file)) throw InputError{file_, "is a folder", "name a CSV file"};
+    stream_.reset(gzopen(file.c_str(), "rb"));  // reads plain files too
+    if (!stream_) throw InputError{file_, "cannot be read", "check the path and its permissions"};
+    (void)gzbuffer(stream_.get(), 1U << 17U);
+    more();
+    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
   }
-  int status = 0;
-  gzerror(stream.get(), &status);
-  if (status == Z_BUF_ERROR)
-    throw InputError{file.string(), "is cut off (gzip ends early)", "copy the file again"};
-  return text;
-}
+
+  /// The next line without its end, good until the next call; false where there are no more.
+  bool next(std::string_view& line) {
+    auto end = text_.find('\n', at_);
+    while (end == std::string::npos && !ended_) {
+      const std::size_t seen = text_.size() - at_;
+      more();
+      end = text_.find('\n', at_ + seen);
+    }
+    if (at_ >= text_.size()) return false;
+    line = std::string_view{text_}.substr(at_, end == std::string::npos ? end : end - at_);
+    at_ = end == std::string::npos ? text_.size() : end + 1;
+    return true;
+  }
+  /// Throws where the rest of the file is damaged: that is what is wrong with it then, whatever a line seems to lack.
+  void check_rest() {
+    while (!ended_) at_ = text_.size(), more();
+  }
+
+ private:
+  void more() {
+    text_.erase(0, std::exchange(at_, 0));
+    const std::size_t kept = text_.size();
+    text_.resize(kept + block);
+    const int got = gzread(stream_.get(), text_.data() + kept, static_cast<unsigned>(block));
+    if (got < 0) throw InputError{file_, "is damaged (gzip cannot unpack it)", "copy the file again"};
+    text_.resize(kept + static_cast<std::size_t>(got));
+    if (text_.find('\0', kept) != std::string::npos)
+      throw InputError{file_, "is not a text file", "name a CSV file"};
+    if (got > 0) return;
+    ended_ = true;
+    int status = 0;
+    gzerror(stream_.get(), &status);
+    if (status == Z_BUF_ERROR) throw InputError{file_, "is cut off (gzip ends early)", "copy the file again"};
+  }
+
+  static constexpr std::size_t block = 1U << 18U;
+  std::string file_;
+  std::unique_ptr<gzFile_s, int (*)(gzFile)> stream_{nullptr, gzclose};
+  std::string text_;  // from the line at `at_` to the end of the last block
+  std::size_t at_ = 0;
+  bool ended_ = false;
+};
 
 std::string_view trimmed(std::string_view text) {
   const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
@@ -103,41 +138,38 @@ Column header(std::string_view cell, const std::string& where) {
 }  // namespace
 
 Table Table::read(const std::filesystem::path& file, const std::vector<std::string>& text_columns) {
-  const std::string text = read_all(file);
-  std::string_view rest = text;
-  if (rest.starts_with("\xEF\xBB\xBF")) rest.remove_prefix(3);
-  if (rest.find('\0') != std::string_view::npos)
-    throw InputError{file.string(), "is not a text file", "name a CSV file"};
+  Lines lines{file};
   Table table;
   table.file = file;
   std::vector<std::string_view> cells;
   std::vector<bool> is_text;
-  std::size_t line_number = 0;
-  while (!rest.empty()) {
-    const auto end = rest.find('\n');
-    const std::string_view line = rest.substr(0, end);
-    rest.remove_prefix(end == std::string_view::npos ? rest.size() : end + 1);
-    ++line_number;
+  std::string_view line;
+  for (std::size_t line_number = 1; lines.next(line); ++line_number) {
     if (trimmed(line).empty()) continue;
-    const std::string where = file.string() + ":" + std::to_string(line_number);
+    const auto where = [&] { return file.string() + ":" + std::to_string(line_number); };
+    const auto refuse = [&](const std::string& at, const std::string& what, const std::string& mend) {
+      const InputError fault{at, what,
+                             mend};  // its text is the line's, which the rest of the file overwrites
+      lines.check_rest();
+      throw fault;
+    };
     split(line, cells);
     if (table.columns.empty()) {
       std::set<std::string> names;
       for (const auto cell : cells) {
-        table.columns.push_back(header(cell, where));
+        table.columns.push_back(header(cell, where()));
         if (!names.insert(table.columns.back().name).second)
-          throw InputError{where, "column `" + table.columns.back().name + "` stands twice",
-                           "keep one of them"};
+          refuse(where(), "column `" + table.columns.back().name + "` stands twice", "keep one of them");
         is_text.push_back(std::find(text_columns.begin(), text_columns.end(), table.columns.back().name) !=
                           text_columns.end());
       }
       continue;
     }
     if (cells.size() != table.columns.size())
-      throw InputError{where,
-                       "this row has " + std::to_string(cells.size()) + " cells, the header " +
-                           std::to_string(table.columns.size()),
-                       "give every row one cell a column (an empty one where a value is missing)"};
+      refuse(where(),
+             "this row has " + std::to_string(cells.size()) + " cells, the header " +
+                 std::to_string(table.columns.size()),
+             "give every row one cell a column (an empty one where a value is missing)");
     for (std::size_t i = 0; i < cells.size(); ++i) {
       Column& column = table.columns[i];
       const auto value = number(cells[i]);
@@ -147,12 +179,12 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
         continue;
       }
       if (!value)
-        throw InputError{where + ": column `" + column.name + "`",
-                         "`" + std::string{cells[i]} + "` is not a number",
-                         "write a number, or leave the cell empty"};
+        refuse(where() + ": column `" + column.name + "`", "`" + std::string{cells[i]} + "` is not a number",
+               "write a number, or leave the cell empty");
       column.values.push_back(*value);
     }
   }
+  for (Column& column : table.columns) column.values.shrink_to_fit();
   if (table.columns.empty())
     throw InputError{file.string(), "is empty", "begin with a header `name [unit],...`"};
   if (table.rows() == 0)

@@ -6,7 +6,9 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
+#include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
@@ -22,11 +24,31 @@ struct Row {
   double still_follows = 0.0;
 };
 
+physics::Plant plant_of(const Machine& machine) {
+  physics::Plant plant{};
+  (void)physics::plant_by_name(machine.plant, plant);
+  return plant;
+}
+
+/// All but the right names and as many others as make `keep`, drawn at random.
+std::set<std::string, std::less<>> all_but(std::size_t keep, const Machine& machine, unsigned seed) {
+  std::vector<std::string> others;
+  for (const auto* info : physics::terms_of(plant_of(machine)))
+    if (credit(machine, std::string{info->name}) < 1.0) others.emplace_back(info->name);
+  Draw draw{seed};
+  for (std::size_t i = others.size(); i > 1; --i) std::swap(others[i - 1], others[draw.index(i)]);
+  const std::size_t right = machine.missing.size();
+  others.erase(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                    others.size(), keep > right ? keep - right : 0)));
+  return {others.begin(), others.end()};
+}
+
 Row run(const std::string& plant, const std::string& effect, double size, unsigned seed,
-        const Trouble& trouble, bool leave_out) {
+        const Trouble& trouble, bool leave_out, std::optional<std::size_t> keep) {
   diagnose::Options options;
   Row row;
   row.machine = make(plant, effect, size, seed, trouble);
+  if (keep) options.without = all_but(*keep, row.machine, seed);
   if (leave_out)
     for (auto& missing : row.machine.missing) {
       for (const auto& [name, credit] : missing.names)
@@ -130,6 +152,9 @@ int main(int argc, char** argv) {
   unsigned machine = 0;
   program.add_option("--machine", machine, "the one of this seed alone");
   program.add_option("--pairs", pairs, "machines of each plant with two effects");
+  std::optional<std::size_t> keep;
+  program.add_option("--keep", keep,
+                     "names that stay in the library: the right ones and others drawn at random");
   std::size_t rows = 0;
   program.add_option("--rows", rows, "of a recording (axis, thermal); 0: some thousands");
   std::filesystem::path folder;
@@ -158,9 +183,9 @@ int main(int argc, char** argv) {
             folder / (plant + "-" + effect + "-" + std::to_string(number)));
       return;
     }
-    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out);
+    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out, keep);
     std::printf(
-        "%-9s %-34s seed %5u size %.2f%s%s win %9.1f  v %.1f l %.1f n %.1f false %d fit %5.2f %5.1f s  %s: "
+        "%-9s %-34s seed %5u size %.2f%s%s win %9.1f  v %.1f l %.1f n %.1f false %d fit %5.2f %6.2f s  %s: "
         "%s\n",
         plant.c_str(), effect.c_str(), number, row.machine.size,
         colours[static_cast<std::size_t>(trouble.colour)],

@@ -119,6 +119,22 @@ case $part in
     refuses 2 "--model: is missing; name the model's file, or give --rollback or --none" $cell stage_x
     refuses 2 "nowhere.yaml" $cell stage_x --model nowhere.yaml
     refuses 2 "COMPONENT: \`stage_z\` is no component of" $cell stage_z --model $believed
+    # A model of another plant: one line that says who takes it, or what does in its stead.
+    model() { # PLANT MORE
+      printf 'invar_model: 1\nplant: %s\n%b\n' "$1" "$2" >other.yaml
+    }
+    model error_map 'columns: {time: t, position: x, error: e}\nparameters: {reference_temperature: {value: 20, unit: degC}}\nbaseline: {positions: [0, 0.1, 0.2], errors: [0, 1e-6, 0]}'
+    refuses 2 "is of plant error_map, which no component takes; give compensation what" $cell stage_x --model other.yaml
+    model sensor 'columns: {time: t, true_position: x, encoder: e}\nparameters: {resolution: {value: 1e-6, unit: m}}'
+    refuses 2 "is of plant sensor, which no component takes; give fusion what" $cell stage_x --model other.yaml
+    model thermal 'columns: {time: t}\nnodes: {slide: {column: s, capacity: {value: 850, unit: J/K}, loss: {value: 9, unit: W/K}}}\nheaters: {pad: {node: slide, column: p, gain: {value: 1, unit: W/W}}}\nambient: a'
+    refuses 2 "is of plant thermal, which no component takes; the component thermal has gains" $cell stage_x --model other.yaml
+    head='columns: {target_x: a, target_y: b, height: h, time: t, landed_x: x, landed_y: y}\nparameters: {placement_error_x: {value: 1e-6, unit: m}, placement_error_y: {value: 0, unit: m}, slope_x: {value: 0, unit: 1}, slope_y: {value: 0, unit: 1}, speed: {value: 2, unit: m/s}}'
+    model droplet "$head"
+    refuses 2 "is for a dispenser; \`stage_x\` is of type stage; the cell has no dispenser" $cell stage_x --model other.yaml
+    refuses 2 "is for a stage; \`dispenser\` is of type dispenser; give it to stage_x, stage_y" deployment/print-cell.yaml dispenser --model $believed
+    model droplet "$head\nterms: [{term: air_drag, diameter: {value: 5e-4, unit: m}}]"
+    refuses 2 "terms[0]: a dispenser cannot aim by \`air_drag\`: its shift is not straight in the height; take it out, or give --partly" $cell stage_x --model other.yaml
     ;;
   *) fail "$part is none of the parts" ;;
 esac

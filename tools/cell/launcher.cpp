@@ -66,6 +66,7 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
                                  outcome_of(process, folder).string()};
   std::filesystem::remove(outcome_of(process, folder));  // of an earlier life
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
+  if (simulated && options.pace > 0.0) words.insert(words.end(), {"--pace", std::to_string(options.pace)});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);

@@ -220,6 +220,7 @@ class RunningProcess {
       else if (port.direction() == Port::Direction::inbox || !is_written_here(port.topic))
         clock.bind(static_cast<InputPort&>(port));
     });
+    if (options_.paced) clock.listen_outside();
     if (recorder_ != nullptr)
       clock.tap([this](const dds::LockstepSample& sample) {
         if (!recorder_->is_wanted(sample.topic.topic)) return;

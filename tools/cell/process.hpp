@@ -11,7 +11,8 @@ struct ProcessOptions {
   std::filesystem::path cell;
   std::string process;
   bool simulated = false;
-  std::string job;  // started at once where this process has the component that runs it; ends with it
+  bool paced = false;  // simulated time with somebody beside it, whose commands count
+  std::string job;     // started at once where this process has the component that runs it; ends with it
   std::filesystem::path outcome;  // file for what became of it, as JSON; empty: none
 };
 

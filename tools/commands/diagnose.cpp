@@ -39,14 +39,25 @@ void write_text(const std::filesystem::path& file, const std::string& text) {
   std::filesystem::rename(temporary, file);
 }
 
-/// `[######--------------]  31 %  fitting the short list`
-void show_progress(double share, const std::string& what) {
-  constexpr int width = 24;
-  std::string bar(width, '-');
-  std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(share * width), '#');
-  std::cerr << "\r\033[K[" << bar << "] " << std::setw(3) << static_cast<int>(100.0 * share) << " %  " << what
-            << std::flush;
-}
+/// `[######--------------]  31 %  fitting the short list`, on a terminal alone; gone when it goes, also by a fault.
+class ProgressLine {
+ public:
+  ~ProgressLine() { clear(); }
+  void show(double share, const std::string& what) const {
+    if (!is_seen_) return;
+    constexpr int width = 24;
+    std::string bar(width, '-');
+    std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(share * width), '#');
+    std::cerr << "\r\033[K[" << bar << "] " << std::setw(3) << static_cast<int>(100.0 * share) << " %  "
+              << what << std::flush;
+  }
+  void clear() const {
+    if (is_seen_) std::cerr << "\r\033[K" << std::flush;
+  }
+
+ private:
+  bool is_seen_ = isatty(STDERR_FILENO) == 1;
+};
 
 int run(const Options& options) {
   if (!options.check_outputs.empty() && options.check_outputs.size() != options.checks.size())
@@ -57,22 +68,21 @@ int run(const Options& options) {
   const auto yaml = config::Yaml::load(options.model);
   const auto model = model::read(yaml);
   yaml.finish();
+  const ProgressLine line;
+  const auto progress = [&](double share, const std::string& what) { line.show(share, what); };
+  progress(0.0, "reading");
   auto data = diagnose::load_case(model, options.recordings);
   std::vector<diagnose::OtherRun> checks;  // read before the search: what is unusable is said at once
   for (std::size_t i = 0; i < options.checks.size(); ++i)
     checks.push_back(diagnose::read_other_run(
         model, {options.checks[i], options.check_outputs.empty() ? "" : options.check_outputs[i],
                 options.fits_check_start}));
-  const bool terminal = isatty(STDERR_FILENO) == 1;
-  const auto progress = [&](double share, const std::string& what) {
-    if (terminal) show_progress(share, what);
-  };
   // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
   diagnose::Options how;
   how.stopped = interrupted;
   (void)interrupted();
   auto diagnosis = diagnose::search(data, progress, how);
-  if (terminal) std::cerr << "\r\033[K";
+  line.clear();
   for (auto& run : checks) {
     diagnose::compare(data, diagnosis, run);
     diagnosis.other_runs.push_back(std::move(run));

@@ -1,5 +1,7 @@
 // `invar job apply`: a model into a running component - a diagnosis's into a stage, which feeds forward its forces; a
 // calibration's into the compensation or the dispenser - or out of it.
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -8,6 +10,7 @@
 #include <optional>
 #include <random>
 
+#include "core/compensation/droplet_model.hpp"
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/axis_feedforward.hpp"
@@ -31,27 +34,69 @@ struct Options {
   bool partly = false;
 };
 
-/// The file's faults are said here, before anything is asked of the cell.
-void check_model(const std::filesystem::path& file, bool partly) {
+/// Which type of component takes a model of a plant; empty: none, and what to do instead.
+struct Taker {
+  physics::Plant plant;
+  std::string_view type, otherwise;
+};
+constexpr Taker takers[] = {
+    {physics::Plant::axis, "stage", ""},
+    {physics::Plant::droplet, "dispenser", ""},
+    {physics::Plant::error_map, "",
+     "give compensation what `invar calibrate thermal` or `geometric` makes of the same readings"},
+    {physics::Plant::sensor, "", "give fusion what `invar calibrate fusion` makes of the same readings"},
+    {physics::Plant::thermal, "",
+     "the component thermal has gains, no model; `invar simulate` runs this one"},
+    {physics::Plant::equations, "", "`invar simulate` runs it"}};
+
+std::string_view why_not_used(const physics::Term& term, physics::Plant plant) {
+  return plant == physics::Plant::axis ? physics::why_not_fed_forward(term)
+                                       : compensation::why_not_aimed_by(term);
+}
+
+/// The file's faults are said here, before anything is asked of the cell. Returns the type of component that takes it; empty:
+/// the cell decides.
+std::string_view check_model(const std::filesystem::path& file, bool partly) {
   const auto yaml = config::Yaml::load(file);
   if (yaml.root().has("invar_compensation")) {
     if (compensation::check_seal(yaml) == 0)
       throw InputError{file.string(), "carries no checksum", "apply a file as a calibration wrote it"};
-    return;
+    return "";
   }
   const auto model = model::read(yaml);
   yaml.finish();
-  if (model.plant != physics::Plant::axis)
-    throw InputError{file.string(), "is of plant " + std::string{physics::name_of(model.plant)},
-                     "a stage takes a model of plant axis"};
+  const auto& taker = *std::find_if(std::begin(takers), std::end(takers),
+                                    [&](const Taker& one) { return one.plant == model.plant; });
+  if (taker.type.empty())
+    throw InputError{
+        file.string(),
+        "is of plant " + std::string{physics::name_of(model.plant)} + ", which no component takes",
+        std::string{taker.otherwise}};
   std::vector<Fault> faults;
   for (std::size_t i = 0; i < model.terms.size(); ++i)
-    if (const auto why = physics::why_not_fed_forward(model.terms[i]); !why.empty() && !partly)
-      faults.push_back({file.string() + ": terms[" + std::to_string(i) + "]",
-                        "a stage cannot feed `" + std::string{model.terms[i].info->name} +
-                            "` forward: " + std::string{why},
-                        "take it out, or give --partly for the rest"});
+    if (const auto why = why_not_used(model.terms[i], model.plant); !why.empty() && !partly)
+      faults.push_back(
+          {file.string() + ": terms[" + std::to_string(i) + "]",
+           (model.plant == physics::Plant::axis ? "a stage cannot feed `" : "a dispenser cannot aim by `") +
+               std::string{model.terms[i].info->name} +
+               (model.plant == physics::Plant::axis ? "` forward: " : "`: ") + std::string{why},
+           "take it out, or give --partly for the rest"});
   if (!faults.empty()) throw InputError{faults};
+  return taker.type;
+}
+
+/// A model for a component of another type.
+void check_type(const config::Cell& cell, const std::string& name, std::string_view type,
+                const std::filesystem::path& file) {
+  const auto* component = cell.find(name);
+  if (type.empty() || component->type == type || component->type == "model_watch") return;
+  std::string list;
+  for (const auto& process : cell.processes)
+    for (const auto& other : process.components)
+      if (other.type == type) list += (list.empty() ? "" : ", ") + other.name;
+  throw InputError{file.string(),
+                   "is for a " + std::string{type} + "; `" + name + "` is of type " + component->type,
+                   list.empty() ? "the cell has no " + std::string{type} : "give it to " + list};
 }
 
 void check_component(const config::Cell& cell, const std::string& name) {
@@ -74,13 +119,15 @@ class ModelPort {
   ModelPort(LiveCell& cell, const std::string& component)
       : cell_{cell},
         writer_{cell.node().writer<compensation::ModelCommand>(
-            dds::topic_name(cell.name(), component, "model"), cell.node().profile("command"))},
-        reader_{cell.node().reader<compensation::ModelStatus>(
-            dds::topic_name(cell.name(), component, "model_status"), "state",
-            [this](const compensation::ModelStatus& status) {
-              const std::lock_guard lock{mutex_};
-              status_ = status;
-            })} {}
+            dds::topic_name(cell.name(), component, "model"), cell.node().profile("command"))} {
+    for (std::size_t i = 0; i < readers_.size(); ++i)  // a component whose only status it is calls it so
+      readers_[i] = cell.node().reader<compensation::ModelStatus>(
+          dds::topic_name(cell.name(), component, i == 0 ? "model_status" : "status"), "state",
+          [this](const compensation::ModelStatus& status) {
+            const std::lock_guard lock{mutex_};
+            status_ = status;
+          });
+  }
 
   bool connect() {
     const auto end = Clock::now() + std::chrono::nanoseconds{cell_.patience().ns};
@@ -111,21 +158,25 @@ class ModelPort {
   dds::Writer<compensation::ModelCommand> writer_;
   std::mutex mutex_;
   std::optional<compensation::ModelStatus> status_;
-  std::unique_ptr<dds::Connection> reader_;  // last: nothing arrives before all else stands
+  std::array<std::unique_ptr<dds::Connection>, 2> readers_;  // last: nothing arrives before all else stands
 };
 
 int apply(Options& options) {
   options.call.resolve();
   std::filesystem::path file;
+  std::string_view type;
   if (!options.rollback && !options.none) {
     if (options.model.empty())
       throw InputError{"--model", "is missing", "name the model's file, or give --rollback or --none"};
     file = std::filesystem::absolute(options.model);
-    check_model(file, options.partly);
+    type = check_model(file, options.partly);
   }
   (void)interrupted();
   LiveCell cell{options.call};
-  if (cell.file() != nullptr) check_component(*cell.file(), options.call.word(0));
+  if (cell.file() != nullptr) {
+    check_component(*cell.file(), options.call.word(0));
+    check_type(*cell.file(), options.call.word(0), type, file);
+  }
   if (!cell.found()) {
     cell.say_not_found(options.call.command);
     return 1;
@@ -168,7 +219,8 @@ void add_job_apply(CLI::App& job) {
       "         invar job apply deployment/cell.yaml compensation --none\n"
       "A stage feeds forward the forces of an axis's model.yaml, and refuses one that leaves too little "
       "current for its servo;\n"
-      "compensation and dispenser take a compensation.yaml. With a folder `state`, what a compensation was "
+      "a dispenser aims by a model.yaml of plant droplet; compensation, dispenser and fusion take a\n"
+      "compensation.yaml of their kind. With a folder `state`, what a compensation was "
       "given here - also\n"
       "none - is what it starts with next time.");
   auto options =

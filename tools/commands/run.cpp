@@ -42,6 +42,7 @@ int run(Options& options) {
     return run_process({.cell = options.launch.cell,
                         .process = options.process,
                         .simulated = options.simulated,
+                        .paced = options.launch.pace > 0.0,
                         .job = options.launch.job,
                         .outcome = options.outcome},
                        stop_requested);
@@ -70,7 +71,7 @@ void add_run(CLI::App& program) {
       command->add_flag("--simulated", options->simulated, "in simulated time, as fast as the CPU goes");
   command
       ->add_option("--pace", options->launch.pace,
-                   "simulated time no faster than so many times the wall clock")
+                   "simulated time no faster than so many times the wall clock; `invar job` reaches it")
       ->check(positive());
   command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");

@@ -15,31 +15,35 @@ namespace {
 
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
-/// Rows in order of time, one a time stamp.
-physics::Record in_order(const physics::Record& raw, DataCount& count) {
-  const std::size_t n = raw.rows();
+/// Rows in order of time, one a time stamp. Column by column: an hour at 1 kHz is not held twice.
+void put_in_order(physics::Record& record, DataCount& count) {
+  const auto& time = record.time;
   std::vector<std::size_t> order;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (std::isfinite(raw.time[i]))
+  order.reserve(time.size());
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    if (std::isfinite(time[i]))
       order.push_back(i);
     else
       ++count.missing;
   }
+  std::size_t out_of_order = 0;
   for (std::size_t i = 1; i < order.size(); ++i)
-    if (raw.time[order[i]] < raw.time[order[i - 1]]) ++count.out_of_order;
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return raw.time[a] < raw.time[b]; });
-  std::vector<std::size_t> kept;
-  for (const auto i : order) {
-    if (!kept.empty() && raw.time[i] <= raw.time[kept.back()])
-      ++count.duplicates;
-    else
-      kept.push_back(i);
-  }
-  physics::Record record;
-  for (const auto i : kept) record.time.push_back(raw.time[i]);
-  for (const auto& [name, values] : raw.signals)
-    for (const auto i : kept) record.signals[name].push_back(values[i]);
-  return record;
+    if (time[order[i]] < time[order[i - 1]]) ++out_of_order;
+  if (out_of_order > 0)
+    std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return time[a] < time[b]; });
+  count.out_of_order += out_of_order;
+  const auto twice =
+      std::unique(order.begin(), order.end(), [&](auto a, auto b) { return time[a] >= time[b]; });
+  count.duplicates += static_cast<std::size_t>(order.end() - twice);
+  order.erase(twice, order.end());
+  std::vector<double> column;
+  const auto reorder = [&](std::vector<double>& values) {
+    column.clear();
+    for (const auto i : order) column.push_back(values[i]);
+    column.swap(values);
+  };
+  for (auto& [name, values] : record.signals) reorder(values);
+  reorder(record.time);  // last: the order is by it
 }
 
 /// A model without inputs loses nothing by rows that lie closer than its motion.
@@ -208,23 +212,30 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
 }
 
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
-void add(Case& data, const physics::Model& model, const recording::Table& table, std::size_t files) {
+void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
+  table.columns.clear();
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
     if (const auto noise = model.noise.find(name); noise != model.noise.end())
       data.given_noise[static_cast<std::size_t>(&name - data.outputs.data())] =
           noise->second * content.units.at(name).factor;
-  auto record = in_order(content.record, data.count);
-  content = {};
+  auto record = std::move(content.record);
+  put_in_order(record, data.count);
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
   const std::size_t ordered = record.rows();
   std::size_t looked_at = 0;
-  for (auto& stretch : shortened(model, std::move(record), most_rows / files)) {
-    looked_at += stretch.record.rows();
-    add(data, model, table.file.filename().string(), std::move(stretch.record), stretch.forget);
+  auto parts = without_pauses(model, std::move(record));
+  data.count.gaps += parts.size() - 1;
+  for (auto& part : parts) {
+    const std::size_t share = std::max<std::size_t>(1, most_rows / files * part.record.rows() / ordered);
+    for (auto& stretch : shortened(model, std::move(part.record), share)) {
+      looked_at += stretch.record.rows();
+      add(data, model, table.file.filename().string(), std::move(stretch.record),
+          std::max(part.forget, stretch.forget));
+    }
   }
   data.count.shortened += ordered - looked_at;
 }
@@ -234,7 +245,7 @@ void add(Case& data, const physics::Model& model, const recording::Table& table,
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
   auto data = empty_case(model);
   for (const auto& file : files)
-    for (const auto& table : model::read_recording(file, model)) add(data, model, table, files.size());
+    for (auto& table : model::read_recording(file, model)) add(data, model, std::move(table), files.size());
   return data;
 }
 

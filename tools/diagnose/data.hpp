@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -24,6 +25,9 @@ struct Recording {
   std::shared_ptr<const physics::Simulation> simulation;
 };
 
+/// Thrown where a simulation is asked for after `Case::stopped` said so.
+struct Stopped {};
+
 /// What the diagnosis knows of the machine.
 struct Case {
   physics::Model model;  // as the user believes
@@ -31,7 +35,8 @@ struct Case {
   std::vector<std::string> outputs;  // signals
   std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
   DataCount count;
-  bool is_time_series = true;  // rows follow one another; false for droplets
+  bool is_time_series = true;     // rows follow one another; false for droplets
+  std::function<bool()> stopped;  // asked before each simulation; empty: never
 };
 
 /// Reads and cleans. Throws InputError for what is unusable.

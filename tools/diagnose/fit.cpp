@@ -123,6 +123,7 @@ void for_neighbours(const std::vector<Freedom>& free, F f) {
 }  // namespace
 
 std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
+  if (data.stopped && data.stopped()) throw Stopped{};
   std::vector<physics::Outputs> all(data.recordings.size());
   for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
   return all;

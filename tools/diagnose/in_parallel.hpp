@@ -22,6 +22,7 @@ void in_parallel(std::size_t n, Work work) {
       } catch (...) {
         const std::scoped_lock lock{mutex};
         failure = std::current_exception();
+        next = n;  // what has not begun is in vain
       }
     }
   };

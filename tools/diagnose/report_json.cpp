@@ -155,6 +155,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"reordered", data.count.out_of_order},
       {"gaps", data.count.gaps},
       {"not_run_through", data.count.shortened}};
+  if (data.count.shortened > 0) report["data"]["looked_at"] = what_was_looked_at(data);
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);
 }

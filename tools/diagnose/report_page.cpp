@@ -272,8 +272,9 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
 void write_page(const Case& data, const Diagnosis& d, const std::string& subject,
                 const std::filesystem::path& file) {
   report::Page page{"Why model and machine differ", subject};
-  const bool fine = d.verdict == Verdict::no_mismatch;
-  const bool clear = d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only;
+  const bool fine = d.verdict == Verdict::no_mismatch && !d.is_partial;
+  const bool clear =
+      (d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only) && !d.is_partial;
   page.callout(verdict_sentence(data, d), fine ? "good" : (clear ? "plain" : "warn"));
   in_short(page, data, d);
 
@@ -325,14 +326,12 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
                  " times the noise" + with + ".");
   page.callout("Next experiment: " + next_experiment(data, d),
                d.verdict == Verdict::ambiguous ? "warn" : "plain");
-  page.paragraph(
-      std::to_string(data.count.rows) + " rows read; left out: " + std::to_string(data.count.missing) +
-      " missing values, " + std::to_string(data.count.outliers) + " outliers, " +
-      std::to_string(data.count.duplicates) + " repeated rows; " + std::to_string(data.count.out_of_order) +
-      " rows put in order, " + std::to_string(data.count.gaps) + " gaps bridged" +
-      (data.count.shortened == 0
-           ? "."
-           : "; of a long recording " + std::to_string(data.count.shortened) + " rows not run through."));
+  page.paragraph(std::to_string(data.count.rows) +
+                 " rows read; left out: " + std::to_string(data.count.missing) + " missing values, " +
+                 std::to_string(data.count.outliers) + " outliers, " + std::to_string(data.count.duplicates) +
+                 " repeated rows; " + std::to_string(data.count.out_of_order) + " rows put in order, " +
+                 std::to_string(data.count.gaps) + " gaps bridged" +
+                 (data.count.shortened == 0 ? "." : "; " + what_was_looked_at(data) + "."));
   page.write(file);
 }
 

@@ -55,6 +55,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
   std::string considered;
   for (std::size_t i = 0; i < d.rejected.size() && i < 5; ++i)
     considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;
+  if (const auto part = what_was_looked_at(data); !part.empty()) out += "  " + part + "\n";
   if (!considered.empty()) out += "  not claimed: " + considered + "\n";
   return out + "  next: " + next_experiment(data, d) + "\n";
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tools/diagnose/report.hpp"
+#include "tools/diagnose/shorten.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::diagnose {
@@ -122,7 +123,14 @@ std::string sizes_of(const Case& data, const Finding& finding) {
   return text;
 }
 
+std::string what_was_looked_at(const Case& data) {
+  if (data.count.shortened == 0) return "";
+  return "a long recording: of " + std::to_string(data.count.rows) + " rows " + how_shortened(data.model) +
+         " looked at, " + std::to_string(data.count.shortened) + " are not run through";
+}
+
 std::string next_experiment(const Case& data, const Diagnosis& d) {
+  if (d.is_partial) return "Let the diagnosis run to its end.";
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
       if (a.log_odds > -ambiguous_margin && a.term.info != finding.term.info)
@@ -189,9 +197,13 @@ std::string moved_parameters(const Diagnosis& d) {
 
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   if (d.is_partial) {
+    if (d.findings.empty())
+      return "Stopped before all was tried; nothing was found until then, which does not say that nothing is "
+             "missing.";
     auto whole = d;
     whole.is_partial = false;
-    return "Stopped before all was tried; so far: " + verdict_sentence(data, whole);
+    return "Stopped before all was tried, and rivals may not have been weighed; so far: " +
+           verdict_sentence(data, whole);
   }
   std::string names;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {

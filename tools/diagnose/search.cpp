@@ -41,6 +41,19 @@ class Search {
   void weigh_alternatives();
   /// Takes back names in whose place a free course over another variable does clearly better.
   void doubt();
+  /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
+  /// or the step says so.
+  template <class Step>
+  bool take(Step step) {
+    if (stopped()) return false;
+    const auto kept = std::tuple{d_, rivals_};
+    try {
+      return step();
+    } catch (const Stopped&) {
+      std::tie(d_, rivals_) = kept;
+      return false;
+    }
+  }
   [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
   [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
@@ -288,16 +301,21 @@ bool Search::add_pair() {
 
 Diagnosis Search::run() {
   prepare();
-  const bool paired = add_pair();
-  for (int round = paired ? 2 : 0; round < 3 && !stopped(); ++round)
-    if (!add_named(round)) break;
-  if (!stopped() && options_.refuses) prune();
-  weigh_alternatives();
+  data_.stopped = options_.stopped;
+  const bool paired = take([&] { return add_pair(); });
+  for (int round = paired ? 2 : 0; round < 3; ++round)
+    if (!take([&] { return add_named(round); })) break;
+  if (options_.refuses) take([&] { return prune(), true; });
+  if (!take([&] { return weigh_alternatives(), true; })) {
+    data_.stopped = {};
+    weigh_alternatives();  // the terms as they stand
+  }
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
-  if (!stopped() && options_.refuses) doubt();
+  if (options_.refuses) take([&] { return doubt(), true; });
   progress_(0.78, "looking for physics without a name");
-  if (!stopped()) add_unnamed(data_, d_);
+  take([&] { return add_unnamed(data_, d_), true; });
   d_.is_partial = stopped();
+  data_.stopped = {};
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
   hold_out(data_, d_, options_.refuses);

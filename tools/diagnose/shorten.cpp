@@ -53,6 +53,9 @@ Record means_over(const Record& record, std::size_t every, const std::vector<std
   return out;
 }
 
+/// Rows after which a loop no longer remembers how it came to where a stretch begins.
+constexpr std::size_t until_forgotten = 300;
+
 /// The row in [first, last) at which `place` has moved least over the rows before.
 std::size_t stillest(const std::vector<double>& place, std::size_t first, std::size_t last) {
   constexpr std::size_t before = 50;
@@ -66,6 +69,48 @@ std::size_t stillest(const std::vector<double>& place, std::size_t first, std::s
 }
 
 }  // namespace
+
+std::vector<Stretch> without_pauses(const physics::Model& model, Record record) {
+  std::vector<Stretch> out;
+  constexpr double longest_bridge = 10000.0;  // ticks
+  constexpr std::size_t least_rows = 2 * until_forgotten;
+  std::vector<std::size_t> begins{0};
+  if (model.plant == physics::Plant::axis && model.controller)
+    for (std::size_t i = 1; i < record.rows(); ++i)
+      if ((record.time[i] - record.time[i - 1]) * model.controller->rate > longest_bridge)
+        begins.push_back(i);
+  begins.push_back(record.rows());
+  std::size_t longest = 0;
+  const auto rows_of = [&](std::size_t part) { return begins[part + 1] - begins[part]; };
+  for (std::size_t k = 1; k + 1 < begins.size(); ++k)
+    if (rows_of(k) > rows_of(longest)) longest = k;
+  if (begins.size() == 2) {
+    out.push_back({std::move(record), 0});
+    return out;
+  }
+  for (std::size_t k = 0; k + 1 < begins.size(); ++k)
+    if (k == longest || rows_of(k) >= least_rows)
+      out.push_back({cut(record, begins[k], rows_of(k)), k > 0 ? until_forgotten : 0});
+  return out;
+}
+
+std::string how_shortened(const physics::Model& model) {
+  using physics::Plant;
+  switch (model.plant) {
+    case Plant::thermal:
+      return "means over equal spans are";
+    case Plant::error_map:
+    case Plant::droplet:
+      return "rows at equal steps are";
+    case Plant::equations:
+      return "its beginning is";
+    case Plant::axis:
+      return "stretches spread over it, each from where the axis stands, are";
+    case Plant::sensor:
+      break;
+  }
+  return "stretches spread over it are";
+}
 
 std::vector<Stretch> shortened(const physics::Model& model, Record record, std::size_t most) {
   using physics::Plant;
@@ -91,7 +136,7 @@ std::vector<Stretch> shortened(const physics::Model& model, Record record, std::
     case Plant::sensor:
       break;
   }
-  constexpr std::size_t stretches = 5, until_forgotten = 300;
+  constexpr std::size_t stretches = 5;
   const std::size_t part = rows / stretches, length = std::min(part / 2, most / stretches);
   const auto* place = record.find(record.find("reference") != nullptr ? "reference" : "position");
   for (std::size_t s = 0; s < stretches; ++s) {

@@ -1,5 +1,6 @@
 // No trick: names, cuts and sampling do not change what a diagnosis says; without the right term it does not make one up.
 #include <gmock/gmock.h>
+#include <yaml-cpp/yaml.h>
 
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
@@ -38,16 +39,73 @@ Machine recut(Machine machine, double first, double last, std::size_t every) {
 struct Known {
   const char *plant, *effect;
   unsigned seed;
+  std::size_t rows = 0;
 };
-constexpr Known known[] = {{"thermal", "sensor_lag", 3},
-                           {"error_map", "periodic_error", 5},
-                           {"droplet", "lens_distortion", 4},
-                           {"sensor", "latency", 8}};
+constexpr Known known[] = {{"thermal", "sensor_lag", 3},         {"error_map", "periodic_error", 5},
+                           {"droplet", "lens_distortion", 4},    {"sensor", "latency", 8},
+                           {"axis", "force_ripple", 3001, 4000}, {"equations", "cubic", 3}};
+
+/// A unit and another of the same quantity: other = factor * value + offset.
+struct OtherUnit {
+  const char *unit, *other;
+  double factor, offset;
+};
+constexpr OtherUnit other_units[] = {
+    {"m", "um", 1e6, 0.0},     {"mm", "m", 1e-3, 0.0},      {"s", "ms", 1e3, 0.0},
+    {"A", "mA", 1e3, 0.0},     {"degC", "K", 1.0, 273.15},  {"W", "kW", 1e-3, 0.0},
+    {"hPa", "Pa", 1e2, 0.0},   {"Pa", "kPa", 1e-3, 0.0},    {"m/s", "mm/s", 1e3, 0.0},
+    {"kg", "g", 1e3, 0.0},     {"N/A", "mN/A", 1e3, 0.0},   {"J/K", "kJ/K", 1e-3, 0.0},
+    {"W/K", "mW/K", 1e3, 0.0}, {"m/px", "um/px", 1e6, 0.0}, {"N s/m", "mN s/m", 1e3, 0.0}};
+
+const OtherUnit* other_unit(const std::string& unit) {
+  const auto found = std::find_if(std::begin(other_units), std::end(other_units),
+                                  [&](const OtherUnit& one) { return unit == one.unit; });
+  return found == std::end(other_units) ? nullptr : found;
+}
+
+/// Every `{value, unit, sigma}` below a node.
+void convert(YAML::Node node) {
+  if (node.IsMap() && node["value"] && node["unit"]) {
+    const auto* to = other_unit(node["unit"].as<std::string>());
+    if (to == nullptr || to->offset != 0.0) return;
+    for (const char* key : {"value", "sigma"})
+      if (node[key]) node[key] = to->factor * node[key].as<double>();
+    node["unit"] = to->other;
+  } else if (node.IsMap()) {
+    for (auto entry : node) convert(entry.second);
+  } else if (node.IsSequence()) {
+    for (auto entry : node) convert(entry);
+  }
+}
+
+/// The same machine, written down in other units: columns, noise and what its user believes.
+Machine in_other_units(Machine machine) {
+  const auto model = model_of(machine);
+  YAML::Node yaml = YAML::Load(machine.yaml);
+  convert(yaml);
+  for (auto entry : yaml["noise"]) {
+    const auto* signal = model.signal(entry.first.as<std::string>());
+    if (const auto* to = other_unit(machine.recordings.front().find(signal->column)->unit); to != nullptr)
+      entry.second = to->factor * entry.second.as<double>();
+  }
+  YAML::Emitter out;
+  out.SetDoublePrecision(17);
+  out << yaml;
+  machine.yaml = std::string{out.c_str()} + "\n";
+  for (auto& table : machine.recordings)
+    for (auto& column : table.columns)
+      if (const auto* to = other_unit(column.unit); to != nullptr) {
+        for (double& value : column.values) value = to->factor * value + to->offset;
+        column.unit = to->other;
+      }
+  return machine;
+}
 
 TEST(NoTrick, OtherNamesOfColumnsAndCasesChangeNothing) {
   for (const auto& k : known) {
-    const auto plain = make(k.plant, k.effect, 1.0, k.seed);
     Trouble trouble;
+    trouble.rows = k.rows;
+    const auto plain = make(k.plant, k.effect, 1.0, k.seed, trouble);
     trouble.renamed = true;
     auto renamed = make(k.plant, k.effect, 1.0, k.seed, trouble);
     for (auto& table : renamed.recordings) table.file = "zzz.csv";
@@ -60,9 +118,29 @@ TEST(NoTrick, OtherNamesOfColumnsAndCasesChangeNothing) {
   }
 }
 
+TEST(NoTrick, OtherUnitsChangeNothing) {
+  for (const auto& k : known) {
+    Trouble trouble;
+    trouble.rows = k.rows;
+    const auto plain = make(k.plant, k.effect, 1.0, k.seed, trouble), converted = in_other_units(plain);
+    ASSERT_NE(plain.recordings.front().columns.front().unit,
+              converted.recordings.front().columns.front().unit);
+    const auto one = diagnosed(plain), other = diagnosed(converted);
+    ASSERT_EQ(names(one), names(other)) << k.plant << ' ' << k.effect;
+    for (std::size_t i = 0; i < one.findings.size(); ++i)
+      for (std::size_t p = 0; p < one.findings[i].sigmas.size();
+           ++p)  // but for the rounding of what is written
+        EXPECT_NEAR(one.findings[i].term.values[p], other.findings[i].term.values[p],
+                    0.1 * one.findings[i].sigmas[p] + 1e-9 * std::abs(one.findings[i].term.values[p]))
+            << k.plant << ' ' << one.findings[i].term.info->parameters[p].name;
+  }
+}
+
 TEST(NoTrick, AnotherCutOfTheRecordingSaysTheSame) {
   for (const auto& k : known) {
-    const auto machine = make(k.plant, k.effect, 1.0, k.seed);
+    Trouble trouble;
+    trouble.rows = k.rows;
+    const auto machine = make(k.plant, k.effect, 1.0, k.seed, trouble);
     EXPECT_THAT(names(diagnosed(recut(machine, 0.0, 0.7, 1))), ::testing::Contains(k.effect)) << k.plant;
     const std::string plant{k.plant};
     // Where each row stands for itself or says where the machine is, a later part does as well, and every second row.
@@ -77,6 +155,8 @@ TEST(NoTrick, AnotherCutOfTheRecordingSaysTheSame) {
 
 TEST(NoTrick, WithoutTheRightTermNoOtherIsClaimedWithConfidence) {
   for (const auto& k : known) {
+    if (k.plant == std::string{"axis"} || k.plant == std::string{"equations"})
+      continue;  // near twins: bench_mismatch --leave-out
     const auto machine = make(k.plant, k.effect, 1.0, k.seed);
     diagnose::Options options;
     options.without = {k.effect};
@@ -151,6 +231,26 @@ TEST(LongRecordings, AnAxisIsCutIntoStretchesThatBeginAtRest) {
   }
   EXPECT_LE(rows, 30000U);
   EXPECT_GT(until, 160.0);  // the end is seen too
+}
+
+// A pause of a day at 1 kHz is 86 million ticks that no simulation should go through.
+TEST(LongRecordings, ALoopThatPausedFallsApart) {
+  physics::Model model;
+  model.plant = physics::Plant::axis;
+  model.controller.emplace().rate = 1000.0;
+  auto record = long_record(20000, 1e-3);
+  for (std::size_t i = 5000; i < 20000; ++i) record.time[i] += 86400.0;
+  for (std::size_t i = 5100; i < 20000; ++i) record.time[i] += 3600.0;  // 100 rows say nothing
+  for (std::size_t i = 9000; i < 20000; ++i) record.time[i] += 5.0;     // this is bridged
+  const auto parts = diagnose::without_pauses(model, record);
+  ASSERT_EQ(parts.size(), 2U);
+  EXPECT_EQ(parts[0].record.rows(), 5000U);
+  EXPECT_EQ(parts[0].forget, 0U);
+  EXPECT_EQ(parts[1].record.rows(), 14900U);
+  EXPECT_GT(parts[1].forget, 0U);
+  EXPECT_EQ(parts[1].record.find("reference")->back(), record.find("reference")->back());
+  model.plant = physics::Plant::sensor;
+  EXPECT_EQ(diagnose::without_pauses(model, record).size(), 1U);
 }
 
 TEST(LongRecordings, HeatIsKeptInMeans) {

@@ -333,6 +333,52 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
   EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 0);
 }
 
+// What `invar diagnose` writes of the same head: patched.yaml of plant droplet.
+TEST(Dispenser, AimsByADiagnosedModelOfTheHead) {
+  const invar::testing::TemporaryFolder folder;
+  const auto head = [&](const std::string& slope_sigma, const std::string& more) {
+    folder.write("patched.yaml",
+                 "invar_model: 1\nplant: droplet\ncolumns: {target_x: tx, target_y: ty, height: h, time: t, "
+                 "landed_x: x, "
+                 "landed_y: y, velocity_x: vx, velocity_y: vy}\nparameters:\n"
+                 "  placement_error_x: {value: 2.0e-6, unit: m, sigma: 1e-6}\n"
+                 "  placement_error_y: {value: 118.2e-6, unit: m, sigma: 1e-6}\n"
+                 "  slope_x: {value: 5.3051e-3, unit: 1" +
+                     slope_sigma +
+                     "}\n"
+                     "  slope_y: {value: 9.0188e-5, unit: 1" +
+                     slope_sigma +
+                     "}\n"
+                     "  speed: {value: 3, unit: m/s}\n"
+                     "terms:\n  - {term: stage_velocity_carry, speed: {value: 2, unit: m/s}}\n"
+                     "  - {term: valve_delay, delay: {value: 3e-4, unit: s}}\n"
+                     "  - {term: camera_rotation, angle: {value: 1e-3, unit: rad}}\n" +
+                     more);
+    return folder / "patched.yaml";
+  };
+  Bench bench;
+  bench.bring_up();
+  EXPECT_EQ(bench.change(compensation::MODEL_STAGE, head(", sigma: 1e-4", "")).state(),
+            compensation::MODEL_STAGED);
+  EXPECT_EQ(bench.change(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_ACTIVE);
+  const TriggerPattern pattern = bench.ask("grid", 20e-3);
+  EXPECT_NE(pattern.model_checksum(), 0U);
+  ASSERT_EQ(pattern.points().size(), 6U);
+  for (const TriggerPoint& point : pattern.points()) {
+    EXPECT_NEAR(point.target()[0] - point.position()[0], 108.102e-6, 1e-9);
+    EXPECT_NEAR(point.target()[1] - point.position()[1], 120.004e-6, 1e-9);
+    EXPECT_EQ(point.lead_ns(), 10'300'000);
+  }
+  // A slope of which nothing is known aims at nothing.
+  bench.change(compensation::MODEL_STAGE, head("", ""));
+  bench.change(compensation::MODEL_ACTIVATE);
+  EXPECT_THAT(bench.ask("grid", 20e-3).refusal().c_str(), ::testing::HasSubstr("not certain enough"));
+  folder.write("axis.yaml",
+               "invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: e}\n");
+  const auto other = bench.change(compensation::MODEL_STAGE, folder / "axis.yaml");
+  EXPECT_EQ(other.state(), compensation::MODEL_REFUSED);
+  EXPECT_THAT(other.text().c_str(), ::testing::HasSubstr("of plant sensor, not of a head"));
+}
 TEST(Dispenser, TakesItsModelOutAndBackInAndHasNoTransactions) {
   const invar::testing::TemporaryFolder folder;
   Bench bench;

@@ -53,6 +53,43 @@ TEST_F(TableTest, WritesWhatItReadsBackExactly) {
   }
 }
 
+TEST_F(TableTest, ReadsALongFileLineByLineAcrossItsBlocks) {
+  Table table;
+  std::vector<double> x, y;
+  for (int i = 0; i < 60000; ++i) x.push_back(i), y.push_back(std::sin(i) * std::pow(10.0, i % 17 - 8));
+  table.add("x", "1", x);
+  table.add("y", "m", y);
+  for (const char* name : {"long.csv", "long.csv.gz"}) {
+    table.write(folder / name);
+    const auto read = Table::read(folder / name);
+    EXPECT_EQ(read.columns[0].values, x) << name;
+    EXPECT_EQ(read.columns[1].values, y) << name;
+  }
+  EXPECT_EQ(Table::read(make("\xEF\xBB\xBFx [m]\r\n1\r\n\r\n2")).columns[0].values,
+            (std::vector<double>{1.0, 2.0}));
+  EXPECT_THAT(fault_of(make(std::string(300000, '\n') + "x,y\n1,2\n3\n")),
+              HasSubstr("in.csv:300003: this row has 1"));
+  EXPECT_THAT(fault_of(make("x\n1\n" + std::string(1, '\0') + "\n")), HasSubstr("is not a text file"));
+}
+
+TEST_F(TableTest, SaysOfAPackedFileThatItIsCutOffRatherThanWhatItsLastLineLacks) {
+  Table table;
+  std::vector<double> x;
+  for (int i = 0; i < 100000; ++i) x.push_back(std::sin(i));
+  table.add("x", "m", x);
+  table.add("y", "m", x);
+  table.write(folder / "whole.csv.gz");
+  for (const double share : {0.2, 0.7, 0.999}) {
+    std::filesystem::copy_file(folder / "whole.csv.gz", folder / "cut.csv.gz",
+                               std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::resize_file(
+        folder / "cut.csv.gz",
+        static_cast<std::uintmax_t>(share *
+                                    static_cast<double>(std::filesystem::file_size(folder / "cut.csv.gz"))));
+    EXPECT_THAT(fault_of(folder / "cut.csv.gz"), HasSubstr("cut.csv.gz: is cut off")) << share;
+  }
+}
+
 TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m],y [m]\n1,2\n3\n")), HasSubstr("in.csv:3: this row has 1 cells"));
   EXPECT_THAT(fault_of(make("x [m]\n1\nabc\n")), HasSubstr("in.csv:3: column `x`: `abc` is not a number"));
