@@ -21,7 +21,7 @@ ROOMS = {
     "core/numerics": ["core/base", "Eigen", "Ceres"],
     "core/metrology": ["core/base", "core/numerics", "Eigen", "Ceres"],
     "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "yaml-cpp", "Eigen"],
-    "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "Eigen", "compression"],
+    "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
@@ -34,7 +34,7 @@ ROOMS = {
 COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/compensation",
              "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
 MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["OpenCV", "core/model", "core/recording"],
-            "recorder": ["core/recording", "core/dds"], "dispenser": ["core/recording"], "supervisor": ["core/dds"],
+            "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
