@@ -50,6 +50,9 @@ metrology::FusionModel model_of(const std::vector<Fusion::Sensor>& sensors) {
     } else {
       metrology::VelocitySensorModel velocity;
       velocity.gains[0] = sensor.gain;
+      velocity.gain_sigma = sensor.gain_sigma;
+      velocity.gain_drift =
+          std::max(velocity.gain_drift, 0.3 * sensor.gain_sigma);  // it may change with speed
       velocity.fastest = velocity.largest = sensor.largest;
       velocity.lag = sensor.delay;
       velocity.lag_sigma = sensor.delay_sigma;

@@ -32,6 +32,7 @@ class Fusion final : public Component {
     double resolution = 0.0;
     double noise = 0.0;
     double gain = 1.0;
+    double gain_sigma = 0.1;
     double largest = 1.0;
     double delay = 0.0;
     double delay_sigma = 5e-4;
@@ -126,6 +127,8 @@ void Fusion::Sensor::describe(auto& p) {
   p(resolution, "resolution", "m", Range{0.0, 0.01}, "one count of a position sensor; 0: continuous");
   p(noise, "noise", "m", Range{0.0, 0.01}, "1 sigma of a continuous position sensor, or of an edge");
   p(gain, "gain", "1", Range{1e-3, 1e3}, "reading of a velocity sensor per velocity");
+  p(gain_sigma, "gain_sigma", "1", Range{0.0, 1.0},
+    "how well that is known, relative; the rest is estimated");
   p(largest, "largest", "m/s", Range{1e-6, 100.0}, "typical largest reading of a velocity sensor");
   p(delay, "delay", "s", Range{0.0, 0.1}, "how late it reads");
   p(delay_sigma, "delay_sigma", "s", Range{0.0, 0.1}, "how well that is known; the rest is estimated");

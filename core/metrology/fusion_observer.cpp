@@ -14,7 +14,6 @@ constexpr std::array<double, 3> jerk_density{0.02, 5.0, 2000.0};
 constexpr double switching_rate = 4.0;  // changes of mode per second
 // What a sensor may drift while it works, in a minute, as part of what it was uncertain by at first.
 constexpr double drift_minute = 60.0;
-constexpr double gain_drift = 8e-4;  // of the gain
 constexpr double offset_part =
     2e-3;  // of a velocity sensor's largest reading: its offset's uncertainty and drift
 constexpr double cell_part = 0.02;          // of a position sensor's step or noise: likewise
@@ -35,7 +34,7 @@ FusionObserver::FusionObserver(const FusionModel& model)
     drift_(offset_of_position(i) + 1) = walk(lateness_drift);
   }
   for (std::size_t i = 0; i < velocities_; ++i) {
-    drift_(gain_of_velocity(i)) = walk(gain_drift);
+    drift_(gain_of_velocity(i)) = std::pow(model_.velocities[i].gain_drift, 2);
     drift_(gain_of_velocity(i) + 1) = walk(offset_part * model_.velocities[i].largest);
     drift_(gain_of_velocity(i) + 2) = walk(lateness_drift);
   }

@@ -14,7 +14,8 @@ namespace invar::metrology {
 /// acceleration, and over what drifts in the sensors while they work: gain, offset and lag of each velocity sensor,
 /// offset and delay of each position sensor but the first, which is the reference. A quantised reading is the
 /// certainty that the position lies in its cell, so every edge is an absolute fix; the cell's likelihood is applied
-/// by its exact first two moments. Noise of the velocity sensors is estimated from their second differences. A
+/// by its exact first two moments. An encoder that counts on edge by edge, without a leap that no motion explains, is believed
+/// against any velocity sensor: then it is the estimate that was lost, and the gains are sought anew. Noise of the velocity sensors is estimated from their second differences. A
 /// sensor that repeats itself, contradicts the others or is missing loses its weight and gets it back when it
 /// agrees again: within one period where a reading is missing or jumps, within four repetitions more than it ever
 /// showed where a continuous one dies, within the way of about two cells where an encoder sticks.
@@ -53,9 +54,8 @@ class FusionObserver final : public FusionEstimator {
     double pulled = 0.0;    // what its cell moved the estimate by since then [m]
     double travel = 0.0;    // that the velocity sensors report since the reading last changed [m]
     double travel_variance = 0.0;
-    double believed = 0.0;  // the last reading that was no surprise [m]
-    double since = 0.0;     // travel by the velocity sensors since then [m]
-    double since_variance = 0.0;
+    double leapt = 0.0;  // changes of the reading that no motion explains, since it was last believed [m]
+    double from = 0.0;   // reading when it last was doubted, or leapt [m]
     std::array<double, most_sensors> others{};  // readings of all when this one last changed
     int repeats = 0;
     int odd = 0;   // surprising readings in a row
@@ -84,12 +84,16 @@ class FusionObserver final : public FusionEstimator {
   void use_position(std::size_t i, const FusionSample& sample) noexcept;
   void add_travel(const FusionSample& sample) noexcept;
   [[nodiscard]] bool refuted_standing(std::size_t position) const noexcept;
-  [[nodiscard]] bool refuted_jump(std::size_t position, double reading) const noexcept;
+  [[nodiscard]] bool refuted_jump(std::size_t position) const noexcept;
+  [[nodiscard]] bool counts_on(std::size_t position, double reading) const noexcept;
+  void see_change(std::size_t position, double reading, double time) noexcept;
+  [[nodiscard]] bool only_position(std::size_t position) const noexcept;
+  [[nodiscard]] double doubt() const noexcept;
   void watch_for_dead(const FusionSample& sample) noexcept;
   [[nodiscard]] bool outlived(std::size_t still, std::size_t moving, double reading) const noexcept;
   void undo(std::size_t steps) noexcept;
   void advance(double period) noexcept;
-  void restart_at(const PositionSensorModel& sensor, double reading) noexcept;
+  void restart_at(std::size_t position, double reading) noexcept;
   [[nodiscard]] bool alone(std::size_t position) const noexcept;
   void renormalise(const std::array<double, models>& likelihood) noexcept;
   [[nodiscard]] State mean() const noexcept;

@@ -9,7 +9,9 @@ namespace invar::metrology {
 
 namespace {
 constexpr double noise_memory = 400.0;  // samples
-}
+constexpr double lost_gain =
+    0.1;  // how well gains are known, relative, when the estimate that used them was lost
+}  // namespace
 
 /// White noise of variance s^2 has second differences of variance 6 s^2; motion hardly shows in them.
 void FusionObserver::learn_noise(const FusionSample& sample) noexcept {
@@ -61,37 +63,65 @@ void FusionObserver::add_travel(const FusionSample& sample) noexcept {
       PositionMemory& memory = position_memory_[k];
       memory.travel += moved;
       memory.travel_variance += variance;
-      memory.since += moved;
-      memory.since_variance += variance;
     }
   }
 }
 
+/// By how much, relative, the travel that the velocity sensors tell may be wrong.
+double FusionObserver::doubt() const noexcept {
+  double most = 0.0;
+  for (const VelocitySensorModel& sensor : model_.velocities) most = std::max(most, 10.0 * sensor.gain_sigma);
+  return std::min(most, 0.5);
+}
+
 /// True where a witness says that a position which reads the same cannot stand still: a velocity sensor beyond
-/// its noise, or another position sensor. A filter that merely expected motion is no witness.
+/// its noise and what its gain may be, or another position sensor. A filter that merely expected motion is no witness.
 bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
   const PositionMemory& memory = position_memory_[position];
   const double cell =
       std::max(0.75 * model_.positions[position].step, 10.0 * model_.positions[position].noise);
-  if (std::abs(memory.travel) > cell + 5.0 * std::sqrt(memory.travel_variance) &&
+  if (std::abs(memory.travel) > (1.0 + 2.0 * doubt()) * cell + 5.0 * std::sqrt(memory.travel_variance) &&
       memory.travel_variance > 0.0)
     return true;
-  for (std::size_t i = 0; i < positions_; ++i)
-    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
-  return false;
+  return !only_position(position);
 }
 
-/// True where a witness says that the position cannot have gone from what was last believed to this reading.
-bool FusionObserver::refuted_jump(std::size_t position, double reading) const noexcept {
-  const PositionMemory& memory = position_memory_[position];
+/// A reading that differs from the one before, `time` earlier: what no motion explains is a leap. A sensor that comes back
+/// where it would have gone meanwhile did not leap.
+void FusionObserver::see_change(std::size_t position, double reading, double time) noexcept {
+  PositionMemory& memory = position_memory_[position];
   const double cell =
       std::max(2.0 * model_.positions[position].step, 20.0 * model_.positions[position].noise);
-  if (memory.since_variance > 0.0 &&
-      std::abs(reading - memory.believed - memory.since) > cell + 5.0 * std::sqrt(memory.since_variance))
-    return true;
+  double fastest = 0.3;
+  for (const VelocitySensorModel& sensor : model_.velocities)
+    fastest = std::max(fastest, 3.0 * sensor.largest);
+  const double change = reading - memory.last;
+  const double beyond = std::abs(change - memory.travel) - 5.0 * std::sqrt(memory.travel_variance) -
+                        doubt() * std::abs(memory.travel);
+  if (std::abs(change) <= cell + fastest * time || beyond <= cell) return;
+  memory.leapt += change - memory.travel;
+  memory.from = reading;
+}
+
+/// True where a witness says that the position cannot have gone from what was last believed to this reading: it leapt and did
+/// not leap back, or another position sensor is believed.
+bool FusionObserver::refuted_jump(std::size_t position) const noexcept {
+  const double cell =
+      std::max(2.0 * model_.positions[position].step, 20.0 * model_.positions[position].noise);
+  return std::abs(position_memory_[position].leapt) > cell || !only_position(position);
+}
+
+bool FusionObserver::only_position(std::size_t position) const noexcept {
   for (std::size_t i = 0; i < positions_; ++i)
-    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return true;
-  return false;
+    if (i != position && !position_memory_[i].faulty && std::isfinite(position_memory_[i].last)) return false;
+  return true;
+}
+
+/// True where a sensor that was doubted counts on: it went some cells since, without a leap.
+bool FusionObserver::counts_on(std::size_t position, double reading) const noexcept {
+  const double cells =
+      std::max(3.0 * model_.positions[position].step, 30.0 * model_.positions[position].noise);
+  return std::abs(reading - position_memory_[position].from) > 0.9 * cells && !refuted_jump(position);
 }
 
 /// True where sensor `still` has not changed while `moving` went on by more than both their cells.
@@ -122,6 +152,7 @@ void FusionObserver::watch_for_dead(const FusionSample& sample) noexcept {
     memory.good = 0;
     if (memory.faulty) continue;
     memory.faulty = true;
+    memory.from = reading;
     back = std::max(back, memory.repeats);
   }
   undo(static_cast<std::size_t>(back));
@@ -143,16 +174,26 @@ void FusionObserver::undo(std::size_t steps) noexcept {
   }
 }
 
-/// Nothing else is left to trust: begin anew in the cell that is read, at unknown speed.
-void FusionObserver::restart_at(const PositionSensorModel& sensor, double reading) noexcept {
+/// The sensor is to be trusted, not the estimate: begin anew in the cell that is read, at unknown speed. What is known of the
+/// sensors stays, but gains with which the estimate was lost are not known.
+void FusionObserver::restart_at(std::size_t position, double reading) noexcept {
+  const PositionSensorModel& sensor = model_.positions[position];
+  PositionMemory& memory = position_memory_[position];
+  memory.faulty = false;
+  memory.odd = 0;
+  memory.conflict = memory.pulled = memory.leapt = 0.0;
   double fastest = 0.3;
   for (const VelocitySensorModel& velocity : model_.velocities) fastest = velocity.largest;
   const double cell = std::hypot(sensor.step / std::sqrt(12.0), sensor.noise);
   for (Mode& mode : modes_) {
     mode.mean.head<3>() << reading + sensor.offset, 0.0, 0.0;
-    mode.covariance.topRows<3>().setZero();  // what is known of the sensors stays
+    mode.covariance.topRows<3>().setZero();
     mode.covariance.leftCols<3>().setZero();
     mode.covariance.diagonal().head<3>() << cell * cell, fastest * fastest / 4.0, fastest * fastest;
+    for (std::size_t i = 0; i < velocities_; ++i) {
+      double& gain = mode.covariance(gain_of_velocity(i), gain_of_velocity(i));
+      gain = std::max(gain, lost_gain * lost_gain);
+    }
     mode.probability = 1.0 / models;
   }
 }

@@ -10,6 +10,7 @@ namespace invar::metrology {
 namespace {
 
 constexpr double surprise = 1e-7;        // probability below which a reading is not believed
+constexpr double doubtful = 1e-3;        // probability below which a reading proves nothing for its sensor
 constexpr double stuck_conflict = 16.0;  // log odds against a reading that stands still
 constexpr int odd_limit = 5;
 constexpr int good_limit = 20;
@@ -148,6 +149,7 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
     return;
   }
   const bool moved = reading != memory.last && std::isfinite(memory.last);
+  if (moved) see_change(i, reading, sample.period);
   memory.last = reading;
   std::array<State, models> gains;
   std::array<Cut, models> cuts;
@@ -188,16 +190,14 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
   const bool odd = probability < surprise;
   if (moved && !odd) memory.conflict = memory.pulled = 0.0;
   if (moved) memory.travel = memory.travel_variance = 0.0;
-  memory.conflict = std::max(
-      0.0, memory.conflict - std::log(std::max(probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0));
+  memory.conflict = std::clamp(
+      memory.conflict - std::log(std::max(probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0), 0.0,
+      2.0 * stuck_conflict);  // no more, so that a sensor can live it down
   if (memory.conflict <= 0.0) memory.pulled = 0.0;
   memory.odd = odd ? memory.odd + 1 : 0;
-  memory.good = odd || probability < 1e-3 ? 0 : memory.good + 1;
+  memory.good = odd || probability < doubtful ? 0 : memory.good + 1;
   if (alone(i) && !(memory.faulty && !moved) && (memory.odd >= 2 || memory.conflict > stuck_conflict)) {
-    restart_at(sensor, reading);
-    memory.faulty = false;
-    memory.odd = 0;
-    memory.conflict = memory.pulled = 0.0;
+    restart_at(i, reading);
     return;
   }
   if (memory.odd >= odd_limit)
@@ -205,21 +205,26 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
       if (k != i && !position_memory_[k].faulty && outlived(k, i, reading)) {
         position_memory_[k].faulty = true;  // it stood still while this one moved on
         position_memory_[k].good = 0;
-        memory.faulty = false;
-        memory.odd = 0;
-        memory.conflict = memory.pulled = 0.0;
-        restart_at(sensor, reading);
+        restart_at(i, reading);
         return;
       }
-  if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i, reading)) {
-    restart_at(sensor, reading);  // nobody contradicts the sensor: it is the estimate that was lost
-    memory.odd = 0;
-    memory.conflict = memory.pulled = 0.0;
+  // Nobody contradicts the sensor: it is the estimate that was lost.
+  if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i)) {
+    restart_at(i, reading);
     return;
+  }
+  if (memory.faulty && moved && counts_on(i, reading)) {
+    if (probability < doubtful) {
+      restart_at(i, reading);
+      return;
+    }
+    memory.faulty = false;
+    memory.conflict = memory.pulled = 0.0;
   }
   if (!memory.faulty &&
       (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict && refuted_standing(i)))) {
     memory.faulty = true;
+    memory.from = reading;
     for (Mode& mode : modes_) {
       mode.mean(0) -= memory.pulled;  // what the stuck reading held back
       mode.covariance(0, 0) += memory.pulled * memory.pulled * 0.05;
@@ -227,8 +232,7 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
   }
   if (memory.faulty && memory.good >= good_limit && memory.conflict <= 0.0) memory.faulty = false;
   if (memory.faulty || odd) return;
-  memory.believed = reading;
-  memory.since = memory.since_variance = 0.0;
+  memory.leapt = 0.0;
   double information = 0.0;
   double moved_by = 0.0;
   std::array<double, models> likelihood{};

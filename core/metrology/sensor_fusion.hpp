@@ -73,7 +73,9 @@ struct VelocitySensorModel {
   double correlation = 1.0;  // how much more the noise counts when integrated than its differences say
   int longest_repeat = 0;    // how often in a row a sound sensor repeated its reading
   double gain_sigma = 5e-3;  // how well the gain is known, relative
-  double lag_sigma = 5e-4;   // how well the lag is known [s]
+  double gain_drift =
+      1e-4;  // what the gain wanders in a second, relative (with speed, too, where nobody measured it)
+  double lag_sigma = 5e-4;  // how well the lag is known [s]
 
   [[nodiscard]] double response(double v) const noexcept;
   [[nodiscard]] double sensitivity(double v) const noexcept;  // df/dv

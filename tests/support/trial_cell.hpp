@@ -1,10 +1,9 @@
 // TrialCell: one axis with a laser along it, a component that runs jobs on it, and who asks for them.
 #pragma once
 
-#include <gtest/gtest.h>
-
 #include <cstdint>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -123,8 +122,7 @@ class TrialCell {
       if (status != nullptr && status->id() == command.id() && status->phase() != job::JOB_RUNNING)
         return *status;
     }
-    ADD_FAILURE() << "the job does not end";
-    return {};
+    throw std::logic_error{"the job does not end"};
   }
 
   WiredAxis axis;

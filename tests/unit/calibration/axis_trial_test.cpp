@@ -102,6 +102,46 @@ TEST(AxisTrial, FusedTrackingBeatsTheEncoderAlone) {
   EXPECT_LT(rms[1], 0.5 * rms[0]);
 }
 
+/// Tachometers that nobody calibrated, quiet enough to be believed: the axis must neither trip nor follow much worse than the
+/// encoder alone would let it (0.28 mm).
+TEST(AxisTrial, NoTachometerMakesTheAxisLoseItsEncoder) {
+  struct Tachometer {
+    double gain, droop, latency, noise;
+  };
+  for (const Tachometer& of : {Tachometer{1.0, 0.6, 0.003, 0.02},
+                               {0.92, 0.6, 0.0, 0.02},
+                               {0.92, 0.6, 0.003, 0.1},
+                               {0.8, 0.0, 0.003, 0.02},
+                               {0.8, 0.8, 0.003, 0.1},
+                               {1.25, 0.0, 0.0, 0.1}}) {
+    SCOPED_TRACE("gain " + std::to_string(of.gain) + ", less by " + std::to_string(of.droop) +
+                 " per m/s, noise " + std::to_string(of.noise));
+    AxisTrial::Parameters of_trial;
+    const invar::testing::TemporaryFolder folder;
+    of_trial.tracking.resize(1);
+    of_trial.tracking[0].name = "track";
+    of_trial.tracking[0].periods = {3.0, 1.3};
+    of_trial.tracking[0].out = (folder / "tracking").string();
+    Cell cell{support::coarse_world(), support::coarse_stage(), of_trial};
+    support::FusedTachometer pair;
+    pair.of_tachometer.gain = of.gain;
+    pair.of_tachometer.gain_droop = of.droop;
+    pair.of_tachometer.latency = of.latency;
+    pair.of_tachometer.noise_level = of.noise;
+    support::FusedX fused{cell.axis, pair};
+    cell.bring_up();
+    const auto status = cell.run("track");
+    ASSERT_EQ(status.phase(), job::JOB_DONE) << status.text().c_str();
+    std::cout << status.text().c_str() << '\n';
+    const auto table = recording::Table::read(folder / "tracking" / "tracking.csv");
+    const auto laser = table.in("laser", "m"), reference = table.in("reference", "m");
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < laser.size(); ++i)
+      if (std::isfinite(laser[i])) errors.push_back(laser[i] - reference[i]);
+    EXPECT_LT(size_of(errors).rms, 0.6e-3);
+  }
+}
+
 TEST(AxisTrial, SaysWhyAJobCannotRun) {
   AxisTrial::Parameters of_trial;
   of_trial.tracking.resize(1);

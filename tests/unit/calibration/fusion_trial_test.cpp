@@ -20,7 +20,7 @@ class FusionTrialTest : public ::testing::Test {
     pair.of_tachometer.gain = 0.9;
     pair.of_tachometer.latency = 0.004;
     pair.of_tachometer.gain_droop = 0.3;
-    pair.of_tachometer.noise_level = 0.1;
+    pair.of_tachometer.noise_level = 0.02;  // the quieter, the more its properties are worth
     of_trial.sensors = {{"encoder", "position", "feedback"}, {"tachometer", "velocity", "port"}};
     of_trial.jobs.resize(1);
     of_trial.jobs[0].name = "fuse";
@@ -67,17 +67,18 @@ TEST_F(FusionTrialTest, FindsTheSensorsInTheCellAndLessensTheErrorOfRunsNotFitte
   EXPECT_NEAR(model.positions[0].step, 2e-3, 1e-6);
   EXPECT_NEAR(model.velocities[0].lag, 0.003, 0.0015);  // the truth
   EXPECT_NEAR(model.velocities[0].response(0.15), 0.9 * 0.15 * (1.0 - 0.3 * 0.15), 0.002);
-  EXPECT_LT(fused_rms("after"), 0.8 * fused_rms("before"));
+  EXPECT_LT(fused_rms("after"), 0.7 * fused_rms("before"));
 }
 
-TEST_F(FusionTrialTest, LeavesAFusionThatKnowsItsSensorsAsItWas) {
+TEST_F(FusionTrialTest, LeavesTheFusionAsItWasWhereTheNoiseHidesWhatAModelBrings) {
+  pair.of_tachometer.noise_level = 0.3;
   pair.of_tachometer.gain = 1.0;  // as it was described
   pair.of_tachometer.gain_droop = 0.0;
   pair.of_tachometer.latency = 0.0;
   const auto status = run();
   EXPECT_EQ(status.phase(), job::JOB_DONE);
   EXPECT_THAT(status.text().c_str(), ::testing::HasSubstr("the fusion is as it was before"));
-  EXPECT_LT(fused_rms("before"), 0.15e-3);  // an encoder of 2 mm alone: 0.58 mm
+  EXPECT_LT(fused_rms("before"), 0.25e-3);  // an encoder of 2 mm alone: 0.58 mm
 }
 
 TEST_F(FusionTrialTest, SaysWhatIsMissing) {
