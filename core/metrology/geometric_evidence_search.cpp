@@ -9,12 +9,13 @@ namespace invar::metrology {
 
 namespace {
 
-/// How far the log of a strength may lie from what is expected beforehand: one sigma.
-Strengths spread() {
+/// How far the log of a strength may lie from what is expected beforehand: one sigma. Of an axis' stretch as far as it
+/// is from half way to either of the two pictures that it stands between (`expected_stretch`).
+Strengths spread(const GeometricPrior& expected) {
   Strengths sd;
   sd.head<first_relative>() << 1.5, 1.5, 1.5, 0.5, 0.5, 0.5, 1.5, 1.5, 0.4;
   sd.segment<component_count>(first_relative).setConstant(0.3);
-  sd.tail<3>().setConstant(0.3);
+  sd.tail<3>() = log_strengths(expected).tail<3>().cwiseAbs().cwiseMax(0.05);
   return sd;
 }
 
@@ -22,7 +23,7 @@ Strengths spread() {
 Evidence score(const NormalEquations& equations, const GeometricBasis& basis, const GeometricPrior& expected,
                const Strengths& logs) {
   Evidence result = evidence(equations, basis, with_log_strengths(expected, logs));
-  const Strengths precision = spread().cwiseAbs2().cwiseInverse();
+  const Strengths precision = spread(expected).cwiseAbs2().cwiseInverse();
   const Strengths off = logs - log_strengths(expected);
   result.value -= 0.5 * off.dot(precision.cwiseProduct(off));
   result.slope -= precision.cwiseProduct(off);

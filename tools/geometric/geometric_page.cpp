@@ -138,7 +138,9 @@ void write_knowledge(report::Page& page, const GeometricResult& result) {
       rows.push_back(
           {next.line.name, place(next.line.from), place(next.line.to), report::si(next.volumetric_rms, "m")});
     }
-    page.paragraph("The next lines that would help most:");
+    page.paragraph(result.method == "full"
+                       ? "The next lines that would help most:"
+                       : "The next lines that would help most, all lines at once (--method full):");
     page.table({"line", "from [mm]", "to [mm]", "expected with it"}, rows);
   }
   std::vector<report::Page::Bar> bars;

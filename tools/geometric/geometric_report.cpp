@@ -99,7 +99,7 @@ void evaluate(GeometricResult& result) {
   // What repeats but no smooth model explains stays, whatever is measured more.
   const double stays = std::sqrt(static_cast<double>(found.basis.chain.axes)) * found.misfit;
   result.knowledge.volumetric_rms = std::hypot(result.knowledge.volumetric_rms, stays);
-  if (result.method == "full") result.next = metrology::next_lines(result.machine, found, 3);
+  result.next = metrology::next_lines(result.machine, found, 3);
   for (auto& next : result.next) next.volumetric_rms = std::hypot(next.volumetric_rms, stays);
 }
 
@@ -291,7 +291,8 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
         << report::si(result.intervals.front().interval, "m") << ": "
         << micro(result.intervals.front().expected_rms) << " um)\n";
   if (!result.next.empty() && !result.knowledge.unidentified.empty())
-    out << "the next line that would help most: " << result.next.front().line.name << ", expected then "
+    out << "the next line that would help most" << (result.method == "full" ? "" : " (with --method full)")
+        << ": " << result.next.front().line.name << ", expected then "
         << micro(result.next.front().volumetric_rms) << " um\n";
 }
 
