@@ -30,6 +30,27 @@ bool brings_energy(const physics::Model& model, const Term& term) {
                      [&](const auto& state) { return state.derivative == term.on; });
 }
 
+/// Does the term do nothing but change a number that the user knows exactly? A steady rate beside a known gravity.
+bool is_known_better(const Case& data, const Fit& fit, std::size_t term) {
+  for (std::size_t k = 0; k < fit.free.size(); ++k) {
+    if (fit.free[k].where != Freedom::Where::term || fit.free[k].term != term) continue;
+    if (fit.columns.cols() != static_cast<Eigen::Index>(fit.free.size()) ||
+        fit.model.terms[term].info->parameter_count() != 1)
+      return false;
+    const auto finite = [](double v) { return std::isfinite(v) ? v : 0.0; };
+    const Eigen::VectorXd own = fit.columns.col(static_cast<Eigen::Index>(k)).unaryExpr(finite);
+    for (std::size_t p = 0; p < data.model.parameters.size(); ++p) {
+      const auto& parameter = data.model.parameters[p];
+      if (!parameter.sigma || *parameter.sigma != 0.0 || parameter.value == 0.0) continue;
+      Freedom known;
+      known.index = p, known.scale = std::abs(parameter.value);
+      const Eigen::VectorXd other = sensitivities(data, fit.model, {known}).col(0).unaryExpr(finite);
+      if (std::abs(own.dot(other)) > 0.9999 * own.norm() * other.norm()) return other.norm() > 0.0;
+    }
+  }
+  return false;
+}
+
 /// Did the recording let the term show what sets it apart?
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const auto [low, high] = span_of(data, model, term.with.empty() ? term.on : term.with);
@@ -120,13 +141,27 @@ bool is_its_own(const Case& data, const physics::Model& model, std::size_t term)
   return false;
 }
 
-/// Is what a sine in time explains a line, with one phase from beginning to end? A hum of the noise has a band, however
-/// much evidence a sine in it gathers. Against the scatter of its amplitude from block to block (Fisher's F).
+/// The turns [rad] of a wave at the rows of a recording: in time, or along what an instrument is held against. Empty for
+/// a wave that reaches the output by way of the machine, whose answer depends on the speed.
+std::vector<double> angles_of(const Case& data, const physics::Model& model, const Term& term,
+                              std::size_t recording) {
+  const auto pitch = term.info->index_of("pitch");
+  const bool along = data.model.plant == physics::Plant::sensor && pitch < physics::most_parameters;
+  const double frequency = wave_of(model, term);
+  if (!along && !(frequency > 0.0)) return {};
+  auto angles =
+      along ? variable_values(data, recording, "true_position") : data.recordings[recording].inputs.time;
+  for (double& angle : angles)
+    angle *= 2.0 * std::numbers::pi * (along ? 1.0 / term.values[pitch] : frequency);
+  return angles;
+}
+
+/// Is what a sine explains a line, with one phase from beginning to end? A hum of the noise has a band, and what coarse
+/// steps make of a motion has another phase in every pass, however much evidence a sine in it gathers. Against the scatter
+/// of its amplitude from block to block (Fisher's F).
 bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
   const auto& info = *model.terms[term].info;
-  const auto at = info.index_of("frequency");
-  if (at == physics::most_parameters || info.index_of("phase") == physics::most_parameters) return true;
-  const double frequency = model.terms[term].values[at], turn = 2.0 * std::numbers::pi * frequency;
+  if (angles_of(data, model, model.terms[term], 0).empty()) return true;
   const auto onset = info.index_of("onset");
   const double from = onset < physics::most_parameters ? model.terms[term].values[onset] : -1e300;
   auto free = model;
@@ -138,7 +173,11 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto& time = data.recordings[r].inputs.time;
       const double begin = std::max(from, time.front()), lasts = time.back() - begin;
-      const double count = std::min(16.0, std::floor(0.5 * lasts * frequency));
+      const auto angles = angles_of(data, model, model.terms[term], r);
+      double way = 0.0;
+      for (std::size_t i = 1; i < angles.size(); ++i)
+        if (time[i] > begin) way += std::abs(angles[i] - angles[i - 1]);
+      const double count = std::min(16.0, std::floor(0.25 * way / std::numbers::pi));
       for (double b = 0.0; b < count; b += 1.0) {
         const double low = begin + lasts * b / count, high = low + lasts / count;
         std::complex<double> sum;
@@ -156,7 +195,7 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
               for (std::size_t k = 0; k < 2; ++k) level[k] += weights[k] * e, power[k] += weights[k];
             } else {
               const double slow = (1.0 - s) * level[0] / power[0] + s * level[1] / power[1];
-              sum += window * (e - slow) * std::polar(1.0, -turn * time[i]);
+              sum += window * (e - slow) * std::polar(1.0, -angles[i]);
             }
           }
         blocks.push_back(sum);
@@ -201,7 +240,7 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
   }
   if (data.model.plant == physics::Plant::equations &&
       (brings_energy(fit.model, fit.model.terms[term]) || !is_affordable(data, fit) ||
-       !acts(data, fit.model, fit.model.terms[term])))
+       is_known_better(data, fit, term) || !acts(data, fit.model, fit.model.terms[term])))
     return false;
   if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term) ||
       is_its_own(data, fit.model, term))

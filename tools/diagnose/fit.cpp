@@ -303,7 +303,7 @@ Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorX
 
 double price_of_current(double frequency) {
   for (const double hum : {50.0, 60.0, 100.0, 120.0, 150.0, 180.0, 300.0, 360.0})
-    if (std::abs(frequency - hum) < 0.003 * hum) return 0.0;
+    if (std::abs(frequency - hum) < 0.003 * hum) return -4.0;
   return 4.0;
 }
 

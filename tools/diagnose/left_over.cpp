@@ -142,6 +142,9 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
 
 namespace {
 
+/// Rows from which on something can be said of their neighbours and their loudness.
+constexpr int enough = 300;
+
 /// measured - simulated of one output, recording by recording; values off by more than six sigma are brought nearer.
 std::vector<Series> left_of(const Case& data, const std::vector<physics::Outputs>& simulated,
                             std::size_t output) {
@@ -222,6 +225,8 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
     causes.emplace_back(time / std::max(1e-300, time.cwiseAbs().maxCoeff()));
   }
   std::vector<double> shares;
+  // A few rows of a slow course go with anything.
+  if (data.is_time_series && common.rows() < enough) return std::vector<double>(data.outputs.size(), 0.0);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     Eigen::MatrixXd basis = common;
     auto changing = changing_effects(data, fit, o, causes);
@@ -229,8 +234,9 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
     const auto left = left_of(data, simulated, o);
     double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
     for (const auto& order : orders)
-      share = std::max(share,
-                       beyond_chance([&](double shift) { return share_along(order, turned(left, shift)); }));
+      if (order.size() >= enough)
+        share = std::max(
+            share, beyond_chance([&](double shift) { return share_along(order, turned(left, shift)); }));
     shares.push_back(share);
   }
   return shares;
@@ -240,6 +246,7 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
   constexpr double least = 5.0;  // coarse steps of a reading make it half as loud again at most
   const auto simulated = simulate(data, fit.model);
   const auto basis = surface(data, simulated).basis;
+  if (basis.rows() < enough) return false;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     auto power = left_of(data, simulated, o);
     for (auto& one : power)
@@ -273,7 +280,7 @@ bool is_above_noise(const Case& data, const Fit& fit) {
         if (std::isfinite(v)) sum += v * v, rows += 1.0;
     // A loop repeats the noise of its reading, at some frequencies more than once; and what is white may be a worse
     // instrument than believed.
-    if (data.is_time_series && rows > 200.0 && std::sqrt(sum / rows) > 2.0 * data.given_noise[o] &&
+    if (data.is_time_series && rows > enough && std::sqrt(sum / rows) > 2.0 * data.given_noise[o] &&
         independent_share(left) < 0.3)
       return true;
   }

@@ -208,6 +208,17 @@ TEST(SimulateEquations, AStoreOnTheWayOfAnInputAndWhatRunsOverFromOneToAnother) 
   EXPECT_DOUBLE_EQ(out[1][20], 0.5 + 0.25 * 0.5);
 }
 
+/// A curve that goes straight through zero is a coefficient: x' = -2 x - 1.5 x.
+TEST(SimulateEquations, ACurveOverAStateIsTheRateThatItDraws) {
+  physics::Term curve;
+  curve.info = physics::unmodelled(physics::Plant::equations, "state");
+  curve.on = "x";
+  curve.curve = {"x", {-1.0, 0.25, 2.0}, {1.5, -0.375, -3.0}};
+  const auto out = falling(curve, 0.01, 200);
+  for (std::size_t i = 0; i < out.size(); i += 20)
+    EXPECT_NEAR(out[i], std::exp(-3.5 * 0.01 * static_cast<double>(i)), 1e-7) << i;
+}
+
 TEST(EquationsModel, SaysWhereATermCannotAct) {
   const std::string head =
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: pump}\nstates:\n"
@@ -228,6 +239,10 @@ TEST(EquationsModel, SaysWhereATermCannotAct) {
       ::testing::AllOf(::testing::HasSubstr("no state, input or output"), ::testing::HasSubstr("`level`")));
   EXPECT_THAT(fault_of("terms: [{term: linear, on: u, coefficient: 1}]\n"), ::testing::HasSubstr("no state"));
   EXPECT_EQ(fault_of("terms: [{term: delay, on: level, delay: 1}]\n"), "none");
+  EXPECT_THAT(fault_of("terms: [{term: unmodelled, on: level, over: w, knots: [0, 1], values: [0, 1]}]\n"),
+              ::testing::HasSubstr("`w` is no state, no input and not t"));
+  EXPECT_EQ(fault_of("terms: [{term: unmodelled, on: level, over: u, knots: [0, 1], values: [0, 1]}]\n"),
+            "none");
 }
 
 }  // namespace

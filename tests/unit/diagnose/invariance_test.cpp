@@ -195,9 +195,28 @@ TEST(NoTrick, ANearNameIsNotClaimedWithConfidence) {
 TEST(NoTrick, WhatFollowsTheInputsIsNotCalledNoise) {
   diagnose::Options options;
   options.without = {"sensor_lag"};
-  for (const unsigned seed : {1006U, 2006U})
-    EXPECT_EQ(names(diagnosed(make("thermal", "sensor_lag", 1.0, seed), options)).front(), "unknown_physics")
-        << seed;
+  for (const unsigned seed : {1006U, 2006U}) {
+    const auto d = diagnosed(make("thermal", "sensor_lag", 1.0, seed), options);
+    EXPECT_EQ(names(d).front(), "unknown_physics") << seed;
+    EXPECT_TRUE(!d.findings.empty() || (d.suspect && !d.suspect->site.empty())) << seed;  // and it says where
+  }
+}
+
+TEST(NoTrick, AGapInTheRecordingOfALoopIsNoPhysics) {
+  Trouble trouble;
+  trouble.faults = true;
+  for (const unsigned seed : {3002U, 3012U})
+    EXPECT_THAT(diagnosed(make("axis", "none", 1.0, seed, trouble)).findings, ::testing::IsEmpty()) << seed;
+}
+
+// A sine in time shows in one recording whether it enters at the motor or at the carriage, but not where.
+TEST(NoTrick, ASineInTimeDoesNotSayWhereItEnters) {
+  const auto machine = make("axis", "periodic_disturbance", 1.0, 6);
+  diagnose::Options options;
+  options.without = {"periodic_disturbance"};
+  for (const auto& finding : diagnosed(machine, options).findings)
+    EXPECT_TRUE(finding.term.info->name == "unmodelled" || finding.probability < 0.5)
+        << finding.term.info->name;
 }
 
 physics::Record long_record(std::size_t rows, double step) {
