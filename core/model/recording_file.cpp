@@ -141,7 +141,7 @@ class Reader {
              clock.samples.cycle[end] > clock.samples.cycle[end - 1])
         ++end;
       if (clock.samples.enabled[begin]) {
-        auto rows = table(begin, end);
+        auto rows = until_rest(table(begin, end));
         tables.push_back(begin == 0 && has_enabled_ ? from_standstill(std::move(rows)) : std::move(rows));
       }
       begin = end;
@@ -343,6 +343,22 @@ class Reader {
         }
         table.add(topic.sources[k].text, topic.units[k], std::move(values));
       }
+    return table;
+  }
+
+  /// Whoever recorded was slower than the motion. An axis that stands is held by dry friction, and what its controller asks
+  /// for meanwhile is a matter of where it came to rest: behind half a second of that the recording says nothing.
+  recording::Table until_rest(recording::Table table) const {
+    const auto* signal = model_.signal("reference");
+    if (signal == nullptr) return table;
+    const auto& reference = table.find(signal->column)->values;
+    std::size_t moved = 0;
+    for (std::size_t i = 1; i < reference.size(); ++i)
+      if (reference[i] != reference[i - 1]) moved = i;
+    const auto& time = table.find(model_.signal("time")->column)->values;
+    const auto end = std::upper_bound(time.begin(), time.end(), time[moved] + 0.5) - time.begin();
+    if (moved > 0)
+      for (auto& column : table.columns) column.values.resize(static_cast<std::size_t>(end));
     return table;
   }
 

@@ -279,7 +279,7 @@ struct Sum {
       ++nulls, claimed += answer.claims ? 1 : 0;
       return;
     }
-    ++cases, fit += answer.fit;
+    ++cases, fit += std::isfinite(answer.fit) ? answer.fit : -1.0;  // a model that runs away
     for (const auto& name : answer.names)
       if (name != "unmodelled" && credit(machine, name) == 0.0) extra += 1.0;
     if (machine.missing.front().names.contains("unmodelled")) return;
