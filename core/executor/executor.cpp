@@ -41,6 +41,7 @@ std::size_t Executor::add(std::unique_ptr<Component> component, Placement placem
   slot->every = placement.every;
   slot->index = slots_.size();
   slot->infos = std::move(placement.parameters);
+  slot->check = std::move(placement.check);
   for (const ParameterInfo& info : slot->infos)
     slot->values.emplace_back(info.number != nullptr ? *info.number : 0.0);
   for (Port* port : slot->component->ports()) {

@@ -60,7 +60,8 @@ class RunningProcess {
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
                                                   .every = static_cast<std::uint32_t>(member.file->every),
-                                                  .latencies = member.file->latencies});
+                                                  .latencies = member.file->latencies,
+                                                  .check = member.prepared.check});
     }
     join_directly();
     fill_black_box();
@@ -399,7 +400,7 @@ int run_process(const ProcessOptions& options, const std::atomic<bool>& stop) {
   LoadedProcess* process = loaded.process(options.process);
   if (process == nullptr)
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
-                     "use one of the names below `processes`"};
+                     mend_name(options.process, loaded.process_names())};
   return RunningProcess{options, loaded, *process}.run(stop);
 }
 

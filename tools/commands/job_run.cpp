@@ -322,6 +322,10 @@ int list(Options& options) {
   }
   if (options.json) std::cout << json.dump(2) << '\n';
   if (!table.empty()) table.print(std::cout);
+  if (cell.found() && cell.file() != nullptr && cell.file()->jobs.empty()) {
+    std::cerr << "the cell " << cell.name() << " has no jobs; its file lists them below `jobs`\n";
+    return 0;
+  }
   if (jobs.names().empty()) {
     cell.say_not_found(options.call.command);
     return 1;
