@@ -214,6 +214,8 @@ void Executor::activate(Slot& slot, Instant now) noexcept {
   Component& component = *slot.component;
   component.set_now(now, count_.cycle);
   component.clear_failure();
+  for (Port* port : component.ports())
+    if (port->direction() == Port::Direction::inbox) static_cast<InputPort*>(port)->discard();
   slot.active_since = now;
   slot.next_due = (next_cycle_ + slot.every - 1) / slot.every * slot.every;
   slot.bump_checked = component.bumpless().empty();

@@ -18,6 +18,7 @@
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/process_claim.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
 
@@ -230,6 +231,8 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
     throw InputError{
         "--host", "`" + options.host + "` is no host of " + cell.file.string(),
         mend_name(options.host, names_of(cell.hosts, [](const auto& host) { return host.name; }))};
+  for (const auto& process : cell.processes)  // let go at once: the processes claim their names themselves
+    if (options.host.empty() || process.host == options.host) (void)ProcessClaim{cell, process.name};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
   announce(options, cell, outcome.simulated);
 
