@@ -21,6 +21,9 @@ class JobComponent : public Component {
   void step(const Tick& tick) noexcept override;
   void deactivate() noexcept override;
 
+  /// There is a job of this name.
+  [[nodiscard]] bool has(const std::string& job) { return find(job).has_value(); }
+
  protected:
   struct Job {
     Task task;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/base/shown.hpp"
+
 namespace invar::supervisor {
 
 namespace {
@@ -29,7 +31,7 @@ void Supervisor::activate() {
   last_heard_.clear();
   lost_.clear();
   failed_.clear();
-  for (const std::string& process : view_.processes) last_heard_[process] = now();
+  began_ = now();
 }
 
 void Supervisor::step(const Tick& tick) noexcept {
@@ -45,11 +47,14 @@ void Supervisor::step(const Tick& tick) noexcept {
 void Supervisor::watch_processes(const Tick& tick) {
   for (const std::string& process : view_.heard()) last_heard_[process] = tick.now;
   for (const std::string& process : view_.processes) {
-    const bool silent = tick.now - last_heard_[process] > Duration::seconds(parameters_.timeout);
+    // One that was never heard of is starting: nothing depends on it yet that would have to be made safe.
+    const auto heard = last_heard_.find(process);
+    const double patience = heard == last_heard_.end() ? parameters_.start_timeout : parameters_.timeout;
+    const Instant since = heard == last_heard_.end() ? began_ : heard->second;
+    const bool silent = tick.now - since > Duration::seconds(patience);
     if (silent && lost_.insert(process).second) {
       view_.notify(true, process,
-                   "process `" + process + "` is lost: not heard of for " +
-                       std::to_string(parameters_.timeout) + " s");
+                   "process `" + process + "` is lost: not heard of for " + shown(patience) + " s");
       std::set<std::string> components;
       for (const auto& [component, home] : view_.process_of)
         if (home == process) components.insert(component);
@@ -80,8 +85,10 @@ void Supervisor::make_safe(const std::set<std::string>& failed) {
     if (home == view_.process_of.end() || lost_.contains(home->second)) continue;
     const std::string refusal = view_.deactivate(component);
     view_.notify(!refusal.empty(), component,
-                 refusal.empty() ? "component `" + component + "` was deactivated: it needs what was lost"
-                                 : "component `" + component + "` cannot be deactivated: " + refusal);
+                 refusal.empty()
+                     ? "component `" + component +
+                           "` was deactivated: it needs what was lost; when that is back, activate it"
+                     : "component `" + component + "` cannot be deactivated: " + refusal);
   }
 }
 

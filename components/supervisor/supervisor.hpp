@@ -37,10 +37,13 @@ class Supervisor final : public Component {
  public:
   struct Parameters {
     double timeout = 2.0;
+    double start_timeout = 30.0;
     bool make_safe = true;
     void describe(auto& p) {
       p(timeout, "timeout", "s", Range{0.5, 600.0}, "a process not heard of for so long is lost",
         while_running);
+      p(start_timeout, "start_timeout", "s", Range{0.5, 600.0},
+        "one never heard of since the start, for so long", while_running);
       p(make_safe, "make_safe", "deactivate what depends on a lost process or a failed component");
     }
   };
@@ -58,7 +61,8 @@ class Supervisor final : public Component {
 
   const Parameters& parameters_;
   CellView view_;
-  std::map<std::string, Instant> last_heard_;
+  Instant began_;
+  std::map<std::string, Instant> last_heard_;  // only those that were
   std::set<std::string> lost_;
   std::set<std::string> failed_;
 };

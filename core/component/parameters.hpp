@@ -1,9 +1,12 @@
 // Parameters: declared once by `describe`; reading, checking, documenting and changing them follow from it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -175,5 +178,27 @@ class ParameterLister {
   std::vector<ParameterInfo>& list_;
   std::string prefix_;
 };
+
+/// What the checks between parameters in `describe` have against these numbers, which stand beside the list of infos (those
+/// that may not change are not looked at); empty: nothing. Any thread.
+using ParameterCheck = std::function<std::string(std::span<const double> numbers)>;
+
+/// The same for parameters as they were read from the file.
+template <Described Parameters>
+std::string objection_to(Parameters parameters, std::span<const double> numbers) {
+  std::vector<ParameterInfo> infos;
+  ParameterLister lister{infos};
+  parameters.describe(lister);
+  for (std::size_t i = 0; i < std::min(infos.size(), numbers.size()); ++i)
+    if (infos[i].number != nullptr) *infos[i].number = numbers[i];
+  // Nothing stands in this file, so that nothing is read and only the checks remain.
+  const auto file = config::Yaml::parse("{}", "");
+  ParameterReader reader{file.root()};
+  parameters.describe(reader);
+  const auto faults = file.faults();
+  return faults.empty()
+             ? ""
+             : faults.front().what + (faults.front().mend.empty() ? "" : "; " + faults.front().mend);
+}
 
 }  // namespace invar

@@ -75,6 +75,8 @@ class InputPort : public Port {
   /// The outputs of this process that feed it. Set-up only.
   [[nodiscard]] const std::vector<const Port*>& sources() const { return sources_; }
   void add_source(const Port& output) { sources_.push_back(&output); }
+  /// Lets go of what waits in an inbox: a component that becomes active does not obey what it was told before. Real-time.
+  virtual void discard() noexcept {}
 
  protected:
   template <class T>
@@ -137,6 +139,10 @@ class Inbox final : public InputPort {
     for (auto& lane : lanes_)
       if (lane->pop(sample)) return true;
     return false;
+  }
+  void discard() noexcept override {
+    for (T sample; take(sample);) {
+    }
   }
   /// Samples refused because this component did not take them in time. Any thread.
   [[nodiscard]] std::uint64_t lost() const noexcept {

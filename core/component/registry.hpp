@@ -17,6 +17,7 @@ namespace invar {
 struct Prepared {
   std::shared_ptr<void> parameters;  // must outlive the component
   std::vector<ParameterInfo> infos;  // with handles into `parameters`
+  ParameterCheck check;
   std::function<std::unique_ptr<Component>()> make;
 };
 
@@ -34,6 +35,9 @@ class Registry {
                       Prepared prepared;
                       ParameterLister lister{prepared.infos};
                       parameters->describe(lister);
+                      prepared.check = [read = *parameters](std::span<const double> numbers) {
+                        return objection_to(read, numbers);
+                      };
                       prepared.make = [parameters] { return std::make_unique<Type>(*parameters); };
                       prepared.parameters = parameters;
                       return prepared;

@@ -12,12 +12,18 @@ namespace invar::config {
 
 namespace {
 
-/// Names become topics, file names and bounded strings on the wire.
-void check_name(const Node& node, const std::string& name) {
-  const bool good = !name.empty() && name.size() <= 31 &&
-                    std::all_of(name.begin(), name.end(),
-                                [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; });
-  if (!good) node.fault("`" + name + "` is no name", "use 1 to 31 letters, digits, _ or -");
+/// Names become file names and bounded strings on the wire; those of cells and components stand in topics too, which must
+/// not have a `-` (Cyclone DDS refuses to read them).
+enum class In { topics, files };
+void check_name(const Node& node, const std::string& name, In where) {
+  const bool good =
+      !name.empty() && name.size() <= 31 && std::all_of(name.begin(), name.end(), [&](unsigned char c) {
+        return std::isalnum(c) != 0 || c == '_' || (c == '-' && where == In::files);
+      });
+  if (!good)
+    node.fault("`" + name + "` is no name",
+               where == In::files ? "use 1 to 31 letters, digits, _ or -"
+                                  : "use 1 to 31 letters, digits or _, since it stands in topics");
 }
 
 CellHost read_host(const Node& node) {
@@ -25,13 +31,13 @@ CellHost read_host(const Node& node) {
   in_addr address{};
   if (node.has("address") && inet_pton(AF_INET, host.address.c_str(), &address) != 1)
     node["address"].fault("`" + host.address + "` is no IPv4 address", "write it as 10.0.0.11");
-  check_name(node, host.name);
+  check_name(node, host.name, In::files);
   return host;
 }
 
 CellComponent read_component(const Node& node, std::uint32_t id) {
   CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, {}, node};
-  check_name(node, component.name);
+  check_name(node, component.name, In::topics);
   component.every = node.integer("every", 1, 1'000'000, 1);
   for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();
   for (const Node& port : node["qos"].children()) component.profiles[port.key()] = port.as_text();
@@ -56,7 +62,7 @@ CellProcess read_process(const Node& node, std::uint32_t& next_id) {
   CellProcess process;
   process.name = node.key();
   process.where = node.where();
-  check_name(node, process.name);
+  check_name(node, process.name, In::files);
   process.host = node.text("host");
   const Range rates{0.1, 20'000.0};
   double rate = 1.0;
@@ -132,7 +138,7 @@ Cell read_cell(const Yaml& yaml) {
   cell.file = yaml.file();
   (void)root.integer("invar_cell", 1, 1);
   cell.name = root.text("name");
-  if (root.has("name")) check_name(root["name"], cell.name);
+  if (root.has("name")) check_name(root["name"], cell.name, In::topics);
   cell.id = static_cast<std::uint32_t>(root.integer("id", 1, 65535, 1));
   cell.domain = static_cast<int>(root.integer("domain", 0, 232, 0));
   cell.simulated_time = root.choice("time", {"real", "simulated"}, "real") == "simulated";

@@ -41,6 +41,7 @@ std::size_t Executor::add(std::unique_ptr<Component> component, Placement placem
   slot->every = placement.every;
   slot->index = slots_.size();
   slot->infos = std::move(placement.parameters);
+  slot->check = std::move(placement.check);
   for (const ParameterInfo& info : slot->infos)
     slot->values.emplace_back(info.number != nullptr ? *info.number : 0.0);
   for (Port* port : slot->component->ports()) {
@@ -213,6 +214,8 @@ void Executor::activate(Slot& slot, Instant now) noexcept {
   Component& component = *slot.component;
   component.set_now(now, count_.cycle);
   component.clear_failure();
+  for (Port* port : component.ports())
+    if (port->direction() == Port::Direction::inbox) static_cast<InputPort*>(port)->discard();
   slot.active_since = now;
   slot.next_due = (next_cycle_ + slot.every - 1) / slot.every * slot.every;
   slot.bump_checked = component.bumpless().empty();

@@ -35,6 +35,7 @@ struct Placement {
   std::shared_ptr<void> storage;                // kept alive as long as the component
   std::uint32_t every = 1;                      // stepped each `every`-th period
   std::map<std::string, Duration> latencies{};  // input -> how old its sample may be when a step reads it
+  ParameterCheck check{};                       // of changed numbers against each other
 };
 
 /// How old the samples of an input were when its component was stepped, by their stamps. Only in real time.

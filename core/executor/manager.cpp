@@ -173,8 +173,15 @@ std::string Executor::set_parameter(std::size_t index, std::string_view path, do
     return text.str();
   }
   const std::lock_guard turn{manager_};
+  const auto which = static_cast<std::size_t>(info - slot.infos.begin());
+  if (slot.check) {
+    std::vector<double> numbers;
+    for (const auto& number : slot.values) numbers.push_back(number.load(std::memory_order_relaxed));
+    numbers[which] = value;
+    if (const std::string objection = slot.check(numbers); !objection.empty()) return at + ": " + objection;
+  }
   const bool answered = carry_out({Command::Kind::set_parameter, static_cast<std::uint32_t>(index),
-                                   static_cast<std::uint32_t>(info - slot.infos.begin()), value});
+                                   static_cast<std::uint32_t>(which), value});
   return answered ? "" : at + ": the loop does not answer; it may hang in a step";
 }
 

@@ -32,6 +32,7 @@ struct Slot {
   std::size_t index = 0;
 
   std::vector<ParameterInfo> infos;
+  ParameterCheck check;
   std::deque<std::atomic<double>> values;  // beside infos: what the loop applied last, for readers
 
   struct Deadline {

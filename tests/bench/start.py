@@ -42,7 +42,7 @@ def components(file):
 
 
 def run(folder, file, wanted):
-    hearer = subprocess.Popen([INVAR, "echo", file, "cell/xy-table/process/components", "--json", "--wait", "60"],
+    hearer = subprocess.Popen([INVAR, "echo", file, "cell/xy_table/process/components", "--json", "--wait", "60"],
                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=folder)
     time.sleep(1.0)  # it takes part in the domain by then
     began = time.time_ns()

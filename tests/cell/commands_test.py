@@ -257,6 +257,12 @@ class Looking(unittest.TestCase):
 
 
 class Acting(unittest.TestCase):
+    def test_a_running_cell_is_not_started_a_second_time(self):
+        status, _, err = invar("run", CELL_FILE, "--real-time", "--duration", "1")
+        self.assertEqual(status, 2)
+        self.assertIn("process `motion` of cell `small` runs already on this PC", err)
+        self.assertEqual(len(err.splitlines()), 1, err)
+
     def test_lifecycle_takes_a_component_down_and_up(self):
         self.assertEqual(invar("lifecycle", CELL_FILE, "laser", "deactivate"), (0, "laser: inactive\n", ""))
         self.assertEqual(invar("lifecycle", CELL_FILE, "laser", "activate"), (0, "laser: active\n", ""))
@@ -279,6 +285,9 @@ class Acting(unittest.TestCase):
         status, _, err = invar("param", "set", CELL_FILE, "thermal", "setpoint", "3000")
         self.assertEqual(status, 1)
         self.assertRegex(err, r"setpoint|3000")
+        status, _, err = invar("param", "set", CELL_FILE, "thermal", "setpoint", "99")  # within its bounds, above the latch
+        self.assertEqual(status, 1)
+        self.assertIn("is not below `over_temperature`", err)
         status, _, err = invar("param", "get", CELL_FILE, "thermal", "setpiont")
         self.assertEqual(status, 1)
         self.assertIn("has no parameter `setpiont`", err)

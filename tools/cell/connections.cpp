@@ -25,14 +25,6 @@ std::vector<std::string> port_names(const Component& component) {
   return names;
 }
 
-std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
-  if (const std::string near = config::nearest(word, names); !near.empty())
-    return "did you mean `" + near + "`?";
-  std::string text = "there are: ";
-  for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
-  return text;
-}
-
 std::string type_of(const Port& port) {
   const dds::WireType* type = dds::WireTypes::all().find(port.type());
   return type == nullptr ? "a type without IDL" : type->name();
@@ -122,6 +114,10 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
              "name the output in the `connect` of the component that reads it");
   } else if (!writes && !listens && other->direction() != Port::Direction::output) {
     at.fault("`" + found->second + "` is no output", "name the output that this port reads");
+  } else if (found->second.substr(0, found->second.find('.')) == member.file->name &&
+             port.direction() == Port::Direction::input) {
+    at.fault("`" + found->second + "` is an output of the same component",
+             "name the component that it shall hear");
   } else if (other->type() != port.type()) {
     at.fault("`" + found->second + "` carries " + type_of(*other) + ", but `" + port.name() + "` takes " +
                  type_of(port),

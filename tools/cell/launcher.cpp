@@ -18,6 +18,7 @@
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/process_claim.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
 
@@ -198,6 +199,13 @@ std::string keep_simulated_time(const LaunchOptions& options, const config::Cell
   return stop ? "" : failure;
 }
 
+template <typename List, typename Name>
+std::vector<std::string> names_of(const List& list, const Name& name) {
+  std::vector<std::string> names;
+  for (const auto& each : list) names.push_back(name(each));
+  return names;
+}
+
 /// A run is silent while all is well: one line says what goes on and how to end it.
 void announce(const LaunchOptions& options, const config::Cell& cell, bool simulated) {
   std::string names;
@@ -217,11 +225,14 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   const config::Cell& cell = *loaded.cell;
   if (!options.job.empty() && !cell.jobs.contains(options.job))
     throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell",
-                     "add it to `jobs`"};
+                     mend_name(options.job, names_of(cell.jobs, [](const auto& job) { return job.first; }))};
   if (!options.host.empty() && std::none_of(cell.hosts.begin(), cell.hosts.end(),
                                             [&](const auto& host) { return host.name == options.host; }))
-    throw InputError{"--host", "`" + options.host + "` is no host of " + cell.file.string(),
-                     "use a name below `hosts`"};
+    throw InputError{
+        "--host", "`" + options.host + "` is no host of " + cell.file.string(),
+        mend_name(options.host, names_of(cell.hosts, [](const auto& host) { return host.name; }))};
+  for (const auto& process : cell.processes)  // let go at once: the processes claim their names themselves
+    if (options.host.empty() || process.host == options.host) (void)ProcessClaim{cell, process.name};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
   announce(options, cell, outcome.simulated);
 

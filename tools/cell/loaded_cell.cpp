@@ -1,6 +1,9 @@
 #include "tools/cell/loaded_cell.hpp"
 
+#include <algorithm>
+
 #include "components/all.hpp"
+#include "components/calibration/job_component.hpp"
 #include "tools/cell/connections.hpp"
 #include "tools/cell/plugins.hpp"
 #include "tools/cell/qos.hpp"
@@ -48,7 +51,46 @@ void prepare(LoadedCell& loaded, const config::CellComponent& component, bool ty
   loaded.processes.back().components.push_back(std::move(result));
 }
 
+/// The names of a component's own jobs: `jobs[0].name` and the like of its parameters.
+std::vector<std::string> job_names(const LoadedComponent& member) {
+  std::vector<std::string> names;
+  for (const ParameterInfo& info : member.prepared.infos)
+    if (info.path.ends_with("].name") && std::count(info.path.begin(), info.path.end(), '.') == 1)
+      names.push_back(info.otherwise);
+  return names;
+}
+
+/// Every job of the cell must be one of the component that is to run it.
+void check_jobs(const LoadedCell& loaded) {
+  for (const LoadedProcess& process : loaded.processes)
+    for (const LoadedComponent& member : process.components)
+      for (const auto& [job, component] : loaded.cell->jobs) {
+        if (component != member.file->name || !member.component) continue;
+        const config::Node at = loaded.yaml.root()["jobs"][job];
+        auto* runs = dynamic_cast<calibration::JobComponent*>(member.component.get());
+        if (runs == nullptr)
+          at.fault("`" + component + "` runs no jobs", "name the component that runs it");
+        else if (!runs->has(job))
+          at.fault("`" + component + "` has no job `" + job + "`", mend_name(job, job_names(member)));
+      }
+}
+
 }  // namespace
+
+std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
+  if (names.empty()) return "there is none";
+  if (const std::string near = config::nearest(word, names); !near.empty())
+    return "did you mean `" + near + "`?";
+  std::string text = "there are: ";
+  for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
+  return text;
+}
+
+std::vector<std::string> LoadedCell::process_names() const {
+  std::vector<std::string> names;
+  for (const LoadedProcess& each : processes) names.push_back(each.file->name);
+  return names;
+}
 
 LoadedProcess* LoadedCell::process(const std::string& name) {
   for (LoadedProcess& candidate : processes)
@@ -76,6 +118,7 @@ LoadedCell load_cell(const std::filesystem::path& file) {
   }
   connect_ports(loaded);
   check_qos(loaded);
+  check_jobs(loaded);
   loaded.yaml.finish();
   return loaded;
 }

@@ -22,6 +22,7 @@
 #include "idl/stage.h"
 #include "tools/cell/black_box_file.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/process_claim.hpp"
 
 namespace invar::tools {
 
@@ -60,7 +61,8 @@ class RunningProcess {
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
                                                   .every = static_cast<std::uint32_t>(member.file->every),
-                                                  .latencies = member.file->latencies});
+                                                  .latencies = member.file->latencies,
+                                                  .check = member.prepared.check});
     }
     join_directly();
     fill_black_box();
@@ -136,7 +138,8 @@ class RunningProcess {
     });
   }
 
-  /// Puts the command that starts the job into the inbox of the component that runs it, and follows its status.
+  /// Prepares the command that starts the job, for the inbox of the component that runs it once that is active, and follows
+  /// its status.
   void watch_job() {
     const auto found = loaded_.cell->jobs.find(options_.job);
     if (found == loaded_.cell->jobs.end()) return;
@@ -163,7 +166,7 @@ class RunningProcess {
     command.id(1);
     command.kind(job::JOB_RUN);
     command.name(options_.job);
-    inbox->add_lane()(command, Instant{0});
+    start_job_ = [lane = inbox->add_lane(), command] { lane(command, Instant{0}); };
   }
 
   Duration separation(std::size_t component, const Port& port) const {
@@ -179,6 +182,7 @@ class RunningProcess {
       spdlog::error("{}: cannot {}: {}", file_.name, to_text(transition), outcome.reason);
       return false;
     }
+    if (start_job_) start_job_();
     return true;
   }
 
@@ -386,6 +390,7 @@ class RunningProcess {
   std::vector<std::unique_ptr<dds::Connection>> topics_;
   ProcessStatus status_;
   bool runs_job_ = false;
+  std::function<void()> start_job_;
   std::mutex job_mutex_;
   job::JobStatus job_;
   std::int64_t job_began_ns_ = 0;
@@ -399,7 +404,8 @@ int run_process(const ProcessOptions& options, const std::atomic<bool>& stop) {
   LoadedProcess* process = loaded.process(options.process);
   if (process == nullptr)
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
-                     "use one of the names below `processes`"};
+                     mend_name(options.process, loaded.process_names())};
+  const ProcessClaim claim{*loaded.cell, options.process};
   return RunningProcess{options, loaded, *process}.run(stop);
 }
 

@@ -205,7 +205,7 @@ ReplayReport replay_process(const std::filesystem::path& cell, const std::string
   LoadedProcess* found = loaded.process(process);
   if (found == nullptr)
     throw InputError{cell.string(), "`" + process + "` is no process of this cell",
-                     "use one of the names below `processes`"};
+                     mend_name(process, loaded.process_names())};
   const auto file = recording::Recording::open(recording);
   // Simulated time begins at 0; what is years away was stamped by UTC.
   if (file.statistics().start > Instant{} + Duration::seconds(1e8))

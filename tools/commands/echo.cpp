@@ -129,7 +129,7 @@ void add_echo(CLI::App& program) {
   auto* command = program.add_subcommand("echo", "Print the samples of a topic as they come");
   command->footer(
       "Example: invar echo deployment/xy-table.yaml thermal.state --count 1\n"
-      "         invar echo --domain 71 cell/xy-table/stage_x/state --json\n"
+      "         invar echo --domain 71 cell/xy_table/stage_x/state --json\n"
       "Ctrl-C ends it. Exit status: 0; 1 nobody writes the topic, or a sample cannot be read; 2 a fault of "
       "the "
       "call or the file");

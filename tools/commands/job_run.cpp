@@ -223,13 +223,14 @@ int report(const Options& options, const std::string& component, const job::JobS
 int follow(const Options& options, Jobs& jobs, const std::string& component, const std::string& name,
            std::uint64_t id) {
   Progress progress;
-  bool cancelling = false;
+  bool cancelling = false, taken = false;
   auto last_heard = Clock::now();
   auto last_sent = Clock::now();
   std::int64_t last_time = 0;
   for (;;) {
     const auto status = jobs.status(component);
     if (status && status->id() == id) {
+      taken = true;
       if (status->at().time_ns() != last_time) last_heard = Clock::now();
       last_time = status->at().time_ns();
       progress.show(*status);
@@ -237,6 +238,11 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
         progress.end();
         return report(options, component, *status);
       }
+    } else if (taken) {  // sent again, it would begin anew by itself
+      progress.end();
+      std::cerr << options.call.command << ": `" << component
+                << "` was started again meanwhile: the job has ended, and its changes were taken back\n";
+      return 1;
     } else if (Clock::now() - last_heard > std::chrono::seconds{5}) {
       progress.end();
       std::cerr << options.call.command << ": `" << component << "` does not take the job"
@@ -322,6 +328,10 @@ int list(Options& options) {
   }
   if (options.json) std::cout << json.dump(2) << '\n';
   if (!table.empty()) table.print(std::cout);
+  if (cell.found() && cell.file() != nullptr && cell.file()->jobs.empty()) {
+    std::cerr << "the cell " << cell.name() << " has no jobs; its file lists them below `jobs`\n";
+    return 0;
+  }
   if (jobs.names().empty()) {
     cell.say_not_found(options.call.command);
     return 1;

@@ -56,8 +56,11 @@ dds::Profile profile_of(const dds::Profiles& profiles, const recording::mcap::Ch
 
 bool is_wanted(const Options& options, const std::string& topic) {
   return options.topics.empty() ||
-         std::any_of(options.topics.begin(), options.topics.end(),
-                     [&](const std::string& part) { return topic.find(part) != std::string::npos; });
+         std::any_of(options.topics.begin(), options.topics.end(), [&](const std::string& part) {
+           std::string path = part;  // `component.port` stands in the topic as component/port
+           std::replace(path.begin(), path.end(), '.', '/');
+           return topic.find(part) != std::string::npos || topic.ends_with("/" + path);
+         });
 }
 
 /// Two writers of one topic are two truths: whoever writes one of ours already.

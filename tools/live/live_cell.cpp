@@ -253,7 +253,7 @@ void LiveCell::say_not_found(const std::string& command) const {
     return;
   }
   std::cerr << command << ": no cell answers in " << where_ << " within " << patience_.in_seconds()
-            << " s; is it running, and on an address of this PC?\n";
+            << " s; is it running, and on an address of this PC? (--wait gives a busy one longer)\n";
 }
 
 dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers, std::int64_t depth) {

@@ -92,6 +92,31 @@ TEST(Parameters, OutOfBoundsOrUnknownAreFaults) {
   EXPECT_EQ(yaml.faults().size(), 2U);
 }
 
+/// A band whose ends must not cross, of which one may change while running.
+struct Band final : Component {
+  struct Parameters {
+    double lower = 1.0, upper = 2.0;
+    void describe(auto& p) {
+      p(lower, "lower", "m", Range{0.0, 10.0}, "", while_running);
+      p(upper, "upper", "m", Range{0.0, 10.0}, "");
+      if constexpr (requires { p.node(); })
+        if (lower >= upper) p.node()["lower"].fault("is not below `upper`", "lower it");
+    }
+  };
+  explicit Band(const Parameters&) {}
+  void step(const Tick&) noexcept override {}
+};
+
+TEST(Parameters, AChangeIsCheckedAgainstTheOthers) {
+  Registry r;
+  r.add<Band>("band", "");
+  const auto yaml = config::Yaml::parse("upper: 3\n", "a.yaml");
+  const auto prepared = r.prepare("band", yaml.root(), {});
+  yaml.finish();
+  EXPECT_EQ(prepared.check(std::vector{2.9, 0.0}), "") << "the upper end is the file's: it may not change";
+  EXPECT_EQ(prepared.check(std::vector{3.0, 0.0}), "is not below `upper`; lower it");
+}
+
 TEST(Ports, InboxKeepsEverySampleInOrderAndCountsWhatDoesNotFit) {
   LowPass::Parameters parameters;
   LowPass source{parameters};

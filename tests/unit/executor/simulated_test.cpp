@@ -175,6 +175,34 @@ TEST(Executor, ATripDeactivatesDownstreamFirstAndBlocksActivationUntilCleared) {
   EXPECT_TRUE(loop.executor.transition(0, Transition::activate).ok());
 }
 
+struct Obedient final : Component {
+  Inbox<Sample> orders{*this, "orders"};
+  std::vector<std::uint64_t> obeyed;
+  void step(const Tick&) noexcept override {
+    for (Sample order; orders.take(order);) obeyed.push_back(order.cycle);
+  }
+};
+
+TEST(Executor, AComponentDoesNotObeyWhatItWasToldWhileItWasNotActive) {
+  Executor executor{simulated()};
+  auto owned = std::make_unique<Obedient>();
+  Obedient& component = *owned;
+  const auto tell = component.orders.add_lane();
+  executor.add(std::move(owned), {"obedient", {}, nullptr, 1});
+  tell({1, 0.0}, at_ms(0));
+  (void)executor.transition(0, Transition::configure);
+  tell({2, 0.0}, at_ms(0));
+  ASSERT_TRUE(executor.transition(0, Transition::activate).ok());
+  tell({3, 0.0}, at_ms(0));
+  executor.advance_to(at_ms(5));
+  (void)executor.transition(0, Transition::deactivate);
+  tell({4, 0.0}, at_ms(5));
+  executor.advance_to(at_ms(10));
+  ASSERT_TRUE(executor.transition(0, Transition::activate).ok());
+  executor.advance_to(at_ms(15));
+  EXPECT_THAT(component.obeyed, ElementsAre(3U));
+}
+
 TEST(Executor, AppliesAParameterBetweenTwoStepsAndSaysWhyNot) {
   Loop loop{simulated()};
   loop.bring_up();
