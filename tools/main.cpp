@@ -1,5 +1,6 @@
 // invar: the one program that people type; its subcommands stand in tools/commands/, one a file.
 #include <exception>
+#include <filesystem>
 #include <iostream>
 
 #include "core/base/fault.hpp"
@@ -49,6 +50,10 @@ int main(int argc, char** argv) {
     std::cerr << error.what();
     if (const auto more = error.faults().size() - 1; more > 0) std::cerr << " (and " << more << " more)";
     std::cerr << '\n';
+    return 2;
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::cerr << error.path1().string() << ": " << error.code().message()
+              << "; check the path and its permissions\n";
     return 2;
   } catch (const std::exception& error) {
     std::cerr << "invar: " << error.what() << '\n';

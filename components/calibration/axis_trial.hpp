@@ -82,6 +82,12 @@ class AxisTrial final : public AxisRunner {
       p(ripple, "ripple", "jobs that identify the force ripple");
       p(tracking, "tracking", "jobs that track sinusoids");
       p(motion, "motion", "jobs that move forth and back, to record and to compare");
+      if constexpr (requires { p.node(); }) {
+        std::set<std::string> names;
+        check_names(p.node()["ripple"], ripple, names);
+        check_names(p.node()["tracking"], tracking, names);
+        check_names(p.node()["motion"], motion, names);
+      }
     }
   };
   explicit AxisTrial(const Parameters& parameters) : AxisRunner{parameters.axis}, parameters_{parameters} {}

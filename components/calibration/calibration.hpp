@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -49,12 +50,17 @@ class Calibration final : public JobComponent, private JobHost {
       p(jobs, "jobs", "geometric calibrations that can be run");
       p(thermal_jobs, "thermal_jobs", "calibrations over position and temperature");
       p(prints, "prints", "print jobs that can be run");
-      if constexpr (requires { p.node(); })
+      if constexpr (requires { p.node(); }) {
+        std::set<std::string> names;
+        check_names(p.node()["jobs"], jobs, names);
+        check_names(p.node()["thermal_jobs"], thermal_jobs, names);
+        check_names(p.node()["prints"], prints, names);
         for (const PrintJob& print : prints)
           if (!print.first.empty() && std::none_of(jobs.begin(), jobs.end(),
                                                    [&](const auto& job) { return job.name == print.first; }))
             p.node()["prints"].fault("`" + print.first + "` is no job of `jobs`",
                                      "name one of them, or leave `first` out");
+      }
       p(zones, "zones", "further temperatures to record: each makes a port temperature_<zone>");
     }
   };

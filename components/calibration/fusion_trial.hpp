@@ -56,10 +56,13 @@ class FusionTrial final : public AxisRunner {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(sensors, "sensors", "as the fusion has them");
       p(jobs, "jobs", "that identify them");
-      if constexpr (requires { p.node(); })
+      if constexpr (requires { p.node(); }) {
+        std::set<std::string> names;
+        check_names(p.node()["jobs"], jobs, names);
         if (std::none_of(sensors.begin(), sensors.end(),
                          [](const Sensor& sensor) { return sensor.quantity == "position"; }))
           p.node()["sensors"].fault("none measures a position", "name the sensors of the fusion");
+      }
     }
   };
   explicit FusionTrial(const Parameters& parameters);

@@ -1,10 +1,15 @@
 // The geometric calibration: lines, the fit, and whether it helps on lines that were not fitted.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "components/calibration/calibration.hpp"
 #include "components/calibration/identify.hpp"
+#include "core/base/fault.hpp"
+#include "core/base/shown.hpp"
+#include "core/machine/machine_file.hpp"
 
 namespace invar::calibration {
 
@@ -34,6 +39,33 @@ void append(recording::Table& table, const std::string& line, const Eigen::Vecto
 }
 
 }  // namespace
+
+void check_travel(const GeometricJob& job, const config::Node& node) {
+  std::error_code unseen;
+  if (!std::filesystem::is_regular_file(job.machine, unseen)) return;
+  metrology::Machine machine;
+  try {
+    machine = machine::load_machine(job.machine);
+  } catch (const InputError& error) {
+    for (const Fault& fault : error.faults())
+      node["machine"].fault(fault.where + ": " + fault.what, fault.mend);
+    return;
+  }
+  const auto check = [&](const char* list, const std::vector<LineSpec>& lines) {
+    const auto places = node[list].list();
+    for (std::size_t i = 0; i < std::min(places.size(), lines.size()); ++i)
+      for (const auto& [end, point] : {std::pair{"from", &lines[i].from}, std::pair{"to", &lines[i].to}})
+        for (std::size_t axis = 0; axis < std::min<std::size_t>(point->size(), 3); ++axis) {
+          const Range travel = machine.travel[axis];
+          if (!travel.contains((*point)[axis]))
+            places[i][end].fault(
+                std::string{"leaves the travel of "} + "xyz"[axis] + " at " + shown((*point)[axis]) + " m",
+                "stay between " + shown(travel.lower) + " and " + shown(travel.upper) + " m");
+        }
+  };
+  check("lines", job.lines);
+  check("verify", job.verify);
+}
 
 Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
                           double share, recording::Table& table) {

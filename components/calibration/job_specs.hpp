@@ -6,10 +6,12 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "core/base/range.hpp"
+#include "core/config/yaml.hpp"
 
 namespace invar::calibration {
 
@@ -43,6 +45,8 @@ struct LineSpec {
     if constexpr (requires { p.node(); }) {
       if (from.size() != to.size() || from.empty() || from.size() > 3)
         p.node().fault("`from` and `to` need one number an axis each", "write from: [0, 0] and to: [0.2, 0]");
+      else if (from == to)
+        p.node().fault("begins where it ends", "let `from` and `to` differ");
     }
   }
   [[nodiscard]] Eigen::Vector3d start() const { return point(from); }
@@ -55,6 +59,19 @@ struct LineSpec {
     return result;
   }
 };
+
+struct GeometricJob;
+/// Faults at `job` for its machine's file, and for lines that leave the travel that this names.
+void check_travel(const GeometricJob& job, const config::Node& node);
+
+/// A fault where a job has the name of an earlier one.
+template <class Spec>
+void check_names(const config::Node& list, const std::vector<Spec>& jobs, std::set<std::string>& names) {
+  const auto places = list.list();
+  for (std::size_t i = 0; i < std::min(jobs.size(), places.size()); ++i)
+    if (!jobs[i].name.empty() && !names.insert(jobs[i].name).second)
+      places[i].fault("job `" + jobs[i].name + "` stands twice in this component", "rename one of them");
+}
 
 /// One geometric calibration as a transaction: lines to fit, lines to verify before and after.
 struct GeometricJob : JobSpec {
@@ -74,6 +91,12 @@ struct GeometricJob : JobSpec {
     p(verify_interval, "verify_interval", "m", Range{1e-4, 1.0}, "between the points of a verification line");
     p(cycles, "cycles", 1, 100, "each line forth and back so often");
     p(readings, "readings", 1, 10'000, "averaged at each point");
+    if constexpr (requires { p.node(); }) {
+      if (lines.empty())
+        p.node()["lines"].fault("no lines to identify the error from",
+                                "write - {name: x, from: [0, 0], to: [0.2, 0]}");
+      check_travel(*this, p.node());
+    }
   }
 };
 
@@ -135,7 +158,8 @@ struct ThermalJob : JobSpec {
       int moving = 0;
       for (std::size_t i = 0; i < line.from.size() && i < line.to.size(); ++i)
         moving += line.from[i] != line.to[i] ? 1 : 0;
-      if (moving != 1) p.node()["line"].fault("does not run along one axis", "change one coordinate alone");
+      if (moving > 1 || line.from.empty())
+        p.node()["line"].fault("does not run along one axis", "change one coordinate alone");
       for (const auto* one : {&trace, &verify})
         if (one->time.empty())
           p.node().fault("needs the traces `trace` and `verify`",

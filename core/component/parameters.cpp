@@ -20,7 +20,11 @@ void ParameterReader::operator()(std::filesystem::path& value, std::string_view 
   const config::Node node = node_[name];
   value = node.as_text();
   if (value.is_relative()) value = folder_ / value;
-  if (!std::filesystem::exists(value))
+  std::error_code error;
+  if (std::filesystem::exists(value, error) || !node.is_scalar()) return;
+  if (error == std::errc::permission_denied)
+    node.fault("`" + value.string() + "` cannot be read", "check its permissions and those of its folder");
+  else
     node.fault("file `" + value.string() + "` does not exist", "paths count from the cell file's folder");
 }
 

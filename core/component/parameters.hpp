@@ -110,7 +110,7 @@ class ParameterReader {
   void operator()(std::vector<Group>& groups, std::string_view name, std::string_view) {
     if (!node_.has(name)) return;
     groups.clear();
-    for (const auto& child : node_[name].children()) {
+    for (const auto& child : node_[name].list()) {
       ParameterReader inner{child, folder_};
       groups.emplace_back().describe(inner);
     }

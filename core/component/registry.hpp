@@ -28,7 +28,8 @@ class Registry {
   /// at its ports.
   template <class Type>
   void add(const std::string& name, const std::string& description) {
-    types_[name] = {description, [](const config::Node& node, const std::filesystem::path& folder) {
+    types_[name] = {description,
+                    [](const config::Node& node, const std::filesystem::path& folder) {
                       auto parameters = std::make_shared<typename Type::Parameters>();
                       ParameterReader reader{node, folder};
                       parameters->describe(reader);
@@ -41,6 +42,14 @@ class Registry {
                       prepared.make = [parameters] { return std::make_unique<Type>(*parameters); };
                       prepared.parameters = parameters;
                       return prepared;
+                    },
+                    [] {
+                      std::vector<ParameterInfo> infos;
+                      ParameterLister lister{infos};
+                      typename Type::Parameters parameters;
+                      parameters.describe(lister);
+                      for (ParameterInfo& info : infos) info.number = nullptr;
+                      return infos;
                     }};
   }
 
@@ -48,7 +57,8 @@ class Registry {
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] const std::string& description(const std::string& type) const;
   /// Reads the parameters from `node`; faults go to its document, so make the component only when there are
-  /// none. Relative paths count from `folder`. Precondition: has(type).
+  /// none. A type that describes a parameter in what is no unit is a fault of its own, and nothing is prepared.
+  /// Relative paths count from `folder`. Precondition: has(type).
   [[nodiscard]] Prepared prepare(const std::string& type, const config::Node& node,
                                  const std::filesystem::path& folder) const;
 
@@ -56,6 +66,7 @@ class Registry {
   struct Entry {
     std::string description;
     std::function<Prepared(const config::Node&, const std::filesystem::path&)> prepare;
+    std::function<std::vector<ParameterInfo>()> infos;  // of the defaults
   };
   std::map<std::string, Entry> types_;
 };

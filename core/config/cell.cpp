@@ -21,16 +21,26 @@ void check_name(const Node& node, const std::string& name, In where) {
         return std::isalnum(c) != 0 || c == '_' || (c == '-' && where == In::files);
       });
   if (!good)
-    node.fault("`" + name + "` is no name",
+    node.fault("`" + clipped(name) + "` is no name",
                where == In::files ? "use 1 to 31 letters, digits, _ or -"
                                   : "use 1 to 31 letters, digits or _, since it stands in topics");
+}
+
+void check_file(const Node& node, const std::filesystem::path& path) {
+  std::error_code error;
+  if (std::filesystem::is_regular_file(path, error)) return;
+  if (error == std::errc::permission_denied)
+    node.fault("file `" + path.string() + "` cannot be read",
+               "check its permissions and those of its folder");
+  else
+    node.fault("file `" + path.string() + "` does not exist", "paths count from the cell file's folder");
 }
 
 CellHost read_host(const Node& node) {
   CellHost host{node.key(), node.text("address")};
   in_addr address{};
   if (node.has("address") && inet_pton(AF_INET, host.address.c_str(), &address) != 1)
-    node["address"].fault("`" + host.address + "` is no IPv4 address", "write it as 10.0.0.11");
+    node["address"].fault("`" + clipped(host.address) + "` is no IPv4 address", "write it as 10.0.0.11");
   check_name(node, host.name, In::files);
   return host;
 }
@@ -38,12 +48,14 @@ CellHost read_host(const Node& node) {
 CellComponent read_component(const Node& node, std::uint32_t id) {
   CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, {}, node};
   check_name(node, component.name, In::topics);
+  if (component.name == "all")
+    node.fault("`all` is no name for a component: `invar lifecycle all` means every one", "choose another");
   component.every = node.integer("every", 1, 1'000'000, 1);
-  for (const Node& port : node["connect"].children()) component.connections[port.key()] = port.as_text();
-  for (const Node& port : node["qos"].children()) component.profiles[port.key()] = port.as_text();
-  for (const Node& port : node["publish"].children())
+  for (const Node& port : node["connect"].map()) component.connections[port.key()] = port.as_text();
+  for (const Node& port : node["qos"].map()) component.profiles[port.key()] = port.as_text();
+  for (const Node& port : node["publish"].map())
     component.publish_rates[port.key()] = port.as_number("Hz", {0.01, 20'000.0});
-  for (const Node& port : node["latency"].children())
+  for (const Node& port : node["latency"].map())
     component.latencies[port.key()] = Duration::seconds(port.as_number("s", {1e-5, 3600.0}));
   return component;
 }
@@ -56,6 +68,15 @@ RealtimeRequest read_realtime(const Node& node) {
   request.require = node.flag("require", false);
   if (node.has("latency")) request.latency = Duration::seconds(node["latency"].as_number("s", {1e-6, 10.0}));
   return request;
+}
+
+void check_publish_rates(const CellComponent& component, Duration period) {
+  const double steps = 1.0 / (period * component.every).in_seconds();
+  for (const auto& [port, rate] : component.publish_rates)
+    if (rate > steps * (1.0 + 1e-6))
+      component.node["publish"][port].fault(
+          "`" + shown(rate) + "` Hz is above the " + shown(steps) + " Hz at which the component is stepped",
+          "lower it, or leave it out: every step is then published");
 }
 
 CellProcess read_process(const Node& node, std::uint32_t& next_id) {
@@ -90,10 +111,10 @@ CellProcess read_process(const Node& node, std::uint32_t& next_id) {
                  : late == "event" ? LatePolicy::event
                                    : LatePolicy::safe_stop;
   const Node components = node.required("components");
-  for (const Node& child : components.children())
-    process.components.push_back(read_component(child, next_id++));
-  if (components.exists() && process.components.empty())
+  for (const Node& child : components.map()) process.components.push_back(read_component(child, next_id++));
+  if (components.is_map() && process.components.empty())
     components.fault("has no components", "name at least one, or remove the process");
+  for (const CellComponent& component : process.components) check_publish_rates(component, process.period);
   return process;
 }
 
@@ -107,7 +128,7 @@ void check_identities(const Node& root, const Cell& cell) {
       for (const CellHost& host : cell.hosts) hosts.push_back(host.name);
       const std::string near = nearest(process.host, hosts);
       root["processes"][process.name]["host"].fault(
-          "`" + process.host + "` is no host of this cell",
+          "`" + clipped(process.host) + "` is no host of this cell",
           near.empty() ? "add it to `hosts`" : "did you mean `" + near + "`?");
     }
     for (const CellComponent& component : process.components)
@@ -147,22 +168,26 @@ Cell read_cell(const Yaml& yaml) {
   const auto beside = [&](const Node& node) {
     std::filesystem::path path = node.as_text();
     if (path.is_relative()) path = cell.file.parent_path() / path;
-    if (!std::filesystem::is_regular_file(path))
-      node.fault("file `" + path.string() + "` does not exist", "paths count from the cell file's folder");
+    if (node.is_scalar()) check_file(node, path);
     return path;
   };
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);
-  for (const Node& plugin : root["plugins"].children()) cell.plugins.push_back(beside(plugin));
+  for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
   const Node hosts = root.required("hosts");
-  for (const Node& host : hosts.children()) cell.hosts.push_back(read_host(host));
+  for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));
   const Node processes = root.required("processes");
   std::uint32_t next_id = 1;
-  for (const Node& process : processes.children()) cell.processes.push_back(read_process(process, next_id));
+  for (const Node& process : processes.map()) cell.processes.push_back(read_process(process, next_id));
+  constexpr std::size_t most_processes = 64;
+  if (processes.is_map() && cell.processes.empty()) processes.fault("has no processes", "name at least one");
+  if (cell.processes.size() > most_processes)
+    processes.fault("has " + std::to_string(cell.processes.size()) + " processes",
+                    "use at most " + std::to_string(most_processes) + ": several components fit in one");
   check_identities(root, cell);
-  for (const Node& job : root["jobs"].children()) {
+  for (const Node& job : root["jobs"].map()) {
     cell.jobs[job.key()] = job.as_text();
-    if (cell.find(job.as_text()) == nullptr)
-      job.fault("`" + job.as_text() + "` is no component of this cell",
+    if (job.is_scalar() && cell.find(job.as_text()) == nullptr)
+      job.fault("`" + clipped(job.as_text()) + "` is no component of this cell",
                 "name the component that runs the job");
   }
   return cell;

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 #include <set>
 #include <sstream>
 
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
+#include "core/config/quotes.hpp"
 
 namespace invar::config {
 
@@ -22,6 +22,7 @@ struct Place {
   std::string key;
   int line = 0;
   bool accept_all = false;
+  bool empty = false;  // the key stands there, without a value
   std::set<std::string> known;
   std::vector<std::pair<std::string, std::shared_ptr<Place>>> children;
 };
@@ -41,7 +42,7 @@ using detail::Document;
 using detail::Place;
 
 std::string joined(const std::string& path, const std::string& key) {
-  return path.empty() ? key : path + "." + key;
+  return path.empty() ? clipped(key) : path + "." + clipped(key);
 }
 
 int line_of(const YAML::Node& node, int otherwise) {
@@ -58,13 +59,17 @@ std::string located(const Document& document, const Place& place) {
 /// Keys that stand twice (of which the parser would keep the first) and keys that nobody asked for.
 void collect_keys(const Document& document, const Place& place, std::vector<Fault>& faults) {
   const auto located_at = [&](const YAML::Node& key) {
-    return document.file.string() + ":" + std::to_string(line_of(key, 0)) + ": " +
-           joined(place.path, key.Scalar());
+    return document.file.string() + ":" + std::to_string(key.Mark().line + 1) + ": " +
+           joined(place.path, key.IsNull()     ? "~"
+                              : key.IsScalar() ? key.Scalar()
+                                               : "?");
   };
   if (place.yaml.IsDefined() && place.yaml.IsMap()) {
     std::set<std::string> seen;
     for (const auto& entry : place.yaml)
-      if (!seen.insert(entry.first.Scalar()).second)
+      if (!entry.first.IsScalar())
+        faults.push_back({located_at(entry.first), "is no key", "write a word before the colon"});
+      else if (!seen.insert(entry.first.Scalar()).second)
         faults.push_back({located_at(entry.first), "stands twice", "keep one of them"});
   }
   if (place.accept_all) return;
@@ -72,7 +77,7 @@ void collect_keys(const Document& document, const Place& place, std::vector<Faul
     const std::vector<std::string> known{place.known.begin(), place.known.end()};
     for (const auto& entry : place.yaml) {
       const std::string key = entry.first.Scalar();
-      if (place.known.contains(key)) continue;
+      if (!entry.first.IsScalar() || place.known.contains(key)) continue;
       std::string mend = "remove it, or use one of: ";
       if (const std::string near = nearest(key, known); !near.empty()) {
         mend = "did you mean `" + near + "`?";
@@ -87,6 +92,26 @@ void collect_keys(const Document& document, const Place& place, std::vector<Faul
 
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
   throw InputError{file.string(), what, mend};
+}
+
+InputError open_quote_at(const std::string& name, int line) {
+  return {name + ":" + std::to_string(line), "a quote is not closed", "close it on this line"};
+}
+
+/// yaml-cpp closes an open quote at the end of the file, or another opening quote closes it some lines below.
+void check_quotes(const std::string& text, const std::string& name, const YAML::Node& node) {
+  if (node.IsMap())
+    for (const auto& entry : node) {
+      check_quotes(text, name, entry.first);
+      check_quotes(text, name, entry.second);
+    }
+  if (node.IsSequence())
+    for (const auto& entry : node) check_quotes(text, name, entry);
+  if (!node.IsScalar() || node.Tag() != "!" || node.Mark().is_null()) return;
+  const auto begin = static_cast<std::size_t>(node.Mark().pos);
+  if (begin >= text.size() || (text[begin] != '"' && text[begin] != '\'')) return;
+  if (const Quoted found = quoted(text, begin); !found.closed || found.swallows_keys)
+    throw open_quote_at(name, node.Mark().line + 1);
 }
 
 std::string range_text(Range range, std::string_view unit) {
@@ -116,7 +141,11 @@ const YAML::Node& Node::raw() const { return place_->yaml; }
 void Node::accept_all() const { place_->accept_all = true; }
 
 void Node::fault(std::string what, std::string mend) const {
-  document_->faults.push_back({where(), std::move(what), std::move(mend)});
+  Fault fault{where(), std::move(what), std::move(mend)};
+  const bool known = std::any_of(document_->faults.begin(), document_->faults.end(), [&](const Fault& other) {
+    return other.where == fault.where && other.what == fault.what;
+  });
+  if (!known) document_->faults.push_back(std::move(fault));
 }
 
 bool Node::has(std::string_view name) const { return (*this)[name].exists(); }
@@ -126,6 +155,7 @@ Node Node::operator[](std::string_view name) const {
   place_->known.insert(key);
   for (const auto& [known, child] : place_->children)
     if (known == key) return {document_, child};
+  if (is_scalar()) fault("a map is expected here", "write `" + key + ": ...` below it");
   auto child = std::make_shared<Place>();
   if (is_map()) {  // a missing key must not become a node of its own: yaml-cpp's "zombie" throws on every use
     const auto& map = static_cast<const YAML::Node&>(place_->yaml);
@@ -135,22 +165,51 @@ Node Node::operator[](std::string_view name) const {
   child->path = joined(place_->path, key);
   child->line = line_of(child->yaml, place_->line);
   place_->children.emplace_back(key, child);
-  return {document_, child};
+  const Node result{document_, child};
+  if (is_map() && !result.exists()) {
+    for (const auto& entry : place_->yaml) {
+      if (!entry.first.IsScalar() || entry.first.Scalar() != key) continue;
+      child->empty = true;
+      child->line = line_of(entry.first, child->line);
+      result.fault("has no value", "write one behind the colon, or remove the key");
+      break;
+    }
+  }
+  return result;
 }
 
 Node Node::required(std::string_view name) const {
-  if (exists() && !is_map())
-    fault("a map is expected here", "write `" + std::string{name} + ": ...` below it");
+  if (is_list()) fault("a map is expected here", "write `" + std::string{name} + ": ...` below it");
   Node child = (*this)[name];
-  if (!child.exists() && is_map()) child.fault("missing", "add `" + std::string{name} + ":`");
+  if (!child.exists() && !child.place_->empty && is_map())
+    child.fault("missing", "add `" + std::string{name} + ":`");
   return child;
+}
+
+std::vector<Node> Node::list() const {
+  if (exists() && !is_list()) {
+    fault("a list is expected here", "write [a, b, c], or one a line with `- ` before it");
+    return {};
+  }
+  return children();
+}
+
+std::vector<Node> Node::map() const {
+  if (exists() && !is_map()) {
+    fault("a map is expected here", "write `key: value` lines below it");
+    return {};
+  }
+  return children();
 }
 
 std::vector<Node> Node::children() const {
   std::vector<Node> result;
+  if (is_scalar())
+    fault("a list or a map is expected here", "write [a, b, c], or `key: value` lines below it");
   if (is_map()) {
     std::set<std::string> seen;
     for (const auto& entry : place_->yaml) {
+      if (!entry.first.IsScalar()) continue;  // `faults` tells it
       const std::string key = entry.first.Scalar();
       if (seen.insert(key).second) result.push_back((*this)[key]);
     }
@@ -185,19 +244,27 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
   Node number = *this;
   Conversion to_asked;
   Quantity result;
+  std::string written_unit;
   if (is_map()) {
     number = required("value");
     if (const Node written = (*this)["unit"]; written.exists()) {
       const std::string name = written.as_text();
       if (const auto convert = conversion(name, unit)) {
         to_asked = *convert;
+        written_unit = name;
       } else if (!parse_unit(name)) {
-        written.fault("`" + name + "` is no unit", "write it in " + std::string{unit});
+        written.fault("`" + clipped(name) + "` is no unit", unit.empty() || unit == "1"
+                                                                ? "leave the unit out"
+                                                                : "write it in " + std::string{unit});
       } else {
         const bool pure = unit.empty() || unit == "1";
         written.fault("`" + name + "` does not measure the same as " +
                           (pure ? "a number without unit" : std::string{unit}),
                       pure ? "leave the unit out" : "write it in " + std::string{unit});
+      }
+      if (written_unit.empty()) {  // what the number means is not known
+        (void)(*this)["sigma"];
+        return {harmless, std::nullopt};
       }
     }
     if (const Node sigma = (*this)["sigma"]; sigma.exists())
@@ -206,20 +273,22 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
   }
   double value = 0.0;
   if (!number.is_scalar() || !YAML::convert<double>::decode(number.raw(), value)) {
-    number.fault(
-        "`" + (number.is_scalar() ? number.raw().Scalar() : std::string{"..."}) + "` is not a number",
-        unit.empty() || unit == "1"
-            ? "write a number"
-            : "write a number in " + std::string{unit} + ", or {value: ..., unit: ...}");
+    number.fault("`" + number.shown_scalar() + "` is not a number",
+                 unit.empty() || unit == "1"
+                     ? "write a number"
+                     : "write a number in " + std::string{unit} + ", or {value: ..., unit: ...}");
     return {harmless, result.sigma};
   }
   value = to_asked(value);
   if (!std::isfinite(value)) {
-    number.fault("`" + number.raw().Scalar() + "` is not finite", "write a finite number");
+    number.fault("`" + number.shown_scalar() + "` is not finite", "write a finite number");
     return {harmless, result.sigma};
   }
   if (!range.contains(value)) {
-    number.fault("`" + number.raw().Scalar() + "` is out of range", "it must be " + range_text(range, unit));
+    const bool converted = !written_unit.empty() && written_unit != unit;
+    number.fault("`" + number.shown_scalar() + (converted ? " " + written_unit : "") + "`" +
+                     (converted ? " = " + shown(value) + " " + std::string{unit} : "") + " is out of range",
+                 "it must be " + range_text(range, unit));
     return {harmless, result.sigma};
   }
   result.value = value;
@@ -231,17 +300,20 @@ double Node::as_number(std::string_view unit, Range range) const { return as_qua
 std::int64_t Node::as_integer(std::int64_t lower, std::int64_t upper) const {
   std::int64_t value = 0;
   if (!is_scalar() || !YAML::convert<std::int64_t>::decode(place_->yaml, value)) {
-    fault("`" + (is_scalar() ? place_->yaml.Scalar() : std::string{"..."}) + "` is not a whole number",
-          "write a whole number");
+    fault("`" + shown_scalar() + "` is not a whole number", "write a whole number");
     return lower;
   }
   if (value < lower || value > upper) {
-    fault("`" + place_->yaml.Scalar() + "` is out of range",
-          "it must be between " + std::to_string(lower) + " and " + std::to_string(upper));
+    // One number alone is asked for of versions.
+    fault("`" + shown_scalar() + "` is out of range",
+          lower == upper ? "this program reads version " + std::to_string(lower)
+                         : "it must be between " + std::to_string(lower) + " and " + std::to_string(upper));
     return lower;
   }
   return value;
 }
+
+std::string Node::shown_scalar() const { return is_scalar() ? clipped(place_->yaml.Scalar()) : "..."; }
 
 std::string Node::as_text() const {
   if (!exists()) return {};
@@ -259,7 +331,7 @@ std::string Node::as_choice(std::initializer_list<std::string_view> choices) con
   if (exists() && is_scalar()) {
     std::string mend = "use one of: ";
     for (const auto& choice : choices) mend += (choice == *choices.begin() ? "" : ", ") + std::string{choice};
-    fault("`" + word + "` is not known here", mend);
+    fault("`" + clipped(word) + "` is not known here", mend);
   }
   return std::string{*choices.begin()};
 }
@@ -267,8 +339,7 @@ std::string Node::as_choice(std::initializer_list<std::string_view> choices) con
 bool Node::as_flag() const {
   bool value = false;
   if (!is_scalar() || !YAML::convert<bool>::decode(place_->yaml, value))
-    fault("`" + (is_scalar() ? place_->yaml.Scalar() : std::string{"..."}) + "` is neither true nor false",
-          "write true or false");
+    fault("`" + shown_scalar() + "` is neither true nor false", "write true or false");
   return value;
 }
 
@@ -284,14 +355,16 @@ Range Node::as_range(std::string_view unit) const {
 std::vector<double> Node::as_numbers(std::string_view unit) const {
   std::vector<double> result;
   if (exists() && !is_list()) fault("a list of numbers is expected here", "write [1, 2, 3]");
-  for (const Node& child : children()) result.push_back(child.as_number(unit));
+  if (is_list())
+    for (const Node& child : children()) result.push_back(child.as_number(unit));
   return result;
 }
 
 std::vector<std::string> Node::as_texts() const {
   std::vector<std::string> result;
   if (exists() && !is_list()) fault("a list is expected here", "write [a, b, c]");
-  for (const Node& child : children()) result.push_back(child.as_text());
+  if (is_list())
+    for (const Node& child : children()) result.push_back(child.as_text());
   return result;
 }
 
@@ -325,7 +398,8 @@ bool Node::flag(std::string_view name, bool otherwise) const {
 }
 
 Yaml Yaml::load(const std::filesystem::path& file) {
-  if (std::filesystem::is_directory(file)) return fail(file, "is a folder", "name a file");
+  std::error_code unseen;  // what cannot be looked at cannot be opened either
+  if (std::filesystem::is_directory(file, unseen)) return fail(file, "is a folder", "name a file");
   std::ifstream stream{file, std::ios::binary};
   if (!stream) return fail(file, "cannot be read", "check the path and its permissions");
   std::ostringstream text;
@@ -341,8 +415,15 @@ Yaml Yaml::parse(const std::string& text, const std::string& name) {
   result.document_->root = std::make_shared<Place>();
   if (text.find('\0') != std::string::npos) return fail(name, "is not a text file", "name a YAML file");
   try {
-    result.document_->root->yaml.reset(YAML::Load(text));
+    auto documents = YAML::LoadAll(text);
+    for (std::size_t i = 1; i < documents.size(); ++i)
+      if (!documents[i].IsNull())
+        throw InputError{name + ":" + std::to_string(line_of(documents[i], 1)),
+                         "a second document begins here", "keep one `---` part: a file holds one"};
+    if (!documents.empty()) result.document_->root->yaml.reset(documents.front());
+    check_quotes(text, name, result.document_->root->yaml);
   } catch (const YAML::Exception& error) {
+    if (const auto line = open_quote(text)) throw open_quote_at(name, *line);
     throw InputError{name + ":" + std::to_string(error.mark.line + 1), "no YAML: " + error.msg,
                      "mend the line or the indentation"};
   }
@@ -366,35 +447,6 @@ std::size_t Yaml::fault_count() const { return document_->faults.size(); }
 
 void Yaml::finish() const {
   if (auto all = faults(); !all.empty()) throw InputError{std::move(all)};
-}
-
-/// Letters inserted, left out, exchanged or swapped with their neighbour (the optimal string alignment distance).
-static std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> before(b.size() + 1), above(b.size() + 1), row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    before = above;
-    above = row;
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      row[j + 1] = std::min({above[j + 1] + 1, row[j] + 1, above[j] + (a[i] == b[j] ? 0U : 1U)});
-      if (i > 0 && j > 0 && a[i] == b[j - 1] && a[i - 1] == b[j])
-        row[j + 1] = std::min(row[j + 1], before[j - 1] + 1);
-    }
-  }
-  return row.back();
-}
-
-std::string nearest(std::string_view word, const std::vector<std::string>& choices) {
-  std::string best;
-  std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
-  for (const auto& choice : choices) {
-    if (const std::size_t distance = edits(word, choice); distance < best_distance) {
-      best_distance = distance;
-      best = choice;
-    }
-  }
-  return best;
 }
 
 }  // namespace invar::config

@@ -47,16 +47,20 @@ class Node {
   [[nodiscard]] bool is_map() const;
   [[nodiscard]] bool is_list() const;
   [[nodiscard]] bool is_scalar() const;
-  /// Records a fault at this place.
+  /// Records a fault at this place, once.
   void fault(std::string what, std::string mend = "") const;
 
   [[nodiscard]] bool has(std::string_view name) const;
-  /// The child, which may not exist; marks the key as known.
+  /// The child, which may not exist; marks the key as known. A key without value is a fault.
   [[nodiscard]] Node operator[](std::string_view name) const;
   /// The child; a fault when it is missing.
   [[nodiscard]] Node required(std::string_view name) const;
-  /// The children of a map in file order (marks all as known), or of a list.
+  /// The children of a map in file order (marks all as known), or of a list; a fault where a scalar stands.
   [[nodiscard]] std::vector<Node> children() const;
+  /// The children of a list; a fault where something else stands.
+  [[nodiscard]] std::vector<Node> list() const;
+  /// The children of a map; a fault where something else stands.
+  [[nodiscard]] std::vector<Node> map() const;
   /// Accepts every key below this place, for a part that somebody else reads.
   void accept_all() const;
 
@@ -90,6 +94,7 @@ class Node {
 
  private:
   friend class Yaml;
+  [[nodiscard]] std::string shown_scalar() const;
   Node(std::shared_ptr<detail::Document> document, std::shared_ptr<detail::Place> place);
   std::shared_ptr<detail::Document> document_;
   std::shared_ptr<detail::Place> place_;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 #include "core/config/yaml.hpp"
 #include "core/modbus/codec.hpp"
@@ -246,6 +247,12 @@ void read_heartbeat(const Node& root, RegisterMap& map, const std::vector<bool>&
       setting.fault("`" + map.registers[*beat.timeout_setting].name + "` is no time",
                     "name a register in s or ms");
       beat.timeout_setting.reset();
+    } else if (beat.timeout_setting && sound[*beat.timeout_setting]) {
+      const Register& target = map.registers[*beat.timeout_setting];
+      if (!target.range.contains(beat.timeout.in_seconds()))
+        node["timeout"].fault(
+            "is outside the range of `" + target.name + "`, which is to hold it",
+            "choose one between " + shown(target.range.lower) + " and " + shown(target.range.upper) + " s");
     }
   }
   if (index == nowhere || !sound[index]) return;
@@ -259,7 +266,13 @@ void read_heartbeat(const Node& root, RegisterMap& map, const std::vector<bool>&
   map.heartbeat = beat;
 }
 
-void read_comm_loss(const Node& root, RegisterMap& map, const std::vector<bool>& sound) {
+/// Without a master an actuator is off: at 0, but for a temperature, which has no zero of its own.
+bool switches_on(const Register& reg, double value) {
+  return value != 0.0 && reg.range.contains(0.0) && !conversion(reg.unit, "degC");
+}
+
+void read_comm_loss(const config::Yaml& yaml, const Node& root, RegisterMap& map,
+                    const std::vector<bool>& sound) {
   const Node node = root["comm_loss"];
   std::vector<bool> decided(map.registers.size());
   const auto decide = [&](const Node& where, std::size_t index) {
@@ -270,13 +283,18 @@ void read_comm_loss(const Node& root, RegisterMap& map, const std::vector<bool>&
       where.fault("`" + map.registers[index].name + "` is both set and held", "keep one of them");
     decided[index] = true;
   };
-  for (const Node& entry : node["set"].children()) {
+  for (const Node& entry : node["set"].map()) {
     const auto found = named(map, entry, entry.key());
     if (!found) continue;
+    const Register& reg = map.registers[*found];
+    const std::size_t before = yaml.fault_count();
     decide(entry, *found);
-    map.comm_loss.set.push_back({*found, value_of(map.registers[*found], entry)});
+    const double value = value_of(reg, entry);
+    if (yaml.fault_count() == before && reg.is_actuator && switches_on(reg, value))
+      entry.fault("switches `" + reg.name + "` on when the master is lost", "set it to 0");
+    map.comm_loss.set.push_back({*found, value});
   }
-  for (const Node& entry : node["hold"].children()) {
+  for (const Node& entry : node["hold"].list()) {
     const auto found = named(map, entry);
     if (!found) continue;
     decide(entry, *found);
@@ -338,18 +356,24 @@ RegisterMap read(const config::Yaml& yaml) {
 
   const Node registers = root.required("registers");
   std::vector<bool> sound;  // what hangs on a wrong register is not reported a second time
-  for (const Node& node : registers.children()) {
+  for (const Node& node : registers.map()) {
     const std::size_t before = yaml.faults().size();
     map.registers.push_back(read_register(yaml, node, order));
     map.registers.back().stale_after = stale;
     sound.push_back(yaml.faults().size() == before);
   }
-  if (registers.exists() && map.registers.empty())
+  if (registers.is_map() && map.registers.empty())
     registers.fault("no registers", "write `name: {address: 0, kind: holding, type: uint16, access: read}`");
   check_overlaps(registers, map, sound);
   read_read_backs(registers, map, sound);
+  const bool reads_back = std::any_of(map.registers.begin(), map.registers.end(),
+                                      [](const Register& reg) { return reg.read_back.has_value(); });
+  if (reads_back && map.read_back_deadline < map.poll)
+    (timeouts.has("read_back") ? timeouts["read_back"] : root["poll"])
+        .fault("a read-back would be given up before the next poll can show it",
+               "make `timeouts.read_back` at least `poll`");
   read_heartbeat(root, map, sound);
-  read_comm_loss(root, map, sound);
+  read_comm_loss(yaml, root, map, sound);
   yaml.finish();
   return map;
 }

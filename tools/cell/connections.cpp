@@ -34,10 +34,10 @@ std::string type_of(const Port& port) {
 void check_port_keys(const LoadedComponent& member) {
   const auto names = port_names(*member.component);
   const auto check = [&](const char* section, std::optional<Port::Direction> only) {
-    for (const Node& entry : member.file->node[section].children()) {
+    for (const Node& entry : member.file->node[section].map()) {
       const Port* found = member.component->find_port(entry.key());
       if (found == nullptr) {
-        entry.fault("`" + entry.key() + "` is no port of `" + member.file->type + "`",
+        entry.fault("`" + clipped(entry.key()) + "` is no port of `" + member.file->type + "`",
                     mend_name(entry.key(), names));
       } else if (only == Port::Direction::output && found->direction() != only) {
         entry.fault("`" + entry.key() + "` is an input", "only outputs are published");
@@ -57,7 +57,7 @@ void check_port_keys(const LoadedComponent& member) {
 Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& at) {
   const auto dot = connection.find('.');
   if (dot == std::string::npos) {
-    at.fault("`" + connection + "` names no port",
+    at.fault("`" + clipped(connection) + "` names no port",
              "write `component.port`, or `/topic` for one of the plant");
     return nullptr;
   }
@@ -67,7 +67,7 @@ Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& 
     std::vector<std::string> names;
     for (const auto& process : loaded.cell->processes)
       for (const auto& candidate : process.components) names.push_back(candidate.name);
-    at.fault("`" + component + "` is no component of this cell", mend_name(component, names));
+    at.fault("`" + clipped(component) + "` is no component of this cell", mend_name(component, names));
     return nullptr;
   }
   Port* found = loaded.port(component, port);
@@ -75,7 +75,7 @@ Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& 
     for (const LoadedProcess& process : loaded.processes)
       for (const LoadedComponent& member : process.components)
         if (member.file->name == component && member.component)
-          at.fault("`" + component + "` has no port `" + port + "`",
+          at.fault("`" + component + "` has no port `" + clipped(port) + "`",
                    mend_name(port, port_names(*member.component)));
   }
   return found;
@@ -99,6 +99,7 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
     return;
   }
   const Node at = member.file->node["connect"][port.name()];
+  if (!at.is_scalar()) return;  // read_cell has said so
   if (found->second.starts_with('/')) {
     port.topic = loaded.cell->topic(found->second);
     return;
@@ -133,7 +134,7 @@ void check_owners(const LoadedCell& loaded) {
   for (const LoadedProcess& process : loaded.processes)
     for (const LoadedComponent& member : process.components)
       for (const auto& [port, target] : member.file->connections) {
-        if (!member.component || target.starts_with('/')) continue;
+        if (!member.component || target.empty() || target.starts_with('/')) continue;
         const Port* output = member.component->find_port(port);
         if (output == nullptr || output->direction() != Port::Direction::output ||
             output->profile != "command")

@@ -4,6 +4,7 @@
 
 #include "components/all.hpp"
 #include "components/calibration/job_component.hpp"
+#include "core/base/shown.hpp"
 #include "tools/cell/connections.hpp"
 #include "tools/cell/plugins.hpp"
 #include "tools/cell/qos.hpp"
@@ -28,7 +29,7 @@ void prepare(LoadedCell& loaded, const config::CellComponent& component, bool ty
     component.node.accept_all();
     if (!component.type.empty() && types_known)
       component.node["type"].fault(
-          "`" + component.type + "` is no component type",
+          "`" + clipped(component.type) + "` is no component type",
           near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
     loaded.processes.back().components.push_back(std::move(result));
     return;
@@ -71,7 +72,8 @@ void check_jobs(const LoadedCell& loaded) {
         if (runs == nullptr)
           at.fault("`" + component + "` runs no jobs", "name the component that runs it");
         else if (!runs->has(job))
-          at.fault("`" + component + "` has no job `" + job + "`", mend_name(job, job_names(member)));
+          at.fault("`" + component + "` has no job `" + clipped(job) + "`",
+                   mend_name(job, job_names(member)));
       }
 }
 

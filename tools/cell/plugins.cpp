@@ -5,10 +5,11 @@
 namespace invar::tools {
 
 bool load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root) {
-  const auto places = root["plugins"].children();
-  bool all = true;
+  const auto places = root["plugins"].list();
+  bool all = !root["plugins"].exists() || root["plugins"].is_list();
   for (std::size_t i = 0; i < cell.plugins.size(); ++i) {
-    if (!std::filesystem::is_regular_file(cell.plugins[i])) {  // read_cell has said so
+    std::error_code unseen;
+    if (!std::filesystem::is_regular_file(cell.plugins[i], unseen)) {  // read_cell has said so
       all = false;
       continue;
     }

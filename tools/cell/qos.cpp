@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/shown.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/profile.hpp"
 #include "tools/cell/loaded_cell.hpp"
@@ -34,7 +35,7 @@ void check_profile(const End& end, const dds::Profiles& profiles) {
     list += (list.empty() ? "" : ", ") + name;
   }
   const std::string near = config::nearest(end.port->profile, names);
-  end.place().fault("`" + end.port->profile + "` is no QoS profile",
+  end.place().fault("`" + clipped(end.port->profile) + "` is no QoS profile",
                     near.empty() ? "use one of: " + list : "did you mean `" + near + "`?");
 }
 
@@ -53,7 +54,8 @@ void compare(const End& writer, const End& reader, const dds::Profiles& profiles
 }  // namespace
 
 void check_qos(LoadedCell& loaded) {
-  if (!std::filesystem::is_regular_file(loaded.cell->profiles)) return;  // read_cell has said so
+  std::error_code unseen;
+  if (!std::filesystem::is_regular_file(loaded.cell->profiles, unseen)) return;  // read_cell has said so
   const dds::Profiles profiles = dds::load_profiles(loaded.cell->profiles);
   std::map<std::string, std::vector<End>> writers;
   std::map<std::string, std::vector<End>> readers;

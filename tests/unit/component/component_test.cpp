@@ -55,6 +55,27 @@ Registry registry() {
   return r;
 }
 
+struct Mistaken final : Component {
+  struct Parameters {
+    double speed = 1.0;
+    void describe(auto& p) { p(speed, "speed", "m/sec", Range{}, "in what is no unit"); }
+  };
+  explicit Mistaken(const Parameters&) {}
+  void step(const Tick&) noexcept override {}
+};
+
+TEST(Registry, NamesTheTypeWhoseUnitDoesNotExist) {
+  Registry types;
+  types.add<Mistaken>("mistaken", "a type with a fault");
+  const auto yaml = config::Yaml::parse("type: mistaken\nspeed: {value: 1, unit: m/s}\n", "a.yaml");
+  (void)types.prepare("mistaken", yaml.root(), {});
+  ASSERT_EQ(yaml.faults().size(), 1U);
+  EXPECT_EQ(
+      yaml.faults().front().line(),
+      "a.yaml:1: type: the component type `mistaken` is faulty: it describes `speed` in `m/sec`, which is no "
+      "unit; mend the unit in its `describe`, and build its plugin again");
+}
+
 TEST(LowPass, FollowsTheStepResponseOfAFirstOrderLag) {
   const auto yaml = config::Yaml::parse("cutoff: 10\n", "a.yaml");
   const auto prepared = registry().prepare("low_pass", yaml.root(), {});

@@ -69,6 +69,65 @@ TEST(Yaml, RefusesWhatIsNoYaml) {
   EXPECT_THROW(Yaml::load("does-not-exist.yaml"), InputError);
 }
 
+std::string refusal(const std::string& text) {
+  try {
+    (void)Yaml::parse(text, "a.yaml");
+  } catch (const InputError& error) {
+    return error.faults().size() == 1 ? error.faults().front().line() : "more than one fault";
+  }
+  return "";
+}
+
+TEST(Yaml, TellsAnOpenQuoteWhereItOpens) {
+  const std::string expected = "a.yaml:2: a quote is not closed; close it on this line";
+  EXPECT_EQ(refusal("a: 1\nb: \"one\nc: 2\n"), expected);
+  EXPECT_EQ(refusal("a: 1\nb: 'one\nc: 2\nd: '\n"), expected);
+  EXPECT_EQ(refusal("a: 1\nb: \"one\nc: \"two\"\n"), expected);
+  EXPECT_EQ(refusal("a: it's\nb: \"a text\n  of two lines\"\nc: 'it''s' # don't\n"), "");
+}
+
+TEST(Yaml, RefusesASecondDocument) {
+  EXPECT_THAT(refusal("a: 1\n---\nb: 2\n"), HasSubstr("a.yaml:3: a second document begins here"));
+  EXPECT_EQ(refusal("---\na: 1\n...\n"), "");
+}
+
+TEST(Yaml, RefusesAKeyWithoutValueAndOneThatIsNoWord) {
+  const auto empty = Yaml::parse("a: 1\nmass:\n", "a.yaml");
+  (void)empty.root().number("a", "");
+  EXPECT_DOUBLE_EQ(empty.root().number("mass", "kg", {}, 3.0), 3.0);
+  EXPECT_EQ(only_fault(empty), "a.yaml:2: mass: has no value; write one behind the colon, or remove the key");
+  const auto none = Yaml::parse("a: 1\n~: 2\n", "a.yaml");
+  (void)none.root().number("a", "");
+  EXPECT_EQ(only_fault(none), "a.yaml:2: ~: is no key; write a word before the colon");
+}
+
+TEST(Yaml, RefusesAScalarWhereAListOrAMapStands) {
+  const auto yaml = Yaml::parse("list: 7\nmap: 8\n", "a.yaml");
+  EXPECT_TRUE(yaml.root()["list"].list().empty());
+  EXPECT_TRUE(yaml.root()["list"].list().empty());  // told once
+  EXPECT_FALSE(yaml.root()["map"].has("key"));
+  ASSERT_EQ(yaml.faults().size(), 2U);
+  EXPECT_THAT(yaml.faults()[0].line(), HasSubstr("a.yaml:1: list: a list is expected here"));
+  EXPECT_THAT(yaml.faults()[1].line(), HasSubstr("a.yaml:2: map: a map is expected here"));
+}
+
+TEST(Yaml, ShowsTheConvertedValueAndStopsAtAWrongUnit) {
+  const auto fast = Yaml::parse("v: {value: 50, unit: km/s}\n", "a.yaml");
+  (void)fast.root().number("v", "m/s", {0, 10});
+  EXPECT_EQ(only_fault(fast),
+            "a.yaml:1: v.value: `50 km/s` = 50000 m/s is out of range; it must be between 0 and 10 m/s");
+  const auto wrong = Yaml::parse("v: {value: 50, unit: m/sec, sigma: 1}\n", "a.yaml");
+  (void)wrong.root().number("v", "m/s", {0, 10});
+  EXPECT_EQ(only_fault(wrong), "a.yaml:1: v.unit: `m/sec` is no unit; write it in m/s");
+}
+
+TEST(Yaml, ShortensAVeryLongWord) {
+  const auto yaml = Yaml::parse("v: " + std::string(500, 'x') + "\n", "a.yaml");
+  (void)yaml.root().number("v", "");
+  EXPECT_EQ(only_fault(yaml),
+            "a.yaml:1: v: `" + std::string(57, 'x') + "...` is not a number; write a number");
+}
+
 TEST(Yaml, RefusesNumbersThatAreNotFinite) {
   const auto yaml = Yaml::parse("x: .nan\n", "a.yaml");
   (void)yaml.root().number("x", "m");
