@@ -90,6 +90,11 @@ double Stage::Faded::operator()(double value, bool changed, double period) noexc
 
 void Stage::deactivate() noexcept { mode_ = AXIS_MODE_DISABLED; }
 
+bool Stage::wind_down() noexcept {
+  leaving_ = true;
+  return mode_ == AXIS_MODE_DISABLED || mode_ == AXIS_MODE_FAULT || mode_ == AXIS_MODE_HOLDING;
+}
+
 void Stage::begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept {
   trajectory_ = trajectory;
   trajectory_start_ = tick.now;
@@ -305,7 +310,7 @@ void Stage::step(const Tick& tick) noexcept {
 
   AxisCommand command;
   while (command_.take(command)) {
-    if (seeing || command.kind() == AXIS_COMMAND_DISABLE) {
+    if ((seeing && !leaving_) || command.kind() == AXIS_COMMAND_DISABLE) {
       obey(command, tick);
     } else {
       sample_.command_id(command.id());
@@ -314,6 +319,7 @@ void Stage::step(const Tick& tick) noexcept {
     }
   }
 
+  if (leaving_ && (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING)) brake(setpoint(tick), tick);
   const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
   if (driving && !seeing) {
     stop_blindly(

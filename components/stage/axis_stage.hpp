@@ -100,6 +100,7 @@ class Stage final : public Component {
   void activate() override;
   void cleanup() noexcept override { model_.close(); }
   void deactivate() noexcept override;
+  bool wind_down() noexcept override;
   void step(const Tick& tick) noexcept override;
 
  private:

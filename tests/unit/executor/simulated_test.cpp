@@ -175,6 +175,44 @@ TEST(Executor, ATripDeactivatesDownstreamFirstAndBlocksActivationUntilCleared) {
   EXPECT_TRUE(loop.executor.transition(0, Transition::activate).ok());
 }
 
+TEST(Executor, WhatMovesIsSteppedUntilItRestsAndKeepsWhatItReads) {
+  Track track{simulated()};
+  track.executor.advance_to(at_ms(10));
+  track.executor.trip("door opened");
+  track.executor.advance_to(at_ms(11));
+  EXPECT_EQ(track.states(), "aa-");
+  EXPECT_TRUE(track.executor.counters().tripped);
+  track.executor.advance_to(at_ms(30));
+  EXPECT_EQ(track.states(), "aa-");
+  EXPECT_EQ(track.runner->speed, 0);
+  track.executor.advance_to(at_ms(31));
+  EXPECT_EQ(track.states(), "---");
+  EXPECT_EQ(track.executor.steps(1), 30U);
+}
+
+TEST(Executor, WhatDoesNotComeToRestIsLetGoInTime) {
+  ExecutorOptions options = simulated();
+  options.wind_down = Duration::milliseconds(50);
+  Track track{options};
+  track.runner->speed = 1'000'000;
+  track.executor.advance_to(at_ms(10));
+  track.executor.trip("door opened");
+  track.executor.advance_to(at_ms(60));
+  EXPECT_EQ(track.states(), "aa-");
+  track.executor.advance_to(at_ms(61));
+  EXPECT_EQ(track.states(), "---");
+}
+
+TEST(Executor, NobodyIsWaitedForWhenNobodySteps) {
+  Track track{simulated()};
+  track.executor.advance_to(at_ms(10));
+  EXPECT_EQ(track.executor.transition(1, Transition::deactivate).verdict, Verdict::done);
+  EXPECT_EQ(track.executor.steps(1), 10U);
+  EXPECT_TRUE(track.executor.transition(1, Transition::activate).ok());
+  track.executor.stop();
+  EXPECT_EQ(track.states(), "---");
+}
+
 TEST(Executor, AppliesAParameterBetweenTwoStepsAndSaysWhyNot) {
   Loop loop{simulated()};
   loop.bring_up();

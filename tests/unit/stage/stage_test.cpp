@@ -379,6 +379,34 @@ TEST(Stage, HomingFindsTheSwitchAndCountsFromIt) {
   EXPECT_GT(bench.position, -1e-3);
 }
 
+TEST(Stage, BrakesWithinItsLimitsBeforeItIsDeactivated) {
+  Bench bench;
+  bench.enable();
+  EXPECT_TRUE(bench.stage.wind_down());  // it stands
+  bench.stage.activate();
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.09; }));
+  const double from = bench.position;
+  int cycles = 0;
+  for (; !bench.stage.wind_down(); ++cycles) {
+    ASSERT_LT(cycles, 200);
+    if (cycles == 5) bench.send(AXIS_COMMAND_MOVE, 0.0);
+    const double before = bench.velocity;
+    ASSERT_TRUE(bench.cycle_once().enabled());
+    ASSERT_TRUE(bench.motor.latest()->enabled());
+    EXPECT_LE(std::abs(bench.state.latest()->setpoint_acceleration()), 2.0 + 1e-9);
+    EXPECT_LE(std::abs(bench.velocity - before) / Bench::period, 2.2);
+  }
+  EXPECT_GT(cycles, 45);  // 0.09 m/s at 2 m/s2
+  EXPECT_LT(std::abs(bench.velocity), 2e-3);
+  EXPECT_LT(bench.position - from, 0.01);  // 2 mm of braking, 3 mm of jerk
+  EXPECT_TRUE(bench.state.latest()->command_refused());
+  bench.stage.deactivate();
+  bench.stage.activate();
+  bench.enable();  // as new
+}
+
 TEST(Stage, SafeValueLetsGoOfTheMotor) {
   Bench bench;
   bench.enable();
