@@ -45,7 +45,8 @@ Stage::Stage(const Parameters& parameters)
 void Stage::activate() {
   mode_ = AXIS_MODE_DISABLED;
   primed_ = false;
-  blind_ = false;
+  blind_ = leaving_ = false;
+  seen_.reset();
   homed_ = parameters_.absolute_encoder;
   offset_ = 0.0;
   current_ = 0.0;
@@ -88,6 +89,11 @@ double Stage::Faded::operator()(double value, bool changed, double period) noexc
 }
 
 void Stage::deactivate() noexcept { mode_ = AXIS_MODE_DISABLED; }
+
+bool Stage::wind_down() noexcept {
+  leaving_ = true;
+  return mode_ == AXIS_MODE_DISABLED || mode_ == AXIS_MODE_FAULT || mode_ == AXIS_MODE_HOLDING;
+}
 
 void Stage::begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept {
   trajectory_ = trajectory;
@@ -168,11 +174,7 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       done = !accepted;
       break;
     case AXIS_COMMAND_STOP:
-      if (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING) {
-        const Limits& own = parameters_.limits;
-        begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick,
-              AXIS_MODE_STOPPING);
-      }
+      if (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING) brake(setpoint(tick), tick);
       break;
     case AXIS_COMMAND_CLEAR_FAULT:
       if (mode_ == AXIS_MODE_FAULT) mode_ = AXIS_MODE_DISABLED;
@@ -184,15 +186,44 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
   sample_.command_done(done);
 }
 
+void Stage::brake(const MotionPoint& from, const Tick& tick) noexcept {
+  const Limits& own = parameters_.limits;
+  begin(Trajectory::stop(from, {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+}
+
+/// Lets go of the motor and says why.
+void Stage::trip(const char* why) noexcept {
+  mode_ = AXIS_MODE_FAULT;
+  fed_forward_ = {};
+  stamp(notice_);
+  notice_.component_id(id);
+  notice_.level(event::SEVERITY_TRIP);
+  notice_.source(name.c_str());
+  notice_.text(why);
+  notices_.write(notice_);
+}
+
+/// What of the inputs is no number; nullptr: nothing.
+const char* Stage::unusable(const AxisFeedback& feedback) noexcept {
+  const auto* fused = fused_.latest();
+  const auto* correction = correction_.latest();
+  if (!std::isfinite(feedback.position()) || !std::isfinite(feedback.velocity()))
+    return "braked without feedback and tripped: the encoder's position or velocity is not a number";
+  if (fused != nullptr && fused->valid() && !std::isfinite(fused->position()))
+    return "braked without feedback and tripped: the fused position is not a number";
+  if (correction != nullptr && !std::isfinite(correction->correction()))
+    return "braked without feedback and tripped: the correction is not a number";
+  return nullptr;
+}
+
 /// Feedback is gone: brake along the stopping trajectory on feedforward alone, then let go.
-void Stage::stop_blindly(const Tick& tick) noexcept {
+void Stage::stop_blindly(const char* why, const Tick& tick) noexcept {
   if (!blind_) {
     blind_ = true;
-    const Limits& own = parameters_.limits;
-    begin(Trajectory::stop(setpoint(tick), {own.velocity, own.acceleration, own.jerk}), tick,
-          AXIS_MODE_STOPPING);
+    blind_because_ = why;
+    brake(setpoint(tick), tick);
   }
-  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) mode_ = AXIS_MODE_FAULT;
+  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) trip(blind_because_);
 }
 
 double Stage::feedforward(const Tick& tick) noexcept {
@@ -221,15 +252,19 @@ void Stage::read_position(const AxisFeedback& feedback, const Tick& tick) noexce
       (fused != nullptr && fused->valid() ? fused->position() : feedback.position() - known) + offset_;
 }
 
-/// What ends a motion: the home switch, the end of the trajectory, a following error or a limit switch.
+/// What ends a motion: the home switch, the end of the trajectory, a following error, a limit switch or the drive.
 void Stage::supervise(const Tick& tick) noexcept {
   const auto& feedback = *feedback_.latest();
-  if (std::abs(following_error_) > parameters_.following_error ||
-      (feedback.limit_low() && setpoint(tick).velocity < 0.0 && mode_ == AXIS_MODE_MOVING) ||
-      (feedback.limit_high() && setpoint(tick).velocity > 0.0)) {
-    mode_ = AXIS_MODE_FAULT;
-    return;
-  }
+  const double velocity = setpoint(tick).velocity;
+  const bool at_limit = (feedback.limit_low() && velocity < 0.0 && mode_ == AXIS_MODE_MOVING) ||
+                        (feedback.limit_high() && velocity > 0.0);
+  const char* why = nullptr;
+  if (at_limit) why = "tripped: it runs into a limit switch";
+  if (!(std::abs(following_error_) <= parameters_.following_error))
+    why = "tripped: the following error is above `following_error`";
+  if (feedback.drive_fault()) why = "tripped: its drive reports a fault";
+  if (!std::isfinite(current_)) why = "tripped: the current that it worked out is not a number";
+  if (why != nullptr) return trip(why);
   if (mode_ == AXIS_MODE_HOMING && feedback.home_switch()) {
     const double shift = parameters_.travel.lower - position_;
     MotionPoint from = setpoint(tick);
@@ -238,8 +273,7 @@ void Stage::supervise(const Tick& tick) noexcept {
     position_ += shift;
     controller_.reset();
     homed_ = true;
-    const Limits& own = parameters_.limits;
-    begin(Trajectory::stop(from, {own.velocity, own.acceleration, own.jerk}), tick, AXIS_MODE_STOPPING);
+    brake(from, tick);
   }
   if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration() && mode_ != AXIS_MODE_HOLDING) {
     if (mode_ == AXIS_MODE_HOMING) {  // travelled the whole way and never saw the switch
@@ -260,18 +294,23 @@ void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
 void Stage::step(const Tick& tick) noexcept {
   const auto* feedback = feedback_.latest();
   const Duration patience = Duration::seconds(parameters_.feedback_timeout);
-  const bool fresh = feedback_.received() != received_;
+  // What is no number has not come: one is bridged, more of them are a loss.
+  const char* bad = feedback != nullptr ? unusable(*feedback) : nullptr;
+  const bool usable = feedback != nullptr && bad == nullptr;
+  if (usable) seen_ = feedback_.arrived();
+  const bool fresh = usable && feedback_.received() != received_;
   received_ = feedback_.received();
-  const bool seeing = feedback != nullptr && feedback_.age(tick.now) <= patience;
+  const bool seeing = seen_ && tick.now - *seen_ <= patience;
   model_changed_ = model_.update();
-  if (seeing) read_position(*feedback, tick);
+  if (seeing && usable) read_position(*feedback, tick);
   // A correction that stays away is held where it was: no step.
-  if (const auto* correction = correction_.latest()) correction_held_ = correction->correction();
+  if (const auto* correction = correction_.latest(); correction != nullptr && bad == nullptr)
+    correction_held_ = correction->correction();
   if (seeing && !primed_) prime(tick);
 
   AxisCommand command;
   while (command_.take(command)) {
-    if (seeing || command.kind() == AXIS_COMMAND_DISABLE) {
+    if ((seeing && !leaving_) || command.kind() == AXIS_COMMAND_DISABLE) {
       obey(command, tick);
     } else {
       sample_.command_id(command.id());
@@ -280,12 +319,15 @@ void Stage::step(const Tick& tick) noexcept {
     }
   }
 
+  if (leaving_ && (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING)) brake(setpoint(tick), tick);
   const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
   if (driving && !seeing) {
-    stop_blindly(tick);
+    stop_blindly(
+        bad != nullptr ? bad : "braked without feedback and tripped: none came for `feedback_timeout`", tick);
     current_ = feedforward(tick);
+    if (!std::isfinite(current_)) trip("tripped: the current that it worked out is not a number");
   } else if (driving && blind_) {
-    mode_ = AXIS_MODE_FAULT;      // sight came back too late: stay stopped until somebody clears the fault
+    trip(blind_because_);         // sight came back too late: stay stopped until somebody clears the fault
   } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
@@ -319,7 +361,8 @@ void Stage::publish(const MotionPoint& at) noexcept {
   sample_.setpoint_velocity(at.velocity);
   sample_.setpoint_acceleration(at.acceleration);
   sample_.position(position_);
-  if (const auto* feedback = feedback_.latest()) sample_.velocity(feedback->velocity());
+  if (const auto* feedback = feedback_.latest(); feedback != nullptr && std::isfinite(feedback->velocity()))
+    sample_.velocity(feedback->velocity());
   sample_.current(current_);
   sample_.correction(correction_held_);
   sample_.following_error(following_error_);

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "components/stage/trajectory.hpp"
@@ -12,6 +13,7 @@
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
 #include "idl/compensation.h"
+#include "idl/event.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
 
@@ -21,7 +23,8 @@ namespace invar::stage {
 /// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction). A model.yaml of
 /// the axis, as `invar diagnose` writes it, may be loaded, also while running: then its forces, those of its terms included,
 /// are what is fed forward, and what its encoder terms know is taken out of the reading.
-/// Safe value: motor not enabled. Stops under control on stale feedback, soft limits and following error.
+/// Safe value: motor not enabled. Feedback that is stale or no number: it brakes on feedforward, then trips. Following error,
+/// limit switches and a fault of the drive trip it at once; a notice says why. To be deactivated, it brakes first.
 class Stage final : public Component {
  public:
   struct Control {
@@ -97,6 +100,7 @@ class Stage final : public Component {
   void activate() override;
   void cleanup() noexcept override { model_.close(); }
   void deactivate() noexcept override;
+  bool wind_down() noexcept override;
   void step(const Tick& tick) noexcept override;
 
  private:
@@ -114,7 +118,10 @@ class Stage final : public Component {
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
   void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
   void prime(const Tick& tick) noexcept;
-  void stop_blindly(const Tick& tick) noexcept;
+  void brake(const MotionPoint& from, const Tick& tick) noexcept;
+  void trip(const char* why) noexcept;
+  [[nodiscard]] const char* unusable(const AxisFeedback& feedback) noexcept;
+  void stop_blindly(const char* why, const Tick& tick) noexcept;
   void supervise(const Tick& tick) noexcept;
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
   void publish(const MotionPoint& setpoint) noexcept;
@@ -128,6 +135,7 @@ class Stage final : public Component {
   Inbox<AxisCommand> command_{*this, "command"};
   Output<MotorCommand> motor_{*this, "motor"};
   Output<AxisState> state_{*this, "state"};
+  Output<event::Notice> notices_{*this, "notices", "event"};
   Staged model_;
   Faded fed_forward_, reading_error_;
   bool model_changed_ = false;
@@ -139,8 +147,12 @@ class Stage final : public Component {
   AxisState sample_;     // what was published last; answers to commands are kept in it
   bool primed_ = false;  // the controller knows the loop's rate
   bool homed_ = false;
-  bool blind_ = false;   // feedback is lost: braking on feedforward alone
-  double offset_ = 0.0;  // what homing adds to the encoder's reading
+  event::Notice notice_;
+  bool blind_ = false;  // feedback is lost: braking on feedforward alone
+  const char* blind_because_ = "";
+  bool leaving_ = false;         // to be deactivated: it brakes and takes no commands
+  std::optional<Instant> seen_;  // when feedback that is usable came last
+  double offset_ = 0.0;          // what homing adds to the encoder's reading
   double position_ = 0.0;
   double correction_held_ = 0.0;
   double current_ = 0.0;

@@ -46,6 +46,9 @@ class Component {
   virtual void step(const Tick& tick) noexcept = 0;
   /// active -> inactive, on the thread that steps. Afterwards the outputs get their safe values.
   virtual void deactivate() noexcept {}
+  /// Before `deactivate`, once a cycle on the thread that steps: is it at rest? While it says no it goes on being stepped
+  /// (a stage brakes), but not for longer than the executor allows. Real-time.
+  virtual bool wind_down() noexcept { return true; }
   /// inactive or error -> unconfigured: give back what configure took. Not on the loop's thread.
   virtual void cleanup() noexcept {}
   /// An input with a deadline is older than that while active, called once a period on the thread that steps.

@@ -6,9 +6,10 @@ namespace invar {
 
 namespace {
 
-bool feeds(const Component& upstream, const Component& downstream) {
+bool feeds(const Component& upstream, const Component& downstream, bool by_commands) {
   for (const Port* to : downstream.ports()) {
     if (to->direction() == Port::Direction::output) continue;
+    if (to->direction() == Port::Direction::inbox && !by_commands) continue;
     const auto& sources = static_cast<const InputPort*>(to)->sources();
     for (const Port* from : upstream.ports()) {
       if (from->direction() != Port::Direction::output) continue;
@@ -19,18 +20,37 @@ bool feeds(const Component& upstream, const Component& downstream) {
   return false;
 }
 
-}  // namespace
+using Relation = std::vector<std::vector<bool>>;
 
-std::vector<std::size_t> upstream_first(const std::vector<const Component*>& components) {
+Relation direct_feeds(const std::vector<const Component*>& components, bool by_commands) {
   const std::size_t n = components.size();
-  std::vector<std::vector<bool>> direct(n, std::vector<bool>(n, false));
+  Relation direct(n, std::vector<bool>(n, false));
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t k = 0; k < n; ++k) direct[i][k] = i != k && feeds(*components[i], *components[k]);
-  auto reaches = direct;  // over any number of steps (Warshall)
+    for (std::size_t k = 0; k < n; ++k)
+      direct[i][k] = i != k && feeds(*components[i], *components[k], by_commands);
+  return direct;
+}
+
+/// Over any number of steps (Warshall).
+Relation closure(Relation reaches) {
+  const std::size_t n = reaches.size();
   for (std::size_t via = 0; via < n; ++via)
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t k = 0; k < n; ++k)
         if (reaches[i][via] && reaches[via][k]) reaches[i][k] = true;
+  return reaches;
+}
+
+}  // namespace
+
+Relation signals_reach(const std::vector<const Component*>& components) {
+  return closure(direct_feeds(components, false));
+}
+
+std::vector<std::size_t> upstream_first(const std::vector<const Component*>& components) {
+  const std::size_t n = components.size();
+  const Relation direct = direct_feeds(components, true);
+  const Relation reaches = closure(direct);
 
   std::vector<std::size_t> order;
   std::vector<bool> placed(n, false);

@@ -13,4 +13,7 @@ namespace invar {
 /// another when an output is connected to an input, or both carry the same topic.
 [[nodiscard]] std::vector<std::size_t> upstream_first(const std::vector<const Component*>& components);
 
+/// [i][k]: signals of `i` reach `k`, directly or through others; commands (inboxes) do not count.
+[[nodiscard]] std::vector<std::vector<bool>> signals_reach(const std::vector<const Component*>& components);
+
 }  // namespace invar

@@ -173,7 +173,10 @@ void Executor::obey(Instant now) noexcept {
         activate(slot, now);
         break;
       case Command::Kind::deactivate:
-        deactivate(slot, now);
+        wind_down(slot, now, true);
+        break;
+      case Command::Kind::wind_down:
+        for (const auto& each : slots_) wind_down(*each, now, false);
         break;
       case Command::Kind::set_parameter:
         *slot.infos[command.parameter].number = command.value;
@@ -196,6 +199,7 @@ void Executor::obey(Instant now) noexcept {
     }
     ++obeyed;
   }
+  take_down(now);
   if (obeyed == 0) return;
   for (const auto& slot : slots_) {
     if (!slot->parameters_dirty) continue;
@@ -233,6 +237,38 @@ void Executor::activate(Slot& slot, Instant now) noexcept {
   if (!slot.bump_checked) check_bump(slot, now);
 }
 
+/// In simulated time the clock may be over, by the clock the loop may not run: then nobody can brake.
+bool Executor::is_stepped() const noexcept {
+  return options_.simulated ? !stop_requested_.load(std::memory_order_acquire) : is_running();
+}
+
+void Executor::wind_down(Slot& slot, Instant now, bool leave) noexcept {
+  if (slot.state.load(std::memory_order_relaxed) != LifecycleState::active) return;
+  if (!slot.winding) slot.leave_by = now + options_.wind_down;
+  slot.winding = winding_ = true;
+  slot.leaving = slot.leaving || leave;
+}
+
+/// Deactivates what is to leave and rests, downstream first; what a braking component reads stays with it.
+void Executor::take_down(Instant now) noexcept {
+  if (!winding_) return;
+  const bool may_wait = is_stepped();
+  for (const auto& slot : slots_) {
+    slot->braking = false;
+    if (!slot->winding || !may_wait || now >= slot->leave_by) continue;
+    slot->component->set_now(now, count_.cycle);
+    slot->braking = !slot->component->wind_down();
+  }
+  winding_ = false;
+  for (const std::size_t index : take_down_order_) {
+    Slot& slot = *slots_[index];
+    const bool needed = std::any_of(slot.signalled.begin(), slot.signalled.end(),
+                                    [](const Slot* reader) { return reader->braking; });
+    if (slot.leaving && !slot.braking && !needed) deactivate(slot, now);
+    winding_ = winding_ || slot.winding;
+  }
+}
+
 void Executor::deactivate(Slot& slot, Instant now) noexcept {
   if (slot.state.load(std::memory_order_relaxed) != LifecycleState::active) return;
   slot.component->set_now(now, count_.cycle);
@@ -248,7 +284,8 @@ void Executor::go_to_error(Slot& slot, std::string_view why, Instant now) noexce
 }
 
 void Executor::deactivate_all(Instant now) noexcept {
-  for (const std::size_t index : take_down_order_) deactivate(*slots_[index], now);
+  for (const auto& slot : slots_) wind_down(*slot, now, true);
+  take_down(now);
 }
 
 void Executor::stop_safely(std::string_view why, Instant now) noexcept {
@@ -265,6 +302,7 @@ void Executor::change_state(Ring<StateChange>& ring, Slot& slot, LifecycleState 
                             std::string_view why) noexcept {
   const FailureText text = failure_text(why);
   slot.failure.write(text);
+  if (&ring == &loop_changes_) slot.winding = slot.leaving = slot.braking = false;
   const LifecycleState from = slot.state.exchange(to, std::memory_order_acq_rel);
   ring.push({now, static_cast<std::uint32_t>(slot.index), from, to, text});
 }

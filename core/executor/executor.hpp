@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <future>
 #include <map>
@@ -124,6 +125,9 @@ class Executor {
 
   /// Carries out one transition of one component and waits for it. Two callers take turns.
   Outcome transition(std::size_t index, Transition transition);
+  /// Asks all active components to come to rest; whoever deactivates them next waits the less. Waits for the loop's answer
+  /// only.
+  void wind_down_all();
   /// Hands a new value to the loop and waits until it is applied, between two steps. Empty: done; otherwise
   /// the reason why not.
   [[nodiscard]] std::string set_parameter(std::size_t index, std::string_view path, double value);
@@ -132,7 +136,7 @@ class Executor {
   [[nodiscard]] std::optional<double> parameter(std::size_t index, std::string_view path) const;
 
   /// Stops safely: at the next cycle all active components are deactivated, downstream first, their outputs
-  /// get their safe values, and the black box freezes. Nothing is activated until clear_trip(). Does not
+  /// get their safe values, and the black box freezes. Who moves brakes before, and keeps what it reads alive so long. Nothing is activated until clear_trip(). Does not
   /// wait.
   void trip(std::string_view reason);
   void clear_trip();
@@ -159,7 +163,14 @@ class Executor {
 
  private:
   struct Command {
-    enum class Kind : std::uint8_t { activate, deactivate, set_parameter, clear_histograms, clear_trip };
+    enum class Kind : std::uint8_t {
+      activate,
+      deactivate,
+      wind_down,
+      set_parameter,
+      clear_histograms,
+      clear_trip
+    };
     Kind kind = Kind::activate;
     std::uint32_t slot = 0;
     std::uint32_t parameter = 0;
@@ -171,7 +182,10 @@ class Executor {
   void step(Slot& slot, Instant now, std::uint64_t cycle, std::uint32_t stretch) noexcept;
   void obey(Instant now) noexcept;
   void activate(Slot& slot, Instant now) noexcept;
+  void wind_down(Slot& slot, Instant now, bool leave) noexcept;
+  void take_down(Instant now) noexcept;
   void deactivate(Slot& slot, Instant now) noexcept;
+  [[nodiscard]] bool is_stepped() const noexcept;
   void go_to_error(Slot& slot, std::string_view why, Instant now) noexcept;
   bool inputs_alive(Slot& slot, const Tick& tick) noexcept;
   void watch_ages(Slot& slot, Instant now) noexcept;
@@ -191,6 +205,8 @@ class Executor {
   void prepare();
   Outcome start_or_stop(Slot& slot, Command::Kind kind, LifecycleState target);
   bool carry_out(const Command& command);
+  bool wait_for_rest(Slot& slot);
+  [[nodiscard]] std::chrono::nanoseconds patience() const;
 
   ExecutorOptions options_;
   std::vector<std::unique_ptr<Slot>> slots_;
@@ -206,6 +222,7 @@ class Executor {
   std::uint64_t next_cycle_ = 0;
   Histogram wake_up_, compute_, latency_;
   bool late_input_ = false;  // in the current cycle
+  bool winding_ = false;     // some component is to come to rest
   Instant stall_end_{INT64_MIN};
   Duration stall_;
   std::optional<StateChange> next_loop_change_, next_manager_change_;  // the reader's

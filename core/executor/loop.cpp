@@ -53,7 +53,10 @@ bool Executor::sleep_until(Instant due) noexcept {
     const timespec t{until.ns / 1'000'000'000, until.ns % 1'000'000'000};
     while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, nullptr) == EINTR) {
     }
-    if (stop_requested_.load(std::memory_order_acquire)) return false;
+    if (stop_requested_.load(std::memory_order_acquire)) {
+      deactivate_all(utc_at(until));
+      if (!winding_) return false;
+    }
     if (last) return true;
     obey(utc_at(until));
   }
@@ -115,7 +118,6 @@ void Executor::loop(std::promise<bool>& ready) {
     count_.stretch = pacer.stretch();
     close_cycle(start, late, done - woke);
   }
-  deactivate_all(now());
   running_.store(false, std::memory_order_release);
 }
 

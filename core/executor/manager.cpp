@@ -17,6 +17,12 @@ void Executor::prepare() {
     is_prepared_ = true;
     take_down_order_ = bring_up_order();
     std::reverse(take_down_order_.begin(), take_down_order_.end());
+    std::vector<const Component*> components;
+    for (const auto& slot : slots_) components.push_back(slot->component.get());
+    const auto reach = signals_reach(components);
+    for (std::size_t i = 0; i < slots_.size(); ++i)
+      for (std::size_t k = 0; k < slots_.size(); ++k)
+        if (i != k && reach[i][k]) slots_[i]->signalled.push_back(slots_[k].get());
     std::vector<std::string> names;
     for (const auto& slot : slots_) {
       names.push_back(slot->component->name);
@@ -63,13 +69,15 @@ const std::vector<ParameterInfo>& Executor::parameters(std::size_t index) const 
   return slots_.at(index)->infos;
 }
 
+std::chrono::nanoseconds Executor::patience() const {
+  return std::max(std::chrono::nanoseconds{2'000'000'000}, std::chrono::nanoseconds{options_.period.ns * 4});
+}
+
 bool Executor::carry_out(const Command& command) {
   using Clock = std::chrono::steady_clock;
   if (!commands_.push(command)) return false;
   ++commanded_;
-  const auto patience =
-      std::max(std::chrono::nanoseconds{2'000'000'000}, std::chrono::nanoseconds{options_.period.ns * 4});
-  const auto until = Clock::now() + patience;
+  const auto until = Clock::now() + patience();
   while (obeyed_.load(std::memory_order_acquire) < commanded_) {
     if (stepping_.try_lock()) {  // nobody steps: this thread may
       obey(now());
@@ -82,9 +90,36 @@ bool Executor::carry_out(const Command& command) {
   return true;
 }
 
+/// As long as cycles go by. Where none do any more in simulated time, nobody brakes: it is deactivated as it is.
+bool Executor::wait_for_rest(Slot& slot) {
+  using Clock = std::chrono::steady_clock;
+  auto until = Clock::now() + patience();
+  for (std::uint64_t seen = counters().executed; state(slot.index) == LifecycleState::active;) {
+    if (const std::uint64_t cycles = counters().executed; cycles != seen) {
+      seen = cycles;
+      until = Clock::now() + patience();
+    }
+    const bool late = Clock::now() > until;
+    if ((late || !is_stepped()) && stepping_.try_lock()) {
+      deactivate(slot, now());
+      stepping_.unlock();
+    } else if (late) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds{100});
+  }
+  return true;
+}
+
+void Executor::wind_down_all() {
+  const std::lock_guard turn{manager_};
+  if (!slots_.empty()) (void)carry_out({Command::Kind::wind_down, 0, 0, 0.0});
+}
+
 Outcome Executor::start_or_stop(Slot& slot, Command::Kind kind, LifecycleState target) {
   Outcome outcome;
-  const bool answered = carry_out({kind, static_cast<std::uint32_t>(slot.index), 0, 0.0});
+  bool answered = carry_out({kind, static_cast<std::uint32_t>(slot.index), 0, 0.0});
+  if (answered && kind == Command::Kind::deactivate) answered = wait_for_rest(slot);
   outcome.state = slot.state.load(std::memory_order_acquire);
   outcome.verdict = outcome.state == target ? Verdict::done : Verdict::failed;
   if (outcome.ok()) return outcome;

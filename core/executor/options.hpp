@@ -31,6 +31,9 @@ struct ExecutorOptions {
   OverrunPolicy overrun = OverrunPolicy::skip;
   std::uint32_t tolerated = 0;  // lost periods within a second that degrade and safe_stop put up with
   std::optional<RealTimeRequest> real_time;  // absent: nothing (a worker process)
+  /// How long a component that is to be deactivated may take to come to rest: 1 m/s at 0.5 m/s2 is 2 s, and who stops a
+  /// process waits 10 s before killing it.
+  Duration wind_down = Duration::seconds(3.0);
   LatePolicy late = LatePolicy::event;
   bool simulated = false;          // driven by advance_to instead of a clock
   std::uint32_t black_box = 1024;  // cycles kept

@@ -90,6 +90,7 @@ Outcome ProcessControl::request_all(Transition transition) {
   auto order = executor_.bring_up_order();
   if (!upwards) std::reverse(order.begin(), order.end());
   if (transition == Transition::reset) executor_.clear_trip();
+  if (transition == Transition::deactivate || transition == Transition::shutdown) executor_.wind_down_all();
   Outcome all{0, Verdict::already, decide(LifecycleState::unconfigured, transition).target, ""};
   if (transition == Transition::activate) all.state = LifecycleState::active;
   if (transition == Transition::deactivate) all.state = LifecycleState::inactive;
@@ -136,6 +137,7 @@ std::string ProcessControl::set_parameter(std::string_view component, std::strin
 }
 
 void ProcessControl::stop() {
+  if (executor_.options().simulated) executor_.request_stop();  // its clock is over: nobody steps any more
   (void)request("all", Transition::shutdown);
   executor_.stop();
 }

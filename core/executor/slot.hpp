@@ -61,6 +61,11 @@ struct Slot {
   bool bump_checked = true;
   bool parameters_dirty = false;
   Instant active_since;
+  bool winding = false;  // asked to come to rest, at the latest by `leave_by`
+  bool leaving = false;  // to be deactivated once neither it nor what reads its signals moves
+  bool braking = false;
+  Instant leave_by;
+  std::vector<Slot*> signalled;  // whom its signals reach, directly or through others
 };
 
 }  // namespace invar

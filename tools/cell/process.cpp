@@ -293,7 +293,7 @@ class RunningProcess {
     };
     view.deactivate = [this](const std::string& component) -> std::string {
       const auto reply = client_->request(client_->process_of(component), component,
-                                          lifecycle::TRANSITION_DEACTIVATE, Duration::seconds(1.0));
+                                          lifecycle::TRANSITION_DEACTIVATE, Duration::seconds(5.0));
       if (!reply) return "its process does not answer";
       return reply->done() ? "" : reply->text().c_str();
     };

@@ -241,6 +241,22 @@ TEST(Loop, ALostPeriodUnderSafeStopDeactivatesEverything) {
   }
 }
 
+TEST(Loop, BrakesBeforeItDeactivatesOnRequestAndWhenItEnds) {
+  Track track{by_the_clock()};
+  track.executor.start();
+  ProcessControl control{track.executor};
+  EXPECT_EQ(control.request("all", Transition::deactivate, 7).verdict, Verdict::done);
+  EXPECT_EQ(track.states(), "---");
+  EXPECT_EQ(track.runner->speed, 0);
+  track.runner->speed = 20;
+  EXPECT_EQ(control.request("all", Transition::activate, 8).verdict, Verdict::done);
+  EXPECT_EQ(control.request("all", Transition::deactivate, 7).verdict, Verdict::done) << "as before";
+  EXPECT_EQ(track.states(), "aaa");
+  track.executor.stop();
+  EXPECT_EQ(track.states(), "---");
+  EXPECT_EQ(track.runner->speed, 0);
+}
+
 TEST(ProcessControl, BringsUpUpstreamFirstAndTakesDownDownstreamFirstOncePerRequestId) {
   std::vector<std::string> journal;
   Executor executor{by_the_clock()};

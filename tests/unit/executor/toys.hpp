@@ -1,6 +1,7 @@
 // Small components that the executor's tests step.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -120,6 +121,25 @@ class Call final : public Component {
   std::function<void(const Tick&)> work_;
 };
 
+/// Slows down by one a step once it is asked to come to rest.
+class Runner final : public Component {
+ public:
+  Input<Sample> seen{*this, "seen"};
+  Output<Sample> driven{*this, "driven"};
+  Runner() { driven.set_safe_value({0, -1.0}); }
+  void step(const Tick& tick) noexcept override {
+    if (asked && speed > 0) --speed;
+    driven.write({tick.cycle, static_cast<double>(speed)});
+  }
+  bool wind_down() noexcept override {
+    asked = true;
+    return speed == 0;
+  }
+  void activate() override { asked = false; }
+  std::atomic<int> speed{20};
+  bool asked = false;
+};
+
 /// Keeps the newest sample of anything, and a hash of all of them.
 class Listener final : public Component {
  public:
@@ -136,6 +156,32 @@ class Listener final : public Component {
   }
   Sample last;
   std::uint64_t hash = 1469598103934665603ULL;
+};
+
+/// What the runner reads, the runner, and who reads the runner.
+struct Track {
+  explicit Track(ExecutorOptions options) : executor{std::move(options)} {
+    auto a = std::make_unique<Plant>();
+    auto b = std::make_unique<Runner>();
+    auto c = std::make_unique<Listener>();
+    runner = b.get();
+    listener = c.get();
+    a->position.connect(b->seen);
+    b->driven.connect(c->force);
+    executor.add(std::move(a));
+    executor.add(std::move(b));
+    executor.add(std::move(c));
+    for (const Transition transition : {Transition::configure, Transition::activate})
+      for (std::size_t i = 0; i < 3; ++i) (void)executor.transition(i, transition);
+  }
+  [[nodiscard]] std::string states() const {
+    std::string text;
+    for (std::size_t i = 0; i < 3; ++i) text += executor.state(i) == LifecycleState::active ? 'a' : '-';
+    return text;
+  }
+  Runner* runner;
+  Listener* listener;
+  Executor executor;
 };
 
 /// Plant, servo and listener, joined in a circle.

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <limits>
 
 namespace invar::stage {
 namespace {
@@ -19,6 +20,7 @@ struct Bench : Component {
   Output<AxisCommand> command{*this, "command"};
   Output<compensation::AxisCorrection> correction{*this, "correction"};
   Input<AxisState> state{*this, "state"};
+  Input<event::Notice> notices{*this, "notices"};
 
   Stage::Parameters parameters = [] {
     Stage::Parameters p;
@@ -31,6 +33,8 @@ struct Bench : Component {
   double velocity = 0.0;
   double spring = 0.0;  // N/m
   bool seeing = true;
+  bool drive_fault = false;
+  double encoder_error = 0.0;
   bool at_switch = false;
   std::uint64_t cycle = 0;
   std::uint64_t next_id = 1;
@@ -44,6 +48,7 @@ struct Bench : Component {
     join(correction, "correction");
     static_cast<OutputPort*>(stage.find_port("motor"))->connect(motor);
     static_cast<OutputPort*>(stage.find_port("state"))->connect(state);
+    static_cast<OutputPort*>(stage.find_port("notices"))->connect(notices);
     stage.activate();
   }
   void join(OutputPort& output, const char* port) {
@@ -61,7 +66,8 @@ struct Bench : Component {
     position += velocity * period + force / mass * period * period / 2;
     velocity += force / mass * period;
     AxisFeedback sample;
-    sample.position(position);
+    sample.position(position + encoder_error);
+    sample.drive_fault(drive_fault);
     sample.velocity(velocity);
     sample.home_switch(at_switch || position < 0.0);
     if (seeing) feedback.write(sample);
@@ -290,6 +296,66 @@ TEST(Stage, LostFeedbackBrakesUnderControlAndThenLetsGo) {
   EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_DISABLED);
 }
 
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// Runs on until the axis trips; every number on the way must be one. What the notice said.
+std::string trip_of(Bench& bench) {
+  const bool tripped = bench.run_until(
+      [&](const AxisState& s) {
+        EXPECT_TRUE(std::isfinite(bench.motor.latest()->current()));
+        EXPECT_TRUE(std::isfinite(s.position()) && std::isfinite(s.following_error()));
+        return s.mode() == AXIS_MODE_FAULT;
+      },
+      1000);
+  EXPECT_TRUE(tripped);
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+  const auto* notice = bench.notices.latest();
+  return notice != nullptr ? notice->text().c_str() : "";
+}
+
+TEST(Stage, AnEncoderThatGivesNoNumberIsLostFeedback) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.09; }));
+  bench.encoder_error = nan;
+  for (int i = 0; i < 4; ++i) bench.cycle_once();
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_STOPPING);
+  EXPECT_NE(trip_of(bench).find("the encoder's position or velocity is not a number"), std::string::npos);
+  EXPECT_LT(std::abs(bench.velocity), 2e-3);
+  bench.send(AXIS_COMMAND_CLEAR_FAULT);
+  bench.send(AXIS_COMMAND_ENABLE);
+  bench.cycle_once();
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+}
+
+TEST(Stage, OneSampleThatIsNoNumberIsBridged) {
+  Bench bench;
+  bench.enable();
+  bench.encoder_error = nan;
+  bench.cycle_once();
+  bench.encoder_error = 0.0;
+  for (int i = 0; i < 100; ++i) EXPECT_TRUE(bench.cycle_once().enabled());
+  EXPECT_NEAR(bench.position, 0.05, 1e-9);
+}
+
+TEST(Stage, ACorrectionThatIsNoNumberIsALostInput) {
+  Bench bench;
+  bench.enable();
+  compensation::AxisCorrection correction;
+  correction.correction(nan);
+  bench.correction.write(correction);
+  EXPECT_NE(trip_of(bench).find("the correction is not a number"), std::string::npos);
+}
+
+TEST(Stage, AFaultOfTheDriveTrips) {
+  Bench bench;
+  bench.enable();
+  bench.drive_fault = true;
+  EXPECT_NE(trip_of(bench).find("its drive reports a fault"), std::string::npos);
+  EXPECT_EQ(bench.notices.received(), 1U);
+}
+
 TEST(Stage, FollowingErrorTrips) {
   Bench bench;
   bench.enable();
@@ -311,6 +377,34 @@ TEST(Stage, HomingFindsTheSwitchAndCountsFromIt) {
   ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.homed() && s.command_done(); }));
   EXPECT_LT(bench.position, 0.0);
   EXPECT_GT(bench.position, -1e-3);
+}
+
+TEST(Stage, BrakesWithinItsLimitsBeforeItIsDeactivated) {
+  Bench bench;
+  bench.enable();
+  EXPECT_TRUE(bench.stage.wind_down());  // it stands
+  bench.stage.activate();
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.09; }));
+  const double from = bench.position;
+  int cycles = 0;
+  for (; !bench.stage.wind_down(); ++cycles) {
+    ASSERT_LT(cycles, 200);
+    if (cycles == 5) bench.send(AXIS_COMMAND_MOVE, 0.0);
+    const double before = bench.velocity;
+    ASSERT_TRUE(bench.cycle_once().enabled());
+    ASSERT_TRUE(bench.motor.latest()->enabled());
+    EXPECT_LE(std::abs(bench.state.latest()->setpoint_acceleration()), 2.0 + 1e-9);
+    EXPECT_LE(std::abs(bench.velocity - before) / Bench::period, 2.2);
+  }
+  EXPECT_GT(cycles, 45);  // 0.09 m/s at 2 m/s2
+  EXPECT_LT(std::abs(bench.velocity), 2e-3);
+  EXPECT_LT(bench.position - from, 0.01);  // 2 mm of braking, 3 mm of jerk
+  EXPECT_TRUE(bench.state.latest()->command_refused());
+  bench.stage.deactivate();
+  bench.stage.activate();
+  bench.enable();  // as new
 }
 
 TEST(Stage, SafeValueLetsGoOfTheMotor) {
