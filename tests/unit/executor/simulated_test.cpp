@@ -201,60 +201,61 @@ TEST(Executor, AComponentDoesNotObeyWhatItWasToldWhileItWasNotActive) {
   ASSERT_TRUE(executor.transition(0, Transition::activate).ok());
   executor.advance_to(at_ms(15));
   EXPECT_THAT(component.obeyed, ElementsAre(3U));
+}
 
-  TEST(Executor, WhatMovesIsSteppedUntilItRestsAndKeepsWhatItReads) {
-    Track track{simulated()};
-    track.executor.advance_to(at_ms(10));
-    track.executor.trip("door opened");
-    track.executor.advance_to(at_ms(11));
-    EXPECT_EQ(track.states(), "aa-");
-    EXPECT_TRUE(track.executor.counters().tripped);
-    track.executor.advance_to(at_ms(30));
-    EXPECT_EQ(track.states(), "aa-");
-    EXPECT_EQ(track.runner->speed, 0);
-    track.executor.advance_to(at_ms(31));
-    EXPECT_EQ(track.states(), "---");
-    EXPECT_EQ(track.executor.steps(1), 30U);
-  }
+TEST(Executor, WhatMovesIsSteppedUntilItRestsAndKeepsWhatItReads) {
+  Track track{simulated()};
+  track.executor.advance_to(at_ms(10));
+  track.executor.trip("door opened");
+  track.executor.advance_to(at_ms(11));
+  EXPECT_EQ(track.states(), "aa-");
+  EXPECT_TRUE(track.executor.counters().tripped);
+  track.executor.advance_to(at_ms(30));
+  EXPECT_EQ(track.states(), "aa-");
+  EXPECT_EQ(track.runner->speed, 0);
+  track.executor.advance_to(at_ms(31));
+  EXPECT_EQ(track.states(), "---");
+  EXPECT_EQ(track.executor.steps(1), 30U);
+}
 
-  TEST(Executor, WhatDoesNotComeToRestIsLetGoInTime) {
-    ExecutorOptions options = simulated();
-    options.wind_down = Duration::milliseconds(50);
-    Track track{options};
-    track.runner->speed = 1'000'000;
-    track.executor.advance_to(at_ms(10));
-    track.executor.trip("door opened");
-    track.executor.advance_to(at_ms(60));
-    EXPECT_EQ(track.states(), "aa-");
-    track.executor.advance_to(at_ms(61));
-    EXPECT_EQ(track.states(), "---");
-  }
+TEST(Executor, WhatDoesNotComeToRestIsLetGoInTime) {
+  ExecutorOptions options = simulated();
+  options.wind_down = Duration::milliseconds(50);
+  Track track{options};
+  track.runner->speed = 1'000'000;
+  track.executor.advance_to(at_ms(10));
+  track.executor.trip("door opened");
+  track.executor.advance_to(at_ms(60));
+  EXPECT_EQ(track.states(), "aa-");
+  track.executor.advance_to(at_ms(61));
+  EXPECT_EQ(track.states(), "---");
+}
 
-  TEST(Executor, NobodyIsWaitedForWhenNobodySteps) {
-    Track track{simulated()};
-    track.executor.advance_to(at_ms(10));
-    EXPECT_EQ(track.executor.transition(1, Transition::deactivate).verdict, Verdict::done);
-    EXPECT_EQ(track.executor.steps(1), 10U);
-    EXPECT_TRUE(track.executor.transition(1, Transition::activate).ok());
-    track.executor.stop();
-    EXPECT_EQ(track.states(), "---");
-  }
+TEST(Executor, NobodyIsWaitedForWhenNobodySteps) {
+  Track track{simulated()};
+  track.executor.advance_to(at_ms(10));
+  EXPECT_EQ(track.executor.transition(1, Transition::deactivate).verdict, Verdict::done);
+  EXPECT_EQ(track.executor.steps(1), 10U);
+  EXPECT_TRUE(track.executor.transition(1, Transition::activate).ok());
+  track.executor.stop();
+  EXPECT_EQ(track.states(), "---");
+}
 
-  TEST(Executor, AppliesAParameterBetweenTwoStepsAndSaysWhyNot) {
-    Loop loop{simulated()};
-    loop.bring_up();
-    loop.executor.advance_to(at_ms(5));
-    EXPECT_EQ(loop.executor.set_parameter(1, "gain", 200.0), "");
-    EXPECT_EQ(loop.servo->changes, 1);
-    EXPECT_DOUBLE_EQ(*loop.executor.parameter(1, "gain"), 200.0);
-    EXPECT_EQ(loop.executor.set_parameter(1, "gain", 2000.0),
-              "servo.gain: 2000 1/s2 is outside 0 .. 1000 1/s2");
-    EXPECT_THAT(loop.executor.set_parameter(1, "gain", std::nan("")), HasSubstr("is outside"));
-    EXPECT_THAT(loop.executor.set_parameter(1, "window", 2.0), HasSubstr("may not change while running"));
-    EXPECT_THAT(loop.executor.set_parameter(1, "gains", 2.0), HasSubstr("did you mean `gain`?"));
-    EXPECT_DOUBLE_EQ(*loop.executor.parameter(1, "gain"), 200.0);
-    EXPECT_EQ(loop.servo->changes, 1);
-  }
+TEST(Executor, AppliesAParameterBetweenTwoStepsAndSaysWhyNot) {
+  Loop loop{simulated()};
+  loop.bring_up();
+  loop.executor.advance_to(at_ms(5));
+  EXPECT_EQ(loop.executor.set_parameter(1, "gain", 200.0), "");
+  EXPECT_EQ(loop.servo->changes, 1);
+  EXPECT_DOUBLE_EQ(*loop.executor.parameter(1, "gain"), 200.0);
+  EXPECT_EQ(loop.executor.set_parameter(1, "gain", 2000.0),
+            "servo.gain: 2000 1/s2 is outside 0 .. 1000 1/s2");
+  EXPECT_THAT(loop.executor.set_parameter(1, "gain", std::nan("")), HasSubstr("is outside"));
+  EXPECT_THAT(loop.executor.set_parameter(1, "window", 2.0), HasSubstr("may not change while running"));
+  EXPECT_THAT(loop.executor.set_parameter(1, "gains", 2.0), HasSubstr("did you mean `gain`?"));
+  EXPECT_DOUBLE_EQ(*loop.executor.parameter(1, "gain"), 200.0);
+  EXPECT_EQ(loop.servo->changes, 1);
+}
 
 }  // namespace
 }  // namespace invar
