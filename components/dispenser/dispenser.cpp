@@ -1,6 +1,9 @@
 #include "components/dispenser/dispenser.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 
 #include "core/compensation/droplet_model.hpp"
 #include "core/compensation/trajectory_file.hpp"
@@ -15,10 +18,32 @@ Dispenser::Dispenser(const Parameters& parameters)
       model_{*this,
              [this](const std::filesystem::path& file, Staged::Model& model) { return load(file, model); },
              "model", "status"} {
-  (void)modbus::load_map_of(
-      parameters.modbus.map, "modbus.map", "pneumatic controller",
-      {"pressure", "purge_pressure", "band", "enable", "purge", "reset_alarms", "actual_pressure",
-       "actual_purge_pressure", "in_band", "supply_low", "over_pressure", "sensor_fault", "comm_lost"});
+  const auto map = modbus::load_map_of(parameters.modbus.map, "modbus.map", "pneumatic controller",
+                                       {{"pressure", "Pa", true},
+                                        {"purge_pressure", "Pa", true},
+                                        {"band", "Pa", true},
+                                        {"enable", "1", true},
+                                        {"purge", "1", true},
+                                        {"reset_alarms", "1", true},
+                                        {"enable"},
+                                        {"purge"},
+                                        {"actual_pressure", "Pa"},
+                                        {"actual_purge_pressure", "Pa"},
+                                        {"in_band"},
+                                        {"supply_low"},
+                                        {"over_pressure"},
+                                        {"sensor_fault"},
+                                        {"comm_lost"}});
+  modbus::must_take(map, "pressure", {parameters.pressure, parameters.pressure}, "pressure");
+  modbus::must_take(map, "purge_pressure", {parameters.purge_pressure, parameters.purge_pressure},
+                    "purge_pressure");
+  modbus::must_take(map, "band", {parameters.band, parameters.band}, "band");
+  const auto taken = [&](const char* reg) {
+    const Range range = map.registers[map.find(reg).value()].range;
+    return Range{std::max(range.lower, settable.lower), std::min(range.upper, settable.upper)};
+  };
+  pressures_ = taken("pressure");
+  purge_pressures_ = taken("purge_pressure");
   for (const Pattern& pattern : parameters.patterns) patterns_[pattern.name] = targets(pattern);
   if (patterns_.size() != parameters.patterns.size())
     throw InputError{"patterns", "two have one name", "rename one of them"};
@@ -56,7 +81,7 @@ bool Dispenser::flag(const char* reg) const {
 }
 
 void Dispenser::drive(bool enable) noexcept {
-  // Out of the map's range cannot be: parameters and commands were checked.
+  // Out of the map's range cannot be: parameters and commands were checked against it.
   (void)client_.device().write("pressure", setpoint_);
   (void)client_.device().write("purge_pressure", purge_setpoint_);
   (void)client_.device().write("band", parameters_.band);
@@ -65,9 +90,22 @@ void Dispenser::drive(bool enable) noexcept {
 }
 
 void Dispenser::obey(const PressureCommand& command) noexcept {
-  constexpr Range sound{1.0, 7e5};
-  if (sound.contains(command.setpoint())) setpoint_ = command.setpoint();
-  if (sound.contains(command.purge_setpoint())) purge_setpoint_ = command.purge_setpoint();
+  const auto take = [&](double wanted, Range range, double& setpoint) {
+    if (wanted == 0.0) return true;  // stays as it is
+    if (range.contains(wanted)) setpoint = wanted;
+    return range.contains(wanted);
+  };
+  const bool taken = take(command.setpoint(), pressures_, setpoint_);
+  const bool purge_taken = take(command.purge_setpoint(), purge_pressures_, purge_setpoint_);
+  if (!taken || !purge_taken) {
+    const Range range = taken ? purge_pressures_ : pressures_;
+    std::array<char, 200> text{};
+    std::snprintf(text.data(), text.size(),
+                  "a command's %s of %g Pa is refused: it must be a number from %g to %g",
+                  taken ? "purge setpoint" : "setpoint",
+                  taken ? command.purge_setpoint() : command.setpoint(), range.lower, range.upper);
+    notices_.say(event::SEVERITY_WARNING, text.data());
+  }
   wanted_ = command.enabled();
   purge_ = command.purge();
   if (!command.reset_alarms()) return;
@@ -143,15 +181,15 @@ void Dispenser::publish() noexcept {
   state.pressure(actual.value);
   state.setpoint(setpoint_);
   state.purge_pressure(client_.device().value("actual_purge_pressure").value);
-  state.enabled(flag("enable"));
+  state.enabled(flag("enable") && !client_.refuses());
   state.purging(flag("purge"));
   state.supply_low(flag("supply_low"));
   state.over_pressure(latched_ || flag("over_pressure"));
   state.sensor_fault(flag("sensor_fault"));
   state.comm_lost(flag("comm_lost"));
-  state.stale(actual.stale || enabled.stale);
+  state.stale(!actual.is_sound() || !enabled.is_sound());
   // Both must find it there: the controller may still hold the band of an older setpoint.
-  state.in_band(!state.stale() && flag("in_band") && !state.supply_low() &&
+  state.in_band(!state.stale() && !client_.refuses() && flag("in_band") && !state.supply_low() &&
                 std::abs(actual.value - setpoint_) <= parameters_.band);
   pressure_.write(state);
 }
@@ -164,11 +202,15 @@ void Dispenser::step(const Tick& tick) noexcept {
   while (wanted_pattern_.take(pattern)) answer(pattern);
 
   client_.receive(tick.now);
-  client_.device().refresh();
+  for (const modbus::HealthChange& change : client_.look(tick.now))
+    notices_.say(change.well ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, change.text.c_str());
+  // A controller that refuses to be shut is left to its watchdog.
+  if (!client_.refuses()) client_.device().refresh();
   // A reset takes a few polls to show; the controller itself stays shut until it has accepted it.
   constexpr Duration grace = Duration::milliseconds(500);
   if ((flag("over_pressure") || flag("sensor_fault")) && tick.now - reset_at_ > grace) latched_ = true;
-  drive(wanted_ && !latched_);
+  drive(wanted_ && !latched_ && !client_.refuses() &&
+        !client_.device().value("actual_pressure").out_of_range);
   client_.send(tick.now);
   publish();
 }

@@ -10,6 +10,7 @@
 
 #include "components/dispenser/pattern.hpp"
 #include "core/component/component.hpp"
+#include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/component/staged_model.hpp"
 #include "core/metrology/droplet_trajectory.hpp"
@@ -22,7 +23,8 @@ namespace invar::dispenser {
 /// their setpoints, lets go of both on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
 /// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use
 /// (compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet; a StagedModel as the stage's is). Not
-/// real-time (Modbus).
+/// real-time (Modbus). It lets go, too, while the pressure that the controller shows cannot be (outside the range of its register)
+/// and while the controller refuses writes, and says so in notices.
 class Dispenser final : public Component {
  public:
   struct Parameters {
@@ -67,6 +69,8 @@ class Dispenser final : public Component {
                                  dispensing::TriggerPattern& pattern);
   void drive(bool enable) noexcept;
   void publish() noexcept;
+  /// What a command or parameter may ask for [Pa].
+  static constexpr Range settable{1.0, 7e5};
   [[nodiscard]] bool flag(const char* reg) const;
 
   const Parameters& parameters_;
@@ -75,7 +79,9 @@ class Dispenser final : public Component {
   Output<dispensing::PressureState> pressure_{*this, "pressure", "state"};
   Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
 
+  Notices notices_{*this};
   modbus::Client client_;
+  Range pressures_, purge_pressures_;  // that the map and `settable` both take
   std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;
   Staged model_;
   double setpoint_ = 0.0;

@@ -1,7 +1,9 @@
 #include "components/thermal/thermal.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 namespace invar::thermal {
@@ -16,13 +18,19 @@ metrology::Thermistor equation_of(const Thermal::Thermistor& parameters) {
 
 Thermal::Thermal(const Parameters& parameters)
     : parameters_{parameters}, thermistor_{equation_of(parameters.thermistor)} {
-  const auto map =
-      modbus::load_map_of(parameters.modbus.map, "modbus.map", "heater",
-                          {"power", "enable", "slide_resistance", "delivered_power", "comm_lost"});
+  const auto map = modbus::load_map_of(parameters.modbus.map, "modbus.map", "heater",
+                                       {{"power", "W", true},
+                                        {"enable", "1", true},
+                                        {"slide_resistance", "ohm"},
+                                        {"delivered_power", "W"},
+                                        {"comm_lost"}});
+  modbus::must_take(map, "power", {0.0, parameters.power_limit}, "power_limit");
+  has_fault_bit_ = map.find("sensor_fault").has_value();
   for (const Zone& zone : parameters.zones) {
     if (!map.find(zone.name + "_resistance"))
       throw InputError{"zones", "the map has no register `" + zone.name + "_resistance`",
                        "name the zone as its register does"};
+    modbus::must_have(map, "modbus.map", "heater", {zone.name + "_resistance", "ohm"});
     zones_.push_back({zone.name + "_resistance", equation_of(zone.thermistor),
                       std::make_unique<Output<NodeTemperature>>(*this, "temperature_" + zone.name, "state"),
                       0.0});
@@ -39,11 +47,13 @@ void Thermal::activate() {
   power_ = 0.0;
   primed_ = false;
   wanted_ = true;
+  told_unsound_ = told_undriven_ = false;
+  unsound_since_.reset();
 }
 
 void Thermal::deactivate() noexcept {
   if (!client_.is_open()) return;
-  drive(0.0, false);
+  (void)drive(0.0, false);
   client_.send(now());
 }
 
@@ -61,31 +71,94 @@ double Thermal::control(double temperature, double period) noexcept {
   return power;
 }
 
-void Thermal::drive(double power, bool enable) noexcept {
+/// False when the power is none that the register takes: the heater is then off, and does not keep its last power.
+bool Thermal::drive(double power, bool enable) noexcept {
+  modbus::Device& device = client_.device();
   power_ = enable ? power : 0.0;
-  // Out of the map's range cannot be: the limit was checked; a refusal would leave the last value and its watchdog.
-  (void)client_.device().write("enable", enable ? 1.0 : 0.0);
-  (void)client_.device().write("power", power_);
+  const bool taken = device.write("power", power_).ok();
+  if (!taken) {
+    power_ = integral_ = 0.0;
+    primed_ = false;
+    (void)device.write("power", 0.0);  // the map takes it: checked when the component was made
+  }
+  (void)device.write("enable", enable && taken ? 1.0 : 0.0);
+  return taken;
+}
+
+void Thermal::obey(const ThermalCommand& command) noexcept {
+  const double setpoint = command.setpoint();
+  if (Parameters::setpoints.contains(setpoint) && setpoint < parameters_.over_temperature) {
+    setpoint_ = setpoint;
+    wanted_ = command.enabled();
+    if (command.reset_latch()) latched_ = false;
+    return;
+  }
+  wanted_ = wanted_ && command.enabled();
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "a command's setpoint of %g degC is refused: it must be a number from %g to %g and below "
+                "`over_temperature` of %g degC",
+                setpoint, Parameters::setpoints.lower, Parameters::setpoints.upper,
+                parameters_.over_temperature);
+  notices_.say(event::SEVERITY_WARNING, text.data());
+}
+
+/// The temperature [degC] by this register; nothing where it cannot be trusted.
+std::optional<double> Thermal::measured(const std::string& reg,
+                                        const metrology::Thermistor& thermistor) const noexcept {
+  const modbus::Device& device = client_.device();
+  const modbus::Reading resistance = device.value(reg);
+  if (!resistance.is_sound() || !(resistance.value > 0.0)) return {};
+  if (has_fault_bit_ && device.value("sensor_fault").value != 0.0) return {};
+  const double temperature = thermistor.temperature(resistance.value);
+  return parameters_.measurable.contains(temperature) ? std::optional{temperature} : std::nullopt;
+}
+
+/// What the device's health is, and whether its sensor can be.
+void Thermal::tell(bool sound, const Tick& tick) noexcept {
+  for (const modbus::HealthChange& change : client_.look(tick.now))
+    notices_.say(change.well ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, change.text.c_str());
+  const modbus::Reading resistance = client_.device().value("slide_resistance");
+  // What is stale or outside the map's range was said above.
+  const bool impossible = !sound && resistance.is_sound();
+  if (!impossible) unsound_since_.reset();
+  if (impossible && !unsound_since_) unsound_since_ = tick.now;
+  constexpr Duration patience = Duration::milliseconds(500);
+  if (impossible && !told_unsound_ && tick.now - *unsound_since_ >= patience) {
+    told_unsound_ = true;
+    std::array<char, 200> text{};
+    std::snprintf(
+        text.data(), text.size(),
+        "the slide's thermistor at %g ohm is open or short, or the map reads it wrongly: the heater is off",
+        resistance.value);
+    notices_.say(event::SEVERITY_FAULT, text.data());
+  } else if (sound && std::exchange(told_unsound_, false)) {
+    notices_.say(event::SEVERITY_NOTE, "the slide's thermistor is sound again");
+  }
 }
 
 void Thermal::step(const Tick& tick) noexcept {
   ThermalCommand command;
-  while (command_.take(command)) {
-    setpoint_ = command.setpoint();
-    wanted_ = command.enabled();
-    if (command.reset_latch()) latched_ = false;
-  }
+  while (command_.take(command)) obey(command);
   if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
   client_.receive(tick.now);
-  client_.device().refresh();
+  const auto measured_now = measured("slide_resistance", thermistor_);
+  const bool sound = measured_now.has_value();
+  tell(sound, tick);
+  // A device that refuses to be switched off is left to its watchdog.
+  if (!client_.refuses()) client_.device().refresh();
 
-  const modbus::Reading resistance = client_.device().value("slide_resistance");
-  const bool sound = !resistance.stale && resistance.value > 1.0;
-  if (sound) temperature_ = thermistor_.temperature(resistance.value);
+  if (sound) temperature_ = *measured_now;
   if (sound && temperature_ > parameters_.over_temperature) latched_ = true;
-  const bool enable = sound && wanted_ && !latched_;
+  bool enable = sound && wanted_ && !latched_ && !client_.refuses();
   if (!enable) primed_ = false;
-  drive(enable ? control(temperature_, tick.period) : 0.0, enable);
+  if (!drive(enable ? control(temperature_, tick.period) : 0.0, enable)) {
+    enable = false;
+    if (!std::exchange(told_undriven_, true))
+      notices_.say(event::SEVERITY_FAULT, "the control law gives no power that the heater takes: it is off");
+  } else if (enable) {
+    told_undriven_ = false;
+  }
   client_.send(tick.now);
 
   NodeTemperature sample;
@@ -104,14 +177,13 @@ void Thermal::step(const Tick& tick) noexcept {
 }
 
 void Thermal::publish_zone(ZoneSensor& zone) noexcept {
-  const modbus::Reading resistance = client_.device().value(zone.resistance);
-  const bool sound = !resistance.stale && resistance.value > 1.0;
-  if (sound) zone.temperature = zone.thermistor.temperature(resistance.value);
+  const auto measured_now = measured(zone.resistance, zone.thermistor);
+  if (measured_now) zone.temperature = *measured_now;
   NodeTemperature sample;
   stamp(sample);
   sample.node(id);
   sample.temperature(zone.temperature);
-  sample.stale(!sound);
+  sample.stale(!measured_now.has_value());
   zone.output->write(sample);
 }
 

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/component/component.hpp"
+#include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/thermistor.hpp"
 #include "core/modbus/endpoint.hpp"
@@ -15,9 +17,11 @@
 
 namespace invar::thermal {
 
-/// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go - and the device's own
-/// watchdog then keeps it off - when readings are stale, a sensor is out of range, or the latch trips: at `over_temperature` the
-/// latch holds until a command resets it. Not real-time (Modbus).
+/// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go when readings are stale or outside
+/// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
+/// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature` the latch
+/// holds until a command resets it. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
+/// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component {
  public:
   struct Pid {
@@ -60,16 +64,18 @@ class Thermal final : public Component {
     double setpoint = 30.0;
     double power_limit = 60.0;
     double over_temperature = 60.0;
+    Range measurable{-40.0, 250.0};
+    static constexpr Range setpoints{-20.0, 150.0};
     void describe(auto& p) {
       p(modbus, "modbus", "the heater's controller");
       p(pid, "pid", "control law");
       p(thermistor, "thermistor", "of the slide");
       p(zones, "zones", "further thermistors, read and published but not controlled");
-      p(setpoint, "setpoint", "degC", Range{-20.0, 150.0}, "wanted at the start; a command changes it",
-        while_running);
+      p(setpoint, "setpoint", "degC", setpoints, "wanted at the start; a command changes it", while_running);
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
       p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0},
         "the latch lets go of the heater above it");
+      p(measurable, "measurable", "degC", "what the thermistors may show; beyond it one is open or short");
       if constexpr (requires { p.node(); })
         if (setpoint >= over_temperature)
           p.node()["setpoint"].fault("is not below `over_temperature`", "lower it, or raise the latch");
@@ -85,11 +91,16 @@ class Thermal final : public Component {
 
  private:
   [[nodiscard]] double control(double temperature, double period) noexcept;
-  void drive(double power, bool enable) noexcept;
+  void obey(const ThermalCommand& command) noexcept;
+  [[nodiscard]] std::optional<double> measured(const std::string& reg,
+                                               const metrology::Thermistor& thermistor) const noexcept;
+  [[nodiscard]] bool drive(double power, bool enable) noexcept;
+  void tell(bool sound, const Tick& tick) noexcept;
 
   const Parameters& parameters_;
   Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Output<NodeTemperature> state_{*this, "state", "state"};
+  Notices notices_{*this};
   metrology::Thermistor thermistor_;
   struct ZoneSensor {
     std::string resistance;  // name of its register
@@ -109,6 +120,10 @@ class Thermal final : public Component {
   bool primed_ = false;
   bool wanted_ = true;
   bool latched_ = false;
+  bool has_fault_bit_ = false;  // the map has `sensor_fault`
+  bool told_unsound_ = false;
+  bool told_undriven_ = false;
+  std::optional<Instant> unsound_since_;  // the device answers, and its sensor cannot be
   double power_ = 0.0;
 };
 

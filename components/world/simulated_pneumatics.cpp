@@ -7,8 +7,9 @@
 namespace invar::world {
 
 SimulatedPneumatics::SimulatedPneumatics(const Parameters& parameters) : parameters_{parameters} {
-  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "pneumatic controller",
-                                       {"pressure", "enable", "actual_pressure", "in_band", "over_pressure"});
+  const auto map = modbus::load_map_of(
+      parameters.modbus.map, "map", "pneumatic controller",
+      {{"pressure", "Pa"}, {"enable"}, {"actual_pressure", "Pa"}, {"in_band"}, {"over_pressure"}});
   if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
 }
 

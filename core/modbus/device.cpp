@@ -19,7 +19,7 @@ std::string_view name_of(WriteState state) {
 
 Device::Device(RegisterMap map)
     : map_{std::move(map)},
-      samples_(map_.registers.size(), Sample{std::numeric_limits<double>::quiet_NaN(), {}, false}),
+      samples_(map_.registers.size(), Sample{std::numeric_limits<double>::quiet_NaN(), {}, false, false}),
       writes_(map_.registers.size()) {}
 Device::~Device() = default;
 
@@ -33,9 +33,9 @@ Reading Device::value(std::size_t reg) const {
   INVAR_EXPECTS(reg < map_.registers.size(), map_.device, reg);
   const std::lock_guard lock{mutex_};
   const Sample& sample = samples_[reg];
-  if (!sample.seen) return {sample.value, Duration{std::numeric_limits<std::int64_t>::max()}, true};
+  if (!sample.seen) return {sample.value, Duration{std::numeric_limits<std::int64_t>::max()}, true, false};
   const Duration age = (threaded_ ? monotonic_now() : polled_now_) - sample.stamp;
-  return {sample.value, age, age > map_.registers[reg].stale_after};
+  return {sample.value, age, age > map_.registers[reg].stale_after, sample.out_of_range};
 }
 
 Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value) {
@@ -44,7 +44,8 @@ Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value)
   const std::lock_guard lock{mutex_};
   Pending& slot = writes_[reg];
   if (slot.report.state == WriteState::queued) ++counters_.writes_superseded;
-  slot = {{++written_, WriteState::queued, value, 0}, {}, false};
+  const auto unshown_since = value == slot.report.wanted ? slot.unshown_since : std::nullopt;
+  slot = {{++written_, WriteState::queued, value, 0}, {}, false, unshown_since};
   has_queued_ = true;
   if (threaded_) {
     const std::uint64_t one = 1;

@@ -6,7 +6,7 @@
 //   ...
 //   heater.refresh();                                        // every cycle: "I live", or the heartbeat stops
 //   const Reading slide = heater.value("slide_temperature");
-//   if (!slide.stale) (void)heater.write("power", controller(slide.value));
+//   if (slide.is_sound()) (void)heater.write("power", controller(slide.value));
 //
 // Values are in SI (temperatures in degC), booleans 0 or 1. Any thread may call; not for real-time loops
 // (takes a short lock, never held over I/O). A name that the map does not have is a broken contract: look
@@ -36,6 +36,10 @@ struct Reading {
   double value = 0.0;  // SI; NaN before the first answer
   Duration age;        // since the answer arrived
   bool stale = true;   // older than the map allows, or never read
+  bool out_of_range =
+      false;  // outside the register's range: an open sensor, a wrong word order, another device
+  /// To be acted on. Whoever drives something lets go of it where this is false.
+  [[nodiscard]] bool is_sound() const { return !stale && !out_of_range; }
 };
 
 enum class WriteState {
@@ -81,6 +85,7 @@ struct DeviceCounters {
   std::uint64_t writes_uncertain = 0;
   std::uint64_t writes_lost = 0;
   std::uint64_t read_back_mismatches = 0;
+  std::uint64_t values_out_of_range = 0;  // read, and outside their register's range
 };
 
 class DeviceIo;
@@ -124,11 +129,14 @@ class Device {
     double value;
     Instant stamp;
     bool seen = false;
+    bool out_of_range = false;
   };
   struct Pending {
     WriteReport report;
     Instant due;           // the deadline of the state it is in
     bool stamped = false;  // `due` is set: the I/O side has seen it
+    std::optional<Instant>
+        unshown_since;  // acknowledged then, and not read back since, however often repeated
   };
 
   const RegisterMap map_;

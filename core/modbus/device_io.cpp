@@ -26,6 +26,14 @@ bool shows(const Register& reg, double wanted, const Register& by, double shown)
   return std::abs(shown - arrived) <= half_count(reg) + half_count(by) + 1e-6 * std::abs(arrived);
 }
 
+/// The range of a register as values on the wire can show it: a bound may lie between two counts.
+Range shown(const Register& reg) {
+  const double slack = reg.type == Type::float32
+                           ? 1e-6 * std::max(std::abs(reg.range.lower), std::abs(reg.range.upper))
+                           : 0.5001 * std::abs(reg.scale);
+  return {reg.range.lower - slack, reg.range.upper + slack};
+}
+
 /// Keeps the rhythm, but does not catch up on what was missed.
 Instant next_in_rhythm(Instant last, Duration period, Instant now) {
   return last + period > now ? last + period : now + period;
@@ -44,7 +52,7 @@ DeviceIo::DeviceIo(Device& device, Backoff backoff, Duration answer_timeout)
     auto& fields = fields_.emplace_back();
     for (const std::size_t index : request.registers) {
       const Register& reg = device.map().registers[index];
-      fields.push_back({reg, static_cast<std::uint16_t>(reg.address - request.address), index});
+      fields.push_back({reg, static_cast<std::uint16_t>(reg.address - request.address), index, shown(reg)});
     }
   }
 }
@@ -101,7 +109,10 @@ Outcome DeviceIo::counted(Outcome outcome, Instant now) {
   auto& counters = device_.counters_;
   ++counters.requests;
   device_.online_ = answered;
-  if (answered) ++counters.answers;
+  if (answered)
+    ++counters.answers;
+  else  // the device may have started anew: what it does not show yet is no fault of it
+    for (auto& slot : device_.writes_) slot.unshown_since.reset();
   if (!outcome) return outcome;
   switch (outcome->cause) {
     case Cause::exception:
@@ -169,7 +180,8 @@ Outcome DeviceIo::write_next(Link& link, const Clock& clock) {
   slot.report = report;
   if (report.state == WriteState::refused || !reg.read_back) return failed;
   if (report.state == WriteState::written) {
-    slot.due = clock() + device_.map_.read_back_deadline;
+    if (!slot.unshown_since) slot.unshown_since = clock();
+    slot.due = *slot.unshown_since + device_.map_.read_back_deadline;
     slot.stamped = true;
   }
   if (std::find(unresolved_.begin(), unresolved_.end(), index) == unresolved_.end())
@@ -193,6 +205,8 @@ Outcome DeviceIo::read_all(Link& link, const Clock& clock, bool& refused) {
     for (const Field& field : fields_[i]) {
       auto& sample = device_.samples_[field.reg];
       sample.value = decode(field.how, words.subspan(field.at));
+      sample.out_of_range = !field.shown.contains(sample.value);
+      if (sample.out_of_range) ++device_.counters_.values_out_of_range;
       sample.stamp = now;
       sample.seen = true;
       read_in_round_[field.reg] = round_;
@@ -214,6 +228,7 @@ void DeviceIo::judge_read_backs(Instant now) {
     if (read_in_round_[by] != round_) return false;
     if (shows(registers[index], slot.report.wanted, registers[by], device_.samples_[by].value)) {
       state = WriteState::confirmed;
+      slot.unshown_since.reset();
       return true;
     }
     if (!slot.stamped) {  // the first sight of the device since the answer was lost

@@ -49,6 +49,7 @@ class DeviceIo {
     Encoding how;
     std::uint16_t at = 0;  // its first word, counted from the request's address
     std::size_t reg = 0;
+    Range shown;  // what the device may show: the register's range and its rounding
   };
   std::vector<ReadRequest> plan_;
   std::vector<std::vector<Field>> fields_;    // by request

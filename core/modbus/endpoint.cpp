@@ -1,20 +1,57 @@
 #include "core/modbus/endpoint.hpp"
 
+#include <sstream>
 #include <utility>
 
 #include "core/base/fault.hpp"
+#include "core/base/unit.hpp"
 
 namespace invar::modbus {
 
+namespace {
+
+/// From SI to the unit that the map is written in.
+Conversion conversion_from_si(const std::string& unit) {
+  const Unit to = parse_unit(unit).value_or(Unit{});
+  return {1.0 / to.factor, -to.offset / to.factor};
+}
+
+}  // namespace
+
 RegisterMap load_map_of(const std::filesystem::path& file, const std::string& key, const std::string& device,
-                        std::initializer_list<const char*> needed) {
+                        std::initializer_list<Needed> needed) {
   if (file.empty()) throw InputError{key, "missing", "name the " + device + "'s register map"};
   RegisterMap map = load_map(file);
-  for (const char* reg : needed)
-    if (!map.find(reg))
-      throw InputError{key, std::string{"has no register `"} + reg + "`",
-                       "name a " + device + "'s register map"};
+  for (const Needed& reg : needed) must_have(map, key, device, reg);
   return map;
+}
+
+void must_have(const RegisterMap& map, const std::string& key, const std::string& device,
+               const Needed& needed) {
+  const std::string named = "register `" + needed.name + "`";
+  const auto index = map.find(needed.name);
+  if (!index) throw InputError{key, "has no " + named, "name a " + device + "'s register map"};
+  const Register& reg = map.registers[*index];
+  if (!conversion(reg.unit, needed.unit))
+    throw InputError{key,
+                     named + " is in `" + reg.unit + "`, and is needed in a unit like `" + needed.unit + "`",
+                     "correct the register's `unit` in the map"};
+  if (needed.written && !reg.writable)
+    throw InputError{key, named + " cannot be written", "give it `access: read_write` in the map"};
+  if (!needed.written && !reg.readable)
+    throw InputError{key, named + " cannot be read", "give it `access: read` in the map"};
+}
+
+void must_take(const RegisterMap& map, const std::string& name, Range values, const std::string& key) {
+  const Register& reg = map.registers[map.find(name).value()];
+  const double asked = reg.range.contains(values.upper) ? values.lower : values.upper;
+  if (reg.range.contains(asked)) return;
+  const Conversion shown = conversion_from_si(reg.unit);
+  std::ostringstream what;
+  what << "asks register `" << name << "` for " << shown(asked) << " " << reg.unit
+       << ", and the map's range is " << shown(reg.range.lower) << " to " << shown(reg.range.upper);
+  throw InputError{key, what.str(),
+                   "stay inside, or correct the register's `range` if the device takes more"};
 }
 
 std::unique_ptr<Server> serve(const ServedEndpoint& parameters) {
@@ -31,6 +68,7 @@ void Client::open(const Endpoint& endpoint, bool simulated_time) {
   bus_ = std::make_unique<Bus>(std::move(options));
   device_ = &bus_->add(load_map(endpoint.map));
   stepped_ = simulated_time;
+  health_ = Health{endpoint.host + ":" + std::to_string(endpoint.port)};
   if (!stepped_) bus_->start();
 }
 
@@ -46,5 +84,7 @@ void Client::receive(Instant now) {
 void Client::send(Instant now) {
   if (stepped_) bus_->send(now);
 }
+
+std::vector<HealthChange> Client::look(Instant now) { return health_.look(*device_, bus_->counters(), now); }
 
 }  // namespace invar::modbus

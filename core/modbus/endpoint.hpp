@@ -6,9 +6,11 @@
 #include <initializer_list>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/base/time.hpp"
 #include "core/modbus/bus.hpp"
+#include "core/modbus/health.hpp"
 #include "core/modbus/server.hpp"
 
 namespace invar::modbus {
@@ -39,10 +41,22 @@ struct ServedEndpoint {
   }
 };
 
+/// A register that a component works with: what it measures, by any unit of that kind, and whether it is commanded.
+struct Needed {
+  std::string name;
+  const char* unit = "1";
+  bool written = false;
+};
+
 /// The map that the parameter `key` names. Throws InputError when it names none, when the file is wrong, and when a register in
-/// `needed` is missing; `device` is what the map is of, for the message.
+/// `needed` is missing, measures something else, or cannot be read or written; `device` is what the map is of, for the message.
 [[nodiscard]] RegisterMap load_map_of(const std::filesystem::path& file, const std::string& key,
-                                      const std::string& device, std::initializer_list<const char*> needed);
+                                      const std::string& device, std::initializer_list<Needed> needed);
+/// The same for one register of a map at hand.
+void must_have(const RegisterMap& map, const std::string& key, const std::string& device,
+               const Needed& needed);
+/// Throws InputError when the register does not take all `values` [SI] that the parameter `key` lets the component write.
+void must_take(const RegisterMap& map, const std::string& reg, Range values, const std::string& key);
 
 /// The device that these parameters describe, listening from now on. Throws InputError as `load_map` and `Server` do.
 [[nodiscard]] std::unique_ptr<Server> serve(const ServedEndpoint& parameters);
@@ -58,10 +72,15 @@ class Client {
   [[nodiscard]] Device& device() const { return *device_; }
   void receive(Instant now);
   void send(Instant now);
+  /// Once a cycle, after `receive`: what its owner should say of the device now. Precondition: open.
+  [[nodiscard]] std::vector<HealthChange> look(Instant now);
+  /// The device refused a write lately: let go of it, and let its watchdog do the same.
+  [[nodiscard]] bool refuses() const { return health_.refuses(); }
 
  private:
   std::unique_ptr<Bus> bus_;
   Device* device_ = nullptr;
+  Health health_;
   bool stepped_ = false;
 };
 

@@ -11,6 +11,8 @@
 #include "components/dispenser/valve.hpp"
 #include "components/world/simulated_pneumatics.hpp"
 #include "core/compensation/trajectory_file.hpp"
+#include "idl/event.h"
+#include "tests/support/changed_map.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -30,6 +32,7 @@ struct Bench final : Component {
   Input<PressureState> pressure{*this, "pressure"};
   Input<PressureState> actual{*this, "actual"};
   Inbox<TriggerPattern> pattern{*this, "pattern"};
+  Inbox<event::Notice> notices{*this, "notices", {}, 4096};
   Input<compensation::ModelStatus> status{*this, "status"};
   Inbox<DropletJetted> jetted{*this, "jetted", {}, 4096};
   Inbox<DropletRefused> refused{*this, "refused", {}, 4096};
@@ -79,6 +82,7 @@ struct Bench final : Component {
     output_of(*dispenser, "pressure").connect(input_of(*valve, "pressure"));
     output_of(*dispenser, "pattern").connect(pattern);
     output_of(*dispenser, "status").connect(status);
+    output_of(*dispenser, "notices").connect(notices);
     output_of(*device, "actual").connect(actual);
     axis.connect(input_of(*valve, "state_x"));
     axis.connect(input_of(*valve, "state_y"));
@@ -101,6 +105,12 @@ struct Bench final : Component {
     device->step(tick);
     if (owner_lives) dispenser->step(tick);
     return *pressure.latest();
+  }
+  std::vector<std::string> said() {
+    std::vector<std::string> texts;
+    event::Notice notice;
+    while (notices.take(notice)) texts.emplace_back(notice.text().c_str());
+    return texts;
   }
   PressureState run_for(double seconds, bool owner_lives = true) {
     PressureState last;
@@ -259,6 +269,63 @@ TEST(Dispenser, DeactivatedItShutsTheSupply) {
   bench.dispenser->deactivate();
   bench.run_for(0.1, false);
   EXPECT_FALSE(bench.actual.latest()->enabled());
+}
+
+TEST(Dispenser, PressureThatCannotBeIsUnknownAndNothingIsPressurised) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.parameters.modbus.map = test::changed_map(
+      folder, "pneumatic.yaml", {{"unit: kPa, range: [-100, 1000]", "unit: kPa, range: [10, 1000]"}});
+  bench.bring_up();
+  const PressureState state = bench.run_for(3.0);
+  EXPECT_TRUE(state.stale());
+  EXPECT_FALSE(state.in_band());
+  EXPECT_LT(bench.actual.latest()->pressure(), 100.0);
+  EXPECT_FALSE(bench.jets());
+  EXPECT_EQ(bench.why(), REFUSED_PRESSURE_STALE);
+  EXPECT_THAT(bench.said(),
+              ::testing::ElementsAre(::testing::HasSubstr("`actual_pressure`, outside its range")));
+}
+
+TEST(Dispenser, ControllerThatRefusesWritesIsShutAndSaidOnceAndOnceAgainWhenItTakesThem) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench{folder.write("faults.yaml",
+                           "invar_modbus_faults: 1\nfaults:\n"
+                           "  - {at: 3, for: 4, do: exception, code: 2, on: writes, register: pressure}\n")};
+  bench.bring_up();
+  ASSERT_TRUE(bench.run_for(2.9).in_band());
+  EXPECT_THAT(bench.said(), ::testing::IsEmpty());
+  const PressureState refused = bench.run_for(1.0);
+  EXPECT_FALSE(refused.enabled());
+  EXPECT_FALSE(refused.in_band());
+  EXPECT_FALSE(bench.actual.latest()->enabled());
+  EXPECT_FALSE(bench.jets());
+  EXPECT_THAT(bench.said(), ::testing::ElementsAre(::testing::HasSubstr("exception 2")));
+  EXPECT_TRUE(bench.run_for(12.0).in_band());
+  EXPECT_THAT(bench.said(), ::testing::ElementsAre(::testing::HasSubstr("takes writes again")));
+}
+
+TEST(Dispenser, RefusesAMapThatCannotTakeItsPressuresAndCommandsBeyondIt) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.parameters.modbus.map =
+      test::changed_map(folder, "pneumatic.yaml", {{"range: [-20000, 700000]", "range: [-20000, 100000]"}});
+  bench.bring_up();
+  PressureCommand command;
+  command.enabled(true);
+  for (const double wrong : {2e5, std::nan("")}) {
+    command.setpoint(wrong);
+    bench.command.write(command);
+    EXPECT_EQ(bench.cycle_once().setpoint(), 67.2e3);
+    EXPECT_THAT(bench.said(), ::testing::ElementsAre(::testing::HasSubstr("is refused")));
+  }
+  bench.parameters.pressure = 2e5;
+  try {
+    const Dispenser dispenser{bench.parameters};
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("pressure: asks register `pressure` for 200000 Pa"));
+  }
 }
 
 TEST(Dispenser, TwoRunsAgreeBitForBit) {

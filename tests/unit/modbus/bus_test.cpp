@@ -54,6 +54,28 @@ TEST(Bus, ReadsWhatTheDeviceShowsInSi) {
   EXPECT_EQ(cell.heater.value("heating").age.ns, 0);
 }
 
+TEST(Bus, AValueOutsideItsRangeSaysSoAndIsCounted) {
+  Cell cell;
+  cell.server.set("slide_resistance", 1e6);
+  cell.server.set("delivered_power", 200.0);
+  cell.server.set("slide_temperature", 300.0);
+  ASSERT_TRUE(cell.step());
+  for (const char* reg : {"slide_resistance", "delivered_power", "slide_temperature"})
+    EXPECT_TRUE(cell.heater.value(reg).is_sound()) << reg;  // on the bound
+  EXPECT_EQ(cell.heater.counters().values_out_of_range, 0U);
+  cell.server.set("slide_resistance", 1.001e6);
+  cell.server.set("delivered_power", 200.02);
+  cell.server.set("slide_temperature", std::nan(""));
+  ASSERT_TRUE(cell.step());
+  for (const char* reg : {"slide_resistance", "delivered_power", "slide_temperature"}) {
+    EXPECT_FALSE(cell.heater.value(reg).stale) << reg;
+    EXPECT_TRUE(cell.heater.value(reg).out_of_range) << reg;
+    EXPECT_FALSE(cell.heater.value(reg).is_sound()) << reg;
+  }
+  EXPECT_EQ(cell.heater.counters().values_out_of_range, 3U);
+  EXPECT_TRUE(cell.heater.value("pad_temperature").is_sound());
+}
+
 TEST(Bus, IsStaleAndNotANumberBeforeTheFirstAnswer) {
   Cell cell;
   EXPECT_TRUE(cell.heater.value("power").stale);

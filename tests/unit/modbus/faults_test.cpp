@@ -215,6 +215,23 @@ TEST(Faults, AnEchoThatFollowsLaterConfirmsAndOneThatStaysAwayIsAMismatch) {
   EXPECT_EQ(cell.valve.counters().read_back_mismatches, 1U);
 }
 
+TEST(Faults, AnEchoThatStaysAwayIsAMismatchAlsoWhereTheWriteIsRepeated) {
+  Cell cell{"  - {at: 90, for: 1, do: drop}\n"};
+  cell.lives = true;
+  cell.run_until(1.0);
+  cell.is_stuck = true;
+  while (cell.now < Instant{} + Duration::seconds(3)) {
+    (void)cell.valve.write("opening", 60);
+    cell.step();
+  }
+  EXPECT_EQ(cell.valve.last_write("opening").state, WriteState::mismatched);
+  cell.is_stuck = false;
+  for (int i = 0; i < 3; ++i) cell.step();
+  (void)cell.valve.write("opening", 60);
+  cell.step();
+  EXPECT_EQ(cell.valve.last_write("opening").state, WriteState::confirmed);
+}
+
 TEST(Faults, SendBringsWhatWasComputedFromThisStepsReadingsIntoThisStep) {
   Cell cell{"  - {at: 90, for: 1, do: drop}\n"};
   cell.lives = true;

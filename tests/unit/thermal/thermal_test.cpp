@@ -8,6 +8,9 @@
 #include <fstream>
 
 #include "components/world/simulated_heater.hpp"
+#include "core/base/fault.hpp"
+#include "idl/event.h"
+#include "tests/support/changed_map.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -15,12 +18,18 @@ namespace invar::thermal {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 struct Bench final : Component {
   Output<ThermalCommand> command{*this, "command"};
   Input<NodeTemperature> state{*this, "state"};
   Input<NodeTemperature> base{*this, "base"};
   Input<NodeTemperature> true_base{*this, "true_base"};
+  Inbox<event::Notice> notices{*this, "notices", {}, 4096};
 
   world::SimulatedHeater::Parameters heater_parameters;
   Thermal::Parameters thermal_parameters;
@@ -52,6 +61,7 @@ struct Bench final : Component {
     }
     static_cast<OutputPort*>(thermal->find_port("state"))->connect(state);
     static_cast<OutputPort*>(thermal->find_port("temperature_base"))->connect(base);
+    static_cast<OutputPort*>(thermal->find_port("notices"))->connect(notices);
     static_cast<OutputPort*>(heater->find_port("base"))->connect(true_base);
     command.connect(*static_cast<InputPort*>(thermal->find_port("command")));
     heater->activate();
@@ -77,6 +87,19 @@ struct Bench final : Component {
     const modbus::Device& device = bus.add(modbus::load_map(heater_parameters.modbus.map));
     EXPECT_TRUE(bus.exchange(at()));
     return device.value("delivered_power").value;
+  }
+  /// What was said since the last call.
+  std::vector<std::string> said() {
+    std::vector<std::string> texts;
+    event::Notice notice;
+    while (notices.take(notice)) texts.emplace_back(notice.text().c_str());
+    return texts;
+  }
+  void ask(double setpoint, bool enabled = true) {
+    ThermalCommand sample;
+    sample.setpoint(setpoint);
+    sample.enabled(enabled);
+    command.write(sample);
   }
   NodeTemperature run_for(double seconds) {
     NodeTemperature last;
@@ -169,6 +192,147 @@ TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   reset.reset_latch(true);
   bench.command.write(reset);
   EXPECT_FALSE(bench.cycle_once().over_temperature());
+}
+
+TEST(Thermal, CommandWhoseSetpointCannotBeIsRefusedAndTheLoopGoesOn) {
+  Bench bench;
+  bench.bring_up();
+  bench.run_for(1200.0);
+  EXPECT_THAT(bench.said(), IsEmpty());
+  for (const double wrong : {std::nan(""), HUGE_VAL, 1e3, -300.0, 60.0}) {  // the latch stands at 60
+    bench.ask(wrong);
+    const NodeTemperature state = bench.run_for(60.0);
+    EXPECT_EQ(state.setpoint(), 30.0) << wrong;
+    EXPECT_TRUE(state.enabled());
+    EXPECT_NEAR(state.temperature(), 30.0, 0.05) << wrong;
+    EXPECT_NEAR(bench.heater_power(), state.heater_power(), 0.5);
+    EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("is refused")));
+  }
+  bench.ask(std::nan(""), false);  // off is off, whatever stands beside it
+  EXPECT_FALSE(bench.run_for(1.0).enabled());
+  EXPECT_EQ(bench.heater_power(), 0.0);
+  bench.ask(std::nan(""), true);
+  EXPECT_FALSE(bench.run_for(1.0).enabled());
+}
+
+TEST(Thermal, PowerThatIsNoNumberSwitchesTheHeaterOff) {
+  Bench bench;
+  bench.bring_up();
+  EXPECT_GT(bench.run_for(10.0).heater_power(), 50.0);
+  bench.ask(30.0, false);
+  bench.cycle_once();
+  bench.ask(30.0, true);
+  const Tick tick{bench.at(), 0.0, bench.cycle++};  // a cycle of no length: the slope is 0/0
+  bench.heater->step(tick);
+  bench.thermal->step(tick);
+  EXPECT_FALSE(bench.state.latest()->enabled());
+  EXPECT_EQ(bench.state.latest()->heater_power(), 0.0);
+  bench.heater->step(Tick{bench.at(), Bench::period, bench.cycle});
+  EXPECT_EQ(bench.heater_power(), 0.0);
+  EXPECT_THAT(bench.said(), Contains(HasSubstr("no power that the heater takes")));
+  EXPECT_GT(bench.run_for(1.0).heater_power(), 50.0);
+}
+
+// Each of these showed a temperature far below zero and gave full power.
+TEST(Thermal, SensorThatCannotBeLetsGoOfTheHeaterAndIsSaidOnce) {
+  const std::pair<std::string, std::string> swapped{
+      "type: uint32, scale: 0.001, unit: ohm", "type: uint32, word_order: cdab, scale: 0.001, unit: ohm"};
+  const std::pair<std::string, std::string> narrow{"range: [0, 1000000]", "range: [0, 500]"};
+  const std::vector<std::pair<std::string, std::string>> faulty{
+      {"bit: 0", "bit: 3"},
+      {"bit: 3, kind: input, type: bool, access: read, description: A",
+       "bit: 0, kind: input, type: bool, access: read, description: A"}};
+  const invar::testing::TemporaryFolder folder;
+  const auto check = [](Bench& bench, const char* text) {
+    bench.bring_up();
+    for (int i = 0; i < 300; ++i) {
+      const NodeTemperature& state = bench.cycle_once();
+      ASSERT_TRUE(state.stale()) << text << ", cycle " << i;
+      ASSERT_FALSE(state.enabled());
+      ASSERT_EQ(state.heater_power(), 0.0);
+    }
+    EXPECT_EQ(bench.heater_power(), 0.0);
+    EXPECT_THAT(bench.said(), ElementsAre(HasSubstr(text)));
+  };
+  {
+    Bench bench;
+    bench.thermal_parameters.modbus.map = test::changed_map(folder, "heater.yaml", {swapped});
+    check(bench, "outside its range");
+  }
+  {
+    Bench bench;
+    bench.thermal_parameters.modbus.map = test::changed_map(folder, "heater.yaml", {narrow});
+    check(bench, "outside its range");
+  }
+  {
+    Bench bench;  // the device's bit of a thermistor that is open or short
+    bench.thermal_parameters.modbus.map = test::changed_map(folder, "heater.yaml", {faulty[0], faulty[1]});
+    check(bench, "open or short");
+  }
+  {
+    Bench bench;  // inside the map's range, but no temperature of a slide
+    bench.thermal_parameters.thermistor.resistance = 20.0;
+    check(bench, "open or short");
+  }
+}
+
+TEST(Thermal, RefusesAMapThatCannotTakeItsPowerOrMeasuresSomethingElse) {
+  const invar::testing::TemporaryFolder folder;
+  const auto fault = [&](std::initializer_list<std::pair<std::string, std::string>> changes,
+                         double limit = 120.0) {
+    Thermal::Parameters parameters;
+    parameters.modbus.map = test::changed_map(folder, "heater.yaml", changes);
+    parameters.power_limit = limit;
+    try {
+      const Thermal thermal{parameters};
+    } catch (const InputError& error) {
+      return std::string{error.what()};
+    }
+    return std::string{"(no fault)"};
+  };
+  EXPECT_EQ(fault({}), "(no fault)");
+  EXPECT_THAT(fault({}, 500.0), AllOf(HasSubstr("power_limit: asks register `power` for 500 W"),
+                                      HasSubstr("range is 0 to 200"), HasSubstr("stay inside")));
+  EXPECT_THAT(fault({{"scale: 0.01, unit: W", "scale: 0.01, unit: m"}}),
+              HasSubstr("register `power` is in `m`, and is needed in a unit like `W`"));
+  EXPECT_EQ(fault({{"scale: 0.01, unit: W, range: [0, 200]", "scale: 10, unit: mW, range: [0, 200000]"}}),
+            "(no fault)");
+  EXPECT_THAT(fault({{"scale: 0.001, unit: ohm", "scale: 0.001, unit: V"}}), HasSubstr("`slide_resistance`"));
+}
+
+TEST(Thermal, DeviceThatRefusesWritesIsLetGoAndSaidOnceAndOnceAgainWhenItTakesThem) {
+  const invar::testing::TemporaryFolder folder;
+  const auto script =
+      folder.write("faults.yaml",
+                   "invar_modbus_faults: 1\nfaults:\n"
+                   "  - {at: 60, for: 5, do: exception, code: 4, on: writes, register: power}\n");
+  Bench bench{script};
+  bench.bring_up();
+  EXPECT_TRUE(bench.run_for(60.0).enabled());
+  EXPECT_THAT(bench.said(), IsEmpty());
+  bench.run_for(0.5);
+  for (int i = 0; i < 40; ++i) {
+    const NodeTemperature& state = bench.cycle_once();
+    EXPECT_FALSE(state.enabled());
+    EXPECT_EQ(state.heater_power(), 0.0);
+  }
+  EXPECT_EQ(bench.heater_power(), 0.0);
+  EXPECT_THAT(bench.said(), ElementsAre(AllOf(HasSubstr("`power`"), HasSubstr("exception 4"))));
+  EXPECT_TRUE(bench.run_for(30.0).enabled());
+  EXPECT_GT(bench.heater_power(), 1.0);
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("takes writes again")));
+}
+
+TEST(Thermal, DeviceThatIsLostIsSaidOnceAndOnceAgainWhenItIsBack) {
+  const invar::testing::TemporaryFolder folder;
+  const auto script =
+      folder.write("faults.yaml", "invar_modbus_faults: 1\nfaults:\n  - {at: 10, for: 20, do: refuse}\n");
+  Bench bench{script};
+  bench.bring_up();
+  bench.run_for(25.0);
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("does not answer")));
+  bench.run_for(25.0);
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("answers again")));
 }
 
 }  // namespace

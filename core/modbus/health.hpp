@@ -1,0 +1,55 @@
+// What the owner of a device should say of it: that it is lost, shows nonsense or refuses writes, and that it is well again.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "core/modbus/bus.hpp"
+
+namespace invar::modbus {
+
+struct HealthChange {
+  bool well = false;  // over, not begun
+  std::string text;
+};
+
+/// Turns readings, write fates and counters into one change when something begins and one when it is over.
+class Health {
+ public:
+  /// `where` stands in the texts: host and port.
+  explicit Health(std::string where = {}) : where_{std::move(where)} {}
+
+  /// To be called once a cycle, after the readings came.
+  [[nodiscard]] std::vector<HealthChange> look(const Device& device, const LinkCounters& link, Instant now);
+  /// A write was refused, or acknowledged and not followed, lately: for 1 s after the last one, and for twice as long, up to
+  /// 1 min, whenever the first try after that fails again.
+  [[nodiscard]] bool refuses() const { return refuses_; }
+
+ private:
+  /// Something that lasts: told once when it has lasted, and once when it is over.
+  struct Lasting {
+    std::optional<Instant> since;
+    bool told = false;
+    bool begins(bool holds, Instant now, Duration patience);
+    bool ends(bool holds);
+  };
+  void look_at_readings(const Device& device, const LinkCounters& link, Instant now);
+  void look_at_writes(const Device& device, Instant now);
+  void say(bool well, const std::string& text) { changes_.push_back({well, text}); }
+
+  std::string where_;
+  Lasting lost_;
+  Lasting outside_;
+  bool was_well_ = false;
+  bool told_refusal_ = false;
+  bool refuses_ = false;
+  std::uint64_t judged_ = 0;  // the newest write that failed
+  Duration hold_ = Duration::seconds(1.0);
+  Instant hold_until_{INT64_MIN};
+  std::vector<HealthChange> changes_;
+};
+
+}  // namespace invar::modbus
