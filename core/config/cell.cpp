@@ -55,8 +55,9 @@ CellComponent read_component(const Node& node, std::uint32_t id) {
   for (const Node& port : node["qos"].map()) component.profiles[port.key()] = port.as_text();
   for (const Node& port : node["publish"].map())
     component.publish_rates[port.key()] = port.as_number("Hz", {0.01, 20'000.0});
-  for (const Node& port : node["latency"].map())
-    component.latencies[port.key()] = Duration::seconds(port.as_number("s", {1e-5, 3600.0}));
+  if (!node["latency"].is_scalar())  // a component may have a parameter of that name
+    for (const Node& port : node["latency"].map())
+      component.latencies[port.key()] = Duration::seconds(port.as_number("s", {1e-5, 3600.0}));
   return component;
 }
 

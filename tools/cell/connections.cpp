@@ -50,7 +50,8 @@ void check_port_keys(const LoadedComponent& member) {
   check("connect", std::nullopt);
   check("qos", std::nullopt);
   check("publish", Port::Direction::output);
-  check("latency", Port::Direction::input);
+  // A component may have a parameter of that name, which is a number.
+  if (!member.file->node["latency"].is_scalar()) check("latency", Port::Direction::input);
 }
 
 /// The port that "component.port" names; a fault at `at` when there is none.

@@ -164,11 +164,7 @@ void bridge_gaps(const physics::Model& model, Recording& recording, double step)
   by_cubic->run(model, cubic);
   for (std::size_t o = 0; o < measured.size(); ++o) {
     // The cubic is nearer than the line by far; a fifth of what parts them is a fair bound of its own error.
-    std::vector<double> second;
-    const auto& y = recording.measured[o];
-    for (std::size_t i = 2; i < y.size(); ++i)
-      second.push_back((y[i] - 2.0 * y[i - 1] + y[i - 2]) / std::sqrt(6.0));
-    const double noise = broad_sigma(second);
+    const double noise = spread_of_differences(recording.measured[o]);
     for (std::size_t i = 0; i < place.size(); ++i)
       if (!(0.2 * std::abs(cubic[o][place[i]] - straight[o][i]) < 0.3 * noise))
         for (auto& values : measured) values[place[i]] = nothing;
@@ -280,7 +276,7 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
         off[i] = residual[i] - median({residual.begin() + static_cast<std::ptrdiff_t>(a),
                                        residual.begin() + static_cast<std::ptrdiff_t>(b)});
       }
-      const double scale = broad_sigma(off);
+      const double scale = robust_sigma(off);
       const double limit = (data.is_time_series ? 6.0 : 5.0) * scale;
       // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
       // lone value.

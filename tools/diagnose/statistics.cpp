@@ -23,18 +23,6 @@ double robust_sigma(const std::vector<double>& values) {
   return 1.4826 * median(finite);
 }
 
-double broad_sigma(const std::vector<double>& values) {
-  std::vector<double> sizes;
-  for (double v : values)
-    if (std::isfinite(v)) sizes.push_back(v);
-  if (sizes.empty()) return 0.0;
-  const double center = median(sizes);
-  for (double& v : sizes) v = std::abs(v - center);
-  const auto decile = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() * 9 / 10);
-  std::nth_element(sizes.begin(), decile, sizes.end());
-  return std::max(robust_sigma(values), *decile / 1.645);
-}
-
 double spread_of_differences(const std::vector<double>& values) {
   std::vector<double> second;
   for (std::size_t i = 2; i < values.size(); ++i)

@@ -8,9 +8,6 @@ namespace invar::diagnose {
 double median(std::vector<double> values);
 /// 1.4826 times the median absolute deviation; NaN are skipped.
 double robust_sigma(const std::vector<double>& values);
-/// The same, but no less than the ninth decile says of a normal distribution: what is read in coarse steps is hardly off
-/// most of the time, and by a step where it moves.
-double broad_sigma(const std::vector<double>& values);
 /// The noise of a slowly changing signal from its second differences, robust; NaN are skipped.
 double spread_of_differences(const std::vector<double>& values);
 

@@ -49,19 +49,6 @@ TEST(RobustSigma, IsNotMovedByOutliers) {
   EXPECT_NEAR(robust_sigma(noise), 1.0, 0.06);
 }
 
-TEST(BroadSigma, IsThatOfNormalValuesAndDoesNotVanishWhereMostAreTheSame) {
-  std::mt19937 random{7};  // seed 7
-  std::normal_distribution<double> normal;
-  std::vector<double> plain(20000), coarse(20000);
-  for (std::size_t i = 0; i < plain.size(); ++i) {
-    plain[i] = 3.0 * normal(random);
-    coarse[i] = std::round(0.4 * normal(random));  // 79 of 100 are 0
-  }
-  EXPECT_NEAR(broad_sigma(plain), 3.0, 0.1);
-  EXPECT_DOUBLE_EQ(robust_sigma(coarse), 0.0);
-  EXPECT_NEAR(broad_sigma(coarse), 1.0 / 1.645, 1e-12);
-}
-
 TEST(IndependentShare, IsThatOfAFirstOrderMemory) {
   for (const double pole : {0.0, 0.6, 0.9}) {
     const double truth = (1.0 - pole) / (1.0 + pole);

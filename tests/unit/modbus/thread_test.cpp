@@ -17,7 +17,7 @@ RegisterMap map_with(const std::string& poll) {
   return parse_map(
       "invar_modbus_map: 1\ndevice: lamp\npoll: " + poll +
           "\n"
-          "timeouts: {answer: 5, stale: 3600}\n"
+          "timeouts: {answer: 5, stale: 3600, read_back: 3600}\n"
           "heartbeat: {register: heartbeat, period: 0.05, refresh_within: 0.2, timeout: 0.4}\n"
           "comm_loss: {set: {brightness: 0}, flag: comm_lost}\n"
           "registers:\n"
