@@ -98,15 +98,18 @@ InputError open_quote_at(const std::string& name, int line) {
   return {name + ":" + std::to_string(line), "a quote is not closed", "close it on this line"};
 }
 
-/// yaml-cpp closes an open quote at the end of the file, or another opening quote closes it some lines below.
-void check_quotes(const std::string& text, const std::string& name, const YAML::Node& node) {
+/// yaml-cpp closes an open quote at the end of the file, or another opening quote closes it some lines below. `seen`: places
+/// and kinds looked at already, since an alias may repeat a part without end.
+void check_quotes(const std::string& text, const std::string& name, const YAML::Node& node,
+                  std::set<std::pair<int, int>>& seen) {
+  if (!seen.emplace(node.Mark().pos, static_cast<int>(node.Type())).second) return;
   if (node.IsMap())
     for (const auto& entry : node) {
-      check_quotes(text, name, entry.first);
-      check_quotes(text, name, entry.second);
+      check_quotes(text, name, entry.first, seen);
+      check_quotes(text, name, entry.second, seen);
     }
   if (node.IsSequence())
-    for (const auto& entry : node) check_quotes(text, name, entry);
+    for (const auto& entry : node) check_quotes(text, name, entry, seen);
   if (!node.IsScalar() || node.Tag() != "!" || node.Mark().is_null()) return;
   const auto begin = static_cast<std::size_t>(node.Mark().pos);
   if (begin >= text.size() || (text[begin] != '"' && text[begin] != '\'')) return;
@@ -421,7 +424,8 @@ Yaml Yaml::parse(const std::string& text, const std::string& name) {
         throw InputError{name + ":" + std::to_string(line_of(documents[i], 1)),
                          "a second document begins here", "keep one `---` part: a file holds one"};
     if (!documents.empty()) result.document_->root->yaml.reset(documents.front());
-    check_quotes(text, name, result.document_->root->yaml);
+    std::set<std::pair<int, int>> seen;
+    check_quotes(text, name, result.document_->root->yaml, seen);
   } catch (const YAML::Exception& error) {
     if (const auto line = open_quote(text)) throw open_quote_at(name, *line);
     throw InputError{name + ":" + std::to_string(error.mark.line + 1), "no YAML: " + error.msg,
