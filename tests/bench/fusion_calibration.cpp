@@ -26,12 +26,7 @@ job::JobStatus calibrate(double gain, double droop, double noise, const std::str
   world.x.model = (support::machines / "axis-rippled.yaml").string();
   support::TrialCell<calibration::FusionTrial> cell{world, support::coarse_stage(), trial};
   support::FusedX fused{cell.axis, pair};
-  auto& wired = cell.wired;
-  wired.join(cell.axis.world, "feedback_x", cell.trial, "feedback");
-  wired.join(fused.tachometer, "reading", cell.trial, "sensor_tachometer");
-  wired.join(fused.fusion, "fused", cell.trial, "fused");
-  wired.join(fused.fusion, "model_status", cell.trial, "model_status");
-  wired.join(cell.trial, "model", fused.fusion, "model");
+  cell.join(fused);
   cell.bring_up();
   return cell.run("fuse");
 }

@@ -104,6 +104,14 @@ class TrialCell {
     wired.add(axis.world);
     wired.add(laser);
   }
+  /// A trial that finds out what the sensors of `fused` are hears them, and gives their fusion what it found.
+  void join(FusedX& fused) {
+    wired.join(axis.world, "feedback_x", trial, "feedback");
+    wired.join(fused.tachometer, "reading", trial, "sensor_tachometer");
+    wired.join(fused.fusion, "fused", trial, "fused");
+    wired.join(fused.fusion, "model_status", trial, "model_status");
+    wired.join(trial, "model", fused.fusion, "model");
+  }
   void bring_up() {
     wired.add(axis.stage);
     wired.add(trial, 2);

@@ -143,13 +143,7 @@ void write_knowledge(report::Page& page, const GeometricResult& result) {
                        : "The next lines that would help most, all lines at once (--method full):");
     page.table({"line", "from [mm]", "to [mm]", "expected with it"}, rows);
   }
-  std::vector<report::Page::Bar> bars;
-  for (const auto& component : knowledge.components)
-    bars.push_back({component.name, 100.0 * component.left,
-                    number(100.0 * component.left, 2) + " %, known to " + micro(component.sigma) +
-                        (component.name[1] >= 'A' && component.name[1] <= 'C' ? " urad" : " um"),
-                    "#9db9d8"});
-  page.bars("Share of the variance expected beforehand that the lines leave, standard deviation", bars);
+  draw_variance_left(page, knowledge, "known to");
 }
 
 /// Accuracy against data interval, from the same readings thinned.

@@ -236,6 +236,18 @@ Plot residual_histogram(const GeometricResult& result) {
   return plot;
 }
 
+void draw_variance_left(report::Page& page, const metrology::Identifiability& knowledge,
+                        const std::string& known) {
+  std::vector<report::Page::Bar> bars;
+  for (const auto& component : knowledge.components)
+    bars.push_back({component.name, 100.0 * component.left,
+                    report::number(100.0 * component.left, 2) + " %, " + known + " " +
+                        micro(component.sigma) +
+                        (component.name[1] >= 'A' && component.name[1] <= 'C' ? " urad" : " um"),
+                    "#9db9d8"});
+  page.bars("Share of the variance expected beforehand that the lines leave, standard deviation", bars);
+}
+
 std::vector<Plot> field_plots(const GeometricModel& model) {
   std::vector<Plot> plots;
   for (int a = 0; a < 3; ++a)

@@ -11,6 +11,9 @@ std::string letter(int axis);
 std::string place(const Eigen::Vector3d& position);
 /// One without points yet.
 report::Series series(const std::string& label, report::Series::Style style, const std::string& colour);
+/// How much of each component's variance the lines leave; `known` leads to its standard deviation ("known to").
+void draw_variance_left(report::Page& page, const metrology::Identifiability& knowledge,
+                        const std::string& known);
 /// A component over its axis with its two-sigma band and what the readings say of it.
 report::Plot component_plot(const GeometricResult& result, int component);
 /// Measured, fitted and predicted deviation along one line.

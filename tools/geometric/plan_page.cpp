@@ -132,13 +132,7 @@ void write_expectation(report::Page& page, const MeasuringPlan& plan) {
   if (knowledge.unidentified.empty())
     page.callout("The lines show every component that moves this machine's tool.", "good");
   for (const auto& open : knowledge.unidentified) page.callout("Left open: " + open.words(), "warn");
-  std::vector<report::Page::Bar> bars;
-  for (const auto& one : knowledge.components)
-    bars.push_back({one.name, 100.0 * one.left,
-                    number(100.0 * one.left, 2) + " %, to " + micro(one.sigma) +
-                        (one.name[1] >= 'A' && one.name[1] <= 'C' ? " urad" : " um"),
-                    "#9db9d8"});
-  page.bars("Share of the variance expected beforehand that the lines leave, standard deviation", bars);
+  draw_variance_left(page, knowledge, "to");
   const auto others = metrology::other_lines(plan.machine, best.lines);
   std::vector<std::pair<double, const PlannedLine*>> checks;
   for (const PlannedLine& line : others)

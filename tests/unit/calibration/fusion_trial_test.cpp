@@ -33,12 +33,7 @@ class FusionTrialTest : public ::testing::Test {
     support::TrialCell<FusionTrial> cell{support::coarse_world(), support::coarse_stage(), of_trial,
                                          laser_reads};
     support::FusedX fused{cell.axis, pair};
-    auto& wired = cell.wired;
-    wired.join(cell.axis.world, "feedback_x", cell.trial, "feedback");
-    wired.join(fused.tachometer, "reading", cell.trial, "sensor_tachometer");
-    wired.join(fused.fusion, "fused", cell.trial, "fused");
-    wired.join(fused.fusion, "model_status", cell.trial, "model_status");
-    wired.join(cell.trial, "model", fused.fusion, "model");
+    cell.join(fused);
     cell.bring_up();
     return cell.run("fuse");
   }
