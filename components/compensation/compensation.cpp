@@ -56,7 +56,7 @@ void Compensation::configure() {
 const char* Compensation::put_into(Stack& stack, LiveModel& model) const noexcept {
   if (!model.refusal.empty()) return model.refusal.c_str();
   if (const char* why = why_not_above(model, stack); why != nullptr) return why;
-  if (model.geometric)
+  if (model.is_volumetric())
     stack.geometric = &model;
   else
     stack.thermal[model.axis] = &model;
@@ -106,6 +106,7 @@ void Compensation::activate() {
   transaction_ = 0;
   temperatures_.forget();
   condition_ = TEMPERATURE_UNUSED;
+  set_states();
   outside_at_ = {INT64_MIN};
   started_ = now();
   easing_.setZero();
@@ -147,7 +148,7 @@ void Compensation::answer(std::uint64_t command, ModelState state, const LiveMod
 
 /// Why a thermal model may not stand above the geometric model of the stack; nullptr: it may.
 const char* Compensation::why_not_above(const LiveModel& model, const Stack& stack) noexcept {
-  if (model.geometric) return nullptr;
+  if (model.is_volumetric()) return nullptr;
   const std::uint32_t below = stack.geometric != nullptr ? stack.geometric->checksum : 0;
   if (model.above == below) return nullptr;
   if (model.above == 0)
@@ -163,6 +164,7 @@ void Compensation::use(const Stack& stack) noexcept {
       if (model != nullptr && model->lag > 0.0) model->lagged = temperatures_.trace().lagged(model->lag);
     set_temperatures();
     condition_ = judge(now());
+    set_states();
   });
 }
 
@@ -210,7 +212,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
       }
       Stack next = active_;
       LiveModel* model = std::exchange(staged_, nullptr);
-      if (model->geometric) {
+      if (model->is_volumetric()) {
         next.geometric = model;
         for (LiveModel*& thermal : next.thermal) {
           if (thermal == nullptr || thermal->above == model->checksum) continue;

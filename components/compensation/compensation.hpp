@@ -22,8 +22,8 @@
 namespace invar::compensation {
 
 /// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, grown to the slide's
-/// temperature where its calibration found an expansion, and for each axis a model over position and temperature of what the
-/// geometric one leaves.
+/// temperature where its calibration found an expansion (or error motions measured one by one, which may depend on
+/// temperatures), and for each axis a model over position and temperature of what the geometric one leaves.
 ///
 /// A model is staged (loaded, checked and compiled by a thread of its own, never by the loop), activated and rolled back by
 /// command. What a change would make the correction jump is eased in at `rate_limit`. Changes made in a transaction are
@@ -101,11 +101,17 @@ class Compensation final : public Component {
   [[nodiscard]] bool expands() const noexcept {
     return active_.geometric != nullptr && active_.geometric->expands;
   }
+  /// Whether the error motions depend on temperatures.
+  [[nodiscard]] bool has_states() const noexcept {
+    return active_.geometric != nullptr && active_.geometric->components && active_.geometric->by_temperature;
+  }
+  [[nodiscard]] double value_of(const LiveModel::State& state) const noexcept;
   [[nodiscard]] bool has_temperature() const noexcept {
     return condition_ != TEMPERATURE_UNUSED && condition_ != TEMPERATURE_REFUSED;
   }
   [[nodiscard]] double kelvin_outside(const LiveModel& model) const noexcept;
   void set_temperatures() noexcept;
+  void set_states() noexcept;
   [[nodiscard]] bool is_used(const LiveModel* thermal) const noexcept {
     return thermal != nullptr && (!thermal->by_temperature || has_temperature());
   }
@@ -162,7 +168,9 @@ class Compensation final : public Component {
 void Compensation::Parameters::describe(auto& p) {
   p(axes, "axes", 1, 3, "how many axes are corrected");
   p(machine, "machine", "machine.yaml: a model of another chain or travel is refused");
-  p(model, "model", "geometric compensation.yaml that is active from the start; none: nothing is corrected");
+  p(model, "model",
+    "compensation.yaml of kind geometric or components that is active from the start; none: nothing is "
+    "corrected");
   p(thermal_model, "thermal_model", "compensation.yaml of kind thermal, likewise");
   p(state, "state",
     "folder that keeps the models in use over a restart, created; relative to where the cell was started. "

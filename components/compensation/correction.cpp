@@ -48,6 +48,16 @@ TemperatureCondition Compensation::judge(Instant at) noexcept {
   bool inside = true;
   double most = 0.0;
   unsigned zones = 0;
+  if (has_states()) {
+    used = true;
+    most = kelvin_outside(*active_.geometric);
+    for (const auto& state : active_.geometric->states) {
+      inside = inside && state.range.contains(value_of(state));
+      if (state.source != LiveModel::Source::zone) continue;
+      zones |= 1U << state.zone;
+      most = std::max(most, beyond(state.range, value_of(state)));
+    }
+  }
   for (const LiveModel* model : active_.thermal) {
     if (model == nullptr || !model->by_temperature) continue;
     used = true;
@@ -83,6 +93,25 @@ void Compensation::set_temperatures() noexcept {
   }
 }
 
+double Compensation::value_of(const LiveModel::State& state) const noexcept {
+  switch (state.source) {
+    case LiveModel::Source::heating_rate:
+      return temperatures_.trace().rate();
+    case LiveModel::Source::zone:
+      return temperatures_.zone(state.zone);
+    default:
+      return temperatures_.trace().temperature();
+  }
+}
+
+/// What the error motions depend on; without a temperature they are those of the middle of the calibration.
+void Compensation::set_states() noexcept {
+  if (!has_states()) return;
+  LiveModel& model = *active_.geometric;
+  if (!has_temperature()) return model.components->forget();
+  for (std::size_t s = 0; s < model.states.size(); ++s) model.components->set(s, value_of(model.states[s]));
+}
+
 void Compensation::follow_temperature(const Tick& tick) noexcept {
   const TemperatureCondition before = condition_;
   const bool first = temperatures_.trace().empty();
@@ -98,9 +127,13 @@ void Compensation::follow_temperature(const Tick& tick) noexcept {
     ease([&] {
       set_temperatures();
       condition_ = judge(tick.now);
+      set_states();
     });
   } else if (const auto next = judge(tick.now); next != condition_) {
-    ease([&] { condition_ = next; });
+    ease([&] {
+      condition_ = next;
+      set_states();
+    });
   }
   if (condition_ == before) return;
   if (condition_ != TEMPERATURE_UNUSED) notify(severity_of(condition_), text_of(condition_));
@@ -109,7 +142,7 @@ void Compensation::follow_temperature(const Tick& tick) noexcept {
 
 Compensation::Layers Compensation::corrections(const Eigen::Vector3d& at) const noexcept {
   Layers layers;
-  if (active_.geometric != nullptr) layers.geometric = -active_.geometric->geometric->error(at);
+  if (active_.geometric != nullptr) layers.geometric = -active_.geometric->error(at);
   if (expands() && has_temperature())
     layers.geometric -= active_.geometric->expanding.expansion_at(at, expanded_to_);
   for (std::size_t i = 0; i < axes_.size(); ++i)
@@ -134,8 +167,20 @@ double Compensation::kelvin_in_doubt(Instant at, unsigned zones) const noexcept 
 
 Eigen::Vector3d Compensation::geometric_sigma(Instant at) const noexcept {
   if (active_.geometric == nullptr || blind_) return Eigen::Vector3d::Zero();
-  Eigen::Vector3d sigma = active_.geometric->geometric->sigma(setpoint_);
-  if (!expands() || !has_temperature()) return sigma;
+  const Eigen::Vector3d sigma = active_.geometric->sigma(setpoint_);
+  if (!has_temperature()) return sigma;
+  if (has_states() && condition_ == TEMPERATURE_HELD) {
+    // The temperatures may have gone on: what that changes is in doubt.
+    LiveModel& model = *active_.geometric;
+    const Eigen::Vector3d held = model.error(setpoint_);
+    for (std::size_t s = 0; s < model.states.size(); ++s)
+      if (model.states[s].source != LiveModel::Source::heating_rate)
+        model.components->set(s, value_of(model.states[s]) + kelvin_in_doubt(at, 0));
+    const Eigen::Vector3d change = model.error(setpoint_) - held;
+    for (std::size_t s = 0; s < model.states.size(); ++s) model.components->set(s, value_of(model.states[s]));
+    return (sigma.cwiseAbs2() + change.cwiseAbs2()).cwiseSqrt();
+  }
+  if (!expands()) return sigma;
   const auto& model = active_.geometric->expanding;
   const Eigen::Vector3d doubt = model.expansion_at(setpoint_, expanded_to_ + kelvin_in_doubt(at, 0)) -
                                 model.expansion_at(setpoint_, expanded_to_);
@@ -201,7 +246,7 @@ void Compensation::publish(const Tick& tick, const Layers& layers, const Eigen::
     sample.sigma(std::hypot(sample.layer_sigma()[0], sample.layer_sigma()[1]));
     if (active_.geometric != nullptr) sample.layer_checksum()[0] = active_.geometric->checksum;
     if (thermal != nullptr) sample.layer_checksum()[1] = thermal->checksum;
-    const bool by_temperature = thermal != nullptr || expands();
+    const bool by_temperature = thermal != nullptr || expands() || has_states();
     if (by_temperature) {
       sample.temperature(temperatures_.trace().temperature());
       sample.heating_rate(temperatures_.trace().rate());

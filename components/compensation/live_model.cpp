@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <functional>
+#include <string_view>
 
+#include "core/compensation/component_file.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
 
@@ -12,7 +13,8 @@ namespace invar::compensation {
 
 namespace {
 
-constexpr int steps = 20;  // of the grids on which a model is looked at
+constexpr int steps = 20;               // of the grids on which a model is looked at
+constexpr double most_compiled = 2e-7;  // m, by which the loop's tables may differ from networks
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -40,58 +42,62 @@ std::string refusal_of_values(double largest, double steepest, double sigma, con
   return {};
 }
 
-std::string refusal_of(const metrology::GeometricModel& model, const metrology::VolumetricTable& table,
-                       const ModelLimits& limits) {
-  if (model.chain.axes != limits.axes)
-    return "it is of another machine: one with " + std::to_string(model.chain.axes) + " axes, this one has " +
+std::string refusal_of_machine(const metrology::Chain& chain, const std::array<Range, 3>& travel,
+                               const ModelLimits& limits) {
+  if (chain.axes != limits.axes)
+    return "it is of another machine: one with " + std::to_string(chain.axes) + " axes, this one has " +
            std::to_string(limits.axes);
-  if (limits.machine) {
-    const metrology::Machine& machine = *limits.machine;
-    for (int place = 0; place < model.chain.axes; ++place) {
-      if (model.chain.order[index(place)] != machine.chain.order[index(place)])
-        return "it is of another machine: its axes stand in another order";
-      const auto axis = index(model.chain.order[index(place)]);
-      const Range travel = machine.travel[axis];
-      if (!covers(model.travel[axis], travel) || !covers(travel, model.travel[axis]))
-        return std::string{"it is of another machine: its axis "} + metrology::axis_letters[axis] +
-               " has another travel";
-    }
+  if (!limits.machine) return {};
+  const metrology::Machine& machine = *limits.machine;
+  for (int place = 0; place < chain.axes; ++place) {
+    if (chain.order[index(place)] != machine.chain.order[index(place)])
+      return "it is of another machine: its axes stand in another order";
+    const auto axis = index(chain.order[index(place)]);
+    if (!covers(travel[axis], machine.travel[axis]) || !covers(machine.travel[axis], travel[axis]))
+      return std::string{"it is of another machine: its axis "} + metrology::axis_letters[axis] +
+             " has another travel";
   }
+  return {};
+}
+
+/// Of a field over the travels: `error` and `sigma` [m] at a position.
+template <class Error, class Sigma>
+std::string refusal_of_field(const metrology::Chain& chain, const std::array<Range, 3>& travel,
+                             Error error_at, Sigma sigma_at, const ModelLimits& limits) {
   // On a grid over the travels: the largest correction of an axis, and the steepest along any axis.
   double largest = 0.0;
   double steepest = 0.0;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   std::array<int, 3> count{1, 1, 1};
   for (int k = 0; k < 3; ++k) {
-    if (!model.chain.has(k)) continue;
+    if (!chain.has(k)) continue;
     count[index(k)] = steps + 1;
-    middle[k] = 0.5 * (model.travel[index(k)].lower + model.travel[index(k)].upper);
+    middle[k] = 0.5 * (travel[index(k)].lower + travel[index(k)].upper);
   }
   const auto at = [&](const std::array<int, 3>& node) {
     Eigen::Vector3d point = middle;
     for (int k = 0; k < 3; ++k)
-      if (model.chain.has(k))
-        point[k] = model.travel[index(k)].lower + model.travel[index(k)].width() * node[index(k)] / steps;
+      if (chain.has(k)) point[k] = travel[index(k)].lower + travel[index(k)].width() * node[index(k)] / steps;
     return point;
   };
   std::array<int, 3> node{};
   for (node[2] = 0; node[2] < count[2]; ++node[2])
     for (node[1] = 0; node[1] < count[1]; ++node[1])
       for (node[0] = 0; node[0] < count[0]; ++node[0]) {
-        const Eigen::Vector3d error = table.error(at(node));
+        const Eigen::Vector3d error = error_at(at(node));
         if (!error.allFinite()) return "it gives no number at a point of the travels";
         largest = std::max(largest, error.cwiseAbs().maxCoeff());
         for (int k = 0; k < 3; ++k) {
           if (node[index(k)] + 1 >= count[index(k)]) continue;
           std::array<int, 3> next = node;
           ++next[index(k)];
-          const double change = (table.error(at(next)) - error).cwiseAbs().maxCoeff();
-          steepest = std::max(steepest, change * steps / model.travel[index(k)].width());
+          const double change = (error_at(at(next)) - error).cwiseAbs().maxCoeff();
+          steepest = std::max(steepest, change * steps / travel[index(k)].width());
         }
       }
-  Eigen::Vector3d sigma = table.sigma(middle);
+  Eigen::Vector3d sigma = sigma_at(middle);
   for (int k = 0; k < 3; ++k)
-    if (!model.chain.has(k)) sigma[k] = 0.0;
+    if (!chain.has(k)) sigma[k] = 0.0;
   return refusal_of_values(largest, steepest, sigma.maxCoeff(), limits);
 }
 
@@ -120,6 +126,10 @@ std::string refusal_of(const metrology::ThermalError& model, std::size_t axis, c
   return refusal_of_values(largest, steepest, sigma, limits);
 }
 
+std::string refusal_of_zone(const std::string& zone) {
+  return "it needs the temperature of `" + zone + "`: name it below `zones` and connect it";
+}
+
 void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
   const ThermalPlace place = read_place(yaml.root());
   const metrology::ThermalError model = read_thermal(yaml.root());
@@ -140,8 +150,7 @@ void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLim
   for (std::size_t z = 0; z < model.zones.size(); ++z) {
     const auto found = std::find(limits.zones.begin(), limits.zones.end(), model.zones[z].name);
     if (found == limits.zones.end()) {
-      live.refusal =
-          "it needs the temperature of `" + model.zones[z].name + "`: name it below `zones` and connect it";
+      live.refusal = refusal_of_zone(model.zones[z].name);
       return;
     }
     live.zones[z] = static_cast<std::size_t>(found - limits.zones.begin());
@@ -149,6 +158,59 @@ void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLim
   }
   live.refusal = refusal_of(model, live.axis, limits);
   if (live.refusal.empty()) live.thermal.emplace(model, 5e-9);
+}
+
+/// Networks are tried at the ends and the middle of every state's range.
+std::string refusal_of(metrology::ComponentTables& tables, const ModelLimits& limits) {
+  const metrology::ComponentNetworks& model = tables.model();
+  if (std::string why = refusal_of_machine(model.chain, model.travel, limits); !why.empty()) return why;
+  if (tables.bound() > most_compiled)
+    return "its networks bend too much for the loop's tables: they would differ by " + in_um(tables.bound());
+  std::size_t combinations = 1;
+  for (std::size_t s = 0; s < model.states.size(); ++s) combinations *= 3;
+  std::string why;
+  for (std::size_t c = 0; c < combinations && why.empty(); ++c) {
+    std::size_t rest = c;
+    for (std::size_t s = 0; s < model.states.size(); ++s, rest /= 3) {
+      const Range& range = model.states[s].range;
+      tables.set(s, range.lower + 0.5 * static_cast<double>(rest % 3) * range.width());
+    }
+    why = refusal_of_field(
+        model.chain, model.travel, [&](const Eigen::Vector3d& p) { return tables.error(p); },
+        [&](const Eigen::Vector3d& p) { return tables.sigma(p); }, limits);
+  }
+  tables.forget();
+  return why;
+}
+
+void read_components_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
+  const auto model = read_components(yaml.root());
+  yaml.finish();
+  live.by_temperature = !model.states.empty();
+  live.temperature = {-HUGE_VAL, HUGE_VAL};
+  for (const auto& state : model.states) {
+    constexpr std::string_view prefix = "temperature_";
+    if (state.name == "temperature") {
+      live.states.push_back({LiveModel::Source::temperature, 0, state.range});
+      live.temperature = state.range;
+    } else if (state.name == "heating_rate") {
+      live.states.push_back({LiveModel::Source::heating_rate, 0, state.range});
+    } else if (state.name.starts_with(prefix)) {
+      const auto found =
+          std::find(limits.zones.begin(), limits.zones.end(), state.name.substr(prefix.size()));
+      if (found == limits.zones.end()) {
+        live.refusal = refusal_of_zone(state.name.substr(prefix.size()));
+        return;
+      }
+      const auto zone = static_cast<std::size_t>(found - limits.zones.begin());
+      live.states.push_back({LiveModel::Source::zone, zone, state.range});
+    } else {
+      live.refusal = "it depends on `" + state.name + "`, which the loop does not know";
+      return;
+    }
+  }
+  live.components.emplace(model);
+  live.refusal = refusal_of(*live.components, limits);
 }
 
 }  // namespace
@@ -171,7 +233,13 @@ void load_live_model(const std::filesystem::path& file, const ModelLimits& limit
     live.expanding = model;
     live.expands = model.reference_temperature && std::any_of(model.expansion.begin(), model.expansion.end(),
                                                               [](double each) { return each != 0.0; });
-    live.refusal = refusal_of(model, *live.geometric, limits);
+    live.refusal = refusal_of_machine(model.chain, model.travel, limits);
+    if (live.refusal.empty())
+      live.refusal = refusal_of_field(
+          model.chain, model.travel, [&](const Eigen::Vector3d& p) { return live.geometric->error(p); },
+          [&](const Eigen::Vector3d& p) { return live.geometric->sigma(p); }, limits);
+  } else if (kind == "components") {
+    read_components_into(live, yaml, limits);
   } else {
     live.refusal = "a model of kind `" + kind + "` corrects no axis";
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/metrology/component_tables.hpp"
 #include "core/metrology/machine.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/metrology/volumetric_table.hpp"
@@ -26,8 +27,16 @@ struct ModelLimits {
 };
 
 /// Kept until the component is cleaned up, so that the loop may hold a plain pointer. `refusal` says why the loop must not
-/// use it; empty: it is sound, and either `geometric` or `thermal` is there.
+/// use it; empty: it is sound, and one of `geometric`, `components` and `thermal` is there.
 struct LiveModel {
+  /// Of the temperatures that the loop knows, or their rate.
+  enum class Source { temperature, heating_rate, zone };
+  struct State {
+    Source source = Source::temperature;
+    std::size_t zone = 0;  // the loop's, for Source::zone
+    Range range;           // it was calibrated over
+  };
+
   std::string refusal;
   std::uint64_t id = 0;
   std::uint32_t checksum = 0;
@@ -37,9 +46,22 @@ struct LiveModel {
   metrology::GeometricModel expanding;  // what `geometric` was compiled from, for its growth by temperature
   bool expands = false;
 
+  std::optional<metrology::ComponentTables> components;  // in the place of `geometric`
+  std::vector<State> states;                             // of `components`, in its order
+
+  /// Of the whole machine, not of an axis.
+  [[nodiscard]] bool is_volumetric() const noexcept { return geometric || components; }
+  /// [m], of a volumetric model, without its expansion. Real-time, as the others.
+  [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position) const noexcept {
+    return components ? components->error(position) : geometric->error(position);
+  }
+  [[nodiscard]] Eigen::Vector3d sigma(const Eigen::Vector3d& position) const noexcept {
+    return components ? components->sigma(position) : geometric->sigma(position);
+  }
+
   std::optional<metrology::CompiledThermalError> thermal;
   std::size_t axis = 0;                                    // of `thermal`
-  bool by_temperature = true;                              // false: a model of one temperature, good at any
+  bool by_temperature = true;                              // false: good at any temperature
   std::uint32_t above = 0;                                 // the geometric model that it was measured above
   Range temperature;                                       // [degC] it was calibrated over
   std::vector<Range> zone_ranges;                          // [degC]

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/compensation/chain_file.hpp"
+
 namespace invar::compensation {
 
 namespace {
@@ -13,7 +15,6 @@ using metrology::axis_of;
 using metrology::component_count;
 using metrology::GeometricModel;
 using metrology::is_rotation;
-using metrology::squareness_count;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
@@ -26,14 +27,7 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
   text.comment("Error = actual minus commanded position of the tool in the workpiece frame; m, rad.");
   text.comment(
       "Components by ISO 230-1; squareness by ISO sign; the frame is fixed by zero error at the origin.");
-  std::string chain;
-  for (int i = 0; i < model.chain.axes; ++i) chain += letter(model.chain.order[index(i)]);
-  text.text("chain", chain);
-  text.open("travel");
-  for (int k = 0; k < 3; ++k)
-    if (model.chain.has(k)) text.range(letter(k), model.travel[index(k)]);
-  text.close();
-  text.numbers("tool", model.tool.data(), 3);
+  write_chain(text, model.chain, model.travel, model.tool);
   text.text("outside", "end values are held");
   text.comment("Lost motion of each axis [m], forward minus backward.");
   text.numbers("reversal", model.reversal.data(), 3);
@@ -44,15 +38,7 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
     text.numbers("expansion_sigma", model.expansion_sigma.data(), 3);
     text.close();
   }
-  text.open("squareness");
-  for (int pair = 0; pair < squareness_count; ++pair) {
-    const double cosine = model.squareness[index(pair)];
-    if (model.squareness_sigma[index(pair)] <= 0.0) continue;
-    text.open(std::string{metrology::squareness_iso_name(pair)});
-    text.number("value", metrology::squareness_angle_from_cosine(pair, cosine)).text("unit", "rad");
-    text.number("sigma", model.squareness_sigma[index(pair)]).close();
-  }
-  text.close();
+  write_squareness(text, model.squareness, model.squareness_sigma);
   text.comment("Uniform cubic B-splines over `interval` [m] of the moving axis: intervals + 3 coefficients,");
   text.comment("the standard deviation at each knot.");
   text.open("components");
@@ -82,22 +68,7 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
 GeometricModel read_geometric(const config::Node& root) {
   GeometricModel model;
   for (const char* key : {"identified_from", "outside", "identification"}) root[key].accept_all();
-  const config::Node chain = root.required("chain");
-  const std::string letters = chain.as_text();
-  model.chain.axes = 0;
-  for (const char c : letters) {
-    const auto axis = metrology::axis_named(std::string(1, c));
-    if (!axis || model.chain.has(*axis) || model.chain.axes == 3) {
-      chain.fault("`" + letters + "` is no chain of axes", "write for example yxz");
-      break;
-    }
-    model.chain.order[index(model.chain.axes++)] = *axis;
-  }
-  const config::Node travel = root.required("travel");
-  for (int k = 0; k < 3; ++k)
-    if (model.chain.has(k)) model.travel[index(k)] = travel.required(letter(k)).as_range("m");
-  const auto tool = exactly(root.required("tool"), 3, "m");
-  model.tool = {tool[0], tool[1], tool[2]};
+  read_chain(root, model.chain, model.travel, model.tool);
   const auto reversal = exactly(root.required("reversal"), 3, "m");
   for (std::size_t k = 0; k < 3; ++k) model.reversal[k] = reversal[k];
   if (const config::Node temperature = root["temperature"]; temperature.exists()) {
@@ -112,14 +83,7 @@ GeometricModel read_geometric(const config::Node& root) {
         temperature["expansion"].fault("an expansion beyond 1e-3 1/K", "calibrate again");
     }
   }
-  const config::Node squareness = root.required("squareness");
-  for (int pair = 0; pair < squareness_count; ++pair) {
-    const config::Node one = squareness[metrology::squareness_iso_name(pair)];
-    if (!one.exists()) continue;
-    const auto quantity = one.as_quantity("rad", {-0.1, 0.1});
-    model.squareness[index(pair)] = metrology::squareness_cosine_from_angle(pair, quantity.value);
-    model.squareness_sigma[index(pair)] = quantity.sigma.value_or(0.0);
-  }
+  read_squareness(root, model.squareness, model.squareness_sigma);
   const config::Node components = root.required("components");
   for (int c = 0; c < component_count; ++c) {
     const config::Node one = components[metrology::iso_name(c)];

@@ -4,41 +4,68 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
+#include "core/base/range.hpp"
 #include "core/metrology/volumetric.hpp"
 #include "core/numerics/rbf_network.hpp"
-#include "core/numerics/rbf_ridge.hpp"
 
 namespace invar::metrology {
 
+/// Beside the position a component may depend on so many states: the loop's tables have three inputs.
+inline constexpr std::size_t most_states_of_a_component = 2;
+
+/// What a component may depend on beside the position of its axis: `temperature` and `temperature_<zone>` [degC],
+/// `heating_rate` [K/s], and the range of the calibration.
+struct MachineState {
+  std::string name;
+  Range range;
+
+  /// Where the error is asked for when the state is not known: the middle of the calibration.
+  [[nodiscard]] double usual() const noexcept { return 0.5 * (range.lower + range.upper); }
+};
+
 /// One error motion as a Gaussian network: its first input is the position of its axis [m], the others are those of the
-/// machine's state that it depends on.
+/// machine's states that it depends on.
 struct ComponentNetwork {
   numerics::RbfNetwork network;
-  std::vector<int> states;  // which of the machine's states (temperature, heating rate, load ..), by index
+  std::vector<std::size_t> states;  // indices into the machine's, at most `most_states_of_a_component`
+  double sigma = 0.0;               // standard deviation of the value inside the ranges, m or rad
+  double slope = 0.0;               // how fast the value may leave its end outside, m or rad per input scale
+
+  /// `of_machine`: all states of the machine.
+  [[nodiscard]] double value(double position, std::span<const double> of_machine) const;
+  /// Grows outside the ranges. Real-time.
+  [[nodiscard]] double sigma_at(double position, std::span<const double> of_machine) const noexcept;
 };
 
-/// The seed's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more): use it where the
-/// components themselves were measured, by an angular interferometer or a level, at several states of the machine. From
-/// displacement lines take `identify`. Set-up and offline use; `numerics::compile` makes tables of the networks.
+/// The seed's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more), for components
+/// that were measured themselves, by an angular interferometer, a level or a straightedge, at several states of the machine.
+/// From displacement lines take `identify`. Offline; `ComponentTables` is for the loop.
 struct ComponentNetworks {
   Chain chain;
+  std::array<Range, 3> travel{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m
+  Eigen::Vector3d tool = Eigen::Vector3d::Zero();                      // m
   Squareness squareness{};
+  Squareness squareness_sigma{};
+  std::vector<MachineState> states;
   std::array<std::optional<ComponentNetwork>, component_count> components;  // none: zero
 
-  [[nodiscard]] ErrorMotions motions(const Eigen::Vector3d& position, const Eigen::VectorXd& state) const;
-  /// Actual minus commanded position [m] of a tool at a state of the machine, to first order with exact axis directions.
-  [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position, const Eigen::Vector3d& tool,
-                                      const Eigen::VectorXd& state) const;
+  [[nodiscard]] ErrorMotions motions(const Eigen::Vector3d& position, std::span<const double> state) const;
+  /// Actual minus commanded position [m] of a tool at a state of the machine, to first order with exact axis directions;
+  /// positions and states outside their ranges are held at the end.
+  [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position, const Eigen::Vector3d& tool_offset,
+                                      std::span<const double> state) const;
+  /// Standard deviation [m] of `error`, the components' taken as independent.
+  /// Real-time.
+  [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position, const Eigen::Vector3d& tool_offset,
+                                         std::span<const double> state) const noexcept;
+  /// Whether every state lies within the calibration. Real-time.
+  [[nodiscard]] bool knows(std::span<const double> state) const noexcept;
 };
-
-/// Fits one component by ridge regression with GCV. `position`: N [m]; `values`: N, m or rad; `state`: states x N, of which
-/// the rows `states` are inputs. Needs some readings more than inputs.
-ComponentNetwork fit_component(const Eigen::Ref<const Eigen::VectorXd>& position,
-                               const Eigen::Ref<const Eigen::MatrixXd>& state, std::vector<int> states,
-                               const Eigen::Ref<const Eigen::VectorXd>& values,
-                               const numerics::RidgeOptions& options = {});
 
 }  // namespace invar::metrology

@@ -5,6 +5,7 @@ Usage: commands_test.py INVAR SOURCE_FOLDER
 The cell runs on a random DDS domain and free ports of the loopback, in a temporary folder.
 """
 import json
+import math
 import os
 import pathlib
 import random
@@ -443,6 +444,80 @@ class Planning(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("is out of reach with these lines", out)
         self.assertFalse((FOLDER / "none.csv").exists() or (FOLDER / "none.html").exists())
+
+
+class Components(unittest.TestCase):
+    """Error motions measured one by one: yaw that grows with temperature and tilts the beam, a straightness that does not."""
+
+    HEAD = "component,position [mm],translation [um],rotation [urad],temperature [degC]"
+
+    @staticmethod
+    def yaw(y, temperature):
+        return 10e-6 * (temperature - 20) * y / 0.2
+
+    @staticmethod
+    def straightness(x):
+        return 4e-6 * math.sin(2 * math.pi * x / 0.3)
+
+    def setUp(self):
+        (FOLDER / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.3], y: [0, 0.2]}\n")
+        noise = random.Random(5)
+        self.rows = []
+        for temperature in (20, 24, 28):
+            for i in range(21):
+                y, x = 0.01 * i, 0.015 * i
+                self.rows.append(f"ECY,{1e3 * y},,{1e6 * self.yaw(y, temperature) + noise.gauss(0, .1)},{temperature}")
+                self.rows.append(f"EYX,{1e3 * x},{1e6 * self.straightness(x) + noise.gauss(0, .05)},,{temperature}")
+        self.rows += [f"EC0Y,,,{30 + noise.gauss(0, .1)},24" for _ in range(4)]
+
+    def calibrate(self, rows, head=HEAD):
+        (FOLDER / "components.csv").write_text("\n".join([head, *rows]) + "\n")
+        shutil.rmtree(FOLDER / "components", ignore_errors=True)
+        return invar("calibrate", "components", "--machine", "machine.yaml", "--readings", "components.csv", "--out",
+                     "components")
+
+    def test_each_is_a_function_of_what_it_depends_on_and_together_they_are_the_field(self):
+        status, out, err = self.calibrate(self.rows)
+        self.assertEqual((status, err), (0, ""), out)
+        report = json.loads((FOLDER / "components/report.json").read_text())
+        self.assertEqual({c["name"]: c["depends_on"] for c in report["components"]}, {"ECY": ["temperature"], "EYX": []})
+        self.assertIn("EXX", report["unidentified"])
+        self.assertNotIn("EC0Y", report["unidentified"])
+        self.assertIn("ECY, eps_z(y)", (FOLDER / "components/report.html").read_text())
+        points = [(0.07, 0.03, 22.0), (0.3, 0.2, 27.0), (0.2, 0.11, 24.0)]
+        (FOLDER / "points.csv").write_text("x [m],y [m],temperature [degC]\n" +
+                                           "".join(f"{x},{y},{t}\n" for x, y, t in points))
+        status, _, err = invar("predict", "--model", "components/compensation.yaml", "--inputs", "points.csv", "--output",
+                               "field.csv")
+        self.assertEqual((status, err), (0, ""))
+        header, *lines = (FOLDER / "field.csv").read_text().splitlines()
+        for (x, y, t), line in zip(points, lines):
+            row = dict(zip(header.split(","), map(float, line.split(","))))
+            # The first axis of the chain (y) is exact; x leans by the squareness: EC0Y turns +Y about +Z relative to X.
+            across = self.straightness(x) + self.yaw(y, t) * x - 30e-6 * x
+            self.assertAlmostEqual(row["error_y [m]"], across, delta=max(1.5e-7, 4 * row["sigma_y [m]"]))
+            self.assertLess(row["sigma_y [m]"], 2e-7)
+
+    def test_bad_readings_are_told_and_nothing_is_written(self):
+        faults = [
+            (["EQX,10,1,,20"], "column `component`, row 1: `EQX` is no error motion"),
+            (["EXZ,10,1,,20"], "`EXZ` is of an axis that the machine lacks"),
+            (["ECY,10,1,,20"], "column `rotation`, row 1: is empty"),
+            (["ECY,10,1,2,20"], "column `translation`, row 1: has a value where the component is the other kind"),
+            (["EXX,,1,,20"], "column `position`, row 1: is empty"),
+            (["EXX,900,1,,20"], "0.9 m is outside the travel"),
+            (["EXX,10,2e6,,20"], "column `translation`, row 1: 2 is out of range"),
+            (["EXX,10,1,,"], "column `temperature`, row 1: is empty, nan or not finite"),
+            (["EXX,10,1,,20"] * 9, "component EXX: was measured at 1 places"),
+            (["EXX,10,1,,20"], "component EXX: has too few readings"),
+            (["EC0Y,,,3,20"], "component EC0Y: has one reading"),
+        ]
+        for rows, words in faults:
+            status, _, err = self.calibrate(rows)
+            self.assertEqual(status, 2, words)
+            self.assertIn(words, err)
+            self.assertEqual(len(err.splitlines()), 1, err)
+            self.assertFalse((FOLDER / "components").exists())
 
 
 class WrongCalls(unittest.TestCase):

@@ -17,6 +17,7 @@ void add_calibrate(CLI::App& program) {
   add_calibrate_thermistor(*group);
   add_calibrate_geometric(*group);
   add_calibrate_plan(*group);
+  add_calibrate_components(*group);
   add_calibrate_controller(*group);
   add_calibrate_ripple(*group);
 }

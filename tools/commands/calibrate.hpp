@@ -27,6 +27,8 @@ void add_calibrate_geometric(CLI::App& group);
 void add_calibrate_plan(CLI::App& group);
 void add_calibrate_controller(CLI::App& group);
 recording::Table predict_geometric(const config::Yaml& model, const recording::Table& inputs);
+void add_calibrate_components(CLI::App& group);
+recording::Table predict_components(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_camera(CLI::App& group);
 void add_calibrate_ripple(CLI::App& group);
 

@@ -1,19 +1,19 @@
 // `invar calibrate geometric`: displacement lines in, the machine's geometric error out.
 #include <unistd.h>
 
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <iostream>
-#include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/compensation/geometric_file.hpp"
 #include "core/machine/machine_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/geometric/field_points.hpp"
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"
 #include "tools/positive.hpp"
@@ -92,46 +92,30 @@ recording::Table predict_geometric(const config::Yaml& model_file, const recordi
   (void)model_file.root().text("kind");
   const auto model = compensation::read_geometric(model_file.root());
   model_file.finish();
-  std::vector<Eigen::Vector3d> positions(inputs.rows(), Eigen::Vector3d::Zero());
-  std::vector<Eigen::Vector3d> tools(inputs.rows(), model.tool);
-  bool any = false;
-  for (int k = 0; k < 3; ++k) {
-    const std::string letter(1, metrology::axis_letters[static_cast<std::size_t>(k)]);
-    const auto fill = [&](const std::string& name, std::vector<Eigen::Vector3d>& into) {
-      const auto values = inputs.optionally_in(name, "m");
-      for (std::size_t i = 0; values && i < values->size(); ++i) into[i][k] = (*values)[i];
-      return values.has_value();
-    };
-    any = fill(letter, positions) || any;
-    (void)fill("tool_" + letter, tools);
-  }
-  if (!any) (void)inputs.in("x", "m");  // says what is missing
+  const FieldPoints points = read_points(inputs, model.tool);
   const auto temperature = inputs.optionally_in("temperature", "degC");
   if (temperature && !model.reference_temperature)
     std::cerr
         << model_file.file().string()
         << ": was calibrated without temperatures; the column `temperature` of the inputs changes nothing\n";
-  recording::Table result;
-  std::array<std::vector<double>, 6> columns;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    Eigen::Vector3d error = model.error(positions[i], tools[i]);
-    Eigen::Vector3d sigma = model.sigma_at(positions[i], tools[i]);
-    bool known = positions[i].allFinite() && tools[i].allFinite();
-    if (temperature && model.reference_temperature) {
-      known = known && std::isfinite((*temperature)[i]);
-      error += model.expansion_at(positions[i], (*temperature)[i]);
-      const Eigen::Vector3d more = model.expansion_sigma_at(positions[i], (*temperature)[i]);
-      sigma = (sigma.cwiseAbs2() + more.cwiseAbs2()).cwiseSqrt();
+  std::vector<FieldValue> values;
+  for (std::size_t i = 0; i < points.positions.size(); ++i) {
+    const Eigen::Vector3d& position = points.positions[i];
+    const Eigen::Vector3d& tool = points.tools[i];
+    const bool warmed = temperature && model.reference_temperature;
+    if (!position.allFinite() || !tool.allFinite() || (warmed && !std::isfinite((*temperature)[i]))) {
+      values.push_back(unknown_value());
+      continue;
     }
-    for (int k = 0; k < 3; ++k) {
-      const auto c = static_cast<std::size_t>(k);
-      columns[c].push_back(known ? error[k] : std::numeric_limits<double>::quiet_NaN());
-      columns[c + 3].push_back(known ? sigma[k] : std::numeric_limits<double>::infinity());
+    FieldValue value{model.error(position, tool), model.sigma_at(position, tool)};
+    if (warmed) {
+      value.error += model.expansion_at(position, (*temperature)[i]);
+      const Eigen::Vector3d more = model.expansion_sigma_at(position, (*temperature)[i]);
+      value.sigma = (value.sigma.cwiseAbs2() + more.cwiseAbs2()).cwiseSqrt();
     }
+    values.push_back(value);
   }
-  const std::array<const char*, 6> names{"error_x", "error_y", "error_z", "sigma_x", "sigma_y", "sigma_z"};
-  for (std::size_t c = 0; c < 6; ++c) result.add(names[c], "m", std::move(columns[c]));
-  return result;
+  return field_table(values);
 }
 
 }  // namespace invar::tools

@@ -13,7 +13,8 @@ namespace {
 
 const std::map<std::string, Predict>& kinds() {
   static const std::map<std::string, Predict> table{
-      {"dispenser", predict_dispenser},   {"fusion", predict_fusion},       {"thermal", predict_thermal},
+      {"components", predict_components}, {"dispenser", predict_dispenser},
+      {"fusion", predict_fusion},         {"thermal", predict_thermal},
       {"thermistor", predict_thermistor}, {"geometric", predict_geometric},
   };
   return table;

@@ -1,9 +1,14 @@
-#include "core/metrology/component_networks.hpp"
-
+// Error motions measured one by one at several states of the machine: which states they depend on, the field they make,
+// and the loop's tables of them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+
+#include "core/metrology/component_identification.hpp"
+#include "core/metrology/component_tables.hpp"
+#include "tests/support/real_time_guard.hpp"
 
 namespace invar::metrology {
 namespace {
@@ -21,68 +26,138 @@ ErrorMotions truth(const Eigen::Vector3d& p, double temperature, double rate) {
 
 class ComponentNetworksTest : public ::testing::Test {
  protected:
-  /// What an instrument of 50 nm and 0.05 urad reads of one component on a grid of positions and states.
-  ComponentNetwork measure(int component, const std::vector<int>& states, std::vector<int> counts) {
+  ComponentNetworksTest() {
+    RecordProperty("seed", 31);
+    networks.chain = {{0, 2, 1}, 3};  // any order
+    networks.travel = {Range{0.0, 0.2}, Range{0.0, 0.2}, Range{0.0, 0.2}};
+    networks.tool = {0.02, -0.01, -0.05};
+    networks.squareness = {1e-4, -5e-5, 2e-5};
+    networks.states = {{"temperature", {26.0, 30.0}}, {"heating_rate", {-1e-3, 1e-3}}};
+    for (const int component : {translation(0, 0), translation(2, 1), rotation(0, 1), rotation(1, 2)}) {
+      fits[static_cast<std::size_t>(component)] = identify_component(measure(component));
+      networks.components[static_cast<std::size_t>(component)] =
+          fits[static_cast<std::size_t>(component)].component;
+    }
+  }
+
+  /// What an instrument of 50 nm and 0.05 urad reads of one component, over positions, temperatures, and heating, resting,
+  /// cooling; one reading in a hundred is 5 um or 5 urad off.
+  ComponentReadings measure(int component) {
     std::vector<Eigen::Vector4d> rows;  // position, temperature, rate, value
     std::normal_distribution<double> normal;
     for (int i = 0; i <= 20; ++i)
-      for (int t = 0; t <= (states.empty() ? 0 : 4); ++t)
-        for (int r = 0; r <= (states.size() > 1 ? 2 : 0); ++r) {
+      for (int t = 0; t <= 4; ++t)
+        for (int r = 0; r <= 2; ++r) {
           const double q = 0.01 * i;
           const double temperature = 26.0 + t;
           const double rate = 1e-3 * (r - 1);
-          const ErrorMotions all = truth(Eigen::Vector3d::Constant(q), states.empty() ? 28.0 : temperature,
-                                         states.size() > 1 ? rate : 0.0);
+          const ErrorMotions all = truth(Eigen::Vector3d::Constant(q), temperature, rate);
           const auto& motion = all[static_cast<std::size_t>(axis_of(component))];
           const double value =
               (is_rotation(component) ? motion.rotation : motion.translation)[direction_of(component)];
-          rows.emplace_back(q, temperature, rate, value + 5e-8 * normal(random));
+          rows.emplace_back(q, temperature, rate,
+                            value + 5e-8 * normal(random) + (rows.size() % 100 == 57 ? 5e-6 : 0.0));
         }
     Eigen::MatrixXd table(4, static_cast<Eigen::Index>(rows.size()));
     for (std::size_t i = 0; i < rows.size(); ++i) table.col(static_cast<Eigen::Index>(i)) = rows[i];
-    numerics::RidgeOptions options;
-    options.counts = std::move(counts);
-    return fit_component(table.row(0), table.middleRows<2>(1), states, table.row(3), options);
+    return {table.row(0), table.middleRows<2>(1), table.row(3)};
+  }
+
+  Eigen::Vector3d somewhere() { return {0.2 * part(random), 0.2 * part(random), 0.2 * part(random)}; }
+  std::array<double, 2> some_state() {
+    return {26.0 + 4.0 * part(random), 1e-3 * (2.0 * part(random) - 1.0)};
   }
 
   std::mt19937_64 random{31};
+  std::uniform_real_distribution<double> part;
+  ComponentNetworks networks;
+  std::array<ComponentFit, component_count> fits;
 };
 
-TEST_F(ComponentNetworksTest, GiveTheFieldOfAWarmMachineAtStatesThatWereNotMeasured) {
-  RecordProperty("seed", 31);
-  ComponentNetworks networks;
-  networks.chain = {{0, 2, 1}, 3};  // any order
-  networks.squareness = {1e-4, -5e-5, 2e-5};
-  const auto put = [&](int component, const std::vector<int>& states, std::vector<int> counts) {
-    networks.components[static_cast<std::size_t>(component)] = measure(component, states, std::move(counts));
+TEST_F(ComponentNetworksTest, DependOnWhatTheReadingsDoAndOnNothingElse) {
+  using States = std::vector<std::size_t>;
+  const auto states = [&](int component) {
+    States found = fits[static_cast<std::size_t>(component)].component.states;
+    std::sort(found.begin(), found.end());
+    return found;
   };
-  put(translation(0, 0), {0}, {12, 4});    // EXX over position and temperature
-  put(translation(2, 1), {}, {12});        // EZY over position
-  put(rotation(0, 1), {0, 1}, {8, 4, 3});  // EAY over position, temperature and heating rate
-  put(rotation(1, 2), {}, {8});            // EBZ
-  const auto directions = axis_directions(networks.chain, networks.squareness);
-  const Eigen::Vector3d tool{0.02, -0.01, -0.05};
-  std::uniform_real_distribution<double> part;
-  double square = 0.0;
-  double before = 0.0;
-  constexpr int count = 400;
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d p{0.2 * part(random), 0.2 * part(random), 0.2 * part(random)};
-    const Eigen::Vector2d state{26.0 + 4.0 * part(random), 1e-3 * (2.0 * part(random) - 1.0)};
-    const Eigen::Vector3d exact =
-        exact_error(networks.chain, directions, p, truth(p, state[0], state[1]), tool);
-    square += (exact - networks.error(p, tool, state)).squaredNorm() / count;
-    const Eigen::Vector3d skew = exact_error(networks.chain, directions, p, {}, tool);
-    before += (exact - skew).squaredNorm() / count;
+  EXPECT_EQ(states(translation(0, 0)), States{0});
+  EXPECT_EQ(states(translation(2, 1)), States{});
+  EXPECT_EQ(states(rotation(0, 1)), (States{0, 1}));
+  EXPECT_EQ(states(rotation(1, 2)), States{});
+  for (const int component : {translation(0, 0), rotation(1, 2)}) {
+    EXPECT_EQ(fits[static_cast<std::size_t>(component)].rejected, 3U);
+    EXPECT_NEAR(fits[static_cast<std::size_t>(component)].noise, 5e-8, 1e-8);
   }
-  EXPECT_LT(std::sqrt(square), 1.5e-7);
-  EXPECT_GT(std::sqrt(before), 1e-6);
 }
 
-TEST_F(ComponentNetworksTest, AComponentThatIsNotThereIsZero) {
-  ComponentNetworks networks;
-  EXPECT_EQ(networks.error({0.1, 0.1, 0.1}, Eigen::Vector3d::Zero(), Eigen::VectorXd{}),
-            Eigen::Vector3d::Zero());
+TEST_F(ComponentNetworksTest, GiveTheFieldOfAWarmMachineAtStatesThatWereNotMeasured) {
+  const auto directions = axis_directions(networks.chain, networks.squareness);
+  double square = 0.0;
+  double before = 0.0;
+  double inside = 0.0;
+  constexpr int count = 400;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d p = somewhere();
+    const auto state = some_state();
+    const Eigen::Vector3d exact =
+        exact_error(networks.chain, directions, p, truth(p, state[0], state[1]), networks.tool);
+    const Eigen::Vector3d left = exact - networks.error(p, networks.tool, state);
+    square += left.squaredNorm() / count;
+    const Eigen::Vector3d skew = exact_error(networks.chain, directions, p, {}, networks.tool);
+    before += (exact - skew).squaredNorm() / count;
+    const Eigen::Vector3d sigma = networks.sigma_at(p, networks.tool, state);
+    for (int k = 0; k < 3; ++k) inside += std::abs(left[k]) <= 2.0 * sigma[k] ? 1.0 / (3.0 * count) : 0.0;
+  }
+  EXPECT_LT(std::sqrt(square), 5e-8);  // below one reading's noise
+  EXPECT_GT(std::sqrt(before), 1e-6);
+  EXPECT_GT(inside, 0.85);
+}
+
+TEST_F(ComponentNetworksTest, AreHeldOutsideWhatWasCalibratedWithALargerSigma) {
+  const Eigen::Vector3d p{0.2, 0.1, 0.1};
+  const std::array<double, 2> end{30.0, 0.0};
+  const std::array<double, 2> beyond{33.0, 0.0};
+  EXPECT_TRUE(networks.knows(end));
+  EXPECT_FALSE(networks.knows(beyond));
+  EXPECT_EQ(networks.error(p, networks.tool, beyond), networks.error(p, networks.tool, end));
+  const double truly = 12e-6 * 0.2 * 3.0;  // what the scale grows from 30 to 33 degC
+  const double sigma = networks.sigma_at(p, networks.tool, beyond).x();
+  EXPECT_GT(sigma, 0.3 * truly);
+  EXPECT_LT(sigma, 3.0 * truly);
+}
+
+TEST_F(ComponentNetworksTest, TablesDifferByNoMoreThanTheirBound) {
+  ComponentTables tables{networks};
+  EXPECT_LT(tables.bound(), 2e-7);
+  double worst = 0.0;
+  double largest_sigma = 0.0;
+  std::uint64_t violations = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector3d p = somewhere();
+    const auto state = some_state();
+    Eigen::Vector3d fast;
+    {
+      const support::RealTimeGuard guard;
+      for (std::size_t s = 0; s < 2; ++s) tables.set(s, state[s]);
+      fast = tables.error(p);
+      largest_sigma = std::max(largest_sigma, tables.sigma(p).maxCoeff());
+      tables.forget();
+      violations += guard.violations();
+    }
+    worst = std::max(worst, (fast - networks.error(p, networks.tool, state)).norm());
+  }
+  EXPECT_LE(worst, tables.bound());
+  EXPECT_GT(worst, 0.0);
+  EXPECT_LT(largest_sigma, 1e-7);
+  EXPECT_EQ(violations, 0U);
+  const std::array<double, 2> usual{28.0, 0.0};
+  const Eigen::Vector3d p = somewhere();
+  EXPECT_LE((tables.error(p) - networks.error(p, networks.tool, usual)).norm(), tables.bound());
+}
+
+TEST(ComponentNetworks, AComponentThatIsNotThereIsZero) {
+  EXPECT_EQ(ComponentNetworks{}.error({0.1, 0.1, 0.1}, Eigen::Vector3d::Zero(), {}), Eigen::Vector3d::Zero());
 }
 
 }  // namespace

@@ -1,0 +1,161 @@
+#include "core/metrology/component_identification.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "core/base/contract.hpp"
+#include "core/metrology/sure_gain.hpp"
+#include "core/numerics/rbf_ridge.hpp"
+#include "core/numerics/robust.hpp"
+
+namespace invar::metrology {
+
+namespace {
+
+constexpr double cell = 0.05;          // of a state's range: readings within it are averaged
+constexpr double far_off = 5.0;        // robust deviations
+constexpr double standard_errors = 2;  // that a further input must gain
+constexpr int most_centres = 33;       // over the position
+constexpr int most_rounds = 4;
+constexpr int most_centres_of_state = 5;
+constexpr double width_of_state = 2.0;  // of its range
+
+using Key = std::vector<long>;
+
+/// Means of the readings that are not left out, by place and state.
+ComponentReadings averaged(const ComponentReadings& readings, const std::vector<bool>& kept) {
+  const Eigen::Index states = readings.state.rows();
+  std::vector<Range> ranges;
+  for (Eigen::Index s = 0; s < states; ++s)
+    ranges.push_back({readings.state.row(s).minCoeff(), readings.state.row(s).maxCoeff()});
+  const double travel = readings.position.maxCoeff() - readings.position.minCoeff();
+  std::map<Key, std::vector<Eigen::Index>> groups;
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
+    if (!kept[static_cast<std::size_t>(i)]) continue;
+    Key key{std::lround((readings.position[i] - readings.position.minCoeff()) / travel * 1e4)};
+    for (Eigen::Index s = 0; s < states; ++s) {
+      const Range& range = ranges[static_cast<std::size_t>(s)];
+      key.push_back(
+          range.width() > 0.0 ? std::lround((readings.state(s, i) - range.lower) / range.width() / cell) : 0);
+    }
+    groups[key].push_back(i);
+  }
+  ComponentReadings means;
+  const auto count = static_cast<Eigen::Index>(groups.size());
+  means.position.resize(count);
+  means.state.resize(states, count);
+  means.value.resize(count);
+  Eigen::Index next = 0;
+  for (const auto& [key, rows] : groups) {
+    means.position[next] = readings.position(rows).mean();
+    means.value[next] = readings.value(rows).mean();
+    for (Eigen::Index s = 0; s < states; ++s) means.state(s, next) = readings.state.row(s)(rows).mean();
+    ++next;
+  }
+  return means;
+}
+
+/// Distinct values, counted in cells of a twentieth of the range.
+int distinct(const Eigen::VectorXd& values, int most) {
+  const Range range{values.minCoeff(), values.maxCoeff()};
+  if (range.width() <= 0.0) return 1;
+  std::vector<long> cells;
+  for (const double value : values)
+    cells.push_back(std::lround((value - range.lower) / range.width() * 20.0 * most));
+  std::sort(cells.begin(), cells.end());
+  const auto count = std::unique(cells.begin(), cells.end()) - cells.begin();
+  return static_cast<int>(std::clamp<std::ptrdiff_t>(count, 1, most));
+}
+
+numerics::RidgeFit fit_over(const ComponentReadings& means, const std::vector<std::size_t>& states) {
+  Eigen::MatrixXd inputs(1 + static_cast<Eigen::Index>(states.size()), means.position.size());
+  inputs.row(0) = means.position.transpose();
+  numerics::RidgeOptions options;
+  options.counts = {distinct(means.position, most_centres)};
+  options.spacings = {2.0};
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i) + 1;
+    inputs.row(row) = means.state.row(static_cast<Eigen::Index>(states[i]));
+    options.counts.push_back(distinct(inputs.row(row).transpose(), most_centres_of_state));
+    // Few levels of a state are measured: Gaussians as wide as its range bend little between them.
+    options.spacings.push_back(std::max(1.0, width_of_state * (options.counts.back() - 1)));
+  }
+  return numerics::fit_ridge(inputs, means.value, options);
+}
+
+std::vector<double> squared(const Eigen::VectorXd& values) {
+  std::vector<double> result;
+  for (const double value : values) result.push_back(value * value);
+  return result;
+}
+
+}  // namespace
+
+ComponentFit identify_component(const ComponentReadings& readings) {
+  const Eigen::Index count = readings.position.size();
+  INVAR_EXPECTS(
+      count >= least_component_readings && readings.value.size() == count && readings.state.cols() == count,
+      count, readings.value.size(), readings.state.cols());
+  ComponentFit result;
+  result.kept.assign(static_cast<std::size_t>(count), true);
+  std::vector<std::size_t> states;
+  numerics::RidgeFit fit;
+  // Again without what the fit shows to be far off, until that is settled.
+  for (int round = 0; round < most_rounds; ++round) {
+    const ComponentReadings means = averaged(readings, result.kept);
+    states.clear();
+    fit = fit_over(means, states);
+    result.over_position = fit.leave_one_out_rms();
+    while (states.size() < most_states_of_a_component) {
+      std::optional<numerics::RidgeFit> best;
+      std::size_t which = 0;
+      for (Eigen::Index s = 0; s < means.state.rows(); ++s) {
+        const auto state = static_cast<std::size_t>(s);
+        const bool used = std::find(states.begin(), states.end(), state) != states.end();
+        if (used || distinct(means.state.row(s).transpose(), most_centres_of_state) < 2) continue;
+        std::vector<std::size_t> more = states;
+        more.push_back(state);
+        if (means.position.size() < static_cast<Eigen::Index>(more.size()) + 3) continue;
+        numerics::RidgeFit tried = fit_over(means, more);
+        if (best && tried.leave_one_out_rms() >= best->leave_one_out_rms()) continue;
+        best = std::move(tried);
+        which = state;
+      }
+      if (!best || !surely_less(squared(best->leave_one_out), squared(fit.leave_one_out), standard_errors))
+        break;
+      states.push_back(which);
+      fit = std::move(*best);
+    }
+    result.component = {fit.network, states, 0.0, fit.rms_slope};
+    double variance = 0.0;
+    for (Eigen::Index i = 0; i < means.position.size(); ++i) {
+      Eigen::VectorXd input(1 + static_cast<Eigen::Index>(states.size()));
+      input[0] = means.position[i];
+      for (std::size_t k = 0; k < states.size(); ++k)
+        input[1 + static_cast<Eigen::Index>(k)] = means.state(static_cast<Eigen::Index>(states[k]), i);
+      variance += std::pow(fit.sigma(input), 2) / static_cast<double>(means.position.size());
+    }
+    result.component.sigma = std::sqrt(variance);
+    result.left_out = fit.leave_one_out_rms();
+    std::vector<double> rest;
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Eigen::VectorXd state = readings.state.col(i);
+      rest.push_back(readings.value[i] -
+                     result.component.value(readings.position[i],
+                                            {state.data(), static_cast<std::size_t>(state.size())}));
+    }
+    result.noise = numerics::robust_deviation(rest, 0.0);
+    std::vector<bool> kept;
+    for (const double each : rest)
+      kept.push_back(result.noise <= 0.0 || std::abs(each) <= far_off * result.noise);
+    if (kept == result.kept) break;
+    if (round + 1 < most_rounds) result.kept = kept;
+  }
+  result.rejected = static_cast<std::size_t>(std::count(result.kept.begin(), result.kept.end(), false));
+  return result;
+}
+
+}  // namespace invar::metrology

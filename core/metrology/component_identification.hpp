@@ -1,0 +1,37 @@
+// Error motions that were measured themselves, at several states of the machine, as networks.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/metrology/component_networks.hpp"
+
+namespace invar::metrology {
+
+/// Readings of one error motion.
+struct ComponentReadings {
+  Eigen::VectorXd position;  // N [m], of the moving axis
+  Eigen::MatrixXd state;     // states of the machine x N
+  Eigen::VectorXd value;     // N, m or rad
+};
+
+/// A component's network and how it was chosen.
+struct ComponentFit {
+  ComponentNetwork component;
+  double left_out = 0.0;       // RMS of readings that the fit did not have, m or rad
+  double over_position = 0.0;  // the same with the position alone
+  double noise = 0.0;          // of one reading, about the fit
+  std::size_t rejected = 0;    // readings further off than five robust deviations
+  std::vector<bool> kept;      // N
+};
+
+/// Least number of readings of a component.
+inline constexpr Eigen::Index least_component_readings = 8;
+
+/// A network over the position by ridge regression (GCV), with a state of the machine for a further input where readings left
+/// out are met better by more than two standard errors, the best such state first. Readings at one position and state
+/// (within a twentieth of its range) are averaged. Needs `least_component_readings`, finite. Set-up only.
+ComponentFit identify_component(const ComponentReadings& readings);
+
+}  // namespace invar::metrology

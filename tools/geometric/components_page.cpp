@@ -1,0 +1,144 @@
+#include "tools/geometric/components_page.hpp"
+
+#include <cmath>
+#include <utility>
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::component_count;
+using metrology::is_rotation;
+using report::number;
+using report::si;
+
+std::size_t index(int i) { return static_cast<std::size_t>(i); }
+
+const char* unit_of(int component) { return is_rotation(component) ? "rad" : "m"; }
+std::string unit_of_state(const std::string& name) { return name == "heating_rate" ? "K/s" : "degC"; }
+
+/// Readings beside the network; at three values of the first state that it depends on.
+report::Plot component_plot(const ComponentsResult& result, int component) {
+  const auto& readings = *result.readings[index(component)];
+  const auto& fit = *result.fits[index(component)];
+  const auto& network = fit.component;
+  report::Plot plot;
+  plot.title = std::string{metrology::iso_name(component)} + ", " + metrology::seed_name(component);
+  plot.x_label = std::string(1, metrology::axis_letters[index(metrology::axis_of(component))]) + " [mm]";
+  plot.y_label = is_rotation(component) ? "rotation [urad]" : "translation [um]";
+  report::Series points;
+  points.style = report::Series::Style::points;
+  points.colour = "#9aa7b1";
+  points.label = "readings";
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
+    if (!fit.kept[static_cast<std::size_t>(i)]) continue;
+    points.x.push_back(1e3 * readings.position[i]);
+    points.y.push_back(1e6 * readings.value[i]);
+  }
+  plot.series.push_back(std::move(points));
+  std::vector<double> state;
+  for (const auto& each : result.model.states) state.push_back(each.usual());
+  const char* colours[] = {"#1f6fb4", "#2a9d5c", "#d1495b"};
+  const Range along = network.network.range[0];
+  for (int level = 0; level < (network.states.empty() ? 1 : 3); ++level) {
+    report::Series line;
+    line.colour = colours[level];
+    if (!network.states.empty()) {
+      const auto& first = result.model.states[network.states[0]];
+      state[network.states[0]] = first.range.lower + 0.5 * level * first.range.width();
+      line.label = number(state[network.states[0]], 4) + " " + unit_of_state(first.name);
+    }
+    report::Series band;
+    band.style = report::Series::Style::band;
+    band.colour = line.colour;
+    for (int i = 0; i <= 150; ++i) {
+      const double q = along.lower + along.width() * i / 150.0;
+      const double value = network.value(q, state);
+      const double sigma = network.sigma_at(q, state);
+      line.x.push_back(1e3 * q);
+      line.y.push_back(1e6 * value);
+      band.x.push_back(1e3 * q);
+      band.y.push_back(1e6 * (value - 2.0 * sigma));
+      band.u.push_back(1e6 * (value + 2.0 * sigma));
+    }
+    plot.series.push_back(std::move(band));
+    plot.series.push_back(std::move(line));
+  }
+  return plot;
+}
+
+report::Plot residual_plot(const ComponentsResult& result) {
+  report::Plot plot;
+  plot.title = "Residuals";
+  plot.x_label = "residual over the noise of its component";
+  plot.y_label = "readings";
+  report::Series bars;
+  bars.style = report::Series::Style::bars;
+  constexpr int reach = 12;
+  std::vector<double> counts(2 * reach + 1, 0.0);
+  for (int c = 0; c < component_count; ++c) {
+    if (!result.fits[index(c)] || result.fits[index(c)]->noise <= 0.0) continue;
+    const auto& readings = *result.readings[index(c)];
+    for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
+      const Eigen::VectorXd state = readings.state.col(i);
+      const double rest = readings.value[i] -
+                          result.fits[index(c)]->component.value(
+                              readings.position[i], {state.data(), static_cast<std::size_t>(state.size())});
+      const long bar = std::lround(rest / result.fits[index(c)]->noise / 0.4);
+      if (std::abs(bar) <= reach) counts[static_cast<std::size_t>(bar + reach)] += 1.0;
+    }
+  }
+  for (int k = -reach; k <= reach; ++k) {
+    bars.x.push_back(0.4 * k);
+    bars.y.push_back(counts[index(k + reach)]);
+  }
+  plot.series = {std::move(bars)};
+  return plot;
+}
+
+}  // namespace
+
+std::string ComponentsResult::depends_on(int component) const {
+  std::string text;
+  for (const std::size_t state : fits[index(component)]->component.states)
+    text += (text.empty() ? "" : ", ") + model.states[state].name;
+  return text.empty() ? "position alone" : text;
+}
+
+report::Page components_page(const ComponentsResult& result) {
+  report::Page page{"Error motions measured one by one", result.readings_file.filename().string() + ", " +
+                                                             std::to_string(result.rows) + " readings, " +
+                                                             result.machine_file.filename().string()};
+  page.callout("Error over the travels " + si(result.field_rms, "m") +
+                   " RMS; what is known of it is good to " + si(result.field_sigma, "m") + " (1 sigma)",
+               "good");
+  for (const auto& what : result.unidentified) page.callout("Not identified: " + what, "warn");
+  for (const auto& note : result.notes) page.paragraph(note);
+  page.heading("Components");
+  std::vector<std::vector<std::string>> rows;
+  std::vector<report::Plot> plots;
+  for (int c = 0; c < component_count; ++c) {
+    if (!result.fits[index(c)]) continue;
+    const auto& fit = *result.fits[index(c)];
+    rows.push_back({std::string{metrology::iso_name(c)}, metrology::seed_name(c), result.depends_on(c),
+                    std::to_string(fit.kept.size()) +
+                        (fit.rejected > 0 ? ", " + std::to_string(fit.rejected) + " rejected" : ""),
+                    si(fit.over_position, unit_of(c)), si(fit.left_out, unit_of(c)),
+                    si(fit.component.sigma, unit_of(c))});
+    plots.push_back(component_plot(result, c));
+  }
+  page.table({"ISO 230-1", "seed", "depends on", "readings", "left out, position alone", "left out", "sigma"},
+             rows);
+  for (int pair = 0; pair < metrology::squareness_count; ++pair)
+    if (result.model.squareness_sigma[index(pair)] > 0.0)
+      page.paragraph(std::string{metrology::squareness_iso_name(pair)} + ": " +
+                     report::with_sigma(
+                         metrology::squareness_angle_from_cosine(pair, result.model.squareness[index(pair)]),
+                         result.model.squareness_sigma[index(pair)], "rad"));
+  page.plots(std::move(plots), "Bands are two standard deviations of the curve.");
+  page.heading("Residual");
+  page.plot(residual_plot(result));
+  return page;
+}
+
+}  // namespace invar::tools
