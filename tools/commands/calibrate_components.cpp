@@ -275,7 +275,9 @@ void calibrate(const Options& options) {
   std::cout << "error over the travels " << si(result.field_rms, "m") << " RMS, known to "
             << si(result.field_sigma, "m") << '\n';
   for (const auto& note : result.notes) std::cout << "note: " << note << '\n';
-  for (const auto& what : result.unidentified) std::cout << "not identified: " << what << '\n';
+  std::string missing;
+  for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
+  if (!missing.empty()) std::cout << "not measured, taken as zero: " << missing << '\n';
   std::cout << "report: " << (options.out / "report.html").string() << '\n';
 }
 

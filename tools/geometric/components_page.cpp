@@ -112,7 +112,9 @@ report::Page components_page(const ComponentsResult& result) {
   page.callout("Error over the travels " + si(result.field_rms, "m") +
                    " RMS; what is known of it is good to " + si(result.field_sigma, "m") + " (1 sigma)",
                "good");
-  for (const auto& what : result.unidentified) page.callout("Not identified: " + what, "warn");
+  std::string missing;
+  for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
+  if (!missing.empty()) page.callout("Not measured, taken as zero: " + missing, "warn");
   for (const auto& note : result.notes) page.paragraph(note);
   page.heading("Components");
   std::vector<std::vector<std::string>> rows;

@@ -24,10 +24,8 @@ ErrorMotions truth(const Eigen::Vector3d& p, double temperature, double rate) {
   return m;
 }
 
-class ComponentNetworksTest : public ::testing::Test {
- protected:
-  ComponentNetworksTest() {
-    RecordProperty("seed", 31);
+struct Calibration {
+  Calibration() {
     networks.chain = {{0, 2, 1}, 3};  // any order
     networks.travel = {Range{0.0, 0.2}, Range{0.0, 0.2}, Range{0.0, 0.2}};
     networks.tool = {0.02, -0.01, -0.05};
@@ -63,15 +61,28 @@ class ComponentNetworksTest : public ::testing::Test {
     return {table.row(0), table.middleRows<2>(1), table.row(3)};
   }
 
+  std::mt19937_64 random{31};
+  ComponentNetworks networks;
+  std::array<ComponentFit, component_count> fits;
+};
+
+class ComponentNetworksTest : public ::testing::Test {
+ protected:
+  ComponentNetworksTest() { RecordProperty("seed", 31); }
+  static const Calibration& calibration() {
+    static const Calibration once;
+    return once;
+  }
+
   Eigen::Vector3d somewhere() { return {0.2 * part(random), 0.2 * part(random), 0.2 * part(random)}; }
   std::array<double, 2> some_state() {
     return {26.0 + 4.0 * part(random), 1e-3 * (2.0 * part(random) - 1.0)};
   }
 
-  std::mt19937_64 random{31};
+  std::mt19937_64 random{32};
   std::uniform_real_distribution<double> part;
-  ComponentNetworks networks;
-  std::array<ComponentFit, component_count> fits;
+  const ComponentNetworks& networks = calibration().networks;
+  const std::array<ComponentFit, component_count>& fits = calibration().fits;
 };
 
 TEST_F(ComponentNetworksTest, DependOnWhatTheReadingsDoAndOnNothingElse) {
