@@ -1,6 +1,8 @@
 // Monte Carlo of the identification on random machines (metrology.md section 6): error left in the volume by line set.
 //
-//     build/bin/bench_geometric_monte_carlo [machines] [rows that contain this text]
+//     build/bin/bench_geometric_monte_carlo [machines] [rows that contain this text] [whole]
+//
+// `whole`: curves of the first four whole waves of the travel, with the slopes that they have.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -78,13 +80,15 @@ double quantile(std::vector<double> values, double part) {
   return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
+testing::MachineSpread spread;
+
 void row(const std::string& name, const Chain& chain, const std::vector<Ends>& ends,
          IdentificationMethod method, int machines, int points = 41) {
   std::vector<double> before, after, inside, predicted, seconds;
   const int count = chain.axes == 2 ? 21 : 7;
   for (int m = 0; m < machines; ++m) {
     std::mt19937_64 random{static_cast<unsigned>(1000 + m)};
-    const Machine machine = testing::random_machine(chain, {0.2, 0.2, 0.2}, random);
+    const Machine machine = testing::random_machine(chain, {0.2, 0.2, 0.2}, random, spread);
     std::vector<DisplacementLine> lines;
     for (std::size_t l = 0; l < ends.size(); ++l)
       lines.push_back(testing::measure(machine, "L" + std::to_string(l), 0.2 * ends[l].from, 0.2 * ends[l].to,
@@ -124,6 +128,7 @@ int main(int argc, char** argv) {
   using namespace invar::metrology;
   const int machines = argc > 1 ? std::atoi(argv[1]) : 60;
   const std::string only = argc > 2 ? argv[2] : "";
+  if (argc > 3 && std::string{argv[3]} == "whole") spread.family = {4, 1.5, 1.0, false};
   const Chain xy{{1, 0, 2}, 2};
   const Chain xyz{{1, 0, 2}, 3};
   std::printf("%d machines, 200 mm, six passes of 1 um white and 0.5 um repeatability; um, seeds 1000..\n",

@@ -12,6 +12,15 @@
 
 namespace invar::metrology::testing {
 
+/// How the curves of a machine look.
+struct CurveFamily {
+  int harmonics = 6;
+  double falls = 1.5;  // amplitudes as h^-falls
+  double base = 2.0;   // the longest wave, in travels
+  bool straight =
+      true;  // the best straight line is taken away: a slope is squareness, scale or a turned frame
+};
+
 struct MachineSpread {
   double straightness = 2e-6;  // m, RMS
   double angle = 8e-6;         // rad, RMS
@@ -19,22 +28,22 @@ struct MachineSpread {
   double slope = 5e-5;         // scale error, one sigma
   double pitch = 0.4e-6;       // m, at 32 mm
   double squareness = 30e-6;   // rad, one sigma
+  CurveFamily family;
 };
 
-/// A band-limited curve, zero at the start: six harmonics of twice the travel, amplitudes falling as h^-1.5, sampled at 81
-/// places; `rms` about its best straight line, which is taken away (a slope is squareness, scale or a turned frame).
-inline std::vector<double> random_curve(double travel, double rms, std::mt19937_64& random,
-                                        std::vector<double>& places) {
+/// A band-limited curve, zero at the start, sampled at 81 places; `rms` about its best straight line.
+inline std::vector<double> random_curve(double travel, double rms, const CurveFamily& family,
+                                        std::mt19937_64& random, std::vector<double>& places) {
   std::normal_distribution<double> normal;
   constexpr int count = 81;
   std::vector<double> values(count, 0.0);
   places.clear();
   for (int i = 0; i < count; ++i) places.push_back(travel * i / (count - 1));
-  for (int h = 1; h <= 6; ++h) {
-    const double in = normal(random) / std::pow(h, 1.5);
-    const double out = normal(random) / std::pow(h, 1.5);
+  for (int h = 1; h <= family.harmonics; ++h) {
+    const double in = normal(random) / std::pow(h, family.falls);
+    const double out = normal(random) / std::pow(h, family.falls);
     for (std::size_t i = 0; i < count; ++i) {
-      const double angle = 3.141592653589793 * h * places[i] / travel;
+      const double angle = 6.283185307179586 * h * places[i] / (family.base * travel);
       values[i] += in * std::sin(angle) + out * std::cos(angle);
     }
   }
@@ -54,6 +63,7 @@ inline std::vector<double> random_curve(double travel, double rms, std::mt19937_
     power += rest * rest / count;
   }
   const double first = values.front();
+  if (!family.straight) slope = 0.0;
   for (std::size_t i = 0; i < count; ++i)
     values[i] = (values[i] - first - slope * places[i]) * rms / std::sqrt(power);
   return values;
@@ -75,7 +85,7 @@ inline Machine random_machine(const Chain& chain, const std::array<double, 3>& t
       const double rms =
           is_rotation(c) ? spread.angle : (is_positioning(c) ? spread.positioning : spread.straightness);
       std::vector<double> places;
-      std::vector<double> values = random_curve(travel[a], rms, random, places);
+      std::vector<double> values = random_curve(travel[a], rms, spread.family, random, places);
       std::vector<ErrorFunction::Harmonic> waves;
       std::vector<double> polynomial;
       if (is_positioning(c)) {
