@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "tools/geometric/components_file.hpp"
+
 namespace invar::tools {
 
 namespace {
@@ -15,7 +17,6 @@ using report::si;
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 const char* unit_of(int component) { return is_rotation(component) ? "rad" : "m"; }
-std::string unit_of_state(const std::string& name) { return name == "heating_rate" ? "K/s" : "degC"; }
 
 /// Readings beside the network; at three values of the first state that it depends on.
 report::Plot component_plot(const ComponentsResult& result, int component) {
