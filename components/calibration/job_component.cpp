@@ -10,6 +10,12 @@ void JobComponent::activate() {
   report(job::JOB_IDLE, "ready");
 }
 
+/// Who commands motion ends before what moves does, so that nobody has to refuse it.
+bool JobComponent::wind_down() noexcept {
+  if (task_.running()) end(job::JOB_CANCELLED, "it was told to come to rest");
+  return true;
+}
+
 void JobComponent::deactivate() noexcept {
   if (task_.running()) end(job::JOB_CANCELLED, "the component was deactivated");
 }

@@ -19,6 +19,7 @@ class JobComponent : public Component {
  public:
   void activate() override;
   void step(const Tick& tick) noexcept override;
+  bool wind_down() noexcept override;
   void deactivate() noexcept override;
 
   /// There is a job of this name.

@@ -52,6 +52,11 @@ class Compensation final : public Component {
     void describe(auto& p);
   };
   explicit Compensation(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override {
+    const std::string folder = std::filesystem::path{parameters_.state}.lexically_normal().string();
+    return folder.empty() ? std::vector<Claim>{}
+                          : std::vector<Claim>{{"the folder " + folder, "state", true}};
+  }
   ~Compensation() override;
   void configure() override;
   void activate() override;

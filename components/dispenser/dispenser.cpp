@@ -37,6 +37,9 @@ Dispenser::Dispenser(const Parameters& parameters)
   modbus::must_take(map, "pressure", {parameters.pressure, parameters.pressure}, "pressure");
   modbus::must_take(map, "purge_pressure", {parameters.purge_pressure, parameters.purge_pressure},
                     "purge_pressure");
+  device_ = parameters.modbus.device(map);
+  modbus::must_let_go(map, "modbus.map", {"enable", "pressure"});
+  modbus::must_let_go(map, "modbus.map", {"purge", "purge_pressure"});
   modbus::must_take(map, "band", {parameters.band, parameters.band}, "band");
   const auto taken = [&](const char* reg) {
     const Range range = map.registers[map.find(reg).value()].range;
@@ -47,6 +50,10 @@ Dispenser::Dispenser(const Parameters& parameters)
   for (const Pattern& pattern : parameters.patterns) patterns_[pattern.name] = targets(pattern);
   if (patterns_.size() != parameters.patterns.size())
     throw InputError{"patterns", "two have one name", "rename one of them"};
+}
+
+std::vector<Component::Claim> Dispenser::claims() const {
+  return {{device_, "modbus", parameters_.modbus.is_on_this_pc()}};
 }
 
 void Dispenser::configure() {

@@ -54,6 +54,7 @@ class Dispenser final : public Component {
   };
 
   explicit Dispenser(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override;
   void configure() override;
   void activate() override;
   void deactivate() noexcept override;
@@ -80,6 +81,7 @@ class Dispenser final : public Component {
   Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
 
   Notices notices_{*this};
+  std::string device_;  // in words
   modbus::Client client_;
   Range pressures_, purge_pressures_;  // that the map and `settable` both take
   std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;

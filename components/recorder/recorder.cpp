@@ -30,9 +30,35 @@ void Recorder::configure() {
   channels_.clear();
 }
 
+/// Writes what waits, the ledger and the summary.
 void Recorder::cleanup() noexcept {
   const std::scoped_lock lock{mutex_};
-  writer_.reset();  // writes what waits, the ledger and the summary
+  if (writer_ && !writer_->close())
+    notices_.say(event::SEVERITY_FAULT,
+                 ("the recording ends early, since the disk takes no more: " + file().string()).c_str());
+  writer_.reset();
+}
+
+void Recorder::activate() {
+  look_at_ = now();
+  told_lost_ = 0;
+}
+
+void Recorder::step(const Tick& tick) noexcept {
+  const std::scoped_lock lock{mutex_};
+  if (!writer_) return;
+  if (writer_->status().failed)
+    return fail(
+        "the disk takes no more: the recording has ended; make room, then reset, configure and activate");
+  if (tick.now < look_at_) return;
+  look_at_ = tick.now + Duration::seconds(10.0);
+  const std::uint64_t lost = writer_->ledger().total().lost;
+  if (lost > told_lost_)
+    notices_.say(event::SEVERITY_FAULT, (std::to_string(lost - told_lost_) +
+                                         " samples are lost: the disk is slower than the cell; name fewer "
+                                         "`topics`, or lower their rates by `publish`")
+                                            .c_str());
+  told_lost_ = lost;
 }
 
 bool Recorder::is_wanted(const std::string& topic) const {

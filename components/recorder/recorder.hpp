@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/component/component.hpp"
+#include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/recording/recording_writer.hpp"
 
@@ -25,7 +26,8 @@ struct Source {
 };
 
 /// Writes samples as they travel, in CDR. The process that runs it knows the cell's topics and hands the samples over:
-/// `offer` says which are wanted, `record` takes one. Not real-time.
+/// `is_wanted` says which, `record` takes one. A disk that takes no more is an error of the component; what is lost because it
+/// is slower than the cell is said in a notice, at most every ten seconds. Not real-time.
 class Recorder final : public Component {
  public:
   struct Parameters {
@@ -39,9 +41,13 @@ class Recorder final : public Component {
     }
   };
   explicit Recorder(const Parameters& parameters) : parameters_{parameters} {}
+  [[nodiscard]] std::vector<Claim> claims() const override {
+    return {{"the file " + file().lexically_normal().string(), "name", true}};
+  }
   void configure() override;
   void cleanup() noexcept override;
-  void step(const Tick&) noexcept override {}
+  void activate() override;
+  void step(const Tick& tick) noexcept override;
 
   [[nodiscard]] std::filesystem::path file() const {
     return std::filesystem::path{parameters_.out} / parameters_.name;
@@ -56,6 +62,9 @@ class Recorder final : public Component {
 
  private:
   const Parameters& parameters_;
+  Notices notices_{*this};
+  std::uint64_t told_lost_ = 0;
+  Instant look_at_;
   std::mutex mutex_;
   std::unique_ptr<recording::RecordingWriter> writer_;
   std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;  // by topic and writer

@@ -1,8 +1,10 @@
 #include "components/stage/axis_stage.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "core/compensation/model_file.hpp"
@@ -28,6 +30,19 @@ physics::AxisControllerSettings settings(const Stage::Control& control, double p
 
 double chosen(double asked, double own) { return asked > 0.0 ? std::min(asked, own) : own; }
 
+/// Limits of a command may be so small that numbers cannot tell the way any more.
+bool are_usable(const MotionLimits& asked, const Stage::Limits& own) {
+  constexpr double least = 1e-9;
+  return asked.velocity >= least * own.velocity && asked.acceleration >= least * own.acceleration &&
+         asked.jerk >= least * own.jerk;
+}
+
+/// ... or that it takes for ever.
+bool ends(const Trajectory& trajectory) {
+  constexpr double longest = 1e6;  // s
+  return trajectory.duration() <= longest;
+}
+
 }  // namespace
 
 Stage::Stage(const Parameters& parameters)
@@ -42,10 +57,14 @@ Stage::Stage(const Parameters& parameters)
   motor_.set_safe_value(released);
 }
 
+std::vector<Component::Claim> Stage::claims() const {
+  return {{"axis " + std::to_string(parameters_.axis), "axis"}};
+}
+
 void Stage::activate() {
   mode_ = AXIS_MODE_DISABLED;
   primed_ = false;
-  blind_ = leaving_ = false;
+  blind_ = leaving_ = disabling_ = false;
   seen_.reset();
   homed_ = parameters_.absolute_encoder;
   offset_ = 0.0;
@@ -88,7 +107,20 @@ double Stage::Faded::operator()(double value, bool changed, double period) noexc
   return last = value + rest;
 }
 
-void Stage::deactivate() noexcept { mode_ = AXIS_MODE_DISABLED; }
+bool Stage::moves() const noexcept {
+  return mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING || mode_ == AXIS_MODE_STOPPING;
+}
+
+void Stage::deactivate() noexcept {
+  if (moves()) {
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(),
+                  "axis %lld is let go of while it moves at %.4g m/s: it did not come to rest in time",
+                  static_cast<long long>(parameters_.axis), sample_.velocity());
+    notices_.say(event::SEVERITY_TRIP, text.data());
+  }
+  mode_ = AXIS_MODE_DISABLED;
+}
 
 bool Stage::wind_down() noexcept {
   leaving_ = true;
@@ -121,11 +153,11 @@ bool Stage::start_sine(const AxisCommand& command, const Tick& tick) noexcept {
                         speed <= parameters_.limits.velocity &&
                         speed * frequency <= parameters_.limits.acceleration;
   const Range travel = parameters_.travel;
-  if (mode_ != AXIS_MODE_HOLDING || !homed_ || !possible || !travel.contains(from) ||
+  const auto sine = Trajectory::sine(from, command.amplitude(), command.period(), command.periods());
+  if (mode_ != AXIS_MODE_HOLDING || !homed_ || !possible || !ends(sine) || !travel.contains(from) ||
       !travel.contains(from + 2.0 * command.amplitude()))
     return false;
-  begin(Trajectory::sine(from, command.amplitude(), command.period(), command.periods()), tick,
-        AXIS_MODE_MOVING);
+  begin(sine, tick, AXIS_MODE_MOVING);
   return true;
 }
 
@@ -135,17 +167,19 @@ bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
                             chosen(command.acceleration(), own.acceleration),
                             chosen(command.jerk(), own.jerk)};
   const bool standing = mode_ == AXIS_MODE_HOLDING;
+  if (!are_usable(limits, own)) return false;
   if (command.kind() == AXIS_COMMAND_MOVE) {
     const Range travel = parameters_.travel;
-    if (!standing || !homed_ || !travel.contains(command.position())) return false;
-    begin(Trajectory::move(setpoint(tick).position, command.position(), limits), tick, AXIS_MODE_MOVING);
+    const auto move = Trajectory::move(setpoint(tick).position, command.position(), limits);
+    if (!standing || !homed_ || !travel.contains(command.position()) || !ends(move)) return false;
+    begin(move, tick, AXIS_MODE_MOVING);
     return true;
   }
-  if (!standing) return false;
   const double beyond = setpoint(tick).position - 1.5 * parameters_.travel.width();
-  begin(Trajectory::move(setpoint(tick).position, beyond,
-                         {parameters_.homing_velocity, limits.acceleration, limits.jerk}),
-        tick, AXIS_MODE_HOMING);
+  const auto home = Trajectory::move(setpoint(tick).position, beyond,
+                                     {parameters_.homing_velocity, limits.acceleration, limits.jerk});
+  if (!standing || !ends(home)) return false;
+  begin(home, tick, AXIS_MODE_HOMING);
   homed_ = false;
   return true;
 }
@@ -162,7 +196,13 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       }
       break;
     case AXIS_COMMAND_DISABLE:
-      if (mode_ != AXIS_MODE_FAULT) mode_ = AXIS_MODE_DISABLED;
+      if (moves()) {
+        disabling_ = true;
+        if (mode_ != AXIS_MODE_STOPPING) brake(setpoint(tick), tick);
+        done = false;
+      } else if (mode_ != AXIS_MODE_FAULT) {
+        mode_ = AXIS_MODE_DISABLED;
+      }
       break;
     case AXIS_COMMAND_MOVE:
     case AXIS_COMMAND_HOME:
@@ -194,13 +234,9 @@ void Stage::brake(const MotionPoint& from, const Tick& tick) noexcept {
 /// Lets go of the motor and says why.
 void Stage::trip(const char* why) noexcept {
   mode_ = AXIS_MODE_FAULT;
+  disabling_ = false;
   fed_forward_ = {};
-  stamp(notice_);
-  notice_.component_id(id);
-  notice_.level(event::SEVERITY_TRIP);
-  notice_.source(name.c_str());
-  notice_.text(why);
-  notices_.write(notice_);
+  notices_.say(event::SEVERITY_TRIP, why);
 }
 
 /// What of the inputs is no number; nullptr: nothing.
@@ -279,7 +315,8 @@ void Stage::supervise(const Tick& tick) noexcept {
     if (mode_ == AXIS_MODE_HOMING) {  // travelled the whole way and never saw the switch
       sample_.command_refused(true);
     }
-    mode_ = AXIS_MODE_HOLDING;
+    mode_ = disabling_ ? AXIS_MODE_DISABLED : AXIS_MODE_HOLDING;
+    disabling_ = false;
     sample_.command_done(true);
   }
 }
@@ -320,6 +357,8 @@ void Stage::step(const Tick& tick) noexcept {
   }
 
   if (leaving_ && (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING)) brake(setpoint(tick), tick);
+  // At rest and about to leave, a plant that has left before is no fault.
+  if (leaving_ && !seeing && mode_ == AXIS_MODE_HOLDING) mode_ = AXIS_MODE_DISABLED;
   const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
   if (driving && !seeing) {
     stop_blindly(
@@ -368,7 +407,7 @@ void Stage::publish(const MotionPoint& at) noexcept {
   sample_.following_error(following_error_);
   sample_.mode(mode_);
   sample_.homed(homed_);
-  sample_.moving(mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING || mode_ == AXIS_MODE_STOPPING);
+  sample_.moving(moves());
   sample_.enabled(mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT);
   sample_.settled(settled_);
   state_.write(sample_);

@@ -5,15 +5,16 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "components/stage/trajectory.hpp"
 #include "core/component/component.hpp"
+#include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/component/staged_model.hpp"
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
 #include "idl/compensation.h"
-#include "idl/event.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
 
@@ -24,7 +25,8 @@ namespace invar::stage {
 /// the axis, as `invar diagnose` writes it, may be loaded, also while running: then its forces, those of its terms included,
 /// are what is fed forward, and what its encoder terms know is taken out of the reading.
 /// Safe value: motor not enabled. Feedback that is stale or no number: it brakes on feedforward, then trips. Following error,
-/// limit switches and a fault of the drive trip it at once; a notice says why. To be deactivated, it brakes first.
+/// limit switches and a fault of the drive trip it at once; a notice says why. To be disabled or deactivated, it brakes first;
+/// deactivated while it still moves it says in a notice how fast.
 class Stage final : public Component {
  public:
   struct Control {
@@ -96,6 +98,7 @@ class Stage final : public Component {
   };
 
   explicit Stage(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override;
   void configure() override { model_.open(parameters_.model, "diagnose the axis again"); }
   void activate() override;
   void cleanup() noexcept override { model_.close(); }
@@ -125,6 +128,7 @@ class Stage final : public Component {
   void supervise(const Tick& tick) noexcept;
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
   void publish(const MotionPoint& setpoint) noexcept;
+  [[nodiscard]] bool moves() const noexcept;
   [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
   [[nodiscard]] double feedforward(const Tick& tick) noexcept;
 
@@ -135,7 +139,7 @@ class Stage final : public Component {
   Inbox<AxisCommand> command_{*this, "command"};
   Output<MotorCommand> motor_{*this, "motor"};
   Output<AxisState> state_{*this, "state"};
-  Output<event::Notice> notices_{*this, "notices", "event"};
+  Notices notices_{*this};
   Staged model_;
   Faded fed_forward_, reading_error_;
   bool model_changed_ = false;
@@ -147,10 +151,10 @@ class Stage final : public Component {
   AxisState sample_;     // what was published last; answers to commands are kept in it
   bool primed_ = false;  // the controller knows the loop's rate
   bool homed_ = false;
-  event::Notice notice_;
   bool blind_ = false;  // feedback is lost: braking on feedforward alone
   const char* blind_because_ = "";
   bool leaving_ = false;         // to be deactivated: it brakes and takes no commands
+  bool disabling_ = false;       // told to let go of the motor: it brakes first
   std::optional<Instant> seen_;  // when feedback that is usable came last
   double offset_ = 0.0;          // what homing adds to the encoder's reading
   double position_ = 0.0;

@@ -80,14 +80,21 @@ Trajectory Trajectory::move(double from, double to, const MotionLimits& limits) 
 Trajectory Trajectory::stop(const MotionPoint& from, const MotionLimits& limits) noexcept {
   Trajectory result;
   result.end_ = from;
-  const double settle = std::abs(from.acceleration) / limits.jerk;
-  result.append(settle, from.acceleration > 0 ? -limits.jerk : limits.jerk);
-  result.end_.acceleration = 0.0;
-  const double jerk = result.end_.velocity > 0 ? -limits.jerk : limits.jerk;
-  const VelocityChange change = velocity_change(std::abs(result.end_.velocity), limits);
-  result.append(change.ramp, jerk);
-  result.append(change.hold, 0.0);
-  result.append(change.ramp, -jerk);
+  // Where the velocity would go if the acceleration only faded; that way the braking has to push.
+  const double fading = from.velocity + from.acceleration * std::abs(from.acceleration) / (2 * limits.jerk);
+  const double sign = fading < 0.0 ? -1.0 : 1.0;
+  const double velocity = sign * from.velocity;
+  const double acceleration = sign * from.acceleration;
+  // From `acceleration` down to -peak, held there, and back to 0: the velocity falls by all it has.
+  double peak = std::sqrt(std::max(0.0, acceleration * acceleration / 2 + limits.jerk * velocity));
+  double hold = 0.0;
+  if (peak > limits.acceleration) {
+    peak = limits.acceleration;
+    hold = (velocity + (acceleration * acceleration / 2 - peak * peak) / limits.jerk) / peak;
+  }
+  result.append((acceleration + peak) / limits.jerk, -sign * limits.jerk);
+  result.append(hold, 0.0);
+  result.append(peak / limits.jerk, sign * limits.jerk);
   result.end_ = {result.end_.position, 0.0, 0.0};
   return result;
 }

@@ -29,7 +29,7 @@ class Trajectory {
   static Trajectory move(double from, double to, const MotionLimits& limits) noexcept;
   /// `periods` times from + amplitude (1 - cos(2 pi t / period)): at rest at both ends, but for a step of the acceleration.
   static Trajectory sine(double from, double amplitude, double period, unsigned periods) noexcept;
-  /// From any motion to rest: first the acceleration is taken back, then a double-S braking.
+  /// From any motion to rest in the least time: a move that is stopped never goes beyond where it was to end.
   static Trajectory stop(const MotionPoint& from, const MotionLimits& limits) noexcept;
 
   /// The motion `time` [s] after the start; the end point afterwards, the start before.

@@ -25,7 +25,12 @@ Thermal::Thermal(const Parameters& parameters)
                                         {"delivered_power", "W"},
                                         {"comm_lost"}});
   modbus::must_take(map, "power", {0.0, parameters.power_limit}, "power_limit");
+  device_ = parameters.modbus.device(map);
+  modbus::must_let_go(map, "modbus.map", {"enable", "power"});
   has_fault_bit_ = map.find("sensor_fault").has_value();
+  has_latch_bit_ = map.find("over_temperature").has_value();
+  has_reset_ = map.find("reset_alarms").has_value();
+  if (has_reset_) modbus::must_have(map, "modbus.map", "heater", {"reset_alarms", "1", true});
   for (const Zone& zone : parameters.zones) {
     if (!map.find(zone.name + "_resistance"))
       throw InputError{"zones", "the map has no register `" + zone.name + "_resistance`",
@@ -33,8 +38,12 @@ Thermal::Thermal(const Parameters& parameters)
     modbus::must_have(map, "modbus.map", "heater", {zone.name + "_resistance", "ohm"});
     zones_.push_back({zone.name + "_resistance", equation_of(zone.thermistor),
                       std::make_unique<Output<NodeTemperature>>(*this, "temperature_" + zone.name, "state"),
-                      0.0});
+                      unknown});
   }
+}
+
+std::vector<Component::Claim> Thermal::claims() const {
+  return {{device_, "modbus", parameters_.modbus.is_on_this_pc()}};
 }
 
 void Thermal::configure() { client_.open(parameters_.modbus, simulated_time); }
@@ -90,7 +99,11 @@ void Thermal::obey(const ThermalCommand& command) noexcept {
   if (Parameters::setpoints.contains(setpoint) && setpoint < parameters_.over_temperature) {
     setpoint_ = setpoint;
     wanted_ = command.enabled();
-    if (command.reset_latch()) latched_ = false;
+    if (command.reset_latch()) {
+      latched_ = false;
+      reset_at_ = now();
+      if (has_reset_) (void)client_.device().write("reset_alarms", 1.0);
+    }
     return;
   }
   wanted_ = wanted_ && command.enabled();
@@ -137,6 +150,27 @@ void Thermal::tell(bool sound, const Tick& tick) noexcept {
   }
 }
 
+/// Too hot: off until somebody resets it. A device that latched by itself is off, whatever it is told.
+void Thermal::latch(bool sound, const Tick& tick) noexcept {
+  constexpr Duration grace = Duration::milliseconds(500);  // until a reset shows
+  const bool hot = sound && temperature_ > parameters_.over_temperature;
+  const bool device = has_latch_bit_ && client_.device().value("over_temperature").value != 0.0 &&
+                      !client_.device().value("over_temperature").stale && tick.now - reset_at_ > grace;
+  if (!(hot || device) || std::exchange(latched_, true)) return;
+  std::array<char, 200> text{};
+  if (hot)
+    std::snprintf(text.data(), text.size(),
+                  "%.4g degC is above `over_temperature`: the heater is off until a command resets the latch",
+                  temperature_);
+  else
+    std::snprintf(text.data(), text.size(),
+                  "the controller has switched the heater off at its own limit, the slide at %.4g degC: it "
+                  "is off until a "
+                  "command resets the latch",
+                  temperature_);
+  notices_.say(event::SEVERITY_TRIP, text.data());
+}
+
 void Thermal::step(const Tick& tick) noexcept {
   ThermalCommand command;
   while (command_.take(command)) obey(command);
@@ -149,7 +183,7 @@ void Thermal::step(const Tick& tick) noexcept {
   if (!client_.refuses()) client_.device().refresh();
 
   if (sound) temperature_ = *measured_now;
-  if (sound && temperature_ > parameters_.over_temperature) latched_ = true;
+  latch(sound, tick);
   bool enable = sound && wanted_ && !latched_ && !client_.refuses();
   if (!enable) primed_ = false;
   if (!drive(enable ? control(temperature_, tick.period) : 0.0, enable)) {

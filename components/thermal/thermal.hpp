@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,8 +20,9 @@ namespace invar::thermal {
 
 /// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go when readings are stale or outside
 /// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
-/// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature` the latch
-/// holds until a command resets it. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
+/// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature`, or when
+/// the device latches at a limit of its own (register `over_temperature`). It holds until a command resets it, and the device
+/// with it (register `reset_alarms`). Each of these is said once in a notice, and once when it is over. A command whose setpoint is
 /// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component {
  public:
@@ -83,6 +85,7 @@ class Thermal final : public Component {
   };
 
   explicit Thermal(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override;
   void configure() override;
   void activate() override;
   void deactivate() noexcept override;
@@ -96,7 +99,9 @@ class Thermal final : public Component {
                                                const metrology::Thermistor& thermistor) const noexcept;
   [[nodiscard]] bool drive(double power, bool enable) noexcept;
   void tell(bool sound, const Tick& tick) noexcept;
+  void latch(bool sound, const Tick& tick) noexcept;
 
+  static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // before the first reading
   const Parameters& parameters_;
   Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Output<NodeTemperature> state_{*this, "state", "state"};
@@ -106,14 +111,15 @@ class Thermal final : public Component {
     std::string resistance;  // name of its register
     metrology::Thermistor thermistor;
     std::unique_ptr<Output<NodeTemperature>> output;
-    double temperature = 0.0;
+    double temperature = unknown;
   };
   void publish_zone(ZoneSensor& zone) noexcept;
   std::vector<ZoneSensor> zones_;
+  std::string device_;  // in words
   modbus::Client client_;
   double setpoint_ = 0.0;
   double setpoint_parameter_ = 0.0;
-  double temperature_ = 0.0;
+  double temperature_ = unknown;
   double integral_ = 0.0;
   double slope_ = 0.0;
   double previous_ = 0.0;
@@ -121,6 +127,9 @@ class Thermal final : public Component {
   bool wanted_ = true;
   bool latched_ = false;
   bool has_fault_bit_ = false;  // the map has `sensor_fault`
+  bool has_latch_bit_ = false;  // ... `over_temperature`
+  bool has_reset_ = false;      // ... `reset_alarms`
+  Instant reset_at_{INT64_MIN / 2};
   bool told_unsound_ = false;
   bool told_undriven_ = false;
   std::optional<Instant> unsound_since_;  // the device answers, and its sensor cannot be

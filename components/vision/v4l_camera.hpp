@@ -31,6 +31,9 @@ class V4lCamera final : public FrameCamera {
   explicit V4lCamera(const Parameters& parameters)
       : FrameCamera{parameters.camera}, parameters_{parameters} {}
   ~V4lCamera() override { stop(); }
+  [[nodiscard]] std::vector<Claim> claims() const override {
+    return is_file() ? std::vector<Claim>{} : std::vector<Claim>{{parameters_.device, "device", true}};
+  }
   void configure() override;
   void cleanup() noexcept override { stop(); }
 

@@ -49,6 +49,10 @@ class SimulatedHeater final : public Component {
     }
   };
   explicit SimulatedHeater(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override {
+    return {{"the port " + parameters_.modbus.host + ":" + std::to_string(parameters_.modbus.port), "port",
+             true}};
+  }
   void configure() override;
   void cleanup() noexcept override;
   void activate() override;

@@ -40,6 +40,10 @@ class SimulatedPneumatics final : public Component {
     }
   };
   explicit SimulatedPneumatics(const Parameters& parameters);
+  [[nodiscard]] std::vector<Claim> claims() const override {
+    return {{"the port " + parameters_.modbus.host + ":" + std::to_string(parameters_.modbus.port), "port",
+             true}};
+  }
   void configure() override;
   void cleanup() noexcept override;
   void activate() override;

@@ -107,13 +107,14 @@ void SimulatedStage::step(const Tick& tick) noexcept {
   last_ = tick.now;
   const auto* slide = slide_.latest();
   const auto* base = base_.latest();
-  const double temperature = slide != nullptr ? slide->temperature() : parameters_.temperature;
+  const bool known = slide != nullptr && std::isfinite(slide->temperature());
+  const double temperature = known ? slide->temperature() : parameters_.temperature;
   const double lag = machine_.errors->scale_lag;
   scale_temperature_ = warm_ && lag > 0.0 ? metrology::lag_step(scale_temperature_, slide_temperature_,
                                                                 temperature, tick.period, lag)
                                           : temperature;
   slide_temperature_ = temperature;
-  warm_ = slide != nullptr;
+  warm_ = known;
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   for (auto& device : devices_) {
     const auto* command = device->motor.latest();
@@ -152,9 +153,9 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     device->truth.write(truth);
     position[device->axis] = device->plant.position();
   }
-  const Eigen::Vector3d growth =
-      machine::heat_growth(machine_, position, scale_temperature_,
-                           base != nullptr ? base->temperature() : parameters_.temperature);
+  const Eigen::Vector3d growth = machine::heat_growth(
+      machine_, position, scale_temperature_,
+      base != nullptr && std::isfinite(base->temperature()) ? base->temperature() : parameters_.temperature);
   const Eigen::Vector3d tool =
       position + metrology::simulated_error(machine_, directions_, position, machine_.tool, moving_, growth);
   sensing::ToolPosition sample;

@@ -79,6 +79,15 @@ class Component {
   };
   [[nodiscard]] const std::vector<Bumpless>& bumpless() const noexcept { return bumpless_; }
 
+  /// Something of the plant that only one component of a cell may have: the drive of an axis, a device, a port.
+  struct Claim {
+    std::string what;         // "the drive of axis 0"
+    std::string parameter;    // that chose it
+    bool of_this_pc = false;  // another PC has one of the same name: a loopback address, a file
+  };
+  /// Set-up: what is this component's alone; two that claim the same are a fault of the deployment.
+  [[nodiscard]] virtual std::vector<Claim> claims() const { return {}; }
+
   /// The name in the deployment ("stage_x"). Set before configure.
   std::string name;
   /// Numeric identity of the cell and of this component, for the keys of its samples. Set before configure.

@@ -176,6 +176,8 @@ Cell read_cell(const Yaml& yaml) {
   for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
   const Node hosts = root.required("hosts");
   for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));
+  if (hosts.is_map() && cell.hosts.empty())
+    hosts.fault("has no hosts", "name at least one, as `pc: {address: 127.0.0.1}`");
   const Node processes = root.required("processes");
   std::uint32_t next_id = 1;
   for (const Node& process : processes.map()) cell.processes.push_back(read_process(process, next_id));

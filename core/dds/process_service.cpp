@@ -181,8 +181,12 @@ void ProcessService::publish_news() {
     const std::string name = control_.executor().component(change.component).name;
     const bool failed = change.to == LifecycleState::error;
     std::string text{to_text(change.from)};
-    text += " -> " + std::string{to_text(change.to)} + (failed ? ": " + std::string{change.why.data()} : "");
-    publish(failed ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, name, text);
+    const std::string why = change.why.data();
+    text += " -> " + std::string{to_text(change.to)} + (why.empty() ? "" : ": " + why);
+    publish(failed        ? event::SEVERITY_FAULT
+            : why.empty() ? event::SEVERITY_NOTE
+                          : event::SEVERITY_WARNING,
+            name, text);
   }
 }
 

@@ -245,6 +245,7 @@ bool Executor::is_stepped() const noexcept {
 void Executor::wind_down(Slot& slot, Instant now, bool leave) noexcept {
   if (slot.state.load(std::memory_order_relaxed) != LifecycleState::active) return;
   if (!slot.winding) slot.leave_by = now + options_.wind_down;
+  at_rest_.store(false, std::memory_order_release);  // nobody has looked yet
   slot.winding = winding_ = true;
   slot.leaving = slot.leaving || leave;
 }
@@ -253,12 +254,15 @@ void Executor::wind_down(Slot& slot, Instant now, bool leave) noexcept {
 void Executor::take_down(Instant now) noexcept {
   if (!winding_) return;
   const bool may_wait = is_stepped();
+  bool at_rest = true;
   for (const auto& slot : slots_) {
     slot->braking = false;
     if (!slot->winding || !may_wait || now >= slot->leave_by) continue;
     slot->component->set_now(now, count_.cycle);
     slot->braking = !slot->component->wind_down();
+    at_rest = at_rest && !slot->braking;
   }
+  at_rest_.store(at_rest, std::memory_order_release);
   winding_ = false;
   for (const std::size_t index : take_down_order_) {
     Slot& slot = *slots_[index];
@@ -271,10 +275,15 @@ void Executor::take_down(Instant now) noexcept {
 
 void Executor::deactivate(Slot& slot, Instant now) noexcept {
   if (slot.state.load(std::memory_order_relaxed) != LifecycleState::active) return;
-  slot.component->set_now(now, count_.cycle);
-  slot.component->deactivate();
+  Component& component = *slot.component;
+  component.set_now(now, count_.cycle);
+  const bool clock_is_over = options_.simulated && !is_stepped();
+  const bool moves = !clock_is_over && !component.wind_down();
+  component.deactivate();
   for (OutputPort* output : slot.outputs) output->write_safe_value();
-  change_state(loop_changes_, slot, LifecycleState::inactive, now);
+  constexpr std::string_view why = "it was let go of while it still moved: its time to come to rest was over";
+  change_state(loop_changes_, slot, LifecycleState::inactive, now, moves ? why : std::string_view{});
+  if (moves) box_.trip(slot.error_prefix, why, now, count_.cycle);
 }
 
 void Executor::go_to_error(Slot& slot, std::string_view why, Instant now) noexcept {

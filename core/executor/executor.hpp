@@ -65,7 +65,7 @@ struct StateChange {
   std::uint32_t component = 0;  // index
   LifecycleState from = LifecycleState::unconfigured;
   LifecycleState to = LifecycleState::unconfigured;
-  std::array<char, 160> why{};  // when `to` is error
+  std::array<char, 160> why{};  // when `to` is error, or it had to leave while it moved
 };
 
 /// One process has one executor. Its thread ("the loop") is the only one that steps, activates and
@@ -128,6 +128,8 @@ class Executor {
   /// Asks all active components to come to rest; whoever deactivates them next waits the less. Waits for the loop's answer
   /// only.
   void wind_down_all();
+  /// Since then: nothing moves any more, or the time for it is over.
+  [[nodiscard]] bool is_at_rest() const noexcept { return at_rest_.load(std::memory_order_acquire); }
   /// Hands a new value to the loop and waits until it is applied, between two steps. Empty: done; otherwise
   /// the reason why not.
   [[nodiscard]] std::string set_parameter(std::size_t index, std::string_view path, double value);
@@ -136,8 +138,9 @@ class Executor {
   [[nodiscard]] std::optional<double> parameter(std::size_t index, std::string_view path) const;
 
   /// Stops safely: at the next cycle all active components are deactivated, downstream first, their outputs
-  /// get their safe values, and the black box freezes. Who moves brakes before, and keeps what it reads alive so long. Nothing is activated until clear_trip(). Does not
-  /// wait.
+  /// get their safe values, and the black box freezes. Who moves brakes before, and keeps what it reads alive so long; who
+  /// does not come to rest in time is let go of, and the state's change and another black box say so. Nothing is activated
+  /// until clear_trip(). Does not wait.
   void trip(std::string_view reason);
   void clear_trip();
   /// Freezes the black box without stopping anything. Does not wait.
@@ -223,6 +226,7 @@ class Executor {
   Histogram wake_up_, compute_, latency_;
   bool late_input_ = false;  // in the current cycle
   bool winding_ = false;     // some component is to come to rest
+  std::atomic<bool> at_rest_{true};
   Instant stall_end_{INT64_MIN};
   Duration stall_;
   std::optional<StateChange> next_loop_change_, next_manager_change_;  // the reader's

@@ -18,6 +18,11 @@ Conversion conversion_from_si(const std::string& unit) {
 
 }  // namespace
 
+std::string Endpoint::device(const RegisterMap& registers) const {
+  const std::string address = host == "localhost" ? "127.0.0.1" : host;
+  return "the device at " + address + ":" + std::to_string(port) + ", unit " + std::to_string(registers.unit);
+}
+
 RegisterMap load_map_of(const std::filesystem::path& file, const std::string& key, const std::string& device,
                         std::initializer_list<Needed> needed) {
   if (file.empty()) throw InputError{key, "missing", "name the " + device + "'s register map"};
@@ -52,6 +57,19 @@ void must_take(const RegisterMap& map, const std::string& name, Range values, co
        << ", and the map's range is " << shown(reg.range.lower) << " to " << shown(reg.range.upper);
   throw InputError{key, what.str(),
                    "stay inside, or correct the register's `range` if the device takes more"};
+}
+
+void must_let_go(const RegisterMap& map, const std::string& key,
+                 std::initializer_list<const char*> registers) {
+  std::string names;
+  for (const char* name : registers) {
+    const auto index = map.find(name);
+    for (const CommLoss::Set& set : map.comm_loss.set)
+      if (set.reg == index && set.value == 0.0) return;
+    names += (names.empty() ? "`" : " or `") + std::string{name} + "`";
+  }
+  throw InputError{key, "does not switch the device off when its master is lost",
+                   "set " + names + " to 0 under `comm_loss.set` of the map"};
 }
 
 std::unique_ptr<Server> serve(const ServedEndpoint& parameters) {

@@ -25,6 +25,9 @@ struct Endpoint {
     p(port, "port", 1, 65535, "TCP port");
     p(map, "map", "register map");
   }
+  /// "the device at 10.0.0.5:502, unit 1", which can have one master only.
+  [[nodiscard]] std::string device(const RegisterMap& registers) const;
+  [[nodiscard]] bool is_on_this_pc() const { return host == "localhost" || host.starts_with("127."); }
 };
 
 /// Parameters of a component that plays a device.
@@ -57,6 +60,9 @@ void must_have(const RegisterMap& map, const std::string& key, const std::string
                const Needed& needed);
 /// Throws InputError when the register does not take all `values` [SI] that the parameter `key` lets the component write.
 void must_take(const RegisterMap& map, const std::string& reg, Range values, const std::string& key);
+/// Throws InputError when none of the registers is set to 0 at comm loss: the device would go on when its master is dead.
+void must_let_go(const RegisterMap& map, const std::string& key,
+                 std::initializer_list<const char*> registers);
 
 /// The device that these parameters describe, listening from now on. Throws InputError as `load_map` and `Server` do.
 [[nodiscard]] std::unique_ptr<Server> serve(const ServedEndpoint& parameters);

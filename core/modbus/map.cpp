@@ -290,8 +290,10 @@ void read_comm_loss(const config::Yaml& yaml, const Node& root, RegisterMap& map
     const std::size_t before = yaml.fault_count();
     decide(entry, *found);
     const double value = value_of(reg, entry);
-    if (yaml.fault_count() == before && reg.is_actuator && switches_on(reg, value))
-      entry.fault("switches `" + reg.name + "` on when the master is lost", "set it to 0");
+    const bool reasoned = entry.is_map() && !entry.text("because", "").empty();
+    if (yaml.fault_count() == before && reg.is_actuator && switches_on(reg, value) && !reasoned)
+      entry.fault("switches `" + reg.name + "` on when the master is lost",
+                  "set it to 0; where on is its safe state, as a vent's, write {value: ..., because: why}");
     map.comm_loss.set.push_back({*found, value});
   }
   for (const Node& entry : node["hold"].list()) {

@@ -70,7 +70,9 @@ struct Heartbeat {
   std::optional<std::size_t> timeout_setting;  // the register that holds `timeout`, if the device has one
 };
 
-/// What the device does of itself when the heartbeat stands still, or before the first one.
+/// What the device does of itself when the heartbeat stands still, or before the first one. An actuator is then off (a
+/// temperature has no off); one that is safe when on, as a vent that lets the pressure out, says why beside its value:
+/// `set: {vent: {value: 1, because: open it lets the pressure out}}`.
 struct CommLoss {
   struct Set {
     std::size_t reg = 0;

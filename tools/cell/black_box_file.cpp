@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/fault.hpp"
 #include "core/recording/recording_writer.hpp"
 
 namespace invar::tools {
@@ -63,7 +64,10 @@ std::filesystem::path write_black_box(const BlackBoxRecord& record, const std::f
       append(cdr, record.samples[i * record.signals.size() + k]);
     writer.write(channel, static_cast<std::uint32_t>(i + 1), cycle.due, cycle.due, cdr);
   }
-  writer.close();
+  if (!writer.close()) {
+    std::filesystem::remove(file);
+    throw InputError{file.string(), "cannot be written whole", "make room on the disk"};
+  }
   return file;
 }
 

@@ -148,6 +148,24 @@ void check_owners(const LoadedCell& loaded) {
       }
 }
 
+/// Two components that want the same of the plant for themselves.
+void check_claims(const LoadedCell& loaded) {
+  std::map<std::string, std::string> owner;
+  for (const LoadedProcess& process : loaded.processes)
+    for (const LoadedComponent& member : process.components) {
+      if (!member.component) continue;
+      for (const Component::Claim& claim : member.component->claims()) {
+        const std::string pc = claim.of_this_pc ? process.file->host : "";
+        const auto [known, added] = owner.emplace(pc + " " + claim.what, member.file->name);
+        if (added) continue;
+        const Node at = member.file->node;
+        (at.has(claim.parameter) ? at[claim.parameter] : at)
+            .fault("takes " + claim.what + ", which is `" + known->second + "`'s already",
+                   "give one of them another `" + claim.parameter + "`");
+      }
+    }
+}
+
 /// How long it takes until the next sample of an output comes to another process.
 Duration between_samples(const config::CellProcess& writer, const config::CellComponent& component,
                          const std::string& port) {
@@ -202,6 +220,7 @@ void connect_ports(LoadedCell& loaded) {
       for (Port* port : member.component->ports()) connect_port(loaded, member, *port);
     }
   check_owners(loaded);
+  check_claims(loaded);
   check_latencies(loaded);
 }
 

@@ -18,6 +18,7 @@
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
@@ -83,12 +84,21 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   return child;
 }
 
-/// Waits for its end or for `condition`.
+/// Waits for its end or for `condition`, so many seconds at most.
 template <class Condition>
-void wait_for(Child& child, Condition condition) {
+void wait_for(Child& child, Condition condition, double patience = 10.0) {
   const auto begin = Clock::now();
-  for (child.poll(false); child.running && !condition() && seconds_since(begin) < 10.0; child.poll(false))
+  for (child.poll(false); child.running && !condition() && seconds_since(begin) < patience; child.poll(false))
     sleep_a_little();
+}
+
+/// What moves brakes while all that it moves on and reads is still there, in whichever process.
+void bring_to_rest(std::vector<Child>& children, const std::filesystem::path& folder) {
+  for (Child& child : children)
+    if (child.running) kill(child.pid, SIGUSR1);
+  for (Child& child : children)
+    wait_for(
+        child, [&] { return std::filesystem::exists(rest_file(outcome_of(child.name, folder))); }, 5.0);
 }
 
 /// SIGTERM, patience, SIGKILL. Components come down process by process, in the order of the file; what the processes have to
@@ -253,6 +263,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   }
   std::vector<bool> by_itself;
   for (const Child& child : children) by_itself.push_back(!child.running);
+  if (!outcome.simulated) bring_to_rest(children, folder.path());
   stop_in_order(children, folder.path());
   for (std::size_t i = 0; i < children.size(); ++i) {
     const Child& child = children[i];

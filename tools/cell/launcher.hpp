@@ -34,8 +34,8 @@ struct LaunchOutcome {
 };
 
 /// Runs until the job has ended, `stop` is set, the time is over or a process ended by itself; without a job, a process that
-/// was killed or failed is started again. Stops in the order of the cell
-/// file, each process with its components downstream first: the file names what moves first and the recorder last.
+/// was killed or failed is started again. To stop, all that moves comes to rest first, in every process; then they stop in the
+/// order of the cell file, each with its components downstream first: the file names what moves first and the recorder last.
 LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace invar::tools

@@ -1,16 +1,19 @@
 #include "tools/cell/process.hpp"
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <deque>
 #include <fstream>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
+#include "core/base/clock.hpp"
 #include "core/dds/cell_client.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
@@ -74,10 +77,9 @@ class RunningProcess {
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 
-  int run(const std::atomic<bool>& stop) {
+  int run(const ProcessOrders& orders) {
     if (supervisor_ != nullptr) client_ = std::make_unique<dds::CellClient>(node_);
-    const int status = options_.simulated ? run_simulated(stop) : run_by_the_clock(stop);
-    return status;
+    return options_.simulated ? run_simulated(orders.stop) : run_by_the_clock(orders);
   }
 
  private:
@@ -186,7 +188,29 @@ class RunningProcess {
     return true;
   }
 
-  int run_by_the_clock(const std::atomic<bool>& stop) {
+  /// What others move on or read must be there until they rest, too: nobody leaves before it is told.
+  void come_to_rest() {
+    if (!resting_) executor_.wind_down_all();
+    resting_ = true;
+    if (told_rest_ || !executor_.is_at_rest() || options_.outcome.empty()) return;
+    std::ofstream{rest_file(options_.outcome)} << '\n';
+    told_rest_ = true;
+  }
+
+  /// True when `invar run` is no more, which nobody could stop any more either; later, when everybody has had the time to
+  /// come to rest, it is `over`.
+  bool is_orphan(bool& over) {
+    if (options_.outcome.empty() || getppid() == parent_) return false;
+    const Instant now = monotonic_now();
+    if (!orphan_since_) {
+      orphan_since_ = now;
+      spdlog::warn("{}: `invar run` is no more: coming to rest and stopping", file_.name);
+    }
+    over = now - *orphan_since_ > executor_.options().wind_down;
+    return true;
+  }
+
+  int run_by_the_clock(const ProcessOrders& orders) {
     each_port([&](std::size_t index, Port& port) {
       if (port.direction() == Port::Direction::output)
         node_.bind(static_cast<OutputPort&>(port), {.period = file_.realtime ? file_.period : Duration{},
@@ -199,8 +223,10 @@ class RunningProcess {
     executor_.start();
     const bool up = bring_up();
     service_->publish_status();  // who waits for the cell need not wait for the next regular one
-    while (up && !stop.load() && !asked_to_stop_ && executor_.is_running() && !job_ended_) {
+    for (bool over = false; up && !over && !orders.stop.load() && !asked_to_stop_ && executor_.is_running() &&
+                            (!job_ended_ || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (is_orphan(over) || orders.rest.load()) come_to_rest();
       for (const dds::Alarm& alarm : node_.take_alarms()) {
         spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
         service_->publish(event::SEVERITY_FAULT, file_.name, alarm.topic + ": " + alarm.text);
@@ -385,6 +411,9 @@ class RunningProcess {
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
   std::map<std::string, std::int64_t> last_status_;
   std::atomic<bool> asked_to_stop_{false};
+  const pid_t parent_ = getppid();
+  std::optional<Instant> orphan_since_;
+  bool resting_ = false, told_rest_ = false;
   recorder::Recorder* recorder_ = nullptr;
   supervisor::Supervisor* supervisor_ = nullptr;
   std::vector<std::unique_ptr<dds::Connection>> topics_;
@@ -399,14 +428,18 @@ class RunningProcess {
 
 }  // namespace
 
-int run_process(const ProcessOptions& options, const std::atomic<bool>& stop) {
+std::filesystem::path rest_file(const std::filesystem::path& outcome) {
+  return std::filesystem::path{outcome}.replace_extension(".rest");
+}
+
+int run_process(const ProcessOptions& options, const ProcessOrders& orders) {
   LoadedCell loaded = load_cell(options.cell);
   LoadedProcess* process = loaded.process(options.process);
   if (process == nullptr)
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
                      mend_name(options.process, loaded.process_names())};
   const ProcessClaim claim{*loaded.cell, options.process};
-  return RunningProcess{options, loaded, *process}.run(stop);
+  return RunningProcess{options, loaded, *process}.run(orders);
 }
 
 }  // namespace invar::tools

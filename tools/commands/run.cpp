@@ -19,9 +19,9 @@ namespace invar::tools {
 
 namespace {
 
-std::atomic<bool> stop_requested{false};
+ProcessOrders orders;
 
-void request_stop(int) { stop_requested = true; }
+void take_order(int signal) { (signal == SIGUSR1 ? orders.rest : orders.stop) = true; }
 
 struct Options {
   LaunchOptions launch;
@@ -34,9 +34,8 @@ struct Options {
 int run(Options& options) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("run"));  // stdout is the summary's
   struct sigaction action {};
-  action.sa_handler = request_stop;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  action.sa_handler = take_order;
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaction(signal, &action, nullptr);
   if (options.simulated || options.real_time) options.launch.simulated = options.simulated;
   if (!options.process.empty())
     return run_process({.cell = options.launch.cell,
@@ -45,8 +44,8 @@ int run(Options& options) {
                         .paced = options.launch.pace > 0.0,
                         .job = options.launch.job,
                         .outcome = options.outcome},
-                       stop_requested);
-  const LaunchOutcome outcome = launch(options.launch, stop_requested);
+                       orders);
+  const LaunchOutcome outcome = launch(options.launch, orders.stop);
   summarise(outcome, std::cout);
   if (!outcome.failure.empty()) std::cerr << "invar run: " << outcome.failure << '\n';
   return outcome.failure.empty() ? 0 : 1;
@@ -58,8 +57,9 @@ void add_run(CLI::App& program) {
   auto* command = program.add_subcommand("run", "Run a cell: all its processes on this PC, or one of them");
   command->footer(
       "Example: invar run deployment/xy-table.yaml --job calibrate-geometry\n"
-      "Ctrl-C stops the cell in the order of its file. Exit status: 0 in order, 1 something failed, 2 the "
-      "file has faults");
+      "Ctrl-C stops the cell: all that moves comes to rest first, then process by process in the order of "
+      "the "
+      "file. Exit status: 0 in order, 1 something failed, 2 the file has faults");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");

@@ -229,6 +229,30 @@ TEST(Executor, WhatDoesNotComeToRestIsLetGoInTime) {
   EXPECT_EQ(track.states(), "aa-");
   track.executor.advance_to(at_ms(61));
   EXPECT_EQ(track.states(), "---");
+  std::vector<std::string> told;
+  for (StateChange change; track.executor.take_change(change);)
+    if (change.to == LifecycleState::inactive && change.why[0] != 0)
+      told.push_back(std::to_string(change.component) + ": " + change.why.data());
+  EXPECT_THAT(told, ElementsAre(HasSubstr("1: it was let go of while it still moved")));
+}
+
+TEST(Executor, AllThatMovesCanBeBroughtToRestWhileEverythingGoesOn) {
+  Track track{simulated()};
+  track.executor.advance_to(at_ms(10));
+  EXPECT_TRUE(track.executor.is_at_rest());  // nobody was asked
+  track.executor.wind_down_all();
+  for (int ms = 10; ms < 30; ++ms) {
+    EXPECT_FALSE(track.executor.is_at_rest()) << ms;
+    track.executor.advance_to(at_ms(ms + 1));
+  }
+  track.executor.advance_to(at_ms(31));
+  EXPECT_TRUE(track.executor.is_at_rest());
+  track.executor.advance_to(at_ms(100));
+  EXPECT_EQ(track.states(), "aaa");
+  EXPECT_EQ(track.runner->speed, 0);
+  EXPECT_TRUE(track.executor.transition(1, Transition::deactivate).ok());
+  for (StateChange change; track.executor.take_change(change);)
+    EXPECT_TRUE(change.to == LifecycleState::active || change.why[0] == 0);
 }
 
 TEST(Executor, NobodyIsWaitedForWhenNobodySteps) {

@@ -27,6 +27,19 @@ TEST(RegisterMap, ReadsTheHeatersMapInSi) {
   EXPECT_EQ(map.comm_loss.set.size(), 2U);
 }
 
+TEST(RegisterMap, AnActuatorThatIsSafeWhenOnSaysWhy) {
+  const std::string vented =
+      "invar_modbus_map: 1\ndevice: valves\nheartbeat: {register: beat, timeout: 1}\n"
+      "comm_loss: {set: {vent: {value: 1, because: open it lets the pressure out}, pump: 0}}\nregisters:\n"
+      "  vent: {address: 0, kind: coil, type: bool, access: read_write, role: actuator, read_back: self}\n"
+      "  pump: {address: 1, kind: coil, type: bool, access: read_write, role: actuator, read_back: self}\n"
+      "  beat: {address: 0, kind: holding, type: uint16, access: read_write, role: setting}\n";
+  const RegisterMap map = parse_map(vented, "valves.yaml");
+  ASSERT_EQ(map.comm_loss.set.size(), 2U);
+  EXPECT_EQ(map.comm_loss.set[0].value, 1.0);
+  EXPECT_EQ(map.comm_loss.set[1].value, 0.0);
+}
+
 TEST(RegisterMap, ConvertsUnitScaleOffsetAndRangeOnce) {
   const RegisterMap map = load_map(INVAR_SOURCE_DIR "/deployment/maps/pneumatic.yaml");
   EXPECT_EQ(named(map, "pressure").word_order, WordOrder::cdab);

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <random>
 
 namespace invar::stage {
 namespace {
@@ -405,6 +406,103 @@ TEST(Stage, BrakesWithinItsLimitsBeforeItIsDeactivated) {
   bench.stage.deactivate();
   bench.stage.activate();
   bench.enable();  // as new
+}
+
+TEST(Stage, BrakesBeforeItLetsGoWhenItIsDisabled) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.09; }));
+  bench.send(AXIS_COMMAND_DISABLE);
+  bench.send(AXIS_COMMAND_DISABLE);  // said twice it is still once
+  ASSERT_TRUE(bench.run_until(
+      [&](const AxisState& s) {
+        EXPECT_TRUE(s.enabled() || std::abs(bench.velocity) < 2e-3) << bench.velocity;
+        return s.mode() == AXIS_MODE_DISABLED;
+      },
+      200));
+  EXPECT_TRUE(bench.state.latest()->command_done());
+  EXPECT_FALSE(bench.state.latest()->command_refused());
+  bench.enable();
+  EXPECT_TRUE(bench.run_until([](const AxisState& s) { return s.settled(); }, 100));
+}
+
+TEST(Stage, AtRestAndAboutToLeaveItDoesNotTripWhenItsPlantHasLeft) {
+  Bench bench;
+  bench.enable();
+  EXPECT_TRUE(bench.stage.wind_down());
+  bench.seeing = false;
+  for (int i = 0; i < 100; ++i) ASSERT_NE(bench.cycle_once().mode(), AXIS_MODE_FAULT) << i;
+  EXPECT_EQ(bench.state.latest()->mode(), AXIS_MODE_DISABLED);
+  EXPECT_FALSE(bench.motor.latest()->enabled());
+  EXPECT_EQ(bench.notices.received(), 0U);
+}
+
+TEST(Stage, LetGoWhileItMovesItSaysWhichAxisAndHowFast) {
+  Bench bench;
+  bench.enable();
+  bench.stage.deactivate();
+  EXPECT_EQ(bench.notices.received(), 0U);  // it stood
+  bench.stage.activate();
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  ASSERT_TRUE(bench.run_until([&](const AxisState&) { return bench.velocity > 0.099; }));
+  bench.stage.deactivate();
+  ASSERT_EQ(bench.notices.received(), 1U);
+  const std::string text = bench.notices.latest()->text().c_str();
+  EXPECT_EQ(text.find("axis 0 is let go of while it moves at 0.09"), 0U) << text;
+}
+
+// Whatever numbers a command carries: every current is one within its limit, and setpoints keep to the axis' limits.
+TEST(Stage, NoCommandTakesItBeyondItsLimits) {
+  const auto seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random{seed};
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  const std::vector<double> edges{0.0,    -0.0, nan,   inf,  -inf, 5e-324,     1e-300, 1e300,
+                                  -1e300, 1e-9, -1e-9, 1e-3, 0.01, 0.05,       0.1,    0.2,
+                                  0.15,   2.0,  60.0,  1e9,  -0.1, 0.2 + 1e-15};
+  const auto any = [&](const auto& from) { return from[random() % from.size()]; };
+  const std::vector<AxisCommandKind> kinds{AXIS_COMMAND_ENABLE, AXIS_COMMAND_DISABLE,    AXIS_COMMAND_MOVE,
+                                           AXIS_COMMAND_MOVE,   AXIS_COMMAND_MOVE,       AXIS_COMMAND_SINE,
+                                           AXIS_COMMAND_STOP,   AXIS_COMMAND_CLEAR_FAULT};
+  Bench bench;
+  bench.enable();
+  const Stage::Limits& limits = bench.parameters.limits;
+  int moved = 0;
+  for (int round = 0; round < 3000; ++round) {
+    AxisCommand command;
+    command.id(bench.next_id++);
+    command.kind(any(kinds));
+    command.position(any(edges));
+    command.velocity(any(edges));
+    command.acceleration(any(edges));
+    command.jerk(any(edges));
+    command.amplitude(any(edges));
+    command.period(any(edges));
+    command.periods(static_cast<std::uint32_t>(random() % 4));
+    bench.command.write(command);
+    for (auto cycles = random() % 60; cycles > 0; --cycles) {
+      const AxisState& s = bench.cycle_once();
+      ASSERT_TRUE(std::abs(bench.motor.latest()->current()) <= bench.parameters.control.limit) << round;
+      // Without a motor the carriage, which has no friction, drifts on at some um/s: a move may begin a little outside.
+      ASSERT_TRUE(!s.moving() || (s.setpoint_position() > -1e-4 && s.setpoint_position() < 0.2 + 1e-4))
+          << round << ": " << s.setpoint_position();
+      ASSERT_TRUE(std::abs(s.setpoint_velocity()) <= limits.velocity * (1 + 1e-6)) << s.setpoint_velocity();
+      ASSERT_TRUE(std::abs(s.setpoint_acceleration()) <= limits.acceleration * (1 + 1e-6))
+          << s.setpoint_acceleration();
+      ASSERT_NE(s.mode(), AXIS_MODE_FAULT) << round << ": " << bench.notices.latest()->text().c_str();
+      moved += static_cast<int>(s.moving());
+    }
+  }
+  EXPECT_GT(moved, 5000);
+  for (const auto kind : {AXIS_COMMAND_STOP, AXIS_COMMAND_ENABLE}) {
+    bench.send(kind);
+    ASSERT_TRUE(bench.run_until([](const AxisState& s) { return s.command_done() && !s.moving(); })) << kind;
+  }
+  bench.send(AXIS_COMMAND_MOVE, 0.12);
+  EXPECT_TRUE(bench.run_until([](const AxisState& s) { return s.command_done() && s.settled(); }));
+  EXPECT_NEAR(bench.position, 0.12, 1e-6);
 }
 
 TEST(Stage, SafeValueLetsGoOfTheMotor) {

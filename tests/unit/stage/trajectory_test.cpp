@@ -56,7 +56,11 @@ TEST(Trajectory, StopsFromAnyPointOfAMove) {
   for (int i = 0; i < 20; ++i) {
     const double t = time(random);
     SCOPED_TRACE("seed " + std::to_string(seed) + ", stop at " + std::to_string(t) + " s");
-    check(Trajectory::stop(move.at(t), limits), move.at(t));
+    const auto stop = Trajectory::stop(move.at(t), limits);
+    check(stop, move.at(t));
+    EXPECT_LE(stop.target(), 0.1 + 1e-9);
+    EXPECT_GE(stop.target(), move.at(t).position);
+    EXPECT_LE(t + stop.duration(), move.duration() + 1e-6);
   }
 }
 

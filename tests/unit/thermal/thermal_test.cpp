@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <bit>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -136,10 +137,11 @@ TEST(Thermal, TwoRunsAgreeBitForBit) {
     Bench bench{script};
     bench.heater_parameters.noise = 0.003;
     bench.bring_up();
-    std::vector<double> trace;
+    std::vector<std::uint64_t> trace;  // bits, since what is not measured yet is no number
     for (int i = 0; i < 800; ++i) {
       const NodeTemperature& state = bench.cycle_once();
-      trace.insert(trace.end(), {state.temperature(), state.heater_power(), state.stale() ? 1.0 : 0.0});
+      for (const double value : {state.temperature(), state.heater_power(), state.stale() ? 1.0 : 0.0})
+        trace.push_back(std::bit_cast<std::uint64_t>(value));
     }
     return trace;
   };
@@ -183,6 +185,7 @@ TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   NodeTemperature state;
   for (int i = 0; i < 6000 && !state.over_temperature(); ++i) state = bench.cycle_once();
   ASSERT_TRUE(state.over_temperature());
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("degC is above `over_temperature`")));
   state = bench.run_for(600.0);
   EXPECT_TRUE(state.over_temperature());
   EXPECT_EQ(state.heater_power(), 0.0);
@@ -192,6 +195,32 @@ TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   reset.reset_latch(true);
   bench.command.write(reset);
   EXPECT_FALSE(bench.cycle_once().over_temperature());
+}
+
+TEST(Thermal, DeviceThatLatchesAtItsOwnLimitIsSaidAndResetWithTheLoopsLatch) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.thermal_parameters.modbus.map = bench.heater_parameters.modbus.map = test::changed_map(
+      folder, "heater.yaml", {{"range: [0, 150], initial: 80", "range: [0, 150], initial: 26"}});
+  bench.bring_up();
+  NodeTemperature state;
+  for (int i = 0; i < 600 && !state.over_temperature(); ++i) state = bench.cycle_once();
+  ASSERT_TRUE(state.over_temperature());
+  EXPECT_LT(state.temperature(), 26.0);  // the pad is hotter than the slide
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("switched the heater off at its own limit")));
+  for (int i = 0; i < 6000; ++i) ASSERT_FALSE(bench.cycle_once().enabled()) << i;
+  EXPECT_THAT(bench.said(), IsEmpty());
+  ThermalCommand reset;
+  reset.setpoint(30.0);
+  reset.enabled(true);
+  reset.reset_latch(true);
+  bench.command.write(reset);
+  double power = 0.0;
+  for (int i = 0; i < 20 && power == 0.0; ++i) {
+    bench.cycle_once();
+    power = bench.heater_power();
+  }
+  EXPECT_GT(power, 1.0);
 }
 
 TEST(Thermal, CommandWhoseSetpointCannotBeIsRefusedAndTheLoopGoesOn) {
@@ -298,6 +327,40 @@ TEST(Thermal, RefusesAMapThatCannotTakeItsPowerOrMeasuresSomethingElse) {
   EXPECT_EQ(fault({{"scale: 0.01, unit: W, range: [0, 200]", "scale: 10, unit: mW, range: [0, 200000]"}}),
             "(no fault)");
   EXPECT_THAT(fault({{"scale: 0.001, unit: ohm", "scale: 0.001, unit: V"}}), HasSubstr("`slide_resistance`"));
+}
+
+TEST(Thermal, RefusesAMapThatLeavesTheHeaterOnWhenItsMasterDies) {
+  const invar::testing::TemporaryFolder folder;
+  for (const char* action :
+       {"  hold: [enable, power]", "  set: {enable: {value: 1, because: I like it warm}}\n  hold: [power]"}) {
+    Thermal::Parameters parameters;
+    parameters.modbus.map =
+        test::changed_map(folder, "heater.yaml", {{"  set: {enable: 0, power: 0}", action}});
+    try {
+      const Thermal thermal{parameters};
+      ADD_FAILURE() << action;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("does not switch the device off when its master is lost"))
+          << action;
+    }
+  }
+}
+
+TEST(Thermal, ATemperatureThatItHasNotGotIsNone) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench{
+      folder.write("faults.yaml", "invar_modbus_faults: 1\nfaults:\n  - {at: 0, for: 5, do: refuse}\n")};
+  bench.bring_up();
+  for (int i = 0; i < 45; ++i) {
+    const NodeTemperature& state = bench.cycle_once();
+    ASSERT_TRUE(std::isnan(state.temperature())) << i;
+    ASSERT_TRUE(std::isnan(bench.base.latest()->temperature())) << i;
+    ASSERT_TRUE(state.stale());
+    ASSERT_FALSE(state.enabled());
+  }
+  const NodeTemperature sound = bench.run_for(30.0);
+  EXPECT_FALSE(sound.stale());
+  EXPECT_GT(sound.temperature(), 15.0);
 }
 
 TEST(Thermal, DeviceThatRefusesWritesIsLetGoAndSaidOnceAndOnceAgainWhenItTakesThem) {
