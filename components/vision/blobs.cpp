@@ -39,7 +39,7 @@ bool is_disc(const Blob& blob, const cv::Mat1b& image) {
          !at_border(blob, image);
 }
 
-Side make_side(const cv::Mat1b& image, const cv::Mat1b& mask, int polarity, double smallest) {
+Side make_side(const cv::Mat1b& image, const BitMask& mask, int polarity, double smallest) {
   Side side;
   side.polarity = polarity;
   side.found = label_blobs(mask, smallest);
