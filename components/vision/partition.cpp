@@ -160,7 +160,7 @@ Partition partition(const cv::Mat1b& image, int window, int polarity) {
       count.at(i, j) = static_cast<float>(rows_of(j).count * std::min(tile, width - i * tile));
   }
   const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
-  TileField mean{columns, rows, width};
+  TileField mean{columns, rows};
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i) mean.at(i, j) = whole.at(i, j) / whole_n.at(i, j);
   const int step = 2 * histogram_step(image);
@@ -178,7 +178,7 @@ Partition partition(const cv::Mat1b& image, int window, int polarity) {
   // sees real classes. Then what lies beyond the threshold; nothing where that does not stand out from the noise.
   TileSums things{columns, rows}, things_n{columns, rows};
   const auto divide = [&](Beyond side, BitMask& mask) {
-    TileField threshold{columns, rows, width};
+    TileField threshold{columns, rows};
     const auto away = static_cast<float>(side == Beyond::above ? margin : -margin);
     for (int j = 0; j < rows; ++j)
       for (int i = 0; i < columns; ++i) threshold.at(i, j) = mean.at(i, j) + away;

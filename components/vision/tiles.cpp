@@ -9,8 +9,6 @@ namespace invar::vision {
 
 namespace {
 
-constexpr int lanes = 8;  // px that are interpolated at once
-
 // Pixels of a tile's row, or sums of such down the tile.
 using TileBytes [[gnu::vector_size(tile)]] = std::uint8_t;
 using TileWords [[gnu::vector_size(2 * tile)]] = std::uint16_t;
@@ -34,29 +32,27 @@ inline void load(const std::uint8_t* from, int columns, TileBytes& to) {
   }
 }
 
-// From levels at the middles of the tiles to a row of pixels between them, rounded: 8 bits below the point, in 16.
-void interpolate(const std::vector<float>& levels, std::vector<std::uint8_t>& row) {
-  using Words [[gnu::vector_size(16)]] = std::uint16_t;
-  using Bytes [[gnu::vector_size(8)]] = std::uint8_t;
-  constexpr Words ramp{0, 1, 2, 3, 4, 5, 6, 7};
-  const int columns = static_cast<int>(levels.size()), width = static_cast<int>(row.size());
-  const auto level = [&](int i) { return levels[static_cast<std::size_t>(std::clamp(i, 0, columns - 1))]; };
-  for (int i = -1; i < columns; ++i) {
-    const float left = level(i);
-    const int slope = static_cast<int>((level(i + 1) - left) * (256.0F / tile));
-    const int start = static_cast<int>(left * 256.0F) + slope / 2 + 128, begin = i * tile + tile / 2;
-    for (int part = 0; part < tile; part += lanes) {
-      const Words words = (Words{} + static_cast<std::uint16_t>(start + part * slope) +
-                           ramp * static_cast<std::uint16_t>(slope)) >>
-                          8;
-      const Bytes bytes = __builtin_convertvector(words, Bytes);
-      const int at = begin + part, from = std::max(0, -at), to = std::min(lanes, width - at);
-      if (to - from == lanes) {
-        std::memcpy(row.data() + at, &bytes, sizeof bytes);
-      } else {
-        for (int k = from; k < to; ++k) row[static_cast<std::size_t>(at + k)] = bytes[k];
-      }
-    }
+// From levels at the middles of the tiles to pixels between them, rounded: 8 bits below the point, in 16. Writes from half a
+// tile before the first pixel to the end of a tile; `levels` has one more at either end.
+INVAR_WIDE_VECTORS
+void interpolate(const float* levels, int columns, std::uint8_t* row) {
+  constexpr TileWords ramp{0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+  for (int i = 0; i <= columns; ++i, row += tile) {
+    const int slope = static_cast<int>((levels[i + 1] - levels[i]) * (256.0F / tile));
+    const int start = static_cast<int>(levels[i] * 256.0F) + slope / 2 + 128;
+    const TileWords words =
+        (TileWords{} + static_cast<std::uint16_t>(start) + ramp * static_cast<std::uint16_t>(slope)) >> 8;
+    const TileBytes bytes = __builtin_convertvector(words, TileBytes);
+    std::memcpy(row, &bytes, sizeof bytes);
+  }
+}
+
+// The levels of two rows of tiles, mixed.
+INVAR_WIDE_VECTORS
+void mix(const float* one, const float* other, float share, int length, float* levels) {
+  for (int i = 0; i < length; ++i) {
+    const float level = one[i] + share * (other[i] - one[i]);
+    levels[i] = level < 0.0F ? 0.0F : (level > 255.0F ? 255.0F : level);
   }
 }
 
@@ -91,24 +87,23 @@ TileSums TileSums::windowed(int reach) const {
   return both;
 }
 
-TileField::TileField(int columns, int rows, int width)
+TileField::TileField(int columns, int rows)
     : columns_{columns},
       rows_{rows},
       values_(static_cast<std::size_t>(columns * rows)),
-      levels_(static_cast<std::size_t>(columns)),
-      row_(static_cast<std::size_t>(width)) {}
+      levels_(static_cast<std::size_t>(columns + 2)),
+      row_(static_cast<std::size_t>(tile * (columns + 1))) {}
 
 const std::uint8_t* TileField::row(int y) {
   const float v =
       std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.0F, static_cast<float>(rows_ - 1));
   const int j = std::min(static_cast<int>(v), std::max(0, rows_ - 2));
   const float share = rows_ > 1 ? v - static_cast<float>(j) : 0.0F;
-  const int next = std::min(j + 1, rows_ - 1);
-  for (int i = 0; i < columns_; ++i)
-    levels_[static_cast<std::size_t>(i)] =
-        std::clamp(at(i, j) + share * (at(i, next) - at(i, j)), 0.0F, 255.0F);
-  interpolate(levels_, row_);
-  return row_.data();
+  mix(&at(0, j), &at(0, std::min(j + 1, rows_ - 1)), share, columns_, levels_.data() + 1);
+  levels_.front() = levels_[1];
+  levels_.back() = levels_[static_cast<std::size_t>(columns_)];
+  interpolate(levels_.data(), columns_, row_.data());
+  return last();
 }
 
 INVAR_WIDE_VECTORS

@@ -31,16 +31,16 @@ class TileSums {
 /// A value a tile, read between the tiles' middles by bilinear interpolation, row by row.
 class TileField {
  public:
-  TileField(int columns, int rows, int width);
+  TileField(int columns, int rows);
   float& at(int i, int j) { return values_[static_cast<std::size_t>(j * columns_ + i)]; }
   /// The row at y, rounded and within 0..255, for comparison with pixels.
   const std::uint8_t* row(int y);
-  [[nodiscard]] const std::uint8_t* last() const { return row_.data(); }
+  [[nodiscard]] const std::uint8_t* last() const { return row_.data() + tile / 2; }
 
  private:
   int columns_, rows_;
   std::vector<float> values_, levels_;
-  std::vector<std::uint8_t> row_;
+  std::vector<std::uint8_t> row_;  // from half a tile before the first pixel
 };
 
 /// Rows of pixels within one row of tiles.
