@@ -199,30 +199,33 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
                       number(0.4 * fit.contrast),
                       number(2.5 * fit.contrast),
                       number(2.0 * filter.blur + 0.5)};  // the linear step reaches no farther
-  std::size_t n = 0;
-  Values misfit, sorted;  // written before they are read
+  Values misfit;  // written before it is read
   for (std::size_t first = 0; first < count; first += lanes) {
-    if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; })) continue;
+    if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; })) {
+      std::fill_n(&misfit[first], lanes, 0.0F);
+      continue;
+    }
     RayEdges edges;
     place_edges(products[first / lanes], filter, rule, &d.c[first], &d.s[first], edges);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const std::size_t k = first + lane;
-      usable[k] *= edges.sound[lane];
-      rays.offset[k] = edges.offset[lane];
-      misfit[k] = sorted[n] = edges.misfit[lane];
-      n += usable[k] > 0.0F;
-    }
+    Lanes trusted;
+    std::memcpy(&trusted, &usable[first], sizeof trusted);
+    trusted *= edges.sound;
+    edges.misfit *= trusted;
+    std::memcpy(&usable[first], &trusted, sizeof trusted);
+    std::memcpy(&rays.offset[first], &edges.offset, sizeof edges.offset);
+    std::memcpy(&misfit[first], &edges.misfit, sizeof edges.misfit);
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.
-  const float most =
-      n > 0 ? *std::max_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n)) : 0.0F;
-  const double typical = (static_cast<double>(most) - 0.03 * fit.contrast) / 2.5;
-  const auto reached = std::count_if(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n),
-                                     [&](float value) { return value >= number(typical); });
-  if (2 * static_cast<std::size_t>(reached) < n) {  // else the median is beyond `typical`
-    const auto limit = number(2.5 * median_of(sorted, static_cast<int>(n)) + 0.03 * fit.contrast);
+  const double typical = (largest_of(misfit, rays.count) - 0.03 * fit.contrast) / 2.5;
+  if (typical > 0.0 &&
+      2 * reaching(misfit, rays.count, typical) < reaching(usable, rays.count, 0.5)) {  // the median is less
+    Values sorted;
+    int n = 0;
     for (std::size_t k = 0; k < count; ++k)
-      if (usable[k] > 0.0F && misfit[k] > limit) usable[k] = 0.0F;
+      if (usable[k] > 0.0F) sorted[static_cast<std::size_t>(n++)] = misfit[k];
+    const auto limit = number(2.5 * median_of(sorted, n) + 0.03 * fit.contrast);
+    for (std::size_t k = 0; k < count; ++k)
+      if (misfit[k] > limit) usable[k] = 0.0F;
   }
   fit.valid = fit_shape(rays, usable, 0.015, fit);
   return fit;

@@ -76,20 +76,6 @@ void weigh_by_tukey(const Values& rest, const Values& usable, float factor, std:
   }
 }
 
-INVAR_WIDE_VECTORS
-double largest_of(const Values& values, std::size_t count) {
-  Lanes largest{};
-  for (std::size_t k = 0; k < count; k += lanes) {
-    Lanes v;
-    load(values.data() + k, v);
-    v = v < 0.0F ? -v : v;
-    largest = v > largest ? v : largest;
-  }
-  float most = 0.0F;
-  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
-  return static_cast<double>(most);
-}
-
 // Sum of the weights, of weight * rest^2, and how many weigh more than 0.2.
 struct Agreement {
   double weight, square;
@@ -214,6 +200,20 @@ double median_of(Values& values, int count) {
 }
 
 INVAR_WIDE_VECTORS
+double largest_of(const Values& values, int count) {
+  Lanes largest{};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); k += lanes) {
+    Lanes v;
+    load(values.data() + k, v);
+    v = v < 0.0F ? -v : v;
+    largest = v > largest ? v : largest;
+  }
+  float most = 0.0F;
+  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
+  return static_cast<double>(most);
+}
+
+INVAR_WIDE_VECTORS
 int reaching(const Values& values, int count, double limit) {
   const auto least = static_cast<float>(limit);
   Lanes reached{};
@@ -257,7 +257,7 @@ bool fit_shape(Rays& rays, const Values& usable, double floor, OutlineFit& fit) 
   }
   constexpr double normal = 1.4826;  // deviation over the median of the sizes
   leave(d, rays.offset, usable, p, count, rest);
-  const double largest = largest_of(rest, count);
+  const double largest = largest_of(rest, rays.count);
   const bool foreign =
       !solved || !p.allFinite() ||
       (largest > 3.7 * floor && 2 * reaching(rest, rays.count, largest / (3.7 * normal)) < used);
