@@ -167,11 +167,16 @@ class Votes {
 
   /// An outline point votes, or takes its votes back (-1): along its normal, as its radius is known to some percent.
   void add(const OutlinePoint& p, int votes) {
-    for (int k = -3; k <= 3; ++k) {
-      const float r = radius_ * (1.0F + 0.08F * static_cast<float>(k));
-      const int x = cvRound(p.x + r * p.nx) - left_, y = cvRound(p.y + r * p.ny) - top_;
-      if (x >= 0 && y >= 0 && x < columns_ && y < rows_)
-        cells_[index(x, y)] = static_cast<std::int16_t>(cells_[index(x, y)] + votes);
+    constexpr float unit = 1 << 14;  // a px in whole numbers, which are rounded at less cost
+    const float start = 0.76F * radius_ * unit, step = 0.08F * radius_ * unit;
+    auto x = static_cast<std::int32_t>((p.x - static_cast<float>(left_) + 0.5F) * unit + start * p.nx),
+         y = static_cast<std::int32_t>((p.y - static_cast<float>(top_) + 0.5F) * unit + start * p.ny);
+    const auto step_x = static_cast<std::int32_t>(step * p.nx), step_y = static_cast<std::int32_t>(step * p.ny);
+    for (int k = 0; k < 7; ++k, x += step_x, y += step_y) {
+      const int column = x >> 14, row = y >> 14;
+      if (column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;
+      std::int16_t& cell = cells_[index(column, row)];
+      cell = static_cast<std::int16_t>(cell + votes);
     }
   }
   /// Where a small square holds the most votes, and how many.

@@ -64,8 +64,8 @@ Blobs label_blobs(const BitMask& mask, double smallest) {
   runs.reserve(4096);
   parent.reserve(4096);
   find_runs(mask, runs, parent);
-  struct Sums {
-    double n = 0, x = 0, y = 0, xx = 0, yy = 0;
+  struct Sums {  // in whole numbers: x twice, its square four times
+    std::int64_t n = 0, x2 = 0, y = 0, xx4 = 0, yy = 0;
     int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
   };
   std::vector<int> set(runs.size(), -1);  // which blob a root is, counted as they come
@@ -79,11 +79,11 @@ Blobs label_blobs(const BitMask& mask, double smallest) {
     }
     run.label = which;
     Sums& s = sums[static_cast<std::size_t>(which)];
-    const double n = run.end - run.begin, middle = 0.5 * (run.begin + run.end - 1), y = run.y;
+    const std::int64_t n = run.end - run.begin, middle2 = run.begin + run.end - 1, y = run.y;
     s.n += n;
-    s.x += n * middle;
+    s.x2 += n * middle2;
     s.y += n * y;
-    s.xx += n * (middle * middle + (n * n - 1.0) / 12.0);
+    s.xx4 += n * middle2 * middle2 + n * (n * n - 1) / 3;
     s.yy += n * y * y;
     s.left = std::min(s.left, run.begin);
     s.right = std::max(s.right, run.end - 1);
@@ -94,12 +94,14 @@ Blobs label_blobs(const BitMask& mask, double smallest) {
   auto& blobs = out.blobs;
   for (std::size_t i = 0; i < sums.size(); ++i) {
     const Sums& s = sums[i];
-    if (s.n < std::max(1.0, smallest)) continue;
-    const double x = s.x / s.n, y = s.y / s.n;
+    const auto n = static_cast<double>(s.n);
+    if (n < std::max(1.0, smallest)) continue;
+    const double x = 0.5 * static_cast<double>(s.x2) / n, y = static_cast<double>(s.y) / n;
     // Each pixel is a square of its own second moment, 1/12 each way.
-    const double moment = s.xx - s.n * x * x + s.yy - s.n * y * y + s.n / 6.0;
+    const double moment =
+        0.25 * static_cast<double>(s.xx4) - n * x * x + static_cast<double>(s.yy) - n * y * y + n / 6.0;
     label[i] = static_cast<int>(blobs.size());
-    blobs.push_back({label[i], s.n, x, y, s.n * s.n / (2.0 * std::numbers::pi * moment), s.left, s.top,
+    blobs.push_back({label[i], n, x, y, n * n / (2.0 * std::numbers::pi * moment), s.left, s.top,
                      s.right, s.bottom});
   }
   for (BlobRun& run : runs) run.label = label[static_cast<std::size_t>(run.label)] + 1;
