@@ -171,7 +171,8 @@ class Votes {
     const float start = 0.76F * radius_ * unit, step = 0.08F * radius_ * unit;
     auto x = static_cast<std::int32_t>((p.x - static_cast<float>(left_) + 0.5F) * unit + start * p.nx),
          y = static_cast<std::int32_t>((p.y - static_cast<float>(top_) + 0.5F) * unit + start * p.ny);
-    const auto step_x = static_cast<std::int32_t>(step * p.nx), step_y = static_cast<std::int32_t>(step * p.ny);
+    const auto step_x = static_cast<std::int32_t>(step * p.nx),
+               step_y = static_cast<std::int32_t>(step * p.ny);
     for (int k = 0; k < 7; ++k, x += step_x, y += step_y) {
       const int column = x >> 14, row = y >> 14;
       if (column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;

@@ -18,7 +18,7 @@ namespace {
 struct Measured {
   Shape shape;
   OutlineFit fit;
-  int rays = 0;        // that the fit was made with
+  int rays = 0;             // that the fit was made with
   bool alone = false;       // its blob held nothing else: the edge is near
   bool approached = false;  // and was found by few rays
   bool alive = true;

@@ -101,8 +101,8 @@ Blobs label_blobs(const BitMask& mask, double smallest) {
     const double moment =
         0.25 * static_cast<double>(s.xx4) - n * x * x + static_cast<double>(s.yy) - n * y * y + n / 6.0;
     label[i] = static_cast<int>(blobs.size());
-    blobs.push_back({label[i], n, x, y, n * n / (2.0 * std::numbers::pi * moment), s.left, s.top,
-                     s.right, s.bottom});
+    blobs.push_back(
+        {label[i], n, x, y, n * n / (2.0 * std::numbers::pi * moment), s.left, s.top, s.right, s.bottom});
   }
   for (BlobRun& run : runs) run.label = label[static_cast<std::size_t>(run.label)] + 1;
   return out;
