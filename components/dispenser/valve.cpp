@@ -21,6 +21,8 @@ struct AxisMotion {
   }
 };
 
+constexpr double closest = 0.999;  // of the driver's period between two pulses: times are whole nanoseconds
+
 bool is_ready(const stage::AxisState& state) { return state.enabled() && state.homed(); }
 
 }  // namespace
@@ -123,7 +125,7 @@ std::optional<Valve::Refusal> Valve::refusal(std::int64_t pulse_ns, std::int64_t
     return Refusal{REFUSED_TEMPERATURE, "the temperature is unknown or outside its window"};
   if (!parameters_.pulses.contains(static_cast<double>(pulse_ns) * 1e-9))
     return Refusal{REFUSED_PULSE, "the valve does not work at this on-time"};
-  if (static_cast<double>(open_ns - last_open_ns_) < 1e9 / parameters_.most_rate)
+  if (static_cast<double>(open_ns - last_open_ns_) < closest * 1e9 / parameters_.most_rate)
     return Refusal{REFUSED_TOO_FAST, "due too soon after the last droplet"};
   return {};
 }

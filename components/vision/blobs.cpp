@@ -39,7 +39,7 @@ bool is_disc(const Blob& blob, const cv::Mat1b& image) {
          !at_border(blob, image);
 }
 
-Side make_side(const cv::Mat1b& image, const cv::Mat1b& mask, int polarity, double smallest) {
+Side make_side(const cv::Mat1b& image, const BitMask& mask, int polarity, double smallest) {
   Side side;
   side.polarity = polarity;
   side.found = label_blobs(mask, smallest);
@@ -136,8 +136,18 @@ Found refine(const std::vector<OutlinePoint>& points, Found at) {
   return at;
 }
 
-constexpr auto plus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a + b); };
-constexpr auto minus = [](std::int16_t a, std::int16_t b) { return static_cast<std::int16_t>(a - b); };
+// One row of counts onto another.
+void add_row(const std::int16_t* from, int length, std::int16_t* to) {
+  for (int x = 0; x < length; ++x) to[x] = static_cast<std::int16_t>(to[x] + from[x]);
+}
+void take_row(const std::int16_t* from, int length, std::int16_t* to) {
+  for (int x = 0; x < length; ++x) to[x] = static_cast<std::int16_t>(to[x] - from[x]);
+}
+std::int16_t largest_of(const std::int16_t* row, int length) {
+  std::int16_t largest = 0;
+  for (int x = 0; x < length; ++x) largest = std::max(largest, row[x]);
+  return largest;
+}
 
 // Votes for centres, over the box of a blob and a margin.
 class Votes {
@@ -150,17 +160,24 @@ class Votes {
         top_{blob.top - margin_},
         columns_{blob.right - blob.left + 1 + 2 * margin_},
         rows_{blob.bottom - blob.top + 1 + 2 * margin_},
-        cells_(static_cast<std::size_t>(columns_ * rows_)),
-        across_(cells_.size()),
-        down_(static_cast<std::size_t>(columns_)) {}
+        stride_{columns_ + 2 * reach_},
+        cells_(static_cast<std::size_t>(stride_ * rows_)),
+        down_(static_cast<std::size_t>(stride_)),
+        both_(static_cast<std::size_t>(columns_)) {}
 
   /// An outline point votes, or takes its votes back (-1): along its normal, as its radius is known to some percent.
   void add(const OutlinePoint& p, int votes) {
-    for (int k = -3; k <= 3; ++k) {
-      const float r = radius_ * (1.0F + 0.08F * static_cast<float>(k));
-      const int x = cvRound(p.x + r * p.nx) - left_, y = cvRound(p.y + r * p.ny) - top_;
-      if (x >= 0 && y >= 0 && x < columns_ && y < rows_)
-        cells_[index(x, y)] = static_cast<std::int16_t>(cells_[index(x, y)] + votes);
+    constexpr float unit = 1 << 14;  // a px in whole numbers, which are rounded at less cost
+    const float start = 0.76F * radius_ * unit, step = 0.08F * radius_ * unit;
+    auto x = static_cast<std::int32_t>((p.x - static_cast<float>(left_) + 0.5F) * unit + start * p.nx),
+         y = static_cast<std::int32_t>((p.y - static_cast<float>(top_) + 0.5F) * unit + start * p.ny);
+    const auto step_x = static_cast<std::int32_t>(step * p.nx),
+               step_y = static_cast<std::int32_t>(step * p.ny);
+    for (int k = 0; k < 7; ++k, x += step_x, y += step_y) {
+      const int column = x >> 14, row = y >> 14;
+      if (column < 0 || row < 0 || column >= columns_ || row >= rows_) continue;
+      std::int16_t& cell = cells_[index(column, row)];
+      cell = static_cast<std::int16_t>(cell + votes);
     }
   }
   /// Where a small square holds the most votes, and how many.
@@ -169,38 +186,32 @@ class Votes {
     double height;
   };
   Peak peak() {
-    for (int y = 0; y < rows_; ++y) {
-      int sum = 0;
-      for (int x = -reach_; x < columns_; ++x) {
-        if (x + reach_ < columns_) sum += cells_[index(x + reach_, y)];
-        if (x - reach_ - 1 >= 0) sum -= cells_[index(x - reach_ - 1, y)];
-        if (x >= 0) across_[index(x, y)] = static_cast<std::int16_t>(sum);
-      }
-    }
     std::int16_t most = -1;
     int at_x = 0, at_y = 0;
     std::fill(down_.begin(), down_.end(), std::int16_t{0});
-    const auto row = [&](int y) { return across_.begin() + static_cast<std::ptrdiff_t>(y) * columns_; };
+    const auto row = [&](int y) { return cells_.data() + y * stride_; };
     for (int y = -reach_; y < rows_; ++y) {
-      if (y + reach_ < rows_)
-        std::transform(down_.begin(), down_.end(), row(y + reach_), down_.begin(), plus);
-      if (y - reach_ - 1 >= 0)
-        std::transform(down_.begin(), down_.end(), row(y - reach_ - 1), down_.begin(), minus);
+      if (y + reach_ < rows_) add_row(row(y + reach_), stride_, down_.data());
+      if (y - reach_ - 1 >= 0) take_row(row(y - reach_ - 1), stride_, down_.data());
       if (y < 0) continue;
-      std::int16_t highest = 0;
-      for (const std::int16_t votes : down_) highest = std::max(highest, votes);
+      std::copy_n(down_.begin(), columns_, both_.begin());
+      for (int k = 1; k <= 2 * reach_; ++k) add_row(down_.data() + k, columns_, both_.data());
+      const std::int16_t highest = largest_of(both_.data(), columns_);
       if (highest <= most) continue;
       most = highest, at_y = y;
-      at_x = static_cast<int>(std::find(down_.begin(), down_.end(), highest) - down_.begin());
+      at_x = static_cast<int>(std::find(both_.begin(), both_.end(), highest) - both_.begin());
     }
     return {at_x + left_, at_y + top_, static_cast<double>(most)};
   }
 
  private:
-  [[nodiscard]] std::size_t index(int x, int y) const { return static_cast<std::size_t>(y * columns_ + x); }
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y * stride_ + reach_ + x);
+  }
   float radius_;
-  int reach_, margin_, left_, top_, columns_, rows_;
-  std::vector<std::int16_t> cells_, across_, down_;
+  int reach_, margin_, left_, top_, columns_, rows_, stride_;
+  std::vector<std::int16_t> cells_;  // with a margin of `reach_` left and right
+  std::vector<std::int16_t> down_, both_;
 };
 
 // Takes a blob apart: every outline point votes for centres along its normal; the best circle is taken, its points

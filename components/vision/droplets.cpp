@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <span>
 
 #include "components/vision/blobs.hpp"
 #include "core/base/contract.hpp"
@@ -17,7 +18,9 @@ namespace {
 struct Measured {
   Shape shape;
   OutlineFit fit;
-  Rays rays;
+  int rays = 0;             // that the fit was made with
+  bool alone = false;       // its blob held nothing else: the edge is near
+  bool approached = false;  // and was found by few rays
   bool alive = true;
 };
 
@@ -34,7 +37,7 @@ double circularity_of(const Measured& drop) {
                wave = drop.shape.cos2 * drop.shape.cos2 + drop.shape.sin2 * drop.shape.sin2;
   // Of r = R + a cos 2t: area pi (R^2 + a^2/2); perimeter 2 pi R (1 + (2 a)^2/(4 R^2)) to second order. Roughness of
   // RMS q at a correlation length of three rays lengthens the perimeter likewise.
-  const double length = 6.0 * std::numbers::pi * radius / drop.rays.count;
+  const double length = 6.0 * std::numbers::pi * radius / drop.rays;
   const double rough = drop.fit.residual / std::max(1.0, length);
   const double perimeter =
       2.0 * std::numbers::pi * radius * (1.0 + wave / (radius * radius) + 0.5 * rough * rough);
@@ -86,24 +89,27 @@ void drop_doubles(std::vector<Measured>& drops) {
   std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });
 }
 
-// The `most` drops whose outline was seen best.
-std::vector<const Measured*> clearest(const std::vector<Measured>& drops, std::size_t most) {
-  std::vector<const Measured*> order;
-  for (const Measured& drop : drops) order.push_back(&drop);
-  const auto end = order.begin() + static_cast<std::ptrdiff_t>(std::min(most, order.size()));
-  std::partial_sort(order.begin(), end, order.end(),
+// Of these the `most` drops whose outline was seen best.
+void keep_clearest(std::vector<Measured*>& drops, std::size_t most) {
+  const auto end = drops.begin() + static_cast<std::ptrdiff_t>(std::min(most, drops.size()));
+  std::partial_sort(drops.begin(), end, drops.end(),
                     [](const Measured* a, const Measured* b) { return clarity(*a) > clarity(*b); });
-  order.erase(end, order.end());
-  return order;
+  drops.erase(end, drops.end());
 }
 
-// What hides part of a drop's edge: its neighbours.
-void close_rays(std::vector<Measured>& drops, double reach, double guard) {
-  visit_neighbours(drops, reach + guard, [&](Measured& one, Measured& other) {
-    const Shape &a = one.shape, &b = other.shape;
-    one.rays.close(a, reach, b.x, b.y, b.radius, guard);
-    other.rays.close(b, reach, a.x, a.y, a.radius, guard);
+// What hides part of a drop's edge: its neighbours, as they were found roughly.
+struct Neighbour {
+  const Measured* of;
+  Shape shape;
+};
+std::vector<Neighbour> neighbours_of(std::vector<Measured>& drops, double gap) {
+  std::vector<Neighbour> all;
+  visit_neighbours(drops, gap, [&](Measured& one, Measured& other) {
+    all.push_back({&one, other.shape});
+    all.push_back({&other, one.shape});
   });
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.of < b.of; });
+  return all;
 }
 
 double outside_share(const Shape& shape, const cv::Mat& image) {
@@ -129,41 +135,104 @@ class Filters {
   std::array<std::optional<EdgeFilter>, EdgeFilter::most_half + 1> made_;
 };
 
-// Every candidate to a few tenths of a pixel. One that stands alone is known well enough to go straight to its edge
-// with few rays; any other is sought.
-std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Filters& filters) {
+constexpr double moved_enough = 0.8;  // px; from where a fit begins to find its edge
+
+// The edge of a drop that stands alone, from near it, by few rays; false where it is not there.
+bool approach(const cv::Mat& image, int polarity, Filters& filters, Rays& rays, Measured& drop) {
+  rays.choose(0.25 * drop.shape.radius);
+  for (int round = 0; round < 3; ++round) {
+    drop.fit = refine_outline(image, drop.shape, polarity, filters.at(drop.shape.radius), rays);
+    if (!drop.fit.valid || drop.fit.support < 0.8) return false;
+    drop.shape = drop.fit.shape;
+    if (drop.fit.moved < moved_enough) return drop.fit.coverage > 0.8;
+  }
+  return false;
+}
+
+// The edge of any drop, from some pixels away, to a few tenths of a pixel; false where it is not there.
+bool seek(const cv::Mat& image, int polarity, Rays& rays, Measured& drop) {
+  drop.alone = false;
+  rays.choose(std::max(10.0, 0.6 * drop.shape.radius));
+  const double reach = std::clamp(0.25 * drop.shape.radius, 3.0, 8.0);
+  drop.fit = seek_outline(image, drop.shape, polarity, reach, rays);
+  if (!drop.fit.valid || drop.fit.coverage < 0.2) return false;
+  drop.shape = drop.fit.shape;
+  return true;
+}
+
+// Every candidate to a few tenths of a pixel: one that stands alone is known as well from its blob, any other is sought.
+std::vector<Measured> rough(const cv::Mat& image, const Detection& found, Rays& rays) {
   std::vector<Measured> drops;
   drops.reserve(found.candidates.size());
   for (const Candidate& candidate : found.candidates) {
     if (candidate.radius < 1.5) continue;
     Measured& drop = drops.emplace_back();
-    const Shape start{candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
-    bool done = false;
-    if (candidate.alone) {
-      drop.rays.choose(0.25 * candidate.radius);
-      drop.shape = start;
-      for (int round = 0; round < 3 && !done; ++round) {
-        drop.fit =
-            refine_outline(image, drop.shape, found.polarity, filters.at(drop.shape.radius), drop.rays);
-        if (!drop.fit.valid || drop.fit.support < 0.8) break;
-        drop.shape = drop.fit.shape;
-        done = drop.fit.moved < 0.8;
-      }
-      done = done && drop.fit.coverage > 0.8;
-    }
-    if (!done) {
-      drop.shape = start;
-      drop.rays.choose(std::max(10.0, 0.6 * candidate.radius));
-      const double reach = std::clamp(0.25 * candidate.radius, 3.0, 8.0);
-      drop.fit = seek_outline(image, drop.shape, found.polarity, reach, drop.rays);
-      if (!drop.fit.valid || drop.fit.coverage < 0.2) {
-        drops.pop_back();
-        continue;
-      }
-      drop.shape = drop.fit.shape;
-    }
+    drop.shape = {candidate.x, candidate.y, candidate.radius, 0.0, 0.0};
+    drop.alone = candidate.alone;
+    drop.fit.coverage = 1.0;
+    if (!candidate.alone && !seek(image, found.polarity, rays, drop)) drops.pop_back();
   }
   return drops;
+}
+
+// The blur is the camera's: from some drops that stand alone, then from the best of these and of those that were sought.
+double blur_of(const cv::Mat& image, int polarity, std::vector<Measured>& drops, Rays& rays) {
+  constexpr std::size_t some = 24;
+  Filters filters{1.2};
+  std::vector<Measured*> alone, seen;
+  for (Measured& drop : drops) (drop.alone ? alone : seen).push_back(&drop);
+  std::vector<double> blurs;
+  for (std::size_t k = 0, count = std::min(some, alone.size()); k < count; ++k) {
+    Measured& drop = *alone[k * alone.size() / count];
+    const Shape start = drop.shape;
+    drop.approached = approach(image, polarity, filters, rays, drop);
+    if (drop.approached) {
+      seen.push_back(&drop);
+      if (drop.fit.blur > 0.0) blurs.push_back(drop.fit.blur);
+    } else {
+      drop.shape = start;
+    }
+  }
+  keep_clearest(seen, 5);
+  double blur = std::clamp(median(blurs, 1.2), 0.4, 4.0);
+  for (int round = 0; round < 2; ++round) {
+    filters = Filters{blur};
+    blurs.clear();
+    for (const Measured* drop : seen) {
+      rays.choose(std::max(10.0, 0.25 * drop->shape.radius));
+      const OutlineFit fit =
+          refine_outline(image, drop->shape, polarity, filters.at(drop->shape.radius), rays);
+      if (fit.valid) blurs.push_back(fit.blur);
+    }
+    const double before = blur;
+    blur = std::clamp(median(blurs, blur), 0.4, 4.0);
+    if (std::abs(blur - before) < 0.1 * blur) break;
+  }
+  return blur;
+}
+
+// Fits a drop's outline until it stands; false where there is none. `neighbours`: of this drop alone.
+bool measure(const cv::Mat& image, int polarity, Filters& filters, double blur, double density,
+             std::span<const Neighbour> neighbours, Rays& rays, Measured& drop) {
+  const Shape start = drop.shape;
+  if (drop.alone && !drop.approached && !approach(image, polarity, filters, rays, drop)) {
+    drop.shape = start;
+    if (!seek(image, polarity, rays, drop)) return false;
+  }
+  rays.choose(std::max(10.0, density * drop.shape.radius));
+  for (const Neighbour& next : neighbours)
+    rays.close(drop.shape, 3.0 * blur + 3.0, next.shape.x, next.shape.y, next.shape.radius, 1.0 + 1.5 * blur);
+  drop.rays = rays.count;
+  bool alive = false;
+  for (int round = 0; round < 4; ++round) {
+    drop.fit = refine_outline(image, drop.shape, polarity, filters.at(drop.shape.radius), rays);
+    if (!drop.fit.valid) return false;
+    drop.shape = drop.fit.shape;
+    alive = true;
+    // A ray that was found foreign has spoilt the common slopes: once more without it.
+    if (drop.fit.moved < 0.25 * blur && (round > 0 || drop.fit.support == 1.0)) break;
+  }
+  return alive;
 }
 
 }  // namespace
@@ -209,47 +278,22 @@ Droplets measure_droplets(const cv::Mat& image, const MeasureOptions& options) {
   out.contrast = found.contrast;
   if (!(found.contrast > 0.0)) return out;
 
-  Filters filters{1.2};
-  std::vector<Measured> drops = rough(image, found, filters);
+  Rays rays;
+  std::vector<Measured> drops = rough(image, found, rays);
   drop_doubles(drops);
-
-  // The blur is the camera's: from the best drops, then for all.
-  std::vector<double> blurs;
-  for (const Measured& drop : drops)
-    if (drop.fit.blur > 0.0 && drop.fit.support > 0.8) blurs.push_back(drop.fit.blur);
-  double blur = std::clamp(median(blurs, 1.2), 0.4, 4.0);
-  for (int round = 0; round < 2; ++round) {
-    filters = Filters{blur};
-    blurs.clear();
-    for (const Measured* drop : clearest(drops, 5)) {
-      Rays rays = drop->rays;
-      const OutlineFit fit =
-          refine_outline(image, drop->shape, found.polarity, filters.at(drop->shape.radius), rays);
-      if (fit.valid) blurs.push_back(fit.blur);
-    }
-    const double before = blur;
-    blur = std::clamp(median(blurs, blur), 0.4, 4.0);
-    if (std::abs(blur - before) < 0.1 * blur) break;
-  }
-  filters = Filters{blur};
+  const double blur = blur_of(image, found.polarity, drops, rays);
+  Filters filters{blur};
   out.blur = blur;
 
   // Where noise rules, more rays are worth their time; elsewhere the pixels are used up already.
   const double density = found.noise > 0.04 * found.contrast ? 0.8 : 0.6;
-  for (Measured& drop : drops) drop.rays.choose(std::max(10.0, density * drop.shape.radius));
-  close_rays(drops, 3.0 * blur + 3.0, 1.0 + 1.5 * blur);
+  const auto neighbours = neighbours_of(drops, 4.0 + 4.5 * blur);
+  auto next = neighbours.begin();
   std::vector<double> contrasts;
   for (Measured& drop : drops) {
-    drop.alive = false;
-    for (int round = 0; round < 4; ++round) {
-      drop.fit = refine_outline(image, drop.shape, found.polarity, filters.at(drop.shape.radius), drop.rays);
-      if (!drop.fit.valid) break;
-      drop.shape = drop.fit.shape;
-      drop.alive = true;
-      // A ray that was found foreign has spoilt the common slopes: once more without it.
-      if (drop.fit.moved < 0.25 * blur && (round > 0 || drop.fit.support == 1.0)) break;
-    }
-    drop.alive = drop.alive && drop.fit.valid;
+    const auto first = next;
+    while (next != neighbours.end() && next->of == &drop) ++next;
+    drop.alive = measure(image, found.polarity, filters, blur, density, {first, next}, rays, drop);
     if (drop.alive) contrasts.push_back(drop.fit.contrast);
   }
   std::erase_if(drops, [](const Measured& drop) { return !drop.alive; });

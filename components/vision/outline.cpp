@@ -13,6 +13,9 @@ namespace invar::vision {
 
 namespace {
 
+constexpr double chance =
+    2.0;  // so many times what chance makes of a square on average is still taken for chance
+
 // Where the samples of eight rays lie, from `inward` px inside the shape to `outward` px outside; rays that leave the image are
 // closed. `whole`: none does. False where no ray is open.
 bool prepare(const RaySamples& samples, const Shape& shape, const Directions& d, std::size_t first,
@@ -147,6 +150,7 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   EightRays block;
   constexpr std::size_t common_rows = EdgeFilter::rows - EdgeFilter::to_slope_in;
   std::array<std::array<Lanes, 3>, common_rows> by_lane{};  // products over the rays, by 1, c, s
+  std::array<Lanes, 2> squares{};                           // of the products with the slopes' rows
   std::array<Lanes, 6> weights{};  // over the rays: their sum, by c, s, c c, c s, s s
   for (std::size_t first = 0; first < count; first += lanes) {
     const bool any = prepare(samples, shape, d, first, filter.half, filter.half, whole, rays, block);
@@ -166,6 +170,10 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
     for (std::size_t row = 0; row < common_rows; ++row)
       for (std::size_t m = 0; m < 3; ++m)
         by_lane[row][m] += harmonic[m] * products[first / lanes].rows[EdgeFilter::to_slope_in + row];
+    for (std::size_t side = 0; side < squares.size(); ++side) {
+      const Lanes& slope = products[first / lanes].rows[EdgeFilter::to_slope_in + side];
+      squares[side] += harmonic[0] * slope * slope;
+    }
   }
   Eigen::Matrix3d normal;
   normal(0, 0) = sum_of(weights[0]), normal(0, 1) = sum_of(weights[1]), normal(0, 2) = sum_of(weights[2]);
@@ -178,12 +186,23 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
   // What the drop has in common: the profile over the angle as constant and first harmonic, its slopes by the sloped step, and
   // its mean, less the slopes, as a step of another blur. All of it is linear in the samples, so in their products.
   const Eigen::Matrix3d inverse = normal.inverse();
-  const auto over_the_angle = [&](EdgeFilter::Row row) -> Eigen::Vector3d {
+  const auto sums_of = [&](EdgeFilter::Row row) -> Eigen::Vector3d {
     const auto& sums = by_lane[row - EdgeFilter::to_slope_in];
-    return inverse * Eigen::Vector3d{sum_of(sums[0]), sum_of(sums[1]), sum_of(sums[2])};
+    return {sum_of(sums[0]), sum_of(sums[1]), sum_of(sums[2])};
   };
-  const Eigen::Vector3d inside = over_the_angle(EdgeFilter::to_slope_in),
-                        outside = over_the_angle(EdgeFilter::to_slope_out);
+  const auto over_the_angle = [&](EdgeFilter::Row row) -> Eigen::Vector3d { return inverse * sums_of(row); };
+  // A slope across the drop moves its edge as a shift of the centre does. Where the rays' own slopes scatter by as much,
+  // there is none, and taking it off would only add its noise to the centre.
+  const auto slopes = [&](EdgeFilter::Row row) {
+    const Eigen::Vector3d sums = sums_of(row);
+    Eigen::Vector3d found = inverse * sums;
+    const double rest = sum_of(squares[row - EdgeFilter::to_slope_in]) - found.dot(sums);
+    const double by_chance = rest / (normal(0, 0) - 3.0) * (inverse(1, 1) + inverse(2, 2));
+    const double across = found.tail<2>().squaredNorm();
+    found.tail<2>() *= across > chance * by_chance ? 1.0 - chance * by_chance / across : 0.0;
+    return found;
+  };
+  const Eigen::Vector3d inside = slopes(EdgeFilter::to_slope_in), outside = slopes(EdgeFilter::to_slope_out);
   const Eigen::Vector2d spread = Eigen::Vector2d{over_the_angle(EdgeFilter::to_spread_height)(0),
                                                  over_the_angle(EdgeFilter::to_spread_blur)(0)} -
                                  inside(0) * filter.spread_inner - outside(0) * filter.spread_outer;
@@ -199,30 +218,33 @@ OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity
                       number(0.4 * fit.contrast),
                       number(2.5 * fit.contrast),
                       number(2.0 * filter.blur + 0.5)};  // the linear step reaches no farther
-  std::size_t n = 0;
-  Values misfit, sorted;  // written before they are read
+  Values misfit;                                         // written before it is read
   for (std::size_t first = 0; first < count; first += lanes) {
-    if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; })) continue;
+    if (std::none_of(&rays.open[first], &rays.open[first] + lanes, [](bool open) { return open; })) {
+      std::fill_n(&misfit[first], lanes, 0.0F);
+      continue;
+    }
     RayEdges edges;
     place_edges(products[first / lanes], filter, rule, &d.c[first], &d.s[first], edges);
-    for (std::size_t lane = 0; lane < lanes; ++lane) {
-      const std::size_t k = first + lane;
-      usable[k] *= edges.sound[lane];
-      rays.offset[k] = edges.offset[lane];
-      misfit[k] = sorted[n] = edges.misfit[lane];
-      n += usable[k] > 0.0F;
-    }
+    Lanes trusted;
+    std::memcpy(&trusted, &usable[first], sizeof trusted);
+    trusted *= edges.sound;
+    edges.misfit *= trusted;
+    std::memcpy(&usable[first], &trusted, sizeof trusted);
+    std::memcpy(&rays.offset[first], &edges.offset, sizeof edges.offset);
+    std::memcpy(&misfit[first], &edges.misfit, sizeof edges.misfit);
   }
   // A scratch or a speck across the ray spoils its profile before it moves its edge.
-  const float most =
-      n > 0 ? *std::max_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n)) : 0.0F;
-  const double typical = (static_cast<double>(most) - 0.03 * fit.contrast) / 2.5;
-  const auto reached = std::count_if(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(n),
-                                     [&](float value) { return value >= number(typical); });
-  if (2 * static_cast<std::size_t>(reached) < n) {  // else the median is beyond `typical`
-    const auto limit = number(2.5 * median_of(sorted, static_cast<int>(n)) + 0.03 * fit.contrast);
+  const double typical = (largest_of(misfit, rays.count) - 0.03 * fit.contrast) / 2.5;
+  if (typical > 0.0 &&
+      2 * reaching(misfit, rays.count, typical) < reaching(usable, rays.count, 0.5)) {  // the median is less
+    Values sorted;
+    int n = 0;
     for (std::size_t k = 0; k < count; ++k)
-      if (usable[k] > 0.0F && misfit[k] > limit) usable[k] = 0.0F;
+      if (usable[k] > 0.0F) sorted[static_cast<std::size_t>(n++)] = misfit[k];
+    const auto limit = number(2.5 * median_of(sorted, n) + 0.03 * fit.contrast);
+    for (std::size_t k = 0; k < count; ++k)
+      if (misfit[k] > limit) usable[k] = 0.0F;
   }
   fit.valid = fit_shape(rays, usable, 0.015, fit);
   return fit;

@@ -50,6 +50,23 @@ void add_up(const Directions& d, const Values& weight, const Values& r, std::siz
   for (std::size_t m = 0; m < of_values; ++m) moments.values[m] = sum_of(of_value[m]);
 }
 
+// Sums over rays of r by the harmonics up to the double angle, each ray alike.
+INVAR_WIDE_VECTORS
+void add_up_alike(const Directions& d, const Values& r, std::size_t count, std::array<double, 5>& sums) {
+  std::array<Lanes, 5> lane{};
+  const std::array<const Values*, 5> harmonics{nullptr, &d.c, &d.s, &d.c2, &d.s2};
+  for (std::size_t k = 0; k < count; k += lanes) {
+    Lanes v, h;
+    load(r.data() + k, v);
+    lane[0] += v;
+    for (std::size_t m = 1; m < lane.size(); ++m) {
+      load(harmonics[m]->data() + k, h);
+      lane[m] += v * h;
+    }
+  }
+  for (std::size_t m = 0; m < lane.size(); ++m) sums[m] = sum_of(lane[m]);
+}
+
 // What the curve leaves of the usable offsets; 0 elsewhere.
 INVAR_WIDE_VECTORS
 void leave(const Directions& d, const Values& offset, const Values& usable, const Vector5& curve,
@@ -74,20 +91,6 @@ void weigh_by_tukey(const Values& rest, const Values& usable, float factor, std:
     const float share = 1.0F - factor * rest[k] * rest[k];
     weight[k] = share > 0.0F ? usable[k] * share * share : 0.0F;
   }
-}
-
-INVAR_WIDE_VECTORS
-double largest_of(const Values& values, std::size_t count) {
-  Lanes largest{};
-  for (std::size_t k = 0; k < count; k += lanes) {
-    Lanes v;
-    load(values.data() + k, v);
-    v = v < 0.0F ? -v : v;
-    largest = v > largest ? v : largest;
-  }
-  float most = 0.0F;
-  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
-  return static_cast<double>(most);
 }
 
 // Sum of the weights, of weight * rest^2, and how many weigh more than 0.2.
@@ -214,6 +217,20 @@ double median_of(Values& values, int count) {
 }
 
 INVAR_WIDE_VECTORS
+double largest_of(const Values& values, int count) {
+  Lanes largest{};
+  for (std::size_t k = 0; k < static_cast<std::size_t>(count); k += lanes) {
+    Lanes v;
+    load(values.data() + k, v);
+    v = v < 0.0F ? -v : v;
+    largest = v > largest ? v : largest;
+  }
+  float most = 0.0F;
+  for (std::size_t lane = 0; lane < lanes; ++lane) most = std::max(most, largest[lane]);
+  return static_cast<double>(most);
+}
+
+INVAR_WIDE_VECTORS
 int reaching(const Values& values, int count, double limit) {
   const auto least = static_cast<float>(limit);
   Lanes reached{};
@@ -247,17 +264,17 @@ bool fit_shape(Rays& rays, const Values& usable, double floor, OutlineFit& fit) 
   Vector5 p = Vector5::Zero();
   bool solved = true;
   if (all) {  // over the full circle the harmonics are orthogonal
-    HarmonicMoments moments;
-    add_up(d, usable, rays.offset, count, moments);
+    std::array<double, 5> sums;
+    add_up_alike(d, rays.offset, count, sums);
     for (Eigen::Index m = 0; m < 5; ++m)
-      p(m) = (m == 0 ? 1.0 : 2.0) / used * moments.values[static_cast<std::size_t>(m)];
+      p(m) = (m == 0 ? 1.0 : 2.0) / used * sums[static_cast<std::size_t>(m)];
   } else {
     solved = harmonic.fit(d, rays.weight, rays.offset, count, ellipse);
     p = harmonic.solution;
   }
   constexpr double normal = 1.4826;  // deviation over the median of the sizes
   leave(d, rays.offset, usable, p, count, rest);
-  const double largest = largest_of(rest, count);
+  const double largest = largest_of(rest, rays.count);
   const bool foreign =
       !solved || !p.allFinite() ||
       (largest > 3.7 * floor && 2 * reaching(rest, rays.count, largest / (3.7 * normal)) < used);

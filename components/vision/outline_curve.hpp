@@ -24,6 +24,9 @@ double radius_at(const Shape& shape, const Directions& directions, std::size_t r
 /// Of the first `count` values, which are reordered; of every other one where there are many.
 double median_of(Values& values, int count);
 
+/// The largest size among the first `count` values (a multiple of 16).
+double largest_of(const Values& values, int count);
+
 /// How many of the first `count` values (a multiple of 16) lie `limit` or more from 0.
 int reaching(const Values& values, int count, double limit);
 

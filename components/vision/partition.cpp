@@ -1,116 +1,22 @@
 #include "components/vision/partition.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
-#include <numbers>
+#include <cstdint>
+#include <opencv2/core/hal/intrin.hpp>
+#include <vector>
 
+#include "components/vision/tiles.hpp"
 #include "components/vision/wide_vectors.hpp"
 
 namespace invar::vision {
 
 namespace {
 
-constexpr int tile = 16;                    // px a side
-constexpr int lanes = 8;                    // px that are interpolated at once
 constexpr int first_row = 2, next_row = 4;  // of a tile: a quarter of its rows is enough for means
 
 // Of what goes into a histogram a few thousand pixels are enough.
 int histogram_step(const cv::Mat1b& image) { return next_row * std::max(1, image.rows / 160); }
-
-// Sums over tiles, then over windows of tiles, by one table of running sums.
-class TileSums {
- public:
-  TileSums(int columns, int rows) : columns_{columns}, rows_{rows}, cells_(cells(columns, rows), 0.0F) {}
-  float& at(int i, int j) { return cells_[static_cast<std::size_t>(j * columns_ + i)]; }
-  [[nodiscard]] float at(int i, int j) const { return cells_[static_cast<std::size_t>(j * columns_ + i)]; }
-  [[nodiscard]] int columns() const { return columns_; }
-  [[nodiscard]] int rows() const { return rows_; }
-  [[nodiscard]] TileSums windowed(int reach) const {
-    TileSums across{columns_, rows_}, both{columns_, rows_};
-    smooth(cells_, across.cells_, columns_, rows_, 1, columns_, reach);
-    smooth(across.cells_, both.cells_, rows_, columns_, columns_, 1, reach);
-    return both;
-  }
-
- private:
-  static std::size_t cells(int columns, int rows) { return static_cast<std::size_t>(columns * rows); }
-  static void smooth(const std::vector<float>& from, std::vector<float>& to, int length, int lines, int step,
-                     int stride, int reach) {
-    for (int line = 0; line < lines; ++line) {
-      const auto index = [&](int k) { return static_cast<std::size_t>(line * stride + k * step); };
-      float sum = 0.0F;
-      for (int k = 0; k < std::min(reach, length); ++k) sum += from[index(k)];
-      for (int k = 0; k < length; ++k) {
-        if (k + reach < length) sum += from[index(k + reach)];
-        if (k - reach - 1 >= 0) sum -= from[index(k - reach - 1)];
-        to[index(k)] = sum;
-      }
-    }
-  }
-  int columns_, rows_;
-  std::vector<float> cells_;
-};
-
-// From levels at the middles of the tiles to a row of pixels between them, rounded: 8 bits below the point, in 16.
-void interpolate(const std::vector<float>& levels, std::vector<std::uint8_t>& row) {
-  using Words [[gnu::vector_size(16)]] = std::uint16_t;
-  using Bytes [[gnu::vector_size(8)]] = std::uint8_t;
-  constexpr Words ramp{0, 1, 2, 3, 4, 5, 6, 7};
-  const int columns = static_cast<int>(levels.size()), width = static_cast<int>(row.size());
-  const auto level = [&](int i) { return levels[static_cast<std::size_t>(std::clamp(i, 0, columns - 1))]; };
-  for (int i = -1; i < columns; ++i) {
-    const float left = level(i);
-    const int slope = static_cast<int>((level(i + 1) - left) * (256.0F / tile));
-    const int start = static_cast<int>(left * 256.0F) + slope / 2 + 128, begin = i * tile + tile / 2;
-    for (int part = 0; part < tile; part += lanes) {
-      const Words words = (Words{} + static_cast<std::uint16_t>(start + part * slope) +
-                           ramp * static_cast<std::uint16_t>(slope)) >>
-                          8;
-      const Bytes bytes = __builtin_convertvector(words, Bytes);
-      const int at = begin + part, from = std::max(0, -at), to = std::min(lanes, width - at);
-      if (to - from == lanes) {
-        std::memcpy(row.data() + at, &bytes, sizeof bytes);
-      } else {
-        for (int k = from; k < to; ++k) row[static_cast<std::size_t>(at + k)] = bytes[k];
-      }
-    }
-  }
-}
-
-// A value a tile, read between the tiles' centres by bilinear interpolation, row by row.
-class TileField {
- public:
-  TileField(int columns, int rows, int width)
-      : columns_{columns},
-        rows_{rows},
-        levels_(static_cast<std::size_t>(columns)),
-        row_(static_cast<std::size_t>(width)) {
-    values_.resize(static_cast<std::size_t>(columns * rows));
-  }
-  float& at(int i, int j) { return values_[static_cast<std::size_t>(j * columns_ + i)]; }
-  [[nodiscard]] const std::vector<std::uint8_t>& last() const { return row_; }
-  /// The row at y, rounded and within 0..255, for comparison with pixels.
-  const std::vector<std::uint8_t>& row(int y) {
-    const float v =
-        std::clamp((static_cast<float>(y) + 0.5F) / tile - 0.5F, 0.0F, static_cast<float>(rows_ - 1));
-    const int j = std::min(static_cast<int>(v), std::max(0, rows_ - 2));
-    const float share = rows_ > 1 ? v - static_cast<float>(j) : 0.0F;
-    const int next = std::min(j + 1, rows_ - 1);
-    const auto mixed = [&](int i) {
-      return std::clamp(at(i, j) + share * (at(i, next) - at(i, j)), 0.0F, 255.0F);
-    };
-    for (int i = 0; i < columns_; ++i) levels_[static_cast<std::size_t>(i)] = mixed(i);
-    interpolate(levels_, row_);
-    return row_;
-  }
-
- private:
-  int columns_, rows_;
-  std::vector<float> values_, levels_;
-  std::vector<std::uint8_t> row_;
-};
 
 double median(std::vector<float>& values) {
   if (values.empty()) return 0.0;
@@ -119,51 +25,21 @@ double median(std::vector<float>& values) {
   return static_cast<double>(*middle);
 }
 
-// 255 where `larger` lies above `smaller`.
-INVAR_WIDE_VECTORS
-void classify(const std::uint8_t* larger, const std::uint8_t* smaller, int width, std::uint8_t* mask) {
-  for (int x = 0; x < width; ++x) mask[x] = larger[x] > smaller[x] ? 255 : 0;
-}
-
-// Pixels of a tile's row, or sums of such down the tile.
-using TileBytes [[gnu::vector_size(tile)]] = std::uint8_t;
-using TileWords [[gnu::vector_size(2 * tile)]] = std::uint16_t;
-
-// The tile's sum and count of the sampled pixels, of those above `high` and of those below `low`.
-struct TileCounts {
-  float sum, count, above, above_count, below, below_count;
-};
-
-// `high`, `low`: the thresholds along the tile's middle.
-INVAR_WIDE_VECTORS
-TileCounts count_tile(const std::uint8_t* first, std::size_t stride, int rows, int columns,
-                      const std::uint8_t* high, const std::uint8_t* low) {
-  const auto load = [columns](const std::uint8_t* from, TileWords& to) {
-    TileBytes bytes{};
-    if (columns == tile) {
-      std::memcpy(&bytes, from, sizeof bytes);
-    } else {
-      for (int k = 0; k < columns; ++k) bytes[k] = from[k];
+// 1 where `larger` lies above `smaller`.
+void classify(const std::uint8_t* larger, const std::uint8_t* smaller, int width, std::uint64_t* bits) {
+  constexpr int lanes = cv::v_uint8x16::nlanes;
+  for (int x = 0; x < width; x += 64) {
+    std::uint64_t word = 0;
+    int k = 0;
+    for (const int end = std::min(64, width - x); k < end; k += lanes) {
+      if (k + lanes > end) break;
+      const auto above = cv::v_load(larger + x + k) > cv::v_load(smaller + x + k);
+      word |= static_cast<std::uint64_t>(static_cast<unsigned>(cv::v_signmask(above))) << k;
     }
-    to = __builtin_convertvector(bytes, TileWords);
-  };
-  TileWords p, h, l, sum{}, above{}, above_count{}, below{}, below_count{};
-  load(high, h), load(low, l);  // beyond the image nothing is above or below
-  for (int y = 0; y < rows; ++y) {
-    load(first + static_cast<std::size_t>(y) * stride, p);
-    const auto up = static_cast<TileWords>(p > h), down = static_cast<TileWords>(p < l);
-    sum += p;
-    above += p & up, above_count -= up;
-    below += p & down, below_count -= down;
+    for (; k < std::min(64, width - x); ++k)
+      word |= static_cast<std::uint64_t>(larger[x + k] > smaller[x + k] ? 1U : 0U) << k;
+    *bits++ = word;
   }
-  const auto total = [](const TileWords& words) {
-    int all = 0;
-    for (int k = 0; k < tile; ++k) all += words[k];
-    return static_cast<float>(all);
-  };
-  return {total(sum),   static_cast<float>(rows * columns),
-          total(above), total(above_count),
-          total(below), total(below_count)};
 }
 
 // How many of the values are at least `limit`.
@@ -228,15 +104,16 @@ double noise_of(const cv::Mat1b& image) {
 double set_thresholds(const TileSums& things, const TileSums& things_n, const TileSums& whole,
                       const TileSums& whole_n, TileField& threshold) {
   constexpr float enough = 12.0F;  // px; fewer say nothing
-  const auto difference = [&](int i, int j) {
-    const float n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
-    if (n < enough || rest < enough) return 0.0F;
-    return things.at(i, j) / n - (whole.at(i, j) - things.at(i, j)) / rest;
-  };
+  TileSums difference{things.columns(), things.rows()};
   std::vector<float> differences;
+  differences.reserve(static_cast<std::size_t>(things.columns() * things.rows()));
   for (int j = 0; j < things.rows(); ++j)
-    for (int i = 0; i < things.columns(); ++i)
-      if (const float d = difference(i, j); d != 0.0F) differences.push_back(d);
+    for (int i = 0; i < things.columns(); ++i) {
+      const float n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
+      if (n < enough || rest < enough) continue;
+      const float d = things.at(i, j) / n - (whole.at(i, j) - things.at(i, j)) / rest;
+      if (d != 0.0F) differences.push_back(difference.at(i, j) = d);
+    }
   if (differences.empty()) {
     for (int j = 0; j < things.rows(); ++j)
       for (int i = 0; i < things.columns(); ++i) threshold.at(i, j) = 1e9F;
@@ -248,7 +125,7 @@ double set_thresholds(const TileSums& things, const TileSums& things_n, const Ti
   const auto contrast = static_cast<float>(median(differences));
   for (int j = 0; j < things.rows(); ++j)
     for (int i = 0; i < things.columns(); ++i) {
-      const float d = difference(i, j), n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
+      const float d = difference.at(i, j), n = things_n.at(i, j), rest = whole_n.at(i, j) - n;
       if (std::abs(d) > 0.35F * std::abs(contrast)) {
         threshold.at(i, j) = things.at(i, j) / n - 0.5F * d;
       } else if (rest < enough) {  // nothing but things
@@ -267,176 +144,63 @@ Partition partition(const cv::Mat1b& image, int window, int polarity) {
   const int columns = (width + tile - 1) / tile, rows = (height + tile - 1) / tile;
   const bool want_light = polarity >= 0, want_dark = polarity <= 0;
   Partition out{{}, {}, 0.0, 0.0, noise_of(image)};
-  if (want_light) out.light.create(height, width);
-  if (want_dark) out.dark.create(height, width);
-
-  // Every tile's sampled rows, against thresholds along its middle.
-  const auto for_each_tile = [&](TileField& high, TileField& low, const auto& take) {
-    for (int j = 0; j < rows; ++j) {
-      const int first = std::min(j * tile + first_row, height - 1), beyond = std::min(height, (j + 1) * tile);
-      const auto &up = high.row(j * tile + tile / 2), &down = low.row(j * tile + tile / 2);
-      for (int i = 0; i < columns; ++i)
-        take(i, j,
-             count_tile(image.ptr<std::uint8_t>(first) + i * tile, next_row * image.step,
-                        (beyond - first + next_row - 1) / next_row, std::min(tile, width - i * tile),
-                        up.data() + i * tile, down.data() + i * tile));
-    }
+  if (want_light) out.light = BitMask{height, width};
+  if (want_dark) out.dark = BitMask{height, width};
+  const auto rows_of = [&](int j) {
+    const int first = std::min(j * tile + first_row, height - 1), beyond = std::min(height, (j + 1) * tile);
+    return TileRows{image.ptr<std::uint8_t>(first), next_row * image.step,
+                    (beyond - first + next_row - 1) / next_row, width};
   };
 
   // What lies clearly above or below its surroundings' mean.
   TileSums sum{columns, rows}, count{columns, rows};
-  TileField high{columns, rows, width}, low{columns, rows, width};
-  for_each_tile(high, low, [&](int i, int j, const TileCounts& tile_counts) {
-    sum.at(i, j) = tile_counts.sum;
-    count.at(i, j) = tile_counts.count;
-  });
-  TileField mean{columns, rows, width};
-  {
-    TileSums s = sum.windowed(window), n = count.windowed(window);
-    for (int j = 0; j < rows; ++j)
-      for (int i = 0; i < columns; ++i) mean.at(i, j) = s.at(i, j) / n.at(i, j);
+  for (int j = 0; j < rows; ++j) {
+    sum_tiles(rows_of(j), sum.row(j));
+    for (int i = 0; i < columns; ++i)
+      count.at(i, j) = static_cast<float>(rows_of(j).count * std::min(tile, width - i * tile));
   }
+  const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
+  TileField mean{columns, rows};
+  for (int j = 0; j < rows; ++j)
+    for (int i = 0; i < columns; ++i) mean.at(i, j) = whole.at(i, j) / whole_n.at(i, j);
   const int step = 2 * histogram_step(image);
   std::vector<std::uint8_t> distances(
       static_cast<std::size_t>(width * (1 + std::max(0, height - 1 - first_row) / step)));
   std::uint8_t* to = distances.data();
   for (int y = first_row; y < height; y += step, to += width)
-    distance_of(image.ptr<std::uint8_t>(y), mean.row(y).data(), width, to);
+    distance_of(image.ptr<std::uint8_t>(y), mean.row(y), width, to);
   const int extreme = value_reached_by(
       distances, std::max(1, static_cast<int>(0.001 * static_cast<double>(distances.size()))));
   const double margin = std::max(5.0 * out.noise + 1.0, 0.2 * extreme);
-  if (extreme <= margin) return out.light.setTo(0), out.dark.setTo(0), out;
+  if (extreme <= margin) return out;
 
-  // Light things against the rest, and dark things against the rest: each class's local level, then the middle between
-  // the two; twice, since the second time sees real classes.
-  for (int j = 0; j < rows; ++j)
-    for (int i = 0; i < columns; ++i) {
-      high.at(i, j) = mean.at(i, j) + static_cast<float>(margin);
-      low.at(i, j) = mean.at(i, j) - static_cast<float>(margin);
+  // Things against the rest: each class's local level, then the middle between the two; twice, since the second time
+  // sees real classes. Then what lies beyond the threshold; nothing where that does not stand out from the noise.
+  TileSums things{columns, rows}, things_n{columns, rows};
+  const auto divide = [&](Beyond side, BitMask& mask) {
+    TileField threshold{columns, rows};
+    const auto away = static_cast<float>(side == Beyond::above ? margin : -margin);
+    for (int j = 0; j < rows; ++j)
+      for (int i = 0; i < columns; ++i) threshold.at(i, j) = mean.at(i, j) + away;
+    double contrast = 0.0;
+    for (int pass = 0; pass < 2; ++pass) {
+      for (int j = 0; j < rows; ++j)
+        sum_beyond(rows_of(j), threshold.row(j * tile + tile / 2), side, things.row(j), things_n.row(j));
+      contrast =
+          set_thresholds(things.windowed(window), things_n.windowed(window), whole, whole_n, threshold);
     }
-  const TileSums whole = sum.windowed(window), whole_n = count.windowed(window);
-  for (int pass = 0; pass < 2; ++pass) {
-    TileSums above{columns, rows}, above_n{columns, rows}, below{columns, rows}, below_n{columns, rows};
-    for_each_tile(high, low, [&](int i, int j, const TileCounts& tile_counts) {
-      above.at(i, j) = tile_counts.above, above_n.at(i, j) = tile_counts.above_count;
-      below.at(i, j) = tile_counts.below, below_n.at(i, j) = tile_counts.below_count;
-    });
-    if (want_light)
-      out.light_contrast =
-          set_thresholds(above.windowed(window), above_n.windowed(window), whole, whole_n, high);
-    if (want_dark)
-      out.dark_contrast =
-          set_thresholds(below.windowed(window), below_n.windowed(window), whole, whole_n, low);
-  }
-  // What does not stand out from the noise is none.
-  const double least = std::max(4.0 * out.noise, 2.0);
-  if (out.light_contrast <= least) out.light_contrast = 0.0;
-  if (-out.dark_contrast <= least) out.dark_contrast = 0.0;
-  out.dark_contrast = -out.dark_contrast;
-  for (int y = 0; y < height; ++y) {
-    const std::uint8_t* p = image.ptr<std::uint8_t>(y);
-    const auto at = [y](TileField& threshold) {  // four rows hardly differ
-      return (y % 4 == 0 ? threshold.row(y + 2) : threshold.last()).data();
-    };
-    if (want_light) classify(p, at(high), width, out.light.ptr<std::uint8_t>(y));
-    if (want_dark) classify(at(low), p, width, out.dark.ptr<std::uint8_t>(y));
-  }
-  if (!(out.light_contrast > 0.0)) out.light.setTo(0);
-  if (!(out.dark_contrast > 0.0)) out.dark.setTo(0);
-  return out;
-}
-
-Blobs label_blobs(const cv::Mat1b& mask, double smallest) {
-  Blobs out;
-  auto& runs = out.runs;
-  std::vector<int> parent;
-  runs.reserve(4096);
-  parent.reserve(4096);
-  const auto root = [&](int i) {
-    while (parent[static_cast<std::size_t>(i)] != i) {
-      parent[static_cast<std::size_t>(i)] =
-          parent[static_cast<std::size_t>(parent[static_cast<std::size_t>(i)])];
-      i = parent[static_cast<std::size_t>(i)];
+    if (side == Beyond::below) contrast = -contrast;
+    if (contrast <= std::max(4.0 * out.noise, 2.0)) return 0.0;
+    for (int y = 0; y < height; ++y) {
+      const std::uint8_t* p = image.ptr<std::uint8_t>(y);
+      const std::uint8_t* limit = y % 4 == 0 ? threshold.row(y + 2) : threshold.last();  // rows hardly differ
+      classify(side == Beyond::above ? p : limit, side == Beyond::above ? limit : p, width, mask.row(y));
     }
-    return i;
+    return contrast;
   };
-  std::size_t above_begin = 0, above_end = 0;
-  for (int y = 0; y < mask.rows; ++y) {
-    const std::uint8_t* p = mask.ptr<std::uint8_t>(y);
-    const std::size_t begin = runs.size();
-    std::size_t above = above_begin;
-    for (int x = 0; x < mask.cols;) {
-      if (p[x] == 0) {
-        const void* next = std::memchr(p + x, 255, static_cast<std::size_t>(mask.cols - x));
-        if (next == nullptr) break;
-        x = static_cast<int>(static_cast<const std::uint8_t*>(next) - p);
-      }
-      const int start = x;
-      const void* end = std::memchr(p + x, 0, static_cast<std::size_t>(mask.cols - x));
-      x = end == nullptr ? mask.cols : static_cast<int>(static_cast<const std::uint8_t*>(end) - p);
-      const int id = static_cast<int>(runs.size());
-      runs.push_back({y, start, x, 0});
-      parent.push_back(id);
-      while (above < above_end && runs[above].end < start) ++above;
-      for (std::size_t k = above; k < above_end && runs[k].begin <= x; ++k) {
-        const int a = root(static_cast<int>(k)), b = root(id);
-        if (a != b) parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-      }
-    }
-    above_begin = begin;
-    above_end = runs.size();
-  }
-  struct Sums {
-    double n = 0, x = 0, y = 0, xx = 0, yy = 0;
-    int left = 1 << 30, top = 1 << 30, right = -1, bottom = -1;
-  };
-  std::vector<int> set(runs.size(), -1);  // which blob a root is, counted as they come
-  std::vector<Sums> sums;
-  for (std::size_t i = 0; i < runs.size(); ++i) {
-    BlobRun& run = runs[i];
-    int& which = set[static_cast<std::size_t>(root(static_cast<int>(i)))];
-    if (which < 0) {
-      which = static_cast<int>(sums.size());
-      sums.emplace_back();
-    }
-    run.label = which;
-    Sums& s = sums[static_cast<std::size_t>(which)];
-    const double n = run.end - run.begin, middle = 0.5 * (run.begin + run.end - 1), y = run.y;
-    s.n += n;
-    s.x += n * middle;
-    s.y += n * y;
-    s.xx += n * (middle * middle + (n * n - 1.0) / 12.0);
-    s.yy += n * y * y;
-    s.left = std::min(s.left, run.begin);
-    s.right = std::max(s.right, run.end - 1);
-    s.top = std::min(s.top, run.y);
-    s.bottom = std::max(s.bottom, run.y);
-  }
-  std::vector<int> label(sums.size(), -1);
-  auto& blobs = out.blobs;
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    const Sums& s = sums[i];
-    if (s.n < std::max(1.0, smallest)) continue;
-    const double x = s.x / s.n, y = s.y / s.n;
-    // Each pixel is a square of its own second moment, 1/12 each way.
-    const double moment = s.xx - s.n * x * x + s.yy - s.n * y * y + s.n / 6.0;
-    label[i] = static_cast<int>(blobs.size());
-    blobs.push_back({label[i], s.n, x, y, s.n * s.n / (2.0 * std::numbers::pi * moment), s.left, s.top,
-                     s.right, s.bottom});
-  }
-  for (BlobRun& run : runs) run.label = label[static_cast<std::size_t>(run.label)] + 1;
+  if (want_light) out.light_contrast = divide(Beyond::above, out.light);
+  if (want_dark) out.dark_contrast = divide(Beyond::below, out.dark);
   return out;
-}
-
-cv::Mat1b mask_of(const Blobs& blobs, const Blob& blob) {
-  cv::Mat1b mask(blob.bottom - blob.top + 3, blob.right - blob.left + 3, static_cast<std::uint8_t>(0));
-  auto run = std::lower_bound(blobs.runs.begin(), blobs.runs.end(), blob.top,
-                              [](const BlobRun& a, int y) { return a.y < y; });
-  for (; run != blobs.runs.end() && run->y <= blob.bottom; ++run)
-    if (run->label == blob.label + 1)
-      std::memset(mask.ptr<std::uint8_t>(run->y - blob.top + 1) + run->begin - blob.left + 1, 255,
-                  static_cast<std::size_t>(run->end - run->begin));
-  return mask;
 }
 
 }  // namespace invar::vision

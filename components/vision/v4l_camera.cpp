@@ -1,7 +1,16 @@
 #include "components/vision/v4l_camera.hpp"
 
+#include <fcntl.h>
+#include <linux/videodev2.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <exception>
+#include <filesystem>
 #include <opencv2/core/utils/logger.hpp>
 #include <stdexcept>
 
@@ -12,15 +21,58 @@
 
 namespace invar::vision {
 
+namespace {
+
+// What is wrong with a device before OpenCV, which does not tell, is asked to open it.
+void check(const std::string& device) {
+  const int file = ::open(device.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
+  if (file < 0) {
+    const int error = errno;
+    if (error == ENOENT || error == ENODEV || error == ENXIO)
+      throw InputError{device, "there is no such device",
+                       "plug the camera in; `ls /dev/video*` shows the cameras of this PC"};
+    if (error == EACCES || error == EPERM)
+      throw InputError{device, "may not be opened by this user",
+                       "add the user to the group `video` and log in again"};
+    std::array<char, 128> text{};
+    throw InputError{device,
+                     std::string{"cannot be opened: "} + ::strerror_r(error, text.data(), text.size()),
+                     "end what else uses it, or name another device"};
+  }
+  v4l2_capability found{};
+  const bool answers = ::ioctl(file, VIDIOC_QUERYCAP, &found) == 0;
+  ::close(file);
+  if (!answers)
+    throw InputError{device, "is no camera of Video4Linux", "`v4l2-ctl --list-devices` shows which are"};
+  const auto can = (found.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? found.device_caps : found.capabilities;
+  constexpr auto wanted = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
+  if ((can & wanted) != wanted) {
+    const auto* name = reinterpret_cast<const char*>(found.card);
+    throw InputError{device,
+                     "takes no pictures: `" + std::string{name, ::strnlen(name, sizeof found.card)} +
+                         "` is for something else",
+                     "name another device of the same camera (`v4l2-ctl --list-devices`)"};
+  }
+}
+
+}  // namespace
+
+bool V4lCamera::is_file() const {
+  std::error_code ignored;
+  return !parameters_.device.starts_with("/dev/") &&
+         !std::filesystem::is_character_file(parameters_.device, ignored);
+}
+
 void V4lCamera::configure() {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   stop();
+  if (!is_file()) check(parameters_.device);
   if (!device_.open(parameters_.device, is_file() ? cv::CAP_ANY : cv::CAP_V4L2)) {
     if (is_file())
       throw InputError{parameters_.device, "no video can be opened there",
                        "name a device (/dev/video0) or a video file that OpenCV reads"};
-    throw InputError{parameters_.device, "no camera of Video4Linux can be opened there",
-                     "check the cable, `v4l2-ctl --list-devices`, and that this user may read it"};
+    throw InputError{parameters_.device, "gives no pictures in a format that is known here",
+                     "end the program that uses it; `v4l2-ctl --list-formats` shows its formats"};
   }
   if (parameters_.width > 0) device_.set(cv::CAP_PROP_FRAME_WIDTH, static_cast<double>(parameters_.width));
   if (parameters_.height > 0) device_.set(cv::CAP_PROP_FRAME_HEIGHT, static_cast<double>(parameters_.height));

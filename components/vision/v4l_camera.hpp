@@ -41,7 +41,7 @@ class V4lCamera final : public FrameCamera {
   void stop() noexcept;
   void read();
   bool take_picture(const Tick& tick, std::uint64_t number, Picture& picture) override;
-  [[nodiscard]] bool is_file() const { return !parameters_.device.starts_with("/dev/"); }
+  [[nodiscard]] bool is_file() const;
 
   const Parameters& parameters_;
   cv::VideoCapture device_;

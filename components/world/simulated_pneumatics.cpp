@@ -7,9 +7,13 @@
 namespace invar::world {
 
 SimulatedPneumatics::SimulatedPneumatics(const Parameters& parameters) : parameters_{parameters} {
-  const auto map = modbus::load_map_of(
-      parameters.modbus.map, "map", "pneumatic controller",
-      {{"pressure", "Pa"}, {"enable"}, {"actual_pressure", "Pa"}, {"in_band"}, {"over_pressure"}});
+  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "pneumatic controller",
+                                       {{"pressure", "Pa"},
+                                        {"enable"},
+                                        {"actual_pressure", "Pa"},
+                                        {"in_band"},
+                                        {"over_pressure"},
+                                        {"sensor_fault"}});
   if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
 }
 
@@ -52,7 +56,8 @@ void SimulatedPneumatics::step(const Tick& tick) noexcept {
   registers.set("in_band", on && std::abs(reading - setpoint) <= registers.value("band") ? 1.0 : 0.0);
   registers.set("supply_low", supply_low ? 1.0 : 0.0);
   registers.set("over_pressure", over_pressure_ ? 1.0 : 0.0);
-  registers.set("ready", over_pressure_ ? 0.0 : 1.0);
+  registers.set("sensor_fault", parameters_.sensor_fault ? 1.0 : 0.0);
+  registers.set("ready", over_pressure_ || parameters_.sensor_fault ? 0.0 : 1.0);
 
   dispensing::PressureState sample;
   stamp(sample);
@@ -64,6 +69,7 @@ void SimulatedPneumatics::step(const Tick& tick) noexcept {
   sample.purging(purging);
   sample.supply_low(supply_low);
   sample.over_pressure(over_pressure_);
+  sample.sensor_fault(parameters_.sensor_fault);
   sample.comm_lost(registers.comm_lost());
   actual_.write(sample);
 }

@@ -26,6 +26,7 @@ class SimulatedPneumatics final : public Component {
     double over_pressure = 3e5;
     double noise = 20.0;
     double leak_through = 0.0;
+    bool sensor_fault = false;
     std::int64_t seed = 5;
     void describe(auto& p) {
       modbus.describe(p);
@@ -36,6 +37,7 @@ class SimulatedPneumatics final : public Component {
       p(noise, "noise", "Pa", Range{0.0, 1e4}, "1 sigma of the pressure sensors");
       p(leak_through, "leak_through", "Pa", Range{0.0, 1.6e6}, "what a worn regulator adds to its setpoint",
         while_running);
+      p(sensor_fault, "sensor_fault", "a pressure sensor says that it is broken");
       p(seed, "seed", 0, 1'000'000'000, "of the noise");
     }
   };

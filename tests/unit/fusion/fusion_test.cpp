@@ -185,44 +185,43 @@ TEST_P(FusionFault, LeavesInTimeWithoutAStepAndComesBack) {
   }
 }
 
+bool late(double, double, double, sensing::AxisReading& reading) {
+  reading.at().time_ns(reading.at().time_ns() - 30'000'000);
+  return true;
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, FusionFault,
-    ::testing::Values(Fault{"encoder_missing", 0, 0.006,
-                            [](double, double, double, sensing::AxisReading&) { return false; }},
-                      Fault{"analogue_missing", 1, 0.006,
-                            [](double, double, double, sensing::AxisReading&) { return false; }},
-                      Fault{"speed_missing", 2, 0.006,
-                            [](double, double, double, sensing::AxisReading&) { return false; }},
-                      Fault{"encoder_stuck", 0, 0.02,
-                            [](double, double held, double, sensing::AxisReading& r) {
-                              return r.position(held), true;
-                            }},
-                      Fault{"analogue_stuck", 1, 0.006,
-                            [](double, double held, double, sensing::AxisReading& r) {
-                              return r.position(held), true;
-                            }},
-                      Fault{"speed_stuck", 2, 0.006,
-                            [](double, double held, double, sensing::AxisReading& r) {
-                              return r.velocity(held), true;
-                            }},
-                      Fault{"speed_dead", 2, 0.006,
-                            [](double, double, double, sensing::AxisReading& r) {
-                              return r.velocity(0.0), true;
-                            }},
-                      Fault{"encoder_dead", 0, 0.006,
-                            [](double, double, double, sensing::AxisReading& r) {
-                              return r.position(0.0), true;
-                            }},
-                      Fault{"encoder_jumps", 0, 0.006,
-                            [](double, double, double truth, sensing::AxisReading& r) {
-                              return r.position(1e-4 * std::round((truth + 0.02) / 1e-4)), true;
-                            }},
-                      Fault{"encoder_late", 0, 0.006,
-                            [](double since, double, double truth, sensing::AxisReading& r) {
-                              r.at().time_ns(r.at().time_ns() - 30'000'000);
-                              (void)since, (void)truth;
-                              return true;
-                            }}),
+    ::testing::Values(
+        Fault{"encoder_missing", 0, 0.006,
+              [](double, double, double, sensing::AxisReading&) { return false; }},
+        Fault{"analogue_missing", 1, 0.006,
+              [](double, double, double, sensing::AxisReading&) { return false; }},
+        Fault{"speed_missing", 2, 0.006, [](double, double, double, sensing::AxisReading&) { return false; }},
+        Fault{"encoder_stuck", 0, 0.02,
+              [](double, double held, double, sensing::AxisReading& r) { return r.position(held), true; }},
+        Fault{"analogue_stuck", 1, 0.006,
+              [](double, double held, double, sensing::AxisReading& r) { return r.position(held), true; }},
+        Fault{"speed_stuck", 2, 0.006,
+              [](double, double held, double, sensing::AxisReading& r) { return r.velocity(held), true; }},
+        Fault{"speed_dead", 2, 0.006,
+              [](double, double, double, sensing::AxisReading& r) { return r.velocity(0.0), true; }},
+        Fault{"encoder_dead", 0, 0.006,
+              [](double, double, double, sensing::AxisReading& r) { return r.position(0.0), true; }},
+        Fault{"encoder_jumps", 0, 0.006,
+              [](double, double, double truth,
+                 sensing::AxisReading&
+                     r) { return r.position(1e-4 * std::round((truth + 0.02) / 1e-4)), true; }},
+        Fault{"analogue_dead", 1, 0.006,
+              [](double, double, double, sensing::AxisReading& r) { return r.position(0.0), true; }},
+        Fault{"analogue_jumps", 1, 0.006,
+              [](double, double, double,
+                 sensing::AxisReading& r) { return r.position(r.position() - 0.01), true; }},
+        Fault{"speed_jumps", 2, 0.006,
+              [](double, double, double,
+                 sensing::AxisReading& r) { return r.velocity(r.velocity() + 0.3), true; }},
+        Fault{"encoder_late", 0, 0.006, late}, Fault{"analogue_late", 1, 0.006, late},
+        Fault{"speed_late", 2, 0.006, late}),
     [](const ::testing::TestParamInfo<Fault>& fault) { return std::string{fault.param.name}; });
 
 TEST(Fusion, EstimatesHowLateTheVelocityIsAndAlignsIt) {
