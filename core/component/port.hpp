@@ -77,6 +77,12 @@ class InputPort : public Port {
   void add_source(const Port& output) { sources_.push_back(&output); }
   /// Lets go of what waits in an inbox: a component that becomes active does not obey what it was told before. Real-time.
   virtual void discard() noexcept {}
+  /// A sample came that is not obeyed: its writer does not own the topic, or it is too old. Any thread.
+  void refuse() noexcept { refused_.fetch_add(1, std::memory_order_relaxed); }
+  /// Samples refused. Any thread.
+  [[nodiscard]] virtual std::uint64_t lost() const noexcept {
+    return refused_.load(std::memory_order_relaxed);
+  }
 
  protected:
   template <class T>
@@ -93,6 +99,7 @@ class InputPort : public Port {
   std::atomic<std::int64_t> arrived_ns_{INT64_MIN};
   std::atomic<std::int64_t> made_ns_{INT64_MIN};
   std::atomic<std::uint64_t> received_{0};
+  std::atomic<std::uint64_t> refused_{0};
 };
 
 /// What takes the samples of an output: an input of this process, or a transport. Called on the writer's
@@ -144,9 +151,9 @@ class Inbox final : public InputPort {
     for (T sample; take(sample);) {
     }
   }
-  /// Samples refused because this component did not take them in time. Any thread.
-  [[nodiscard]] std::uint64_t lost() const noexcept {
-    std::uint64_t sum = 0;
+  /// Those too that this component did not take in time. Any thread.
+  [[nodiscard]] std::uint64_t lost() const noexcept override {
+    std::uint64_t sum = InputPort::lost();
     for (const auto& lane : lanes_) sum += lane->lost();
     return sum;
   }

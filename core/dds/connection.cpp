@@ -5,6 +5,7 @@
 #include <mutex>
 #include <sstream>
 
+#include "core/dds/guid_text.hpp"
 #include "core/dds/raw_type.hpp"
 
 namespace invar::dds {
@@ -50,11 +51,12 @@ bool WriterConnection::wait_for_acknowledgments(Duration patience) { return wait
 
 ReaderConnection::ReaderConnection(Participant& participant, const std::string& topic,
                                    fdds::TopicDataType* type, const Profile& profile, Discovery& discovery,
-                                   Receive receive)
+                                   Receive receive, std::shared_ptr<CommandGate> gate)
     : participant_{participant},
       discovery_{discovery},
       topic_{topic},
       receive_{std::move(receive)},
+      gate_{std::move(gate)},
       reader_{&participant.create_reader(topic, type, profile, this)} {}
 
 ReaderConnection::~ReaderConnection() {
@@ -64,9 +66,28 @@ ReaderConnection::~ReaderConnection() {
 
 std::size_t ReaderConnection::matched() const { return static_cast<std::size_t>(matched_.load()); }
 
+void ReaderConnection::on_subscription_matched(fdds::DataReader*,
+                                               const fdds::SubscriptionMatchedStatus& status) {
+  matched_ = status.current_count;
+  if (status.current_count_change >= 0) return;
+  const std::string writer =
+      guid_text(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle));
+  if (gate_) gate_->gone(writer);
+  const std::lock_guard lock{silent_mutex_};
+  silent_.erase(writer);
+}
+
 void ReaderConnection::on_liveliness_changed(fdds::DataReader*, const fdds::LivelinessChangedStatus& status) {
-  if (status.not_alive_count_change > 0)
-    discovery_.raise({topic_, "a writer of `" + topic_ + "` went silent: its liveliness lease ran out"});
+  if (status.not_alive_count_change <= 0) return;
+  const std::string writer =
+      guid_text(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle));
+  if (gate_) gate_->gone(writer);
+  // Fast DDS takes a silent writer for alive again whenever another one shows life: told once.
+  const std::lock_guard lock{silent_mutex_};
+  if (silent_.insert(writer).second)
+    discovery_.raise({topic_, "a writer of `" + topic_ + "` (" +
+                                  discovery_.name_of(discovery_.claimant(writer).participant) +
+                                  ") went silent: its liveliness lease ran out"});
 }
 
 RawWriterConnection::RawWriterConnection(Participant& participant, const std::string& topic,

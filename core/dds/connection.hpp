@@ -4,7 +4,11 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
+#include <set>
+#include <string>
 
+#include "core/dds/command_gate.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/participant.hpp"
 #include "core/dds/wire_type.hpp"
@@ -44,7 +48,8 @@ class ReaderConnection final : public Connection, private fdds::DataReaderListen
  public:
   using Receive = std::function<void(fdds::DataReader& reader)>;
   ReaderConnection(Participant& participant, const std::string& topic, fdds::TopicDataType* type,
-                   const Profile& profile, Discovery& discovery, Receive receive);
+                   const Profile& profile, Discovery& discovery, Receive receive,
+                   std::shared_ptr<CommandGate> gate = nullptr);
   ~ReaderConnection() override;
 
   [[nodiscard]] std::size_t matched() const override;
@@ -54,9 +59,7 @@ class ReaderConnection final : public Connection, private fdds::DataReaderListen
 
  private:
   void on_data_available(fdds::DataReader* reader) override { receive_(*reader); }
-  void on_subscription_matched(fdds::DataReader*, const fdds::SubscriptionMatchedStatus& status) override {
-    matched_ = status.current_count;
-  }
+  void on_subscription_matched(fdds::DataReader*, const fdds::SubscriptionMatchedStatus& status) override;
   void on_liveliness_changed(fdds::DataReader*, const fdds::LivelinessChangedStatus& status) override;
   void on_sample_lost(fdds::DataReader*, const fdds::SampleLostStatus& status) override {
     lost_ = static_cast<std::uint64_t>(status.total_count);
@@ -66,6 +69,9 @@ class ReaderConnection final : public Connection, private fdds::DataReaderListen
   Discovery& discovery_;
   std::string topic_;
   Receive receive_;
+  std::shared_ptr<CommandGate> gate_;
+  std::mutex silent_mutex_;
+  std::set<std::string> silent_;  // writers, told so
   std::atomic<std::int32_t> matched_{0};
   std::atomic<std::uint64_t> lost_{0};
   fdds::DataReader* reader_;

@@ -2,15 +2,21 @@
 
 #include <algorithm>
 
+#include "core/base/clock.hpp"
+
 namespace invar::dds {
 
 namespace {
 constexpr std::size_t alarms_kept = 1000;
 }
 
-void Discovery::add_participant(const std::string& id, const std::string& name) {
+void Discovery::add_participant(const std::string& id, const std::string& name,
+                                std::vector<PeerAddress> addresses) {
   const std::lock_guard lock{mutex_};
-  participants_[id] = name;
+  Peer& peer = participants_[id];
+  peer.name = name;
+  peer.addresses = std::move(addresses);
+  if (peer.number == 0) peer.number = ++came_;
   for (auto& [key, endpoint] : endpoints_)
     if (key.starts_with(id)) endpoint.participant = name;
 }
@@ -27,7 +33,7 @@ void Discovery::add_endpoint(Endpoint endpoint) {
   if (endpoint.participant.empty()) {
     const auto known = std::find_if(participants_.begin(), participants_.end(),
                                     [&](const auto& entry) { return endpoint.id.starts_with(entry.first); });
-    endpoint.participant = known != participants_.end() ? known->second : "an unnamed participant";
+    endpoint.participant = known != participants_.end() ? known->second.name : "an unnamed participant";
   }
   const auto old = endpoints_.find(endpoint.id);
   if (old != endpoints_.end()) {
@@ -70,7 +76,7 @@ void Discovery::raise(Alarm alarm) {
 Snapshot Discovery::snapshot() const {
   const std::lock_guard lock{mutex_};
   Snapshot out;
-  for (const auto& [id, name] : participants_) out.participants.push_back({id, name});
+  for (const auto& [id, peer] : participants_) out.participants.push_back({id, peer.name});
   for (const auto& [id, endpoint] : endpoints_) out.endpoints.push_back(endpoint);
   return out;
 }
@@ -85,7 +91,41 @@ std::vector<Alarm> Discovery::take_alarms() {
 std::string Discovery::participant_name(const std::string& id) const {
   const std::lock_guard lock{mutex_};
   const auto found = participants_.find(id);
-  return found == participants_.end() ? "" : found->second;
+  return found == participants_.end() ? "" : found->second.name;
+}
+
+std::string Discovery::name_of(const std::string& participant) const {
+  const std::string name = participant_name(participant);
+  return name.empty() ? "participant " + participant : name;
+}
+
+Claimant Discovery::claimant(const std::string& writer) const {
+  const std::lock_guard lock{mutex_};
+  const auto known = endpoints_.find(writer);
+  return {writer, writer.substr(0, writer.find('|')),
+          known == endpoints_.end() ? 0 : known->second.qos.strength};
+}
+
+bool Discovery::is_gone(const std::string& participant) {
+  std::vector<PeerAddress> addresses;
+  {
+    const std::lock_guard lock{mutex_};
+    const auto found = participants_.find(participant);
+    if (found == participants_.end()) return true;
+    Peer& peer = found->second;
+    for (const auto& [id, other] : participants_)
+      peer.gone = peer.gone || (other.number > peer.number && !peer.addresses.empty() &&
+                                other.addresses == peer.addresses);
+    const Instant now = monotonic_now();
+    if (peer.gone || now - peer.looked < Duration::milliseconds(100)) return peer.gone;
+    peer.looked = now;
+    addresses = peer.addresses;
+  }
+  const bool gone = are_abandoned(addresses);
+  const std::lock_guard lock{mutex_};
+  if (const auto found = participants_.find(participant); found != participants_.end())
+    found->second.gone = gone;
+  return gone;
 }
 
 }  // namespace invar::dds

@@ -7,6 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "core/base/time.hpp"
+#include "core/dds/ownership.hpp"
+#include "core/dds/peer_address.hpp"
 #include "core/dds/profile.hpp"
 
 namespace invar::dds {
@@ -35,12 +38,15 @@ struct Snapshot {
 struct Alarm {
   std::string topic;
   std::string text;
+  bool fault = true;  // otherwise a warning
 };
 
 /// What the participants of one node know. Any thread.
 class Discovery {
  public:
-  void add_participant(const std::string& id, const std::string& name);
+  /// `addresses`: where it hears discovery.
+  void add_participant(const std::string& id, const std::string& name,
+                       std::vector<PeerAddress> addresses = {});
   void remove_participant(const std::string& id);
   /// A new endpoint of ours or a foreign one. Every pair of one of ours and one of anybody on the same topic
   /// is checked; one that cannot match raises an alarm that names both ends and the policy, once.
@@ -52,12 +58,27 @@ class Discovery {
   /// The alarms since the last call, oldest first.
   [[nodiscard]] std::vector<Alarm> take_alarms();
   [[nodiscard]] std::string participant_name(const std::string& id) const;
+  /// Its name, or what is known instead.
+  [[nodiscard]] std::string name_of(const std::string& participant) const;
+  /// Whose a writer is, and how strong.
+  [[nodiscard]] Claimant claimant(const std::string& writer) const;
+  /// Whether a participant has ended, though its lease runs on: others use its addresses, or nobody. Looked up ten times a
+  /// second at most; may take some milliseconds.
+  [[nodiscard]] bool is_gone(const std::string& participant);
 
  private:
   void check(const Endpoint& one, const Endpoint& other);
 
   mutable std::mutex mutex_;
-  std::map<std::string, std::string> participants_;
+  struct Peer {
+    std::string name;
+    std::vector<PeerAddress> addresses;
+    std::uint64_t number = 0;  // in the order of their coming
+    Instant looked{INT64_MIN / 2};
+    bool gone = false;
+  };
+  std::map<std::string, Peer> participants_;
+  std::uint64_t came_ = 0;
   std::map<std::string, Endpoint> endpoints_;
   std::deque<Alarm> alarms_;
 };

@@ -34,6 +34,13 @@ bool is_kept(const Profile& profile) {
   return profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
 }
 
+/// None where everybody is heard.
+std::shared_ptr<CommandGate> gate_of(const std::string& topic, const Profile& profile, Discovery& discovery,
+                                     std::function<void()> refused = {}) {
+  if (!profile.exclusive) return nullptr;
+  return std::make_shared<CommandGate>(topic, profile, discovery, std::move(refused));
+}
+
 struct BoundOutput {
   std::unique_ptr<WriterConnection> connection;
   std::unique_ptr<Outlet> outlet;
@@ -122,9 +129,12 @@ void Node::bind(InputPort& port, Clock clock) {
   const Profile& qos = profile(port.profile);
   const WireType& type = wire_type_of(port.type(), port.topic);
   std::shared_ptr<Inlet> inlet = type.attach(port, is_kept(qos));
+  const auto gate = gate_of(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
+  inlet->guard(gate);
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
-      [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }));
+      [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); },
+      gate));
 }
 
 void Node::start(std::function<Instant()> ended) {
@@ -172,9 +182,11 @@ std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::typ
   const WireType& wire = wire_type_of(type, topic);
   std::shared_ptr<Inlet> inlet =
       wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, is_kept(profile));
+  const auto gate = gate_of(topic, profile, parts_->discovery);
+  inlet->guard(gate);
   return std::make_unique<ReaderConnection>(
       parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,
-      [inlet](fdds::DataReader& reader) { inlet->receive(reader, utc_now()); });
+      [inlet](fdds::DataReader& reader) { inlet->receive(reader, utc_now()); }, gate);
 }
 
 }  // namespace invar::dds

@@ -5,6 +5,7 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <pthread.h>
 #include <unistd.h>
@@ -21,7 +22,9 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/dds/guid_text.hpp"
 #include "core/dds/qos.hpp"
+#include "core/dds/writer_keys.hpp"
 
 namespace invar::dds {
 
@@ -29,13 +32,6 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::types::ReturnCode_t;
 
 namespace {
-
-template <class T>
-std::string as_text(const T& value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
 
 /// Begins the user data of our participants; the process id follows.
 constexpr std::string_view pid_mark = "invar pid ";
@@ -106,6 +102,15 @@ std::int32_t process_of(const rtps::ParticipantProxyData& peer, const rtps::Guid
   return pid;
 }
 
+std::vector<PeerAddress> addresses_of(const rtps::ParticipantProxyData& peer) {
+  std::vector<PeerAddress> addresses;
+  for (const auto& locator : peer.metatraffic_locators.unicast)
+    if (locator.kind == LOCATOR_KIND_UDPv4)
+      addresses.push_back(
+          {rtps::IPLocator::toIPv4string(locator), rtps::IPLocator::getPhysicalPort(locator)});
+  return addresses;
+}
+
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
                                            Traffic traffic, const Profiles& profiles) {
   namespace transport = eprosima::fastdds::rtps;
@@ -174,7 +179,7 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   if (participant_ == nullptr)
     throw InputError{"domain " + std::to_string(options.domain), "Fast DDS could not create a participant",
                      "check that the host's address is one of this PC's, and that /dev/shm has room"};
-  discovery_.add_participant(as_text(participant_->guid().guidPrefix), name_);
+  discovery_.add_participant(guid_text(participant_->guid().guidPrefix), name_);
 }
 
 Participant::~Participant() {
@@ -225,7 +230,7 @@ fdds::DataWriter& Participant::create_writer(const std::string& name, fdds::Topi
   fdds::Topic* on = topic(name, type);
   auto* writer = publisher(profile.partitions)->create_datawriter(on, writer_qos(profile), listener);
   INVAR_EXPECTS(writer != nullptr, name, profile.name);  // the profile was checked when it was read
-  discovery_.add_endpoint({as_text(writer->guid()), name_, name, on->get_type_name(), true, true, profile});
+  discovery_.add_endpoint({guid_text(writer->guid()), name_, name, on->get_type_name(), true, true, profile});
   return *writer;
 }
 
@@ -233,9 +238,11 @@ fdds::DataReader& Participant::create_reader(const std::string& name, fdds::Topi
                                              const Profile& profile, fdds::DataReaderListener* listener) {
   const std::lock_guard lock{mutex_};
   fdds::Topic* on = topic(name, type);
+  const WriterKeys::Making making{profile.exclusive};
   auto* reader = subscriber(profile.partitions)->create_datareader(on, reader_qos(profile), listener);
   INVAR_EXPECTS(reader != nullptr, name, profile.name);
-  discovery_.add_endpoint({as_text(reader->guid()), name_, name, on->get_type_name(), false, true, profile});
+  discovery_.add_endpoint(
+      {guid_text(reader->guid()), name_, name, on->get_type_name(), false, true, profile});
   return *reader;
 }
 
@@ -244,13 +251,13 @@ void Participant::remove(fdds::DataWriter& writer) {
   std::size_t removed = 0;
   writer.clear_history(&removed);
   const std::lock_guard lock{mutex_};
-  discovery_.remove_endpoint(as_text(writer.guid()));
+  discovery_.remove_endpoint(guid_text(writer.guid()));
   const_cast<fdds::Publisher*>(writer.get_publisher())->delete_datawriter(&writer);  // NOLINT
 }
 
 void Participant::remove(fdds::DataReader& reader) {
   const std::lock_guard lock{mutex_};
-  discovery_.remove_endpoint(as_text(reader.guid()));
+  discovery_.remove_endpoint(guid_text(reader.guid()));
   const_cast<fdds::Subscriber*>(reader.get_subscriber())->delete_datareader(&reader);  // NOLINT
 }
 
@@ -261,7 +268,7 @@ bool Participant::has_dead_peer() const {
 
 void Participant::on_participant_discovery(fdds::DomainParticipant* own,
                                            rtps::ParticipantDiscoveryInfo&& info) {
-  const std::string id = as_text(info.info.m_guid.guidPrefix);
+  const std::string id = guid_text(info.info.m_guid.guidPrefix);
   const bool is_gone = info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
                        info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
   {
@@ -275,18 +282,18 @@ void Participant::on_participant_discovery(fdds::DomainParticipant* own,
   if (is_gone)
     discovery_.remove_participant(id);
   else
-    discovery_.add_participant(id, info.info.m_participantName.c_str());
+    discovery_.add_participant(id, info.info.m_participantName.c_str(), addresses_of(info.info));
 }
 
 void Participant::on_publisher_discovery(fdds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) {
-  const std::string id = as_text(info.info.guid());
+  const std::string id = guid_text(info.info.guid());
   if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) return discovery_.remove_endpoint(id);
   discovery_.add_endpoint({id, "", info.info.topicName().c_str(), info.info.typeName().c_str(), true, false,
                            described(info.info.m_qos)});
 }
 
 void Participant::on_subscriber_discovery(fdds::DomainParticipant*, rtps::ReaderDiscoveryInfo&& info) {
-  const std::string id = as_text(info.info.guid());
+  const std::string id = guid_text(info.info.guid());
   if (info.status == rtps::ReaderDiscoveryInfo::REMOVED_READER) return discovery_.remove_endpoint(id);
   discovery_.add_endpoint({id, "", info.info.topicName().c_str(), info.info.typeName().c_str(), false, false,
                            described(info.info.m_qos)});

@@ -176,7 +176,8 @@ void ProcessService::publish(event::Severity level, const std::string& source, c
 
 void ProcessService::publish_news() {
   for (const auto& alarm : node_.take_alarms())
-    publish(event::SEVERITY_FAULT, node_.options().process, alarm.text);
+    publish(alarm.fault ? event::SEVERITY_FAULT : event::SEVERITY_WARNING, node_.options().process,
+            alarm.text);
   for (StateChange change; control_.executor().take_change(change);) {
     const std::string name = control_.executor().component(change.component).name;
     const bool failed = change.to == LifecycleState::error;
@@ -248,6 +249,7 @@ void ProcessService::publish_status() {
     out.state(on_wire(from.state));
     out.failure(from.failure);
     out.steps(from.steps);
+    out.lost(from.lost);
     out.every(from.every);
     out.compute(on_wire(from.compute));
     for (const InputAge& input : from.ages) {

@@ -35,6 +35,7 @@ bool RawType::serialize(void* data, rtps::SerializedPayload_t* payload) {
 }
 
 bool RawType::deserialize(rtps::SerializedPayload_t* payload, void* data) {
+  keys_.deserialized(*payload, data);
   const auto* bytes = reinterpret_cast<const std::byte*>(payload->data);
   static_cast<Bytes*>(data)->assign(bytes, bytes + payload->length);
   return true;
@@ -44,14 +45,22 @@ std::function<std::uint32_t()> RawType::getSerializedSizeProvider(void* data) {
   return [data] { return static_cast<std::uint32_t>(static_cast<const Bytes*>(data)->size()); };
 }
 
-void* RawType::createData() { return new Bytes; }  // NOLINT: the interface of Fast DDS
-void RawType::deleteData(void* data) { delete static_cast<Bytes*>(data); }  // NOLINT
+void* RawType::createData() { return keys_.created(new Bytes); }  // NOLINT: the interface of Fast DDS
+void RawType::deleteData(void* data) {
+  keys_.deleted(data);
+  delete static_cast<Bytes*>(data);  // NOLINT
+}
 
 bool RawType::getKey(void* data, rtps::InstanceHandle_t* handle, bool force_md5) {
   if (!m_isGetKeyDefined) return false;
   std::memset(handle->value, 0, 16);
   handle->value[0] = 1;
-  if (!known_) return true;
+  const bool good = !known_ || known_key(data, handle, force_md5);
+  keys_.mix(data, *handle);
+  return good;
+}
+
+bool RawType::known_key(void* data, rtps::InstanceHandle_t* handle, bool force_md5) {
   auto& bytes = *static_cast<Bytes*>(data);
   rtps::SerializedPayload_t payload;
   payload.data = reinterpret_cast<rtps::octet*>(bytes.data());

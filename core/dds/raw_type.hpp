@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "core/dds/writer_keys.hpp"
+
 namespace invar::dds {
 
 /// A sample is a std::vector<std::byte> of CDR with its encapsulation. Where the type is one of WireTypes,
@@ -26,9 +28,12 @@ class RawType final : public eprosima::fastdds::dds::TopicDataType {
   bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5) override;
 
  private:
+  bool known_key(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5);
+
   std::mutex mutex_;
   std::unique_ptr<eprosima::fastdds::dds::TopicDataType> known_;
   void* sample_ = nullptr;
+  WriterKeys keys_;
 };
 
 }  // namespace invar::dds

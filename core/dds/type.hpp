@@ -3,6 +3,7 @@
 
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
+#include "core/dds/writer_keys.hpp"
 #include "idl/types.hpp"
 
 namespace invar::dds {
@@ -21,10 +22,18 @@ class Type final : public B {
  public:
   bool getKey(void* data, eprosima::fastrtps::rtps::InstanceHandle_t* handle, bool force_md5) override {
     thread_local B own;
-    return own.getKey(data, handle, force_md5);
+    if (!own.getKey(data, handle, force_md5)) return false;
+    keys_.mix(data, *handle);
+    return true;
+  }
+  void* createData() override { return keys_.created(B::createData()); }
+  void deleteData(void* data) override {
+    keys_.deleted(data);
+    B::deleteData(data);
   }
 
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
+    keys_.deserialized(*payload, data);
     try {
       return B::deserialize(payload, data) && idl::within_bounds(*static_cast<typename B::type*>(data));
     } catch (...) {
@@ -33,6 +42,9 @@ class Type final : public B {
   }
 
   bool is_plain() const override { return false; }
+
+ private:
+  WriterKeys keys_;
 };
 
 }  // namespace invar::dds

@@ -5,8 +5,11 @@
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
+#include <algorithm>
 #include <mutex>
 
+#include "core/dds/command_gate.hpp"
+#include "core/dds/guid_text.hpp"
 #include "core/dds/type.hpp"
 #include "core/dds/wire_type.hpp"
 
@@ -100,7 +103,7 @@ class TypedInlet final : public Inlet {
     fdds::SampleInfo info;
     while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
            ReturnCode_t::RETCODE_OK)
-      if (info.valid_data) sink_(sample_, now);
+      if (info.valid_data && is_obeyed(info)) sink_(sample_, now);
   }
 
   bool deliver(std::span<const std::byte> cdr, Instant now) override {
@@ -116,6 +119,16 @@ class TypedInlet final : public Inlet {
   }
 
  private:
+  bool is_obeyed(const fdds::SampleInfo& info) {
+    if (!gate_) return true;
+    eprosima::fastrtps::rtps::InstanceHandle_t handle;
+    (void)type_.getKey(&sample_, &handle, false);
+    Ownership::Instance instance;
+    std::copy_n(&handle.value[0], instance.size(), instance.begin());
+    return gate_->passes(instance, guid_text(info.sample_identity.writer_guid()),
+                         {info.source_timestamp.to_ns()});
+  }
+
   std::mutex mutex_;
   Sink<T> sink_;
   bool keep_;

@@ -22,6 +22,8 @@ class TopicDataType;
 
 namespace invar::dds {
 
+class CommandGate;
+
 /// The samples of one output on their way to the middleware.
 class Outlet {
  public:
@@ -42,6 +44,11 @@ class Inlet {
   virtual void receive(eprosima::fastdds::dds::DataReader& reader, Instant now) = 0;
   /// Hands over one sample in CDR (with encapsulation); false when it is malformed.
   virtual bool deliver(std::span<const std::byte> cdr, Instant now) = 0;
+  /// Set-up only: what a reader hands over passes it first.
+  void guard(std::shared_ptr<CommandGate> gate) { gate_ = std::move(gate); }
+
+ protected:
+  std::shared_ptr<CommandGate> gate_;
 };
 
 /// Takes the CDR (with encapsulation) of each sample that an output writes, on the writer's thread.

@@ -28,6 +28,13 @@ bool is_beyond(LifecycleState state, Transition transition) {
   return false;
 }
 
+std::uint64_t lost_by(const Component& component) {
+  std::uint64_t sum = 0;
+  for (const Port* port : component.ports())
+    if (const auto* input = dynamic_cast<const InputPort*>(port)) sum += input->lost();
+  return sum;
+}
+
 }  // namespace
 
 ComponentStatus ProcessControl::component(std::size_t index) const {
@@ -38,6 +45,7 @@ ComponentStatus ProcessControl::component(std::size_t index) const {
           executor.failure(index),
           executor.every(index),
           executor.steps(index),
+          lost_by(executor.component(index)),
           executor.compute(index).percentiles(),
           executor.ages(index)};
 }

@@ -21,6 +21,8 @@ struct ComponentStatus {
   std::string failure;  // when in error
   std::uint32_t every = 1;
   std::uint64_t steps = 0;
+  std::uint64_t lost =
+      0;  // samples that its inputs refused: their sender does not own them, or the inbox was full
   Percentiles compute;  // of its step; empty in simulated time
   std::vector<InputAge> ages;
 };

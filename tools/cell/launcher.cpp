@@ -11,12 +11,14 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <thread>
 
 #include "core/base/temporary_folder.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
+#include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
@@ -67,7 +69,9 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
                                  "--outcome",
                                  outcome_of(process, folder).string()};
   std::filesystem::remove(outcome_of(process, folder));  // of an earlier life
+  std::filesystem::remove(progress_file(outcome_of(process, folder)));
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
+  if (options.quiet) words.emplace_back("--quiet");
   if (simulated && options.pace > 0.0) words.insert(words.end(), {"--pace", std::to_string(options.pace)});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -139,6 +143,30 @@ std::string text_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>{stream}, {}};
 }
 
+/// Looks now and then how far the job is, as the process that runs it says.
+class JobNews {
+ public:
+  JobNews(const LaunchOptions& options, const config::Cell& cell, const std::filesystem::path& folder)
+      : tell_{options.progress} {
+    const auto job = cell.jobs.find(options.job);
+    if (job == cell.jobs.end()) return;
+    for (const auto& process : cell.processes)
+      for (const auto& component : process.components)
+        if (component.name == job->second) file_ = progress_file(outcome_of(process.name, folder));
+  }
+  void look() {
+    if (!tell_ || file_.empty() || Clock::now() - looked_ < std::chrono::milliseconds{50}) return;
+    looked_ = Clock::now();
+    const auto news = nlohmann::json::parse(text_of(file_), nullptr, false);
+    if (news.is_object()) tell_(news.value("fraction", 0.0), news.value("text", ""));
+  }
+
+ private:
+  const std::function<void(double, const std::string&)>& tell_;
+  std::filesystem::path file_;
+  Clock::time_point looked_{};
+};
+
 /// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
 bool keeps_time(const LaunchOptions& options, const config::Cell& cell) {
   return options.host.empty() || cell.processes.front().host == options.host;
@@ -177,13 +205,16 @@ dds::NodeOptions node_options(const config::Cell& cell) {
 
 std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell,
                                 std::vector<Child>& children, const std::atomic<bool>& stop,
-                                Clock::time_point begin, LaunchOutcome& outcome) {
+                                Clock::time_point begin, JobNews& news, LaunchOutcome& outcome) {
   dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const auto& process : cell.processes) names.push_back(process.name);
   dds::SimulatedClockMaster master{node, names, cell.window};
   node.start();
-  const auto given_up = [&] { return stop.load() || any_ended(children); };
+  const auto given_up = [&] {
+    news.look();
+    return stop.load() || any_ended(children);
+  };
   // Somebody may have to start the other PCs by hand.
   const Duration patience = Duration::seconds(names.size() > children.size() ? 300.0 : 30.0);
   std::string failure = master.wait_for_all(patience, given_up);
@@ -244,9 +275,10 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   for (const auto& process : cell.processes)  // let go at once: the processes claim their names themselves
     if (options.host.empty() || process.host == options.host) (void)ProcessClaim{cell, process.name};
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
-  announce(options, cell, outcome.simulated);
+  if (!options.quiet) announce(options, cell, outcome.simulated);
 
   const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
+  JobNews news{options, cell, folder.path()};
   std::vector<Child> children;
   for (const auto& process : cell.processes)
     if (options.host.empty() || process.host == options.host)
@@ -255,11 +287,13 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   if (outcome.simulated && !keeps_time(options, cell)) {
     while (!stop && any_runs(children)) sleep_a_little();
   } else if (outcome.simulated) {
-    outcome.failure = keep_simulated_time(options, cell, children, stop, begin, outcome);
+    outcome.failure = keep_simulated_time(options, cell, children, stop, begin, news, outcome);
   } else {
     while (!stop && (options.duration <= 0.0 || seconds_since(begin) < options.duration) &&
-           (options.job.empty() ? keep_alive(children, options, folder.path()) : !any_ended(children)))
+           (options.job.empty() ? keep_alive(children, options, folder.path()) : !any_ended(children))) {
+      news.look();
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
   }
   std::vector<bool> by_itself;
   for (const Child& child : children) by_itself.push_back(!child.running);

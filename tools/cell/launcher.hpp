@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,9 @@ struct LaunchOptions {
   double duration = 0.0;          // s of the cell's time; 0: until stopped
   double pace =
       0.0;  // simulated time runs no faster than so many times the wall clock; 0: as fast as it goes
+  bool quiet = false;  // nothing on the error output but what is wrong
+  /// Called as the job goes on: how much of it is done (0 to 1), and what it does now.
+  std::function<void(double fraction, const std::string& text)> progress;
 };
 
 struct ProcessOutcome {

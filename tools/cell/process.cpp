@@ -5,7 +5,7 @@
 
 #include <chrono>
 #include <deque>
-#include <fstream>
+#include <filesystem>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -24,6 +24,7 @@
 #include "idl/job.h"
 #include "idl/stage.h"
 #include "tools/cell/black_box_file.hpp"
+#include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/cell/process_claim.hpp"
 
@@ -227,9 +228,11 @@ class RunningProcess {
                             (!job_ended_ || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
+      leave_progress();
       for (const dds::Alarm& alarm : node_.take_alarms()) {
         spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
-        service_->publish(event::SEVERITY_FAULT, file_.name, alarm.topic + ": " + alarm.text);
+        service_->publish(alarm.fault ? event::SEVERITY_FAULT : event::SEVERITY_WARNING, file_.name,
+                          alarm.topic + ": " + alarm.text);
       }
     }
     say_how_the_job_ended();
@@ -265,7 +268,11 @@ class RunningProcess {
           executor_.advance_to(until);
           return std::string{};
         },
-        [&] { return !options_.job.empty() && (!runs_job_ || job_ended_.load()); }, stop);
+        [&] {
+          leave_progress();
+          return !options_.job.empty() && (!runs_job_ || job_ended_.load());
+        },
+        stop);
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
     say_how_the_job_ended();
     status_ = control_.status();
@@ -330,6 +337,12 @@ class RunningProcess {
     return view;
   }
 
+  void leave_progress() {
+    if (!runs_job_) return;
+    const std::scoped_lock lock{job_mutex_};
+    progress_.leave(job_.progress(), job_.text().c_str());
+  }
+
   void say_how_the_job_ended() {
     const std::scoped_lock lock{job_mutex_};
     if (runs_job_ && job_ended_ && job_.phase() != job::JOB_DONE)
@@ -375,17 +388,9 @@ class RunningProcess {
   /// The components are down by then: the launcher goes on to the next process when it sees the file.
   void write_outcome() {
     if (options_.outcome.empty()) return;
-    nlohmann::json outcome{{"process", file_.name},
-                           {"cycles", status_.counters.executed},
-                           {"overruns", status_.counters.overruns},
-                           {"skipped", status_.counters.skipped},
-                           {"rate", 1.0 / file_.period.in_seconds()},
-                           {"compute_p50_ns", status_.compute.p50.ns},
-                           {"compute_p99_ns", status_.compute.p99.ns},
-                           {"wake_up_p50_ns", status_.wake_up.p50.ns},
-                           {"wake_up_p99_ns", status_.wake_up.p99.ns},
-                           {"not_granted", status_.not_granted}};
-    if (recorder_ != nullptr) outcome["recording"] = std::filesystem::absolute(recorder_->file()).string();
+    nlohmann::json outcome = loop_outcome(status_, file_.period);
+    if (recorder_ != nullptr && std::filesystem::exists(recorder_->file()))
+      outcome["recording"] = std::filesystem::absolute(recorder_->file()).string();
     if (runs_job_) {
       const std::scoped_lock lock{job_mutex_};
       outcome["job"] = {{"name", job_.name().c_str()},
@@ -394,10 +399,7 @@ class RunningProcess {
                         {"result", job_.result_path().c_str()},
                         {"seconds", static_cast<double>(job_.at().time_ns() - job_began_ns_) * 1e-9}};
     }
-    std::filesystem::path whole = options_.outcome;
-    whole += ".part";
-    std::ofstream{whole} << outcome.dump(2) << '\n';
-    std::filesystem::rename(whole, options_.outcome);
+    write_whole(options_.outcome, outcome);
   }
 
   const ProcessOptions& options_;
@@ -424,6 +426,7 @@ class RunningProcess {
   job::JobStatus job_;
   std::int64_t job_began_ns_ = 0;
   std::atomic<bool> job_ended_{false};
+  ProgressFile progress_{options_.outcome};
 };
 
 }  // namespace

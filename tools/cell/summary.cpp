@@ -3,7 +3,9 @@
 #include <cmath>
 #include <iomanip>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "core/base/shown.hpp"
 #include "core/metrology/line_errors.hpp"
 #include "core/recording/export.hpp"
 #include "core/recording/recording_reader.hpp"
@@ -97,9 +99,12 @@ void add_heater(report::Page& page, const std::filesystem::path& folder, std::os
   }
 }
 
+bool is_done(const nlohmann::json& job) { return job.is_object() && job.value("done", false); }
+
 void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& out) {
   const std::filesystem::path folder = job.value("result", "");
   out << "job             " << job.value("name", "") << ": " << job.value("text", "") << '\n';
+  if (!is_done(job)) return;  // the files there are of an earlier one, or not whole
   const auto before_file = folder / "verify_before.csv";
   const auto after_file = folder / "verify_after.csv";
   if (std::filesystem::exists(before_file) && std::filesystem::exists(after_file)) {
@@ -121,55 +126,115 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
   add_heater(page, folder, out);
 }
 
-}  // namespace
+/// The lines of a summary by the word that they begin with, as wide as a column.
+nlohmann::ordered_json by_name(const std::string& lines) {
+  constexpr std::size_t column = 16;
+  auto json = nlohmann::ordered_json::object();
+  std::istringstream stream{lines};
+  for (std::string line; std::getline(stream, line);) {
+    if (line.size() <= column) continue;
+    std::string name = line.substr(0, column);
+    name.erase(name.find_last_not_of(' ') + 1);
+    if (!name.empty()) json[name] = line.substr(column);
+  }
+  return json;
+}
 
-void summarise(const LaunchOutcome& outcome, std::ostream& out) {
-  report::Page page{"Invar: a cell and its job",
-                    outcome.simulated ? "in simulated time" : "by the wall clock"};
-  std::vector<std::vector<std::string>> loops;
-  std::filesystem::path folder;
+/// What the processes left, as a table and for programs.
+struct Processes {
+  inline static const std::vector<std::string> header{
+      "process", "rate", "cycles", "overruns", "late", "compute p50 / p99", "wake-up p50 / p99"};
+
+  explicit Processes(const LaunchOutcome& outcome) {
+    for (const ProcessOutcome& process : outcome.processes) add(process, outcome.simulated);
+  }
+
+  void print(std::ostream& out) const {
+    const std::vector<int> widths{16, 10, 10, 10, 10, 22, 22};
+    const auto row = [&](const std::vector<std::string>& cells) {
+      for (std::size_t i = 0; i < cells.size(); ++i) out << std::left << std::setw(widths[i]) << cells[i];
+      out << '\n';
+    };
+    row(header);
+    for (const auto& cells : rows) row(cells);
+    out << '\n';
+    for (const std::string& line : notes) out << line << '\n';
+    if (!notes.empty()) out << '\n';
+  }
+
+  std::vector<std::vector<std::string>> rows;
+  std::vector<std::string> notes;  // what was not as declared
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
   nlohmann::json job;
   std::vector<std::string> recordings;
-  for (const ProcessOutcome& process : outcome.processes) {
-    const auto report = nlohmann::json::parse(process.report, nullptr, false);
+
+ private:
+  void add(const ProcessOutcome& process, bool simulated) {
+    auto report = nlohmann::json::parse(process.report, nullptr, false);
     if (report.is_discarded()) {
-      loops.push_back(
-          {process.process, "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
-      continue;
+      rows.push_back(
+          {process.process, "-", "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
+      json.push_back({{"process", process.process}, {"status", process.status}});
+      return;
     }
     const auto us = [&](const char* key) { return number(report.value(key, 0.0) * 1e-3, 3) + " us"; };
-    loops.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
-                     std::to_string(report.value("cycles", 0ULL)),
-                     std::to_string(report.value("overruns", 0ULL)),
-                     outcome.simulated ? "-" : us("compute_p50_ns") + " / " + us("compute_p99_ns"),
-                     outcome.simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
+    rows.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
+                    std::to_string(report.value("cycles", 0ULL)),
+                    std::to_string(report.value("overruns", 0ULL)),
+                    report.contains("late") && !simulated ? std::to_string(report.value("late", 0ULL)) : "-",
+                    simulated ? "-" : us("compute_p50_ns") + " / " + us("compute_p99_ns"),
+                    simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
+    for (const auto& line : report.value("not_granted", std::vector<std::string>{}))
+      notes.push_back("not granted     " + process.process + ": " + line);
+    for (const auto& input : report.value("late_inputs", nlohmann::json::array()))
+      if (const auto late = input.value("late", 0ULL); late > 0 && !simulated)
+        notes.push_back("late input      " + input.value("input", "") + ": " + std::to_string(late) + " of " +
+                        std::to_string(input.value("steps", 0ULL)) + " steps read a sample older than " +
+                        milliseconds({input.value("limit_ns", std::int64_t{0})}, 4) + "; the oldest of " +
+                        milliseconds({input.value("max_ns", std::int64_t{0})}, 4));
     if (report.contains("job")) job = report["job"];
     if (report.contains("recording")) recordings.push_back(report["recording"]);
+    report["status"] = process.status;
+    json.push_back(std::move(report));
   }
-  const std::vector<std::string> header{"process",          "rate", "cycles", "overruns", "compute p50 / p99",
-                                        "wake-up p50 / p99"};
-  const std::vector<int> widths{16, 10, 10, 10, 22, 22};
-  for (std::size_t i = 0; i < header.size(); ++i) out << std::left << std::setw(widths[i]) << header[i];
-  out << '\n';
-  for (const auto& row : loops) {
-    for (std::size_t i = 0; i < row.size(); ++i) out << std::left << std::setw(widths[i]) << row[i];
-    out << '\n';
+};
+
+}  // namespace
+
+nlohmann::ordered_json summarise(const LaunchOutcome& outcome, std::ostream& out) {
+  report::Page page{"Invar: a cell and its job",
+                    outcome.simulated ? "in simulated time" : "by the wall clock"};
+  Processes processes{outcome};
+  processes.print(out);
+  nlohmann::ordered_json json{{"failure", outcome.failure},
+                              {"simulated", outcome.simulated},
+                              {"wall_seconds", outcome.wall_seconds},
+                              {"processes", processes.json},
+                              {"job", processes.job},
+                              {"summary", nlohmann::ordered_json::object()},
+                              {"report", nullptr},
+                              {"recordings", processes.recordings}};
+  if (!processes.job.is_null()) {
+    std::ostringstream lines;
+    summarise_job(processes.job, page, lines);
+    out << lines.str();
+    json["summary"] = by_name(lines.str());
   }
-  out << '\n';
-  if (!job.is_null()) {
-    folder = job.value("result", "");
-    summarise_job(job, page, out);
-  }
-  page.heading("Processes");
-  page.table(header, loops);
   out << "time            " << number(outcome.wall_seconds, 3) << " s of the wall clock";
-  if (!job.is_null()) out << " for a job of " << number(job.value("seconds", 0.0), 4) << " s of the cell";
+  if (!processes.job.is_null())
+    out << " for a job of " << number(processes.job.value("seconds", 0.0), 4) << " s of the cell";
   out << '\n';
-  if (!folder.empty()) {
+  page.heading("Processes");
+  page.table(Processes::header, processes.rows);
+  // Only what is there is named: a job that failed may have left nothing, and what lies there may be another's.
+  const std::filesystem::path folder = processes.job.is_null() ? "" : processes.job.value("result", "");
+  if (is_done(processes.job) && std::filesystem::is_directory(folder)) {
     page.write(folder / "report.html");
+    json["report"] = (folder / "report.html").string();
     out << "report          " << (folder / "report.html").string() << '\n';
   }
-  for (const std::string& file : recordings) out << "recording       " << file << '\n';
+  for (const std::string& file : processes.recordings) out << "recording       " << file << '\n';
+  return json;
 }
 
 }  // namespace invar::tools

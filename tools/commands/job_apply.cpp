@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
 
@@ -32,6 +33,7 @@ struct Options {
   bool rollback = false;
   bool none = false;
   bool partly = false;
+  bool json = false;
 };
 
 /// Which type of component takes a model of a plant; empty: none, and what to do instead.
@@ -119,7 +121,7 @@ class ModelPort {
   ModelPort(LiveCell& cell, const std::string& component)
       : cell_{cell},
         writer_{cell.node().writer<compensation::ModelCommand>(
-            dds::topic_name(cell.name(), component, "model"), cell.node().profile("command"))} {
+            dds::topic_name(cell.name(), component, "model"), by_hand(cell.node().profile("command")))} {
     for (std::size_t i = 0; i < readers_.size(); ++i)  // a component whose only status it is calls it so
       readers_[i] = cell.node().reader<compensation::ModelStatus>(
           dds::topic_name(cell.name(), component, i == 0 ? "model_status" : "status"), "state",
@@ -154,12 +156,34 @@ class ModelPort {
   }
 
  private:
+  /// Whoever gives a model by hand outranks the component of jobs that gave one before; a component that is in the middle of
+  /// a calibration says so.
+  static dds::Profile by_hand(dds::Profile profile) {
+    ++profile.strength;
+    return profile;
+  }
+
   LiveCell& cell_;
   dds::Writer<compensation::ModelCommand> writer_;
   std::mutex mutex_;
   std::optional<compensation::ModelStatus> status_;
   std::array<std::unique_ptr<dds::Connection>, 2> readers_;  // last: nothing arrives before all else stands
 };
+
+std::string state_text(compensation::ModelState state) {
+  constexpr std::array words{"none", "staged", "active", "refused"};
+  const auto index = static_cast<std::size_t>(state);
+  return index < words.size() ? words[index] : "?";
+}
+
+nlohmann::ordered_json json_of(const std::string& component, const compensation::ModelStatus& answer,
+                               const std::filesystem::path& file) {
+  return {{"component", component},
+          {"state", state_text(answer.state())},
+          {"model", file.string()},
+          {"text", answer.text().c_str()},
+          {"time_ns", answer.at().time_ns()}};
+}
 
 int apply(Options& options) {
   options.call.resolve();
@@ -188,8 +212,15 @@ int apply(Options& options) {
               << "` takes no model; is it a stage, compensation or dispenser of this cell?\n";
     return 1;
   }
+  const auto say = [&](const compensation::ModelStatus& answer, const std::string& text) {
+    if (options.json)
+      std::cout << json_of(component, answer, file).dump(2) << '\n';
+    else
+      std::cout << component << ": " << text << '\n';
+  };
   const auto refused = [&](const std::optional<compensation::ModelStatus>& answer) {
     if (answer && answer->state() != compensation::MODEL_REFUSED) return false;
+    if (options.json && answer) say(*answer, "");
     std::cerr << options.call.command << ": `" << component << "` "
               << (answer ? std::string{"refused: "} + answer->text().c_str() : "does not answer") << '\n';
     return true;
@@ -198,14 +229,14 @@ int apply(Options& options) {
     const auto answer =
         port.order(options.none ? compensation::MODEL_CLEAR : compensation::MODEL_ROLLBACK, "");
     if (refused(answer)) return 1;
-    std::cout << component
-              << (answer->state() == compensation::MODEL_NONE ? ": no model any more\n"
-                                                              : ": the model before is active\n");
+    say(*answer,
+        answer->state() == compensation::MODEL_NONE ? "no model any more" : "the model before is active");
     return 0;
   }
   if (refused(port.order(compensation::MODEL_STAGE, file.string()))) return 1;
-  if (refused(port.order(compensation::MODEL_ACTIVATE, ""))) return 1;
-  std::cout << component << ": " << file.string() << " is active\n";
+  const auto active = port.order(compensation::MODEL_ACTIVATE, "");
+  if (refused(active)) return 1;
+  say(*active, file.string() + " is active");
   return 0;
 }
 
@@ -222,13 +253,15 @@ void add_job_apply(CLI::App& job) {
       "a dispenser aims by a model.yaml of plant droplet; compensation, dispenser and fusion take a\n"
       "compensation.yaml of their kind. With a folder `state`, what a compensation was "
       "given here - also\n"
-      "none - is what it starts with next time.");
+      "none - is what it starts with next time.\n"
+      "Exit status: 0 done; 1 refused or no answer; 2 a fault of the call or a file");
   auto options =
       std::make_shared<Options>(*command, std::vector<Word>{{"COMPONENT", "that takes it, such as stage_x"}});
   auto* model =
       command->add_option("--model", options->model,
                           "model.yaml as `invar diagnose` writes it, or a calibration's compensation.yaml");
   command->add_flag("--partly", options->partly, "leave out the terms that a stage cannot feed forward");
+  command->add_flag("--json", options->json, "print the component's answer as JSON");
   auto* rollback = command->add_flag("--rollback", options->rollback, "back to the model before");
   command->add_flag("--none", options->none, "take the models out")->excludes(rollback)->excludes(model);
   command->callback([options] {

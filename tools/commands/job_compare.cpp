@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "core/base/unit.hpp"
@@ -20,6 +21,7 @@ struct Options {
   std::filesystem::path recording;
   std::filesystem::path machine;
   std::filesystem::path out = "out/compare";
+  bool json = false;
 };
 
 struct Difference {
@@ -67,7 +69,8 @@ void compare(const Options& options) {
       "fitted. Where the curves part, the model leaves something out: `invar diagnose` finds what.");
   std::vector<std::vector<std::string>> rows;
   std::vector<report::Plot> plots;
-  std::cout << "signal            rms difference   largest          share of the signal\n";
+  auto json = nlohmann::ordered_json::array();
+  if (!options.json) std::cout << "signal            rms difference   largest          share of the signal\n";
   const auto outputs = model.outputs();
   for (std::size_t k = 0; k < outputs.size(); ++k) {
     const physics::Signal& signal = *model.signal(outputs[k]);
@@ -76,8 +79,14 @@ void compare(const Options& options) {
     const Difference d = difference(signal, *measured, simulated[k]);
     const std::string share = d.spread > 0.0 ? report::number(100.0 * d.rms / d.spread, 2) + " %" : "-";
     rows.push_back({d.signal, report::si(d.rms, d.unit), report::si(d.maximum, d.unit), share});
-    std::printf("%-17s %-16s %-16s %s\n", d.signal.c_str(), rows.back()[1].c_str(), rows.back()[2].c_str(),
-                share.c_str());
+    json.push_back({{"signal", d.signal},
+                    {"unit", d.unit},
+                    {"rms_difference", d.rms},
+                    {"largest_difference", d.maximum},
+                    {"spread", d.spread}});
+    if (!options.json)
+      std::printf("%-17s %-16s %-16s %s\n", d.signal.c_str(), rows.back()[1].c_str(), rows.back()[2].c_str(),
+                  share.c_str());
     report::Series was{.label = "recorded",
                        .style = report::Series::Style::line,
                        .x = recorded.record.time,
@@ -109,7 +118,16 @@ void compare(const Options& options) {
   page.plots(plots);
   std::filesystem::create_directories(options.out);
   page.write(options.out / "report.html");
-  std::cout << "report: " << (options.out / "report.html").string() << '\n';
+  const std::string report = (options.out / "report.html").string();
+  if (options.json)
+    std::cout << nlohmann::ordered_json{{"recording", options.recording.string()},
+                                        {"machine", options.machine.string()},
+                                        {"signals", json},
+                                        {"report", report}}
+                     .dump(2)
+              << '\n';
+  else
+    std::cout << "report: " << report << '\n';
 }
 
 }  // namespace
@@ -125,6 +143,7 @@ void add_job_compare(CLI::App& job) {
   command->add_option("--machine", options->machine, "model.yaml: parameters and controller of the machine")
       ->required();
   command->add_option("--out", options->out, "folder for report.html")->capture_default_str();
+  command->add_flag("--json", options->json, "print the differences as JSON, in SI");
   command->callback([options] { compare(*options); });
 }
 

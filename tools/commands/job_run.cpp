@@ -1,6 +1,4 @@
 // `invar job run|list|cancel`: the jobs of a running cell - started, followed, stopped.
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -16,6 +14,7 @@
 #include "idl/job.h"
 #include "tools/commands/job.hpp"
 #include "tools/live/interrupt.hpp"
+#include "tools/live/job_progress.hpp"
 #include "tools/live/live_cell.hpp"
 #include "tools/live/text_table.hpp"
 
@@ -160,28 +159,6 @@ class Jobs {
   std::map<std::string, Parts> components_;  // last: nothing arrives before all else stands
 };
 
-/// A line that is rewritten on a terminal; in a pipe a line each time something new is said.
-class Progress {
- public:
-  void show(const job::JobStatus& status) {
-    const bool screen = isatty(STDERR_FILENO) != 0;
-    const std::string text = status.text().c_str();
-    if (!screen && text == last_) return;
-    last_ = text;
-    std::cerr << (screen ? "\r\x1b[K" : "") << std::lround(status.progress() * 100.0) << " %  " << text
-              << (screen ? "" : "\n") << std::flush;
-    open_ = screen;
-  }
-  void end() {
-    if (open_) std::cerr << '\n';
-    open_ = false;
-  }
-
- private:
-  std::string last_;
-  bool open_ = false;
-};
-
 /// The component that runs the job: by the cell file, by --component, or the only one there is.
 std::string component_of(LiveCell& cell, Jobs& jobs, const Options& options, const std::string& name) {
   if (!options.component.empty()) return options.component;
@@ -222,7 +199,7 @@ int report(const Options& options, const std::string& component, const job::JobS
 
 int follow(const Options& options, Jobs& jobs, const std::string& component, const std::string& name,
            std::uint64_t id) {
-  Progress progress;
+  JobProgress progress;
   bool cancelling = false, taken = false;
   auto last_heard = Clock::now();
   auto last_sent = Clock::now();
@@ -233,7 +210,7 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
       taken = true;
       if (status->at().time_ns() != last_time) last_heard = Clock::now();
       last_time = status->at().time_ns();
-      progress.show(*status);
+      progress.show(status->progress(), status->text().c_str());
       if (status->phase() != job::JOB_RUNNING && status->phase() != job::JOB_IDLE) {
         progress.end();
         return report(options, component, *status);
@@ -359,7 +336,10 @@ int cancel(Options& options) {
     while (Clock::now() < end && jobs.status(component)->phase() == job::JOB_RUNNING)
       if (!sleep_for(Duration::milliseconds(20))) break;
     const auto after = jobs.status(component);
-    std::cout << after->name().c_str() << ": " << phase_text(after->phase()) << '\n';
+    if (options.json)
+      std::cout << json_of(component, *after).dump(2) << '\n';
+    else
+      std::cout << after->name().c_str() << ": " << phase_text(after->phase()) << '\n';
     return after->phase() == job::JOB_CANCELLED ? 0 : 1;
   }
   std::cerr << options.call.command << ": " << (name.empty() ? "no job" : "no job `" + name + "`")
@@ -399,10 +379,12 @@ void add_job_run(CLI::App& group) {
           "Exit status: 0; 1 no component that runs jobs answers; 2 a fault of the call or the file",
           list);
   group.get_subcommand("list")->add_flag("--json", listed->json, "print it as JSON");
-  add(group, "cancel", "Cancel the job that runs", {{"JOB", "only if it is this one", false}},
-      "Example: invar job cancel deployment/xy-table.yaml\n"
-      "Exit status: 0 cancelled; 1 none is running or no answer; 2 a fault of the call or the file",
-      cancel);
+  auto cancelled =
+      add(group, "cancel", "Cancel the job that runs", {{"JOB", "only if it is this one", false}},
+          "Example: invar job cancel deployment/xy-table.yaml\n"
+          "Exit status: 0 cancelled; 1 none is running or no answer; 2 a fault of the call or the file",
+          cancel);
+  group.get_subcommand("cancel")->add_flag("--json", cancelled->json, "print what became of it as JSON");
 }
 
 }  // namespace invar::tools

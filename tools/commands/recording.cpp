@@ -127,9 +127,20 @@ void recover(const Options& options) {
   if (target.empty())
     target = options.file.parent_path() / (options.file.stem().string() + ".recovered.mcap");
   const auto result = recording::recover(recording, target);
+  const auto total = result.ledger.total();
+  if (options.json) {
+    const nlohmann::ordered_json json{{"file", options.file.string()},
+                                      {"recovered", target.string()},
+                                      {"damage", recording.damage()},
+                                      {"messages", result.messages},
+                                      {"channels", result.ledger.channels.size()},
+                                      {"missing", total.missing},
+                                      {"gaps", total.gaps}};
+    std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+    return;
+  }
   for (const std::string& damage : recording.damage())
     std::cout << options.file.string() << ": " << damage << '\n';
-  const auto total = result.ledger.total();
   std::cout << target.string() << ": " << result.messages << " messages of " << result.ledger.channels.size()
             << " channels; by their sequence numbers " << total.missing << " are missing in " << total.gaps
             << " gaps\n";
@@ -153,6 +164,7 @@ void add_recording(CLI::App& program) {
   mend->footer("Example: invar recording recover run.mcap --out whole.mcap");
   mend->add_option("file", options->file, "the recording (.mcap)")->required();
   mend->add_option("--out", options->out, "file to write (FILE.recovered.mcap)");
+  mend->add_flag("--json", options->json, "print what was found as JSON");
   mend->callback([options] { recover(*options); });
 }
 

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "core/base/clock.hpp"
@@ -26,6 +27,7 @@ struct Options {
   double from = 0.0;
   bool fast = false;
   bool beside = false;
+  bool json = false;
   std::string process;
 };
 
@@ -81,20 +83,37 @@ int replay_into(const Options& options) {
     return 1;
   }
   TextTable table{{"output", "recorded>", "the same>", "first difference at [s]>", "which"}};
+  nlohmann::ordered_json json{{"process", options.process},
+                              {"fed", report.fed},
+                              {"seconds", report.simulated_seconds},
+                              {"absent_inputs", report.absent_inputs},
+                              {"outputs", nlohmann::ordered_json::array()}};
   std::uint64_t recorded = 0;
   std::uint64_t equal = 0;
   for (const auto& output : report.outputs) {
     recorded += output.recorded;
     equal += output.equal;
+    json["outputs"].push_back({{"topic", output.topic},
+                               {"recorded", output.recorded},
+                               {"equal", output.equal},
+                               {"first_difference_ns", output.first_ns},
+                               {"first_difference", output.first_difference}});
     table.add({output.topic, std::to_string(output.recorded), std::to_string(output.equal),
                output.first_ns < 0 ? "-" : number_text(static_cast<double>(output.first_ns) * 1e-9, 8),
                output.first_difference});
+  }
+  const int status = recorded > 0 && equal == recorded ? 0 : 1;
+  if (options.json) {
+    json["recorded"] = recorded;
+    json["equal"] = equal;
+    std::cout << json.dump(2) << '\n';
+    return status;
   }
   table.print(std::cout);
   for (const auto& topic : report.absent_inputs) std::cout << "not recorded, so not fed: " << topic << '\n';
   std::cout << report.fed << " samples fed in " << number_text(report.simulated_seconds) << " s of the cell; "
             << equal << " of " << recorded << " recorded outputs came out the same\n";
-  return recorded > 0 && equal == recorded ? 0 : 1;
+  return status;
 }
 
 int replay(Options& options) {
@@ -144,11 +163,24 @@ int replay(Options& options) {
   for (auto& [topic, channel] : channels) channel.writer->wait_for_acknowledgments(Duration::seconds(1.0));
   std::uint64_t refused = 0;
   TextTable table{{"topic", "published>", "readers>"}};
+  auto topics = nlohmann::ordered_json::array();
   for (const auto& [topic, channel] : channels) {
     table.add({topic, std::to_string(channel.published), std::to_string(channel.writer->matched())});
     refused += channel.writer->lost();
+    topics.push_back({{"topic", topic},
+                      {"published", channel.published},
+                      {"readers", channel.writer->matched()},
+                      {"refused", channel.writer->lost()}});
   }
-  table.print(std::cout);
+  if (options.json)
+    std::cout << nlohmann::ordered_json{{"file", options.call.word(0)},
+                                        {"published", published},
+                                        {"refused", refused},
+                                        {"topics", topics}}
+                     .dump(2)
+              << '\n';
+  else
+    table.print(std::cout);
   if (refused > 0) std::cerr << "invar replay: " << refused << " samples were refused by the middleware\n";
   return refused == 0 && published > 0 ? 0 : 1;
 }
@@ -182,6 +214,7 @@ void add_replay(CLI::App& program) {
   command
       ->add_option("--into", options->process, "feed this process of the cell file, and compare its outputs")
       ->excludes(rate);
+  command->add_flag("--json", options->json, "print what was published, or compared, as JSON");
   command->callback([options] {
     if (const int result = replay(*options); result != 0) throw CLI::RuntimeError(result);
   });

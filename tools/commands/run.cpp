@@ -6,13 +6,19 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
 
+#include "core/base/temporary_folder.hpp"
 #include "tools/cell/launcher.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/summary.hpp"
 #include "tools/command.hpp"
+#include "tools/live/job_progress.hpp"
 #include "tools/positive.hpp"
 
 namespace invar::tools {
@@ -29,24 +35,44 @@ struct Options {
   std::filesystem::path outcome;
   bool simulated = false;
   bool real_time = false;
+  bool json = false;
 };
+
+/// One process, without a launcher.
+int run_one(const Options& options) {
+  std::optional<TemporaryFolder> folder;  // for its last words, where only we want them
+  std::filesystem::path outcome = options.outcome;
+  if (options.json && outcome.empty()) outcome = folder.emplace("invar-run").path() / "outcome.json";
+  const int status = run_process({.cell = options.launch.cell,
+                                  .process = options.process,
+                                  .simulated = options.simulated,
+                                  .paced = options.launch.pace > 0.0,
+                                  .job = options.launch.job,
+                                  .outcome = outcome},
+                                 orders);
+  if (options.json) std::cout << std::ifstream{outcome}.rdbuf();
+  return status;
+}
 
 int run(Options& options) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("run"));  // stdout is the summary's
+  options.launch.quiet = options.launch.quiet || options.json;
+  if (options.launch.quiet) spdlog::set_level(spdlog::level::warn);
   struct sigaction action {};
   action.sa_handler = take_order;
   for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaction(signal, &action, nullptr);
   if (options.simulated || options.real_time) options.launch.simulated = options.simulated;
-  if (!options.process.empty())
-    return run_process({.cell = options.launch.cell,
-                        .process = options.process,
-                        .simulated = options.simulated,
-                        .paced = options.launch.pace > 0.0,
-                        .job = options.launch.job,
-                        .outcome = options.outcome},
-                       orders);
+  if (!options.process.empty()) return run_one(options);
+  JobProgress progress;
+  if (!options.launch.quiet)
+    options.launch.progress = [&](double fraction, const std::string& text) {
+      progress.show(fraction, text);
+    };
   const LaunchOutcome outcome = launch(options.launch, orders.stop);
-  summarise(outcome, std::cout);
+  progress.end();
+  std::ostringstream unseen;
+  const auto json = summarise(outcome, options.json ? unseen : std::cout);
+  if (options.json) std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   if (!outcome.failure.empty()) std::cerr << "invar run: " << outcome.failure << '\n';
   return outcome.failure.empty() ? 0 : 1;
 }
@@ -57,9 +83,12 @@ void add_run(CLI::App& program) {
   auto* command = program.add_subcommand("run", "Run a cell: all its processes on this PC, or one of them");
   command->footer(
       "Example: invar run deployment/xy-table.yaml --job calibrate-geometry\n"
+      "The progress of a job goes to the error output: one line kept current on a terminal, else one at each "
+      "change.\n"
       "Ctrl-C stops the cell: all that moves comes to rest first, then process by process in the order of "
       "the "
-      "file. Exit status: 0 in order, 1 something failed, 2 the file has faults");
+      "file.\n"
+      "Exit status: 0 in order, 1 something failed, 2 the file has faults");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");
@@ -74,6 +103,9 @@ void add_run(CLI::App& program) {
                    "simulated time no faster than so many times the wall clock; `invar job` reaches it")
       ->check(positive());
   command->add_flag("--real-time", options->real_time, "by the wall clock")->excludes(simulated);
+  command->add_flag("--json", options->json,
+                    "print one JSON object at the end: processes, job, report, recordings; implies --quiet");
+  command->add_flag("--quiet", options->launch.quiet, "no progress of the job, only what is wrong");
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
   command->callback([options] {
     if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);
