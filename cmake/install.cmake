@@ -9,6 +9,8 @@ install(TARGETS ${INVAR_PACKAGE} EXPORT invar
   FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/idl/generated/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar
   FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+# For programs on another DDS, which make their types of them.
+install(DIRECTORY idl/ DESTINATION ${CMAKE_INSTALL_DATADIR}/invar/idl FILES_MATCHING PATTERN "*.idl")
 install(TARGETS invar RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(EXPORT invar NAMESPACE invar:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar FILE invar-targets.cmake)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/invar-config.cmake.in ${CMAKE_BINARY_DIR}/invar-config.cmake

@@ -18,5 +18,6 @@ void add_run(CLI::App& program);
 void add_recording(CLI::App& program);
 void add_simulate(CLI::App& program);
 void add_diagnose(CLI::App& program);
+void add_types(CLI::App& program);
 
 }  // namespace invar::tools

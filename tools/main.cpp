@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   invar::tools::add_status(program);
   invar::tools::add_top(program);
   invar::tools::add_topics(program);
+  invar::tools::add_types(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::RuntimeError& end) {

@@ -8,7 +8,10 @@ namespace invar::dds {
 
 namespace {
 constexpr std::size_t alarms_kept = 1000;
-}
+// A busy host may be late to say that nobody is there; meanwhile nothing else is received on that thread.
+constexpr Duration patience = Duration::milliseconds(10);
+constexpr Duration between_looks = Duration::milliseconds(200);
+}  // namespace
 
 void Discovery::add_participant(const std::string& id, const std::string& name,
                                 std::vector<PeerAddress> addresses) {
@@ -117,11 +120,11 @@ bool Discovery::is_gone(const std::string& participant) {
       peer.gone = peer.gone || (other.number > peer.number && !peer.addresses.empty() &&
                                 other.addresses == peer.addresses);
     const Instant now = monotonic_now();
-    if (peer.gone || now - peer.looked < Duration::milliseconds(100)) return peer.gone;
+    if (peer.gone || now - peer.looked < between_looks) return peer.gone;
     peer.looked = now;
     addresses = peer.addresses;
   }
-  const bool gone = are_abandoned(addresses);
+  const bool gone = are_abandoned(addresses, patience);
   const std::lock_guard lock{mutex_};
   if (const auto found = participants_.find(participant); found != participants_.end())
     found->second.gone = gone;

@@ -78,6 +78,24 @@ void append_number(std::string& line, auto value) {
   line.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
 
+/// When a sample was made: its stamp, an invar::base::Stamp. Nothing: its type has none, or nobody filled it.
+std::optional<Instant> made(const Value& value) {
+  const Value* stamp = value.at("at");
+  const Value* time = stamp == nullptr ? nullptr : stamp->at("time_ns");
+  const auto* ns = time == nullptr ? nullptr : std::get_if<std::int64_t>(&time->content);
+  return ns == nullptr || *ns == 0 ? std::nullopt : std::optional{Instant{*ns}};
+}
+
+Instant sent(const RecordedMessage& message) {
+  return message.publish_time.ns == 0 ? message.log_time : message.publish_time;
+}
+
+/// Stamps of simulated time in a recording that was made by the wall clock count from the start of the cell, as they are.
+double seconds_since(Instant start, Instant made) {
+  constexpr Instant year_2000{946'684'800'000'000'000};
+  return (made < year_2000 && start >= year_2000 ? made - Instant{} : made - start).in_seconds();
+}
+
 class Exporter {
  public:
   Exporter(const Recording& recording, const std::filesystem::path& folder, const ExportOptions& options)
@@ -216,7 +234,7 @@ class Exporter {
     const auto fields = topic.columns->names();
     std::string line;
     const std::vector<ColumnName> own{
-        {"time", "s"}, {"log_time", "ns"}, {"publish_time", "ns"}, {"sequence", ""}};
+        {"time", "s"}, {"received", "s"}, {"log_time", "ns"}, {"publish_time", "ns"}, {"sequence", ""}};
     for (const auto& column : own) {
       const bool taken =
           std::any_of(fields.begin(), fields.end(), [&](const auto& f) { return f.path == column.path; });
@@ -229,7 +247,10 @@ class Exporter {
   }
 
   void append_row(std::string& line, const Topic& topic, const RecordedMessage& message, const Value& value) {
-    append_number(line, (message.log_time - recording_.statistics().start).in_seconds());
+    const Instant start = recording_.statistics().start;
+    append_number(line, seconds_since(start, made(value).value_or(sent(message))));
+    line += ',';
+    append_number(line, (message.log_time - start).in_seconds());
     line += ',';
     append_number(line, message.log_time.ns);
     line += ',';

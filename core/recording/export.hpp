@@ -30,8 +30,10 @@ struct ExportReport {
   std::size_t damaged_chunks = 0;
 };
 
-/// Writes into `folder` (made where it is missing). A CSV begins with `time [s]` since the recording's first message,
-/// `log_time [ns]` and `publish_time [ns]` in full, `sequence`, then the fields (see Columns). A name of those four that
+/// Writes into `folder` (made where it is missing). A CSV begins with `time [s]`, when the sample was made by its stamp `at`
+/// (where its type has none, or nobody filled it: when it was sent), and `received [s]`, when the recorder took it, both
+/// since the recording's first message (stamps of simulated time that was recorded from outside: since the start of the
+/// cell); then `log_time [ns]` and `publish_time [ns]` in full, `sequence`, then the fields (see Columns). A name of those five that
 /// a field has too gets `recording.` before it. Files are complete or absent. Throws InputError when the folder cannot
 /// be written or the selection names a topic that is not in the recording.
 ExportReport export_recording(const Recording& recording, const std::filesystem::path& folder,

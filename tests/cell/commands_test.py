@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pathlib
+import pty
 import random
 import re
 import shutil
@@ -300,7 +301,9 @@ class Acting(unittest.TestCase):
         running = Call("job", "run", CELL_FILE, "long")
         self.wait_for_phase("running")
         self.assertEqual(invar("job", "run", CELL_FILE, "long")[0], 1, "one at a time")
-        self.assertEqual(invar("job", "cancel", CELL_FILE), (0, "long: cancelled\n", ""))
+        status, out, err = invar("job", "cancel", CELL_FILE, "--json")
+        self.assertEqual((status, err), (0, ""), out)
+        self.assertEqual((json.loads(out)["job"], json.loads(out)["phase"]), ("long", "cancelled"))
         status, out, err = running.end()
         self.assertEqual(status, 1)
         self.assertIn("long: cancelled", out)
@@ -356,9 +359,11 @@ class Acting(unittest.TestCase):
 
         elsewhere = ("--domain", DOMAIN + 1, "--address", "127.0.0.1")
         hearer = Call("echo", *elsewhere, "--cell", "small", "cell/small/stage_x/state", "--json", "--wait", 30)
-        status, out, err = invar("replay", *elsewhere, "one.mcap", "--rate", 2)
+        status, out, err = invar("replay", *elsewhere, "one.mcap", "--rate", 2, "--json")
         self.assertEqual(status, 0, err)
-        self.assertRegex(out, rf"stage_x/state +{recorded['messages']} ")
+        replayed = json.loads(out)
+        self.assertEqual((replayed["published"], replayed["refused"]), (recorded["messages"], 0))
+        self.assertEqual(replayed["topics"][0]["topic"], "cell/small/stage_x/state")
         time.sleep(1)
         status, out, err = hearer.interrupt()
         self.assertEqual(status, 0, err)
@@ -370,6 +375,112 @@ class Acting(unittest.TestCase):
         self.assertGreater(len(heard), 20)
         times = {s["message"]["at"]["time_ns"] for s in sent}
         self.assertTrue(all(h["at"]["time_ns"] in times for h in heard))
+
+
+class Running(unittest.TestCase):
+    """Cells of their own in simulated time."""
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-running-"))
+
+    def tearDown(self):
+        shutil.rmtree(self.folder)
+
+    def cell(self, name, changes=()):
+        text = CELL.replace("name: small", f"name: {name}")
+        for old, new in changes:
+            self.assertIn(old, text)
+            text = text.replace(old, new)
+        (self.folder / name).mkdir()
+        file = self.folder / name / "cell.yaml"
+        file.write_text(text.format(domain=random.SystemRandom().randrange(100, 200), source=SOURCE, port=free_port()))
+        return file
+
+    def start(self, file, *more, stderr=subprocess.PIPE):
+        return subprocess.Popen([INVAR, "run", file, "--simulated", "--job", "short", *more], cwd=file.parent,
+                                stdout=subprocess.PIPE, stderr=stderr, text=True)
+
+    def test_a_run_ends_with_one_object_for_programs_and_says_nothing_before(self):
+        file = self.cell("for_programs")
+        run = self.start(file, "--json")
+        out, err = run.communicate(timeout=200)
+        self.assertEqual((run.returncode, err), (0, ""), out)
+        ended = json.loads(out)
+        self.assertEqual((ended["failure"], ended["simulated"]), ("", True))
+        self.assertEqual([p["process"] for p in ended["processes"]], ["motion", "heat", "calibration"])
+        motion = ended["processes"][0]
+        self.assertEqual((motion["status"], motion["rate"]), (0, 1000))
+        self.assertGreater(motion["cycles"], 1000)
+        self.assertEqual(motion["latency_limit_ns"], 1_000_000)
+        self.assertEqual([i["input"] for i in motion["late_inputs"]], ["stage_x.feedback"])
+        self.assertEqual((ended["job"]["name"], ended["job"]["done"]), ("short", True))
+        self.assertTrue((file.parent / ended["report"]).exists())
+        self.assertRegex(ended["summary"]["error after"], r"rms .* max")
+        self.assertEqual(ended["recordings"], [])
+
+    def test_progress_is_lines_in_a_pipe_and_one_line_on_a_terminal(self):
+        piped = self.start(self.cell("piped"))
+        ours, theirs = pty.openpty()
+        shown = self.start(self.cell("shown"), stderr=theirs)
+        os.close(theirs)
+        screen = b""
+        try:
+            while block := os.read(ours, 4096):
+                screen += block
+        except OSError:  # how the end of a terminal is said
+            pass
+        shown.communicate(timeout=200)
+        out, err = piped.communicate(timeout=200)
+        self.assertEqual((piped.returncode, shown.returncode), (0, 0), err)
+        lines = [line for line in err.splitlines() if re.match(r"\d+ %  \S", line)]
+        self.assertGreater(len(lines), 1, err)
+        self.assertNotIn("\x1b", err)
+        texts = [line.split("%  ")[1] for line in lines]
+        self.assertTrue(all(a != b for a, b in zip(texts, texts[1:])), "only at changes: " + err)
+        fractions = [int(line.split()[0]) for line in lines]
+        self.assertEqual(fractions, sorted(fractions))
+        self.assertNotIn("%", out.replace("share", ""))
+        self.assertRegex(out, r"process +rate +cycles +overruns +late ")
+        self.assertIn(b"\r\x1b[K", screen)
+        self.assertRegex(screen, rb"\d+ %  \S")
+
+    def test_a_run_that_fails_names_only_what_is_there(self):
+        # Nothing settles within a nanometre in a millisecond: the job fails before it measures.
+        file = self.cell("failing", [("settle_timeout: 60", "settle_timeout: 0.001")])
+        run = self.start(file)
+        out, err = run.communicate(timeout=200)
+        self.assertEqual(run.returncode, 1, out + err)
+        self.assertRegex(out, r"job +short: \S")
+        for what, name in re.findall(r"^(report|recording) +(\S+)$", out, re.M):
+            self.assertTrue((file.parent / name).exists(), out)
+        self.assertNotIn("error before", out)
+
+
+class Types(unittest.TestCase):
+    def test_every_type_is_listed_with_what_it_needs(self):
+        status, out, err = invar("types", "--json")
+        self.assertEqual((status, err), (0, ""))
+        types = {t["type"]: t for t in json.loads(out)}
+        for name in re.findall(r'registry.add<[^>]+>\(\s*"(\w+)"', (SOURCE / "components/all.cpp").read_text()):
+            self.assertIn(name, types)
+        stage = types["stage"]
+        ports = {p["name"]: p for p in stage["ports"]}
+        self.assertEqual((ports["command"]["direction"], ports["command"]["data"], ports["command"]["profile"]),
+                         ("inbox", "invar::stage::AxisCommand", "command"))
+        self.assertEqual(ports["state"]["direction"], "output")
+        fields = {f["name"]: f for f in ports["state"]["fields"]}
+        self.assertEqual((fields["position"]["unit"], fields["axis"]["key"]), ("m", True))
+        parameters = {p["path"]: p for p in stage["parameters"]}
+        velocity = parameters["limits.velocity"]
+        self.assertEqual((velocity["type"], velocity["unit"]), ("number", "m/s"))
+        self.assertLess(velocity["lower"], velocity["upper"])
+        self.assertTrue(types["thermal"]["parameters"])
+        self.assertTrue({p["path"]: p for p in types["thermal"]["parameters"]}["setpoint"]["while_running"])
+        status, out, _ = invar("types")
+        self.assertRegex(out, r"stage +\d+ +\d+ +servo of one axis")
+        status, out, _ = invar("types", "stage")
+        self.assertRegex(out, r"command +inbox +invar::stage::AxisCommand +command")
+        self.assertIn("position: number [m]", out)
 
 
 class OnThisHost(unittest.TestCase):
@@ -557,6 +668,9 @@ class WrongCalls(unittest.TestCase):
                 (["param", "lst"], "invar param has no subcommand `lst`; did you mean `list`? See `invar param --help`"),
                 (["run", CELL_FILE, "--jbo", "x"], "invar run has no option `--jbo`; did you mean `--job`?"),
                 (["run", CELL_FILE, "--duration", "0"], "--duration: `0` is not a number above 0; see `invar run --help`"),
+                (["types", "stgae"], "`stgae` is no component type; did you mean `stage`?"),
+                (["types", "--plugin", "nothing.so"], "nothing.so: cannot be loaded"),
+                (["run", CELL_FILE, "--josn"], "did you mean `--json`?"),
                 (["profiles", "nowhere.yaml"], "nowhere.yaml"),
                 (["profiles", "--xml", "word"], "word")):
             with self.subTest(" ".join(map(str, words))):
@@ -565,10 +679,18 @@ class WrongCalls(unittest.TestCase):
                 self.assertIn(why, err)
                 self.assertEqual(err.count("\n"), 1, err)
 
+    def test_every_command_with_an_answer_gives_it_to_programs(self):
+        for words in (["about"], ["check"], ["diagnose"], ["doctor"], ["echo"], ["export"], ["hz"], ["job", "apply"],
+                      ["job", "cancel"], ["job", "compare"], ["job", "list"], ["job", "run"], ["latency-test"],
+                      ["lifecycle"], ["param", "list"], ["param", "get"], ["param", "set"], ["record"],
+                      ["recording", "info"], ["recording", "recover"], ["replay"], ["run"], ["status"], ["top"],
+                      ["topics"], ["types"]):
+            self.assertIn("--json", invar(*words, "--help")[1], words)
+
     def test_help_has_an_example(self):
         for words in (["status"], ["top"], ["topics"], ["echo"], ["hz"], ["lifecycle"], ["param", "list"],
                       ["param", "get"], ["param", "set"], ["job", "run"], ["job", "list"], ["job", "cancel"],
-                      ["record"], ["replay"], ["doctor"], ["latency-test"], ["profiles"]):
+                      ["record"], ["replay"], ["doctor"], ["latency-test"], ["profiles"], ["types"], ["about"], ["job", "apply"]):
             status, out, _ = invar(*words, "--help")
             self.assertEqual(status, 0)
             self.assertIn("Example: invar " + " ".join(words), out)

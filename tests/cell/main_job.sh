@@ -29,6 +29,7 @@ awk -F, 'NR == 1 { for (i = 1; i <= NF; i++) if ($i ~ /^temperature/) c = i } EN
   { echo "the slide is not at 30 degC at the end"; exit 1; }
 
 # The recording through the motion process's components once more: they write what they wrote.
-(cd one && "$invar" replay ../deployment/xy-table.yaml out/xy-table/recording.mcap --into motion) ||
+(cd one && "$invar" replay ../deployment/xy-table.yaml out/xy-table/recording.mcap --into motion --json >replayed &&
+  /usr/bin/python3 -c 'import json; r = json.load(open("replayed")); assert r["equal"] == r["recorded"] > 0 and r["outputs"]') ||
   { echo "the replay differs from the recording"; exit 1; }
 echo "passed"

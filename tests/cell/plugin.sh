@@ -6,6 +6,13 @@ set -euo pipefail
 build=$1 source=$2
 folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
 cmake --install "$build" --prefix "$folder/installed" >/dev/null
+# The IDL is there for other implementations of DDS: Cyclone's compiler, which is not ours, takes every file.
+mkdir "$folder/foreign"
+for idl in "$source"/idl/*.idl; do
+  cmp "$idl" "$folder/installed/share/invar/idl/${idl##*/}"
+  idlc -o "$folder/foreign" -I "$folder/installed/share/invar/idl" "$folder/installed/share/invar/idl/${idl##*/}"
+done
+grep -q invar_stage_AxisCommand_desc "$folder/foreign/stage.h"
 cmake -S "$source/examples/low_pass" -B "$folder/build" -G Ninja -DCMAKE_PREFIX_PATH="$folder/installed" >/dev/null
 ninja -C "$folder/build" >/dev/null
 mkdir "$folder/cell"; cd "$folder/cell"
@@ -13,6 +20,9 @@ cp "$source"/examples/low_pass/*.yaml "$source/deployment/profiles.yaml" "$folde
 sed -i "s/^domain: .*/domain: $((100 + RANDOM % 100))/" cell.yaml
 invar=$folder/installed/bin/invar
 "$invar" check cell.yaml
+"$invar" types --plugin liblow_pass.so low_pass | tee types
+grep -Eq '^raw +input +invar::stage::AxisFeedback +realtime' types
+grep -Eq '^cutoff +number +Hz +\[0\.1, 450\] +100 +yes +-3 dB corner' types
 "$invar" run cell.yaml --simulated --duration 1
 "$invar" export out/recording.mcap --out tables
 ls tables

@@ -54,7 +54,8 @@ int read(dds::Node& node) {
       });
   const auto second = node.reader<thermal::NodeTemperature>(
       "cell/two-hosts/heat/node", "state", [&](const auto& t) { warm = t.temperature() == 30.5; });
-  const bool enough = dds::testing::eventually([&] { return states >= 400 && warm; });
+  const bool enough =
+      dds::testing::eventually([&] { return states >= 400 && warm && command.connection().matched() > 0; });
   stage::AxisCommand stop;
   stop.kind(stage::AXIS_COMMAND_STOP);
   command.write(stop);

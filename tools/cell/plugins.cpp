@@ -4,6 +4,20 @@
 
 namespace invar::tools {
 
+Fault load_plugin(const std::filesystem::path& file, Registry& registry) {
+  void* library = dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (library == nullptr)
+    return {file.string(), std::string{"cannot be loaded: "} + dlerror(),
+            "name a shared library that was built against this version of Invar"};
+  using Entry = void (*)(Registry&);
+  const auto entry = reinterpret_cast<Entry>(dlsym(library, "invar_add_components"));
+  if (entry == nullptr)
+    return {file.string(), "has no entry function `invar_add_components`",
+            "add INVAR_PLUGIN(registry) { ... } to it"};
+  entry(registry);
+  return {};
+}
+
 bool load_plugins(const config::Cell& cell, Registry& registry, const config::Node& root) {
   const auto places = root["plugins"].list();
   bool all = !root["plugins"].exists() || root["plugins"].is_list();
@@ -13,22 +27,10 @@ bool load_plugins(const config::Cell& cell, Registry& registry, const config::No
       all = false;
       continue;
     }
-    void* library = dlopen(std::filesystem::absolute(cell.plugins[i]).c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (library == nullptr) {
-      places[i].fault(std::string{"cannot be loaded: "} + dlerror(),
-                      "name a shared library that was built against this version of Invar");
-      all = false;
-      continue;
-    }
-    using Entry = void (*)(Registry&);
-    const auto entry = reinterpret_cast<Entry>(dlsym(library, "invar_add_components"));
-    if (entry == nullptr) {
-      places[i].fault("has no entry function `invar_add_components`",
-                      "add INVAR_PLUGIN(registry) { ... } to it");
-      all = false;
-      continue;
-    }
-    entry(registry);
+    const Fault fault = load_plugin(cell.plugins[i], registry);
+    if (fault.what.empty()) continue;
+    places[i].fault(fault.what, fault.mend);
+    all = false;
   }
   return all;
 }

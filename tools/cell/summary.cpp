@@ -195,7 +195,7 @@ struct Processes {
     if (report.contains("job")) job = report["job"];
     if (report.contains("recording")) recordings.push_back(report["recording"]);
     report["status"] = process.status;
-    json.push_back(std::move(report));
+    json.push_back(nlohmann::ordered_json(report));
   }
 };
 

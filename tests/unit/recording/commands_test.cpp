@@ -73,6 +73,12 @@ TEST_F(RecordingCommands, RecoverMakesACutFileWhole) {
       run.text,
       HasSubstr("a.recovered.mcap: 99 messages of 1 channels; by their sequence numbers 1 are missing"));
   EXPECT_TRUE(Recording::open(folder / "a.recovered.mcap").complete());
+  const auto json = nlohmann::json::parse(
+      invar("recording recover --json " + file.string() + " --out " + (folder / "b.mcap").string()).text);
+  EXPECT_EQ(json["messages"], 99);
+  EXPECT_EQ(json["missing"], 1);
+  EXPECT_EQ(json["recovered"], (folder / "b.mcap").string());
+  EXPECT_FALSE(json["damage"].empty());
 }
 
 TEST_F(RecordingCommands, ExportWritesUnitsIntoTheHeader) {

@@ -76,18 +76,51 @@ TEST_F(ExportTest, WritesATableATopicThatReadsBackWithItsUnits) {
   EXPECT_EQ(report.topics[0].problem, "message 11: the payload ends before its type does");
   EXPECT_EQ(report.topics[2].problem, "its schema does not define `test::Absent`");
   EXPECT_TRUE(report.topics[2].file.empty());
-  EXPECT_EQ(
-      line("cell.a.stage.position.csv", 1),
-      "time [s],log_time [ns],publish_time [ns],sequence,axis,x [m],mode,time_ns,volts.length,volts[0] [V],"
-      "volts[1] [V],note,sequence_number");
+  EXPECT_EQ(line("cell.a.stage.position.csv", 1),
+            "time [s],received [s],log_time [ns],publish_time [ns],sequence,axis,x "
+            "[m],mode,time_ns,volts.length,volts[0] [V],"
+            "volts[1] [V],note,sequence_number");
   EXPECT_EQ(line("cell.a.stage.position.csv", 3),
-            "0.001,1763763828001000000,1763763828000999995,2,2,0.1,MODE_ON,1763763828123456790,1,1.5,,\"a, "
+            "0.000999995,0.001,1763763828001000000,1763763828000999995,2,2,0.1,MODE_ON,1763763828123456790,1,"
+            "1.5,,\"a, "
             "\"\"b\"\"\",0");
-  EXPECT_EQ(line("cell.a.clash.csv", 1), "recording.time [s],log_time [ns],publish_time [ns],sequence,time");
+  EXPECT_EQ(line("cell.a.clash.csv", 1),
+            "recording.time [s],received [s],log_time [ns],publish_time [ns],sequence,time");
   const auto table = Table::read(report.topics[0].file, {"mode", "note"});
   EXPECT_EQ(table.rows(), 10U);
   EXPECT_DOUBLE_EQ(table.in("x", "mm")[3], 300.0);
   EXPECT_EQ(table.find("mode")->texts[1], "MODE_ON");
+}
+
+// The laser reads, the recorder hears of it 40 ms later: an evaluation that goes by the recorder's time is 40 ms off.
+TEST_F(ExportTest, TheTimeOfASampleIsWhenItWasMade) {
+  constexpr const char* stamped = R"(
+module test {
+  @final struct Stamp { int64 time_ns; uint64 cycle; };
+  @final struct Reading { Stamp at; @unit("m") double x; };
+};)";
+  const auto type = parse_idl(stamped, "s.idl").find("test::Reading");
+  {
+    RecordingWriter writer{folder / "stamped.mcap"};
+    const auto channel = writer.add_channel({"laser", "test::Reading", stamped, "", "", {}});
+    const auto simulated = writer.add_channel({"paced", "test::Reading", stamped, "", "", {}});
+    const auto write = [&](std::uint16_t to, std::uint32_t number, Instant made) {
+      Value value = Value::zero(*type);
+      value.at("at.time_ns")->content = made.ns;
+      const Instant received = start + Duration::milliseconds(100 * number);
+      writer.write(to, number, received, received - Duration::milliseconds(1), encode(value));
+    };
+    write(channel, 0, start - Duration::milliseconds(40));
+    write(channel, 1, start + Duration::milliseconds(60));
+    write(channel, 2, Instant{});  // nobody filled it
+    write(simulated, 3, Instant{} + Duration::seconds(12.5));
+    EXPECT_TRUE(writer.close());
+  }
+  const auto report = export_recording(Recording::open(folder / "stamped.mcap"), folder / "out");
+  const auto laser = Table::read(report.topics.at(0).file);
+  EXPECT_THAT(laser.in("time", "s"), ElementsAre(-0.04, 0.06, 0.199));
+  EXPECT_THAT(laser.in("received", "s"), ElementsAre(0.0, 0.1, 0.2));
+  EXPECT_THAT(Table::read(report.topics.at(1).file).in("time", "s"), ElementsAre(12.5));
 }
 
 TEST_F(ExportTest, WritesOnlyWhatWasSelected) {
@@ -97,7 +130,7 @@ TEST_F(ExportTest, WritesOnlyWhatWasSelected) {
   const auto report = export_recording(Recording::open(folder / "a.mcap"), folder / "out", options);
   ASSERT_THAT(report.topics, SizeIs(1));
   EXPECT_EQ(report.topics[0].rows, 3U);
-  EXPECT_THAT(line("cell.a.stage.position.csv", 2), ::testing::StartsWith("0.003,"));
+  EXPECT_THAT(line("cell.a.stage.position.csv", 2), HasSubstr(",0.003,"));
   options.selection.topics = {"stage.position"};  // component.port
   EXPECT_EQ(export_recording(Recording::open(folder / "a.mcap"), folder / "out", options).topics.at(0).rows,
             3U);
