@@ -9,20 +9,6 @@ namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-/// The longest lever a rotation of `axis` can have within the travels.
-double longest_arm(const ComponentNetworks& model, const Eigen::Matrix3d& directions, int axis) {
-  double longest = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();
-    for (int k = 0; k < 3; ++k)
-      if (model.chain.has(k))
-        position[k] = ((corner >> static_cast<unsigned>(k)) & 1U) != 0U ? model.travel[index(k)].upper
-                                                                        : model.travel[index(k)].lower;
-    longest = std::max(longest, lever_arms(model.chain, directions, position, model.tool).col(axis).norm());
-  }
-  return longest;
-}
-
 }  // namespace
 
 ComponentTables::ComponentTables(ComponentNetworks model, double tolerance, std::size_t most_nodes)
@@ -30,7 +16,8 @@ ComponentTables::ComponentTables(ComponentNetworks model, double tolerance, std:
   for (int c = 0; c < component_count; ++c) {
     const auto& component = model_.components[index(c)];
     if (!component || !model_.chain.has(axis_of(c))) continue;
-    const double arm = is_rotation(c) ? longest_arm(model_, directions_, axis_of(c)) : 1.0;
+    const double arm =
+        is_rotation(c) ? longest_arm(model_.chain, model_.travel, directions_, model_.tool, axis_of(c)) : 1.0;
     const double allowed = tolerance / std::max(arm, 1e-9);
     Entry entry{c, component->states, {}};
     const auto take = [&](auto compiled) {

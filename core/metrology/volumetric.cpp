@@ -1,6 +1,7 @@
 #include "core/metrology/volumetric.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 namespace invar::metrology {
@@ -80,6 +81,21 @@ Eigen::Vector3d linear_error(const Chain& chain, const Eigen::Matrix3d& directio
     arm += along;
   }
   return error;
+}
+
+double longest_arm(const Chain& chain, const std::array<Range, 3>& travel, const Eigen::Matrix3d& directions,
+                   const Eigen::Vector3d& tool, int axis) {
+  double longest = 0.0;
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k)
+      if (chain.has(k)) {
+        const Range& range = travel[static_cast<std::size_t>(k)];
+        position[k] = ((corner >> static_cast<unsigned>(k)) & 1U) != 0U ? range.upper : range.lower;
+      }
+    longest = std::max(longest, lever_arms(chain, directions, position, tool).col(axis).norm());
+  }
+  return longest;
 }
 
 }  // namespace invar::metrology

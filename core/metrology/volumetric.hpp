@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 
+#include "core/base/range.hpp"
 #include "core/metrology/components.hpp"
 
 namespace invar::metrology {
@@ -60,5 +61,9 @@ Eigen::Vector3d linear_error(const Chain& chain, const Eigen::Matrix3d& directio
 /// Real-time.
 Eigen::Matrix3d lever_arms(const Chain& chain, const Eigen::Matrix3d& directions,
                            const Eigen::Vector3d& position, const Eigen::Vector3d& tool) noexcept;
+
+/// The longest lever [m] that a rotation of `axis` can have within the travels. Set-up.
+double longest_arm(const Chain& chain, const std::array<Range, 3>& travel, const Eigen::Matrix3d& directions,
+                   const Eigen::Vector3d& tool, int axis);
 
 }  // namespace invar::metrology

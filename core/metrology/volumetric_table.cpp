@@ -10,20 +10,6 @@ namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
-/// The longest lever a rotation of `axis` can have within the travels.
-double longest_arm(const GeometricModel& model, const Eigen::Matrix3d& directions, int axis) {
-  double longest = 0.0;
-  for (unsigned corner = 0; corner < 8; ++corner) {
-    Eigen::Vector3d position;
-    for (int k = 0; k < 3; ++k) {
-      const Range r = model.chain.has(k) ? model.travel[index(k)] : Range{0.0, 0.0};
-      position[k] = ((corner >> static_cast<unsigned>(k)) & 1U) != 0U ? r.upper : r.lower;
-    }
-    longest = std::max(longest, lever_arms(model.chain, directions, position, model.tool).col(axis).norm());
-  }
-  return longest;
-}
-
 }  // namespace
 
 VolumetricTable::VolumetricTable(const GeometricModel& model, double tolerance, int most_nodes)
@@ -35,7 +21,7 @@ VolumetricTable::VolumetricTable(const GeometricModel& model, double tolerance, 
   for (int axis = 0; axis < 3; ++axis) {
     if (!chain_.has(axis)) continue;
     // h^2/8 times the sum of largest curvatures, rotations at their longest arm, bounds this axis' share.
-    const double arm = longest_arm(model, directions_, axis);
+    const double arm = longest_arm(model.chain, model.travel, directions_, model.tool, axis);
     double curvature = 0.0;
     for (int c = 6 * axis; c < 6 * axis + 6; ++c)
       if (model.coefficients[index(c)].size() > 0)

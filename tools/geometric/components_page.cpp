@@ -40,30 +40,18 @@ report::Plot component_plot(const ComponentsResult& result, int component) {
   std::vector<double> state;
   for (const auto& each : result.model.states) state.push_back(each.usual());
   const char* colours[] = {"#1f6fb4", "#2a9d5c", "#d1495b"};
-  const Range along = network.network.range[0];
+  const Range known = network.network.range[0];
   for (int level = 0; level < (network.states.empty() ? 1 : 3); ++level) {
-    report::Series line;
-    line.colour = colours[level];
+    std::string label;
     if (!network.states.empty()) {
       const auto& first = result.model.states[network.states[0]];
       state[network.states[0]] = first.range.lower + 0.5 * level * first.range.width();
-      line.label = number(state[network.states[0]], 4) + " " + unit_of_state(first.name);
+      label = number(state[network.states[0]], 4) + " " + unit_of_state(first.name);
     }
-    report::Series band;
-    band.style = report::Series::Style::band;
-    band.colour = line.colour;
-    for (int i = 0; i <= 150; ++i) {
-      const double q = along.lower + along.width() * i / 150.0;
-      const double value = network.value(q, state);
-      const double sigma = network.sigma_at(q, state);
-      line.x.push_back(1e3 * q);
-      line.y.push_back(1e6 * value);
-      band.x.push_back(1e3 * q);
-      band.y.push_back(1e6 * (value - 2.0 * sigma));
-      band.u.push_back(1e6 * (value + 2.0 * sigma));
-    }
-    plot.series.push_back(std::move(band));
-    plot.series.push_back(std::move(line));
+    report::add_curve(plot, {1e3 * known.lower, 1e3 * known.upper}, label, colours[level], [&](double mm) {
+      return report::CurvePoint{1e6 * network.value(1e-3 * mm, state),
+                                1e6 * network.sigma_at(1e-3 * mm, state)};
+    });
   }
   return plot;
 }

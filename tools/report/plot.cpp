@@ -157,6 +157,27 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
 
 }  // namespace
 
+void add_curve(Plot& plot, const Range& range, const std::string& label, const std::string& colour,
+               const std::function<CurvePoint(double x)>& at) {
+  Series band;
+  band.style = Series::Style::band;
+  band.colour = colour;
+  Series line;
+  line.label = label;
+  line.colour = colour;
+  for (int i = 0; i <= 200; ++i) {
+    const double x = range.lower + range.width() * i / 200.0;
+    const CurvePoint point = at(x);
+    line.x.push_back(x);
+    line.y.push_back(point.value);
+    band.x.push_back(x);
+    band.y.push_back(point.value - 2.0 * point.sigma);
+    band.u.push_back(point.value + 2.0 * point.sigma);
+  }
+  plot.series.push_back(std::move(band));
+  plot.series.push_back(std::move(line));
+}
+
 std::vector<std::string> draw(const std::vector<Plot>& plots) {
   if (plots.empty()) return {};
   const TemporaryFolder folder{"invar-plots"};

@@ -1,6 +1,7 @@
 // Plot: what to draw; gnuplot draws it as SVG.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -34,6 +35,15 @@ struct Plot {
   int width = 720;   // px
   int height = 360;  // px
 };
+
+/// What a curve is worth at a place, in the plot's units.
+struct CurvePoint {
+  double value = 0.0;
+  double sigma = 0.0;
+};
+/// Adds a line and, behind it, its band of two standard deviations, at 201 places of `range` (the plot's x).
+void add_curve(Plot& plot, const Range& range, const std::string& label, const std::string& colour,
+               const std::function<CurvePoint(double x)>& at);
 
 /// One <svg> element a plot, in order, drawn by one gnuplot process. Long lines are thinned to about 4000
 /// points by their local extremes, so that a peak is never lost. Throws std::runtime_error when gnuplot is

@@ -64,25 +64,12 @@ report::Plot levels_plot(const ThermalReadings& readings, const ThermalFit& fit)
         points.x.push_back(1e3 * readings.x(i));
         points.y.push_back(1e6 * readings.error(i));
       }
-    report::Series line;
-    line.label = number(t, 4) + " degC";
-    line.colour = colours[level];
-    report::Series band;
-    band.style = report::Series::Style::band;
-    band.colour = colours[level];
-    for (int k = 0; k <= 200; ++k) {
-      const double x = fit.model.x.lower + fit.model.x.width() * k / 200.0;
-      const double value = fit.model.value(fit.model.typical(x, t));
-      const double sigma = fit.model.sigma(fit.model.typical(x, t));
-      line.x.push_back(1e3 * x);
-      line.y.push_back(1e6 * value);
-      band.x.push_back(1e3 * x);
-      band.y.push_back(1e6 * (value - 2.0 * sigma));
-      band.u.push_back(1e6 * (value + 2.0 * sigma));
-    }
-    plot.series.push_back(std::move(band));
     plot.series.push_back(std::move(points));
-    plot.series.push_back(std::move(line));
+    const Range along{1e3 * fit.model.x.lower, 1e3 * fit.model.x.upper};
+    report::add_curve(plot, along, number(t, 4) + " degC", colours[level], [&](double mm) {
+      const auto state = fit.model.typical(1e-3 * mm, t);
+      return report::CurvePoint{1e6 * fit.model.value(state), 1e6 * fit.model.sigma(state)};
+    });
   }
   return plot;
 }
