@@ -56,8 +56,9 @@ void Thermal::activate() {
   power_ = 0.0;
   primed_ = false;
   wanted_ = true;
-  told_unsound_ = told_undriven_ = false;
+  told_unsound_ = told_undriven_ = told_stuck_ = false;
   unsound_since_.reset();
+  stuck_since_.reset();
 }
 
 void Thermal::deactivate() noexcept {
@@ -171,6 +172,28 @@ void Thermal::latch(bool sound, const Tick& tick) noexcept {
   notices_.say(event::SEVERITY_TRIP, text.data());
 }
 
+/// A relay that sticks, or another master: the heater is on, and this loop cannot help it.
+void Thermal::look_at_delivery(const Tick& tick) noexcept {
+  const modbus::Reading delivered = client_.device().value("delivered_power");
+  const bool stuck =
+      power_ == 0.0 && delivered.is_sound() && delivered.value > 0.01 * parameters_.power_limit;
+  if (!stuck) stuck_since_.reset();
+  if (stuck && !stuck_since_) stuck_since_ = tick.now;
+  constexpr Duration patience = Duration::seconds(2.0);
+  if (stuck && !told_stuck_ && tick.now - *stuck_since_ >= patience) {
+    told_stuck_ = true;
+    std::array<char, 200> text{};
+    std::snprintf(
+        text.data(), text.size(),
+        "the heater gets %.4g W though it was told to be off: cut its supply, and look at its relay and for "
+        "another master",
+        delivered.value);
+    notices_.say(event::SEVERITY_TRIP, text.data());
+  } else if (!stuck && delivered.is_sound() && std::exchange(told_stuck_, false)) {
+    notices_.say(event::SEVERITY_NOTE, "the heater is off as it was told");
+  }
+}
+
 void Thermal::step(const Tick& tick) noexcept {
   ThermalCommand command;
   while (command_.take(command)) obey(command);
@@ -194,6 +217,7 @@ void Thermal::step(const Tick& tick) noexcept {
     told_undriven_ = false;
   }
   client_.send(tick.now);
+  look_at_delivery(tick);
 
   NodeTemperature sample;
   stamp(sample);

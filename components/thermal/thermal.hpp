@@ -22,7 +22,7 @@ namespace invar::thermal {
 /// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
 /// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature`, or when
 /// the device latches at a limit of its own (register `over_temperature`). It holds until a command resets it, and the device
-/// with it (register `reset_alarms`). Each of these is said once in a notice, and once when it is over. A command whose setpoint is
+/// with it (register `reset_alarms`). A controller that delivers power though it was told to be off is said, too. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
 /// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component {
  public:
@@ -100,6 +100,7 @@ class Thermal final : public Component {
   [[nodiscard]] bool drive(double power, bool enable) noexcept;
   void tell(bool sound, const Tick& tick) noexcept;
   void latch(bool sound, const Tick& tick) noexcept;
+  void look_at_delivery(const Tick& tick) noexcept;
 
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // before the first reading
   const Parameters& parameters_;
@@ -132,6 +133,8 @@ class Thermal final : public Component {
   Instant reset_at_{INT64_MIN / 2};
   bool told_unsound_ = false;
   bool told_undriven_ = false;
+  bool told_stuck_ = false;
+  std::optional<Instant> stuck_since_;    // power flows, and none was asked for
   std::optional<Instant> unsound_since_;  // the device answers, and its sensor cannot be
   double power_ = 0.0;
 };

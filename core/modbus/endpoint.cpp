@@ -1,5 +1,6 @@
 #include "core/modbus/endpoint.hpp"
 
+#include <cmath>
 #include <sstream>
 #include <utility>
 
@@ -103,6 +104,30 @@ void Client::send(Instant now) {
   if (stepped_) bus_->send(now);
 }
 
-std::vector<HealthChange> Client::look(Instant now) { return health_.look(*device_, bus_->counters(), now); }
+/// A device that starts anew, or that somebody else wrote to, may wait longer for a heartbeat than its owner counts on.
+void Client::keep_watchdog() {
+  const RegisterMap& map = device_->map();
+  const bool came_back = device_->is_online() && !was_online_;
+  was_online_ = device_->is_online();
+  if (!map.heartbeat || !map.heartbeat->timeout_setting) return;
+  const std::size_t index = *map.heartbeat->timeout_setting;
+  const Register& reg = map.registers[index];
+  if (!reg.writable) return;
+  const double wanted = map.heartbeat->timeout.in_seconds();
+  if (reg.readable) {
+    const Reading shown = device_->value(index);
+    if (shown.stale || std::abs(shown.value - wanted) <= 0.5 * std::abs(reg.scale) + 1e-6 * wanted) return;
+    const WriteState state = device_->last_write(index).state;
+    if (state == WriteState::queued || (state == WriteState::written && reg.read_back)) return;
+  } else if (!came_back) {
+    return;
+  }
+  (void)device_->write(index, wanted);  // in its range: checked with the map
+}
+
+std::vector<HealthChange> Client::look(Instant now) {
+  keep_watchdog();
+  return health_.look(*device_, bus_->counters(), now);
+}
 
 }  // namespace invar::modbus

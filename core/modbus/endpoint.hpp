@@ -78,15 +78,19 @@ class Client {
   [[nodiscard]] Device& device() const { return *device_; }
   void receive(Instant now);
   void send(Instant now);
-  /// Once a cycle, after `receive`: what its owner should say of the device now. Precondition: open.
+  /// Once a cycle, after `receive`: what its owner should say of the device now. Sets the device's watchdog, too, where that shows
+  /// another time than the map wants, or the device came back. Precondition: open.
   [[nodiscard]] std::vector<HealthChange> look(Instant now);
   /// The device refused a write lately: let go of it, and let its watchdog do the same.
   [[nodiscard]] bool refuses() const { return health_.refuses(); }
 
  private:
+  void keep_watchdog();
+
   std::unique_ptr<Bus> bus_;
   Device* device_ = nullptr;
   Health health_;
+  bool was_online_ = false;
   bool stepped_ = false;
 };
 

@@ -50,6 +50,10 @@ start device
 wait_for "the heater to heat again with its device back" heats
 wait_for "sound readings" thermal '"stale":false'
 
+# Another master makes the device wait ten seconds for a heartbeat: its owner takes that back.
+mbpoll -m tcp -p "$port" -t 4 -r 3 -1 127.0.0.1 10000 >/dev/null
+waits_a_second() { mbpoll -m tcp -p "$port" -t 4 -r 3 -1 127.0.0.1 2>/dev/null | grep -Eq '^\[3\]:[[:space:]]*1000$'; }
+wait_for "the watchdog's second to be set again" waits_a_second
 heats || { echo "not heating"; exit 1; }
 kill -9 "${pid[heat]}"
 wait_for "the device's watchdog to switch the heater off" off

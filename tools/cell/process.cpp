@@ -1,6 +1,8 @@
 #include "tools/cell/process.hpp"
 
+#include <signal.h>
 #include <spdlog/spdlog.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -247,6 +249,7 @@ class RunningProcess {
   }
 
   int run_simulated(const std::atomic<bool>& stop) {
+    if (!options_.outcome.empty()) prctl(PR_SET_PDEATHSIG, SIGTERM);  // without `invar run` time stands still
     dds::SimulatedClockClient clock{node_};
     each_port([&](std::size_t index, Port& port) {
       if (port.direction() == Port::Direction::output)

@@ -176,6 +176,17 @@ TEST(Thermal, DeviceSwitchesOffByItselfWhenTheLoopNoLongerRuns) {
   EXPECT_NEAR(bench.run_for(1200.0).temperature(), 30.0, 0.05);
 }
 
+TEST(Thermal, SetsTheWatchdogOfADeviceThatWouldWaitLonger) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.thermal_parameters.modbus.map = bench.heater_parameters.modbus.map = test::changed_map(
+      folder, "heater.yaml", {{"range: [100, 10000], initial: 1000", "range: [100, 10000], initial: 10000"}});
+  bench.bring_up();
+  EXPECT_GT(bench.run_for(60.0).heater_power(), 50.0);
+  for (int i = 0; i < 30; ++i) bench.cycle_once(false);
+  EXPECT_EQ(bench.heater_power(), 0.0);
+}
+
 TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   Bench bench;
   bench.thermal_parameters.over_temperature = 26.0;
@@ -221,6 +232,23 @@ TEST(Thermal, DeviceThatLatchesAtItsOwnLimitIsSaidAndResetWithTheLoopsLatch) {
     power = bench.heater_power();
   }
   EXPECT_GT(power, 1.0);
+}
+
+TEST(Thermal, HeaterThatStaysOnThoughItWasToldToBeOffIsSaidOnce) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench{folder.write("faults.yaml",
+                           "invar_modbus_faults: 1\nfaults:\n"
+                           "  - {at: 9, for: 40, do: freeze, register: delivered_power}\n")};
+  bench.bring_up();
+  EXPECT_TRUE(bench.run_for(10.0).enabled());
+  EXPECT_THAT(bench.said(), IsEmpty());
+  bench.ask(30.0, false);
+  bench.run_for(1.5);
+  EXPECT_THAT(bench.said(), IsEmpty());
+  bench.run_for(20.0);
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("W though it was told to be off: cut its supply")));
+  bench.run_for(20.0);
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("the heater is off as it was told")));
 }
 
 TEST(Thermal, CommandWhoseSetpointCannotBeIsRefusedAndTheLoopGoesOn) {
