@@ -79,6 +79,29 @@ TEST(Fusion, EstimatesHowLateTheVelocityIsAndAlignsIt) {
   }
 }
 
+TEST(Fusion, EstimatesHowLateAPositionIsAndAlignsIt) {
+  auto parameters = Rig::parameters_of();
+  parameters.sensors[2].delay_sigma = 5e-3;
+  Rig rig{parameters};
+  constexpr double delay = 4e-3;  // 0.5 mm at the fastest
+  double squares = 0.0;
+  int count = 0;
+  sensing::FusedPosition fused;
+  while (rig.time() < 15.0) {
+    const double now = rig.time();
+    fused = rig.step([&](int sensor, double t, sensing::AxisReading& reading) {
+      if (sensor == 1) reading.position(reading.position() - Rig::truth(t) + Rig::truth(t - delay));
+      return true;
+    });
+    if (now < 5.0) continue;
+    squares += std::pow(fused.position() - Rig::truth(now), 2);
+    ++count;
+  }
+  EXPECT_NEAR(fused.lateness()[1], delay, 0.3e-3);
+  EXPECT_LT(std::sqrt(squares / count), 0.03e-3);
+  EXPECT_EQ(fused.live(), 7U);
+}
+
 TEST(Fusion, TakesSensorsOfOtherRates) {
   Rig rig;
   double squares = 0.0;
