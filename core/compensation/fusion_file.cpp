@@ -202,7 +202,11 @@ FusionFile read_fusion(const config::Node& root) {
 
 std::unique_ptr<metrology::FusionEstimator> make_estimator(const FusionFile& model,
                                                            const metrology::WeightLearning& learning) {
-  if (model.method == "weights") return std::make_unique<metrology::WeightedFusion>(model.weights, learning);
+  if (model.method == "weights") {
+    auto weights = model.weights;
+    weights.known = model.sensors.positions;
+    return std::make_unique<metrology::WeightedFusion>(weights, learning);
+  }
   return std::make_unique<metrology::FusionObserver>(model.sensors);
 }
 

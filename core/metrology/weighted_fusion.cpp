@@ -12,7 +12,9 @@ namespace invar::metrology {
 
 namespace {
 constexpr double speed_memory = 0.05;  // [s]
-}
+constexpr double hardest = 100.0;      // acceleration that an axis may have [m/s2]
+constexpr int to_agree = 20;           // readings of a sensor that leapt
+}  // namespace
 
 WeightFit fit_weights(const Eigen::Ref<const Eigen::MatrixXd>& sensors,
                       const Eigen::Ref<const Eigen::VectorXd>& reference) {
@@ -101,10 +103,15 @@ void WeightedFusion::reset() noexcept {
   last_.fill(std::numeric_limits<double>::quiet_NaN());
   repeats_.fill(0);
   unread_.fill(0.0);
+  way_.fill(0.0);
+  since_.fill(0.0);
+  jitter_.fill(0.0);
+  readings_.fill(0);
+  doubted_.fill(0);
   recursive_.reset();
   shift_.fill(0.0);
   intercept_shift_ = 0.0;
-  step_moved_ = moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
+  step_moved_ = speed_ = spread_ = largest_ = fused_ = 0.0;
   started_ = moving_ = false;
 }
 
@@ -118,6 +125,28 @@ void WeightedFusion::start(const FusionSample& sample) noexcept {
   started_ = true;
 }
 
+/// Whether a sensor counts with this reading: not from a leap until it has agreed with the others for some time.
+bool WeightedFusion::believed(std::size_t i, bool leapt, bool agrees) noexcept {
+  if (leapt || (doubted_[i] > 0 && !agrees))
+    doubted_[i] = to_agree;
+  else if (doubted_[i] > 0)
+    --doubted_[i];
+  return doubted_[i] == 0;
+}
+
+/// What a sound sensor's readings differ by at most, beside the motion, as learnt from them; infinite until they told.
+double WeightedFusion::usual_change(std::size_t i, double change) noexcept {
+  const double usual =
+      readings_[i] < to_agree ? std::numeric_limits<double>::infinity() : 8.0 * std::sqrt(jitter_[i]);
+  if (!std::isfinite(change)) return usual;
+  readings_[i] = std::min(readings_[i] + 1, 100);
+  const double square = readings_[i] > to_agree
+                            ? std::min(change * change, 16.0 * jitter_[i])  // a leap is no noise
+                            : change * change;
+  jitter_[i] += (square - jitter_[i]) / readings_[i];
+  return usual;
+}
+
 void WeightedFusion::read_velocity(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept {
   const double reading = sample.velocities[i - positions_];
   unread_[i] += sample.period;
@@ -127,7 +156,10 @@ void WeightedFusion::read_velocity(std::size_t i, const FusionSample& sample, Fu
     return;
   }
   repeats_[i] = reading == last_[i] ? repeats_[i] + 1 : 0;
-  if (std::isfinite(reading) && repeats_[i] < 5) {
+  const double change = reading - last_[i], usual = usual_change(i, change);
+  const bool sound = believed(i, std::abs(change) > usual + hardest * unread_[i],
+                              std::abs(reading - speed_) < usual + 0.2 * largest_);
+  if (sound && std::isfinite(reading) && repeats_[i] < 5) {
     const double before = std::isfinite(last_[i]) ? last_[i] : reading;
     const double moved = 0.5 * (reading + before) * unread_[i];
     value_[i] += moved;
@@ -148,6 +180,8 @@ void WeightedFusion::read_velocity(std::size_t i, const FusionSample& sample, Fu
 }
 
 void WeightedFusion::read_position(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept {
+  way_[i] += step_moved_;
+  if (std::abs(speed_) > 0.05 * largest_) since_[i] += step_moved_;  // not what a tachometer says at rest
   if ((sample.silent >> i & 1U) != 0U) {
     value_[i] += step_moved_;
     fused.live |= 1U << i;
@@ -155,10 +189,20 @@ void WeightedFusion::read_position(std::size_t i, const FusionSample& sample, Fu
   }
   const double reading = sample.positions[i];
   repeats_[i] = reading == last_[i] ? repeats_[i] + 1 : 0;
-  if (repeats_[i] == 0) moved_ = 0.0;
+  if (repeats_[i] == 0) since_[i] = 0.0;
+  bool sound = std::isfinite(reading);
+  if (i < model_.known.size()) {
+    const PositionSensorModel& known = model_.known[i];
+    const double change = reading - last_[i] - way_[i];
+    const double leap = std::max({2.0 * known.step, 20.0 * known.noise, usual_change(i, change)});
+    sound =
+        believed(i, std::abs(change) > leap, std::abs(reading - fused_ - step_moved_) < 2.0 * leap) && sound;
+    if (known.step <= 0.0 && repeats_[i] >= 5 + 3 * known.longest_repeat) sound = false;
+  }
+  way_[i] = 0.0;
   last_[i] = reading;
   value_[i] = reading;
-  if (std::isfinite(reading)) fused.live |= 1U << i;
+  if (sound) fused.live |= 1U << i;
 }
 
 /// Fills the weights: by the selectors and what was learnt, of those that live, sum one.
@@ -234,11 +278,13 @@ FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
   step_moved_ = speed_ * sample.period;  // where no velocity sensor says better
   for (std::size_t i = positions_; i < sensors_; ++i) read_velocity(i, sample, fused);
   for (std::size_t i = 0; i < positions_; ++i) read_position(i, sample, fused);
-  moved_ += step_moved_;
   // A position that stands still while the velocity has moved on by far more than it steps: stuck.
-  if (sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U && std::abs(moved_) > 0.005)
-    for (std::size_t i = 0; i < positions_; ++i)
-      if (repeats_[i] > 20) fused.live &= ~(1U << i);
+  if (sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U)
+    for (std::size_t i = 0; i < positions_; ++i) {
+      const bool stepped = i < model_.known.size() && model_.known[i].step > 0.0;
+      if (repeats_[i] > 0 && std::abs(since_[i]) > (stepped ? 3.0 * model_.known[i].step : 0.005))
+        fused.live &= ~(1U << i);
+    }
   weigh(sample, fused);
 
   double mean = 0.0;

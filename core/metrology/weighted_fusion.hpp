@@ -56,6 +56,7 @@ struct WeightModel {
   std::vector<numerics::RbfNetwork> weights;  // positions + velocities - 1
   double intercept = 0.0;                     // [m]
   std::vector<double> delays;                 // how late each sensor is [s]; positions + velocities
+  std::vector<PositionSensorModel> known;     // what is known of the position sensors; may be empty
   NoiseBySpeed noise;
   FusionPolynomial polynomial;
 };
@@ -72,7 +73,9 @@ struct WeightLearning {
 
 /// Runs the weights: integrates the velocities from the first position reading, moves every sensor on by its delay,
 /// looks the weights up by the low-passed speed and the noise level - given, or by the model from the speed, or
-/// estimated over a window of readings. A sensor that is missing or repeats itself loses its weight. Where a sample has
+/// estimated over a window of readings. A sensor that is missing loses its weight at once, one that repeats itself after five
+/// readings (an encoder: after the way of three of its steps), one that leaps as no motion does at once and until it has agreed with the
+/// others for twenty readings; the last only of sensors that are `known` and of velocities. Where a sample has
 /// a reference, recursive least squares learns how far weights and intercept have moved from the model since: within bounds,
 /// and eased in with the memory, so that nothing steps.
 class WeightedFusion final : public FusionEstimator {
@@ -87,6 +90,8 @@ class WeightedFusion final : public FusionEstimator {
   [[nodiscard]] double travel(const FusionSample& sample) noexcept;
   void read_velocity(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
   void read_position(std::size_t i, const FusionSample& sample, FusedPosition& fused) noexcept;
+  [[nodiscard]] double usual_change(std::size_t i, double change) noexcept;
+  [[nodiscard]] bool believed(std::size_t i, bool leapt, bool agrees) noexcept;
   void weigh(const FusionSample& sample, FusedPosition& fused) noexcept;
   void learn(const FusionSample& sample, const FusedPosition& fused) noexcept;
   [[nodiscard]] double aligned(std::size_t i, const FusionSample& sample) const noexcept;
@@ -102,12 +107,16 @@ class WeightedFusion final : public FusionEstimator {
   Values last_{};   // its reading
   std::array<int, most_sensors> repeats_{};
   std::array<double, most_sensors> unread_{};  // time since it was read [s]
+  Values way_{};                               // moved since a position was read [m]
+  Values since_{};                             // moved since it changed [m]
+  Values jitter_{};  // mean square of what two readings differ by, beside the motion [m2, m2/s2]
+  std::array<int, most_sensors> readings_{};  // that are in it
+  std::array<int, most_sensors> doubted_{};  // readings until a sensor that leapt is believed again; 0: it is
   RecursiveWeights recursive_;
   Values found_{};                // weights by the model
   Values shift_{};                // of the weights of the second sensor and those behind it, as learnt
   double intercept_shift_ = 0.0;  // [m]
   double step_moved_ = 0.0;       // by the first velocity sensor in this period [m]
-  double moved_ = 0.0;            // by it since each position last changed [m]
   double fused_ = 0.0;
   double speed_ = 0.0;
   double spread_ = 0.0;

@@ -97,6 +97,43 @@ TEST(NoiseBySpeed, IsFoundWhereTheNoiseFollowsTheSpeed) {
     EXPECT_GE(noise.log_deviation[k], noise.log_deviation[k - 1]);
 }
 
+TEST(NoiseBySpeed, IsWhatTheWeightsAreLookedUpByWhileItRuns) {
+  // Noise that grows with the speed: by the model at once, over a window when it has passed.
+  const auto run_of = [](double period, unsigned seed) {
+    std::mt19937 random{seed};
+    std::normal_distribution<double> normal;
+    FusionRun run = record(Rig{}, sinusoid(period), 2.0 * period, 0.0, seed);
+    for (Eigen::Index i = 1; i + 1 < run.time.size(); ++i) {
+      const double v = (run.reference(i + 1) - run.reference(i - 1)) / (2.0 * dt);
+      run.velocities(i, 0) = v + (0.002 + 0.05 * std::abs(v)) * normal(random);
+    }
+    run.noise_level.resize(0);
+    return run;
+  };
+  std::vector<FusionRun> runs;
+  for (unsigned r = 0; r < 12; ++r) runs.push_back(run_of(1.5 + 0.3 * r, 60 + r));
+  double off[2];  // RMS, relative, by the speed and over a window
+  for (const bool by_speed : {true, false}) {
+    WeightOptions options;
+    options.noise_by_speed = by_speed;
+    WeightedFusion weighted{identify_weights(runs, options)};
+    const FusionRun unseen = run_of(2.3, 99);
+    const auto fused = fuse(weighted, unseen);
+    double squares = 0.0;
+    const Eigen::Index half = unseen.time.size() / 2;
+    for (Eigen::Index i = half; i < unseen.time.size(); ++i) {
+      const double v = std::abs(0.1 * 2.0 * std::numbers::pi / 2.3 *
+                                std::sin(2.0 * std::numbers::pi * unseen.time(i) / 2.3));
+      squares += std::pow(fused[static_cast<std::size_t>(i)].noise[1] / (0.002 + 0.05 * v) - 1.0, 2);
+    }
+    off[by_speed ? 0 : 1] = std::sqrt(squares / static_cast<double>(unseen.time.size() - half));
+  }
+  std::printf("noise off by %.0f %% RMS by the speed, %.0f %% over a window\n", 100.0 * off[0],
+              100.0 * off[1]);
+  EXPECT_LT(off[0], 0.3);
+  EXPECT_LT(off[0], 0.5 * off[1]);
+}
+
 TEST(EstimatedNoiseLevel, IsTheLevelThatWasPutIn) {
   for (const double level : {0.05, 0.3, 1.0})
     EXPECT_NEAR(estimated_noise_level(record(Rig{}, sinusoid(3.0), 6.0, level, 2).velocities.col(0)), level,
