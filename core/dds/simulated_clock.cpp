@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <random>
 #include <set>
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/dds/command_gate.hpp"
 #include "core/dds/typed_wire.hpp"
 
 namespace invar::dds {
@@ -239,13 +239,21 @@ void SimulatedClockClient::bind(InputPort& port) {
   membership_.wanted.push_back(port.topic);
 }
 
+/// What the cell's own processes write comes in bundles; by DDS it is heard a second time, and not listened to.
 void SimulatedClockClient::listen_outside() {
   std::set<std::string> heard;
+  const std::string own = "invar/" + node_.options().cell + "/";
   for (const auto& input : inputs_) {
     if (!input.is_inbox || !heard.insert(input.topic).second) continue;
+    const Profile& profile = node_.profile(input.profile);
+    auto gate =
+        profile.exclusive ? std::make_shared<CommandGate>(input.topic, profile, node_.discovery()) : nullptr;
     outside_readers_.push_back(node_.raw_reader(
-        input.topic, input.type, node_.profile(input.profile),
-        [this, topic = input.topic](const RawSample& sample) {
+        input.topic, input.type, profile, [this, topic = input.topic, own, gate](const RawSample& sample) {
+          const std::string writer{sample.writer};
+          Discovery& discovery = node_.discovery();
+          if (discovery.participant_name(discovery.claimant(writer).participant).starts_with(own)) return;
+          if (gate && !gate->passes({}, writer, {sample.sent_ns})) return;
           const std::lock_guard lock{mutex_};
           for (const auto& one : inputs_)
             if (one.topic == topic)
@@ -255,22 +263,14 @@ void SimulatedClockClient::listen_outside() {
   }
 }
 
-/// What the cell's own processes write comes in bundles; by DDS they are heard a second time, and not listened to.
 void SimulatedClockClient::deliver_outside(Instant at) {
   std::vector<FromOutside> came;
   {
     const std::lock_guard lock{mutex_};
     came.swap(outside_);
   }
-  if (came.empty()) return;
-  const std::string own = "invar/" + node_.options().cell + "/";
-  std::map<std::string, std::string> participants;  // by writer
-  for (auto& endpoint : node_.snapshot().endpoints)
-    participants[endpoint.id] = std::move(endpoint.participant);
   for (const auto& sample : came)
-    if (const auto found = participants.find(sample.writer);
-        found != participants.end() && !found->second.starts_with(own))
-      (void)sample.inlet->deliver(sample.cdr, at);  // what is malformed is a stranger's
+    (void)sample.inlet->deliver(sample.cdr, at);  // what is malformed is a stranger's
 }
 
 void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) {

@@ -220,7 +220,7 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
       std::cerr << options.call.command << ": `" << component
                 << "` was started again meanwhile: the job has ended, and its changes were taken back\n";
       return 1;
-    } else if (Clock::now() - last_heard > std::chrono::seconds{5}) {
+    } else if (Clock::now() - last_heard > std::chrono::duration<double>{options.call.patience}) {
       progress.end();
       std::cerr << options.call.command << ": `" << component << "` does not take the job"
                 << (status && status->phase() == job::JOB_RUNNING ? std::string{": "} + status->text().c_str()
@@ -238,7 +238,7 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
       cancelling = true;
       last_sent = Clock::now();
     }
-    if (cancelling && Clock::now() - last_sent > std::chrono::seconds{5}) {
+    if (cancelling && Clock::now() - last_sent > std::chrono::duration<double>{options.call.patience}) {
       std::cerr << options.call.command << ": `" << component << "` does not confirm that it stopped\n";
       return 1;
     }
@@ -332,7 +332,7 @@ int cancel(Options& options) {
     if (!name.empty() && name != status->name().c_str()) continue;
     if (!options.component.empty() && component != options.component) continue;
     if (!jobs.send(component, job::JOB_CANCEL, status->id(), status->name().c_str(), "")) return 1;
-    const auto end = Clock::now() + std::chrono::seconds{5};
+    const auto end = Clock::now() + std::chrono::nanoseconds{cell.patience().ns};
     while (Clock::now() < end && jobs.status(component)->phase() == job::JOB_RUNNING)
       if (!sleep_for(Duration::milliseconds(20))) break;
     const auto after = jobs.status(component);

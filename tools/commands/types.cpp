@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "components/all.hpp"
 #include "core/base/shown.hpp"
@@ -22,30 +23,39 @@ namespace {
 struct Options {
   std::string type;
   std::vector<std::filesystem::path> plugins;
+  std::filesystem::path cell;
   bool json = false;
 };
 
-/// A component type as far as it can be known without a cell file.
+/// A component type as far as it can be known: ports may follow from parameters.
 struct Type {
   std::string name, description;
   std::vector<ParameterInfo> parameters;
-  std::unique_ptr<Component> example;  // none: its ports follow from parameters that have no default
+  const Component* example = nullptr;  // with the ports that it shows
   std::string why_no_ports;
-  std::shared_ptr<void> storage;  // of the example's parameters
+  std::unique_ptr<Component> made;
+  std::shared_ptr<void> storage;  // its parameters
 };
 
-Type look_at(const Registry& registry, const std::string& name) {
-  Type type{name, registry.description(name), {}, nullptr, "", nullptr};
+/// The first component of a type in a cell.
+const Component* example_in(const LoadedCell& cell, const std::string& type) {
+  for (const LoadedProcess& process : cell.processes)
+    for (const LoadedComponent& member : process.components)
+      if (member.component && member.file->type == type) return member.component.get();
+  return nullptr;
+}
+
+Type look_at(const Registry& registry, const std::string& name, const LoadedCell* cell) {
+  Type type{name, registry.description(name), {}, nullptr, "", nullptr, nullptr};
   const auto nothing = config::Yaml::parse("{}", name);
   Prepared prepared = registry.prepare(name, nothing.root(), {});
   type.parameters = std::move(prepared.infos);
   type.storage = prepared.parameters;
-  if (const auto faults = nothing.faults(); !prepared.make || !faults.empty()) {
-    type.why_no_ports = faults.empty() ? "it cannot be made" : faults.front().what;
-    return type;
-  }
-  try {
-    type.example = prepared.make();
+  if (cell != nullptr) type.example = example_in(*cell, name);
+  if (type.example != nullptr) return type;
+  try {  // what is missing of its parameters need not be what its ports follow from
+    if (prepared.make) type.made = prepared.make();
+    type.example = type.made.get();
   } catch (const InputError& error) {
     type.why_no_ports = error.faults().front().line();
   }
@@ -118,7 +128,7 @@ nlohmann::ordered_json json_of(const Type& type) {
                               {"ports", nlohmann::ordered_json::array()},
                               {"parameters", nlohmann::ordered_json::array()}};
   if (!type.why_no_ports.empty()) json["ports_unknown"] = type.why_no_ports;
-  if (type.example)
+  if (type.example != nullptr)
     for (const Port* port : type.example->ports()) {
       const auto* input = options_of(*port);
       json["ports"].push_back({{"name", port->name()},
@@ -149,7 +159,7 @@ void print(const Type& type) {
   std::cout << type.name << ": " << type.description << "\n\n";
   TextTable ports{{"port", "direction", "data", "profile", ""}};
   std::vector<std::string> data;
-  if (type.example)
+  if (type.example != nullptr)
     for (const Port* port : type.example->ports()) {
       const auto* input = options_of(*port);
       std::string more = input != nullptr && input->optional ? "optional" : "";
@@ -159,7 +169,8 @@ void print(const Type& type) {
       if (std::find(data.begin(), data.end(), data_of(*port)) == data.end()) data.push_back(data_of(*port));
     }
   if (!type.why_no_ports.empty())
-    std::cout << "its ports follow from parameters that have no default (" << type.why_no_ports << ")\n";
+    std::cout << "its ports follow from parameters that have no default (" << type.why_no_ports
+              << "); --cell shows those that it has in a cell\n";
   else if (ports.empty())
     std::cout << "without its parameters it has no ports\n";
   else
@@ -185,8 +196,11 @@ void print(const Type& type) {
 }
 
 void types(const Options& options) {
-  Registry registry;
-  add_all_components(registry);
+  std::optional<LoadedCell> cell;
+  if (!options.cell.empty()) cell = load_cell(options.cell);
+  Registry own;
+  Registry& registry = cell ? *cell->registry : own;
+  if (!cell) add_all_components(registry);
   for (const auto& plugin : options.plugins)
     if (const Fault fault = load_plugin(plugin, registry); !fault.what.empty())
       throw InputError{std::vector{fault}};
@@ -194,7 +208,7 @@ void types(const Options& options) {
     throw InputError{"TYPE", "`" + clipped(options.type) + "` is no component type",
                      mend_name(options.type, registry.names())};
   if (!options.type.empty()) {
-    const Type type = look_at(registry, options.type);
+    const Type type = look_at(registry, options.type, cell ? &*cell : nullptr);
     if (options.json)
       std::cout << json_of(type).dump(2) << '\n';
     else
@@ -204,9 +218,9 @@ void types(const Options& options) {
   TextTable table{{"type", "ports>", "parameters>", "what"}};
   auto json = nlohmann::ordered_json::array();
   for (const auto& name : registry.names()) {
-    const Type type = look_at(registry, name);
+    const Type type = look_at(registry, name, cell ? &*cell : nullptr);
     if (options.json) json.push_back(json_of(type));
-    table.add({name, type.example ? std::to_string(type.example->ports().size()) : "-",
+    table.add({name, type.example != nullptr ? std::to_string(type.example->ports().size()) : "-",
                std::to_string(type.parameters.size()), type.description});
   }
   if (options.json)
@@ -222,14 +236,19 @@ void add_types(CLI::App& program) {
       "types", "List the component types that a cell can have, their ports and parameters");
   command->footer(
       "Example: invar types stage\n"
+      "         invar types simulated_stage --cell deployment/xy-table.yaml\n"
       "         invar types --plugin liblow_pass.so low_pass --json\n"
-      "Without TYPE one line a type. Ports of a type whose number of axes, jobs and the like is a parameter "
-      "are those of its defaults.\n"
+      "Without TYPE one line a type. Where ports follow from parameters (axes, a machine's file), those of "
+      "the "
+      "defaults are shown,\n"
+      "with --cell those of that cell's first component of the type.\n"
       "Exit status: 0; 2 a fault of the call or the library");
   auto options = std::make_shared<Options>();
   command->add_option("type", options->type, "all of this one");
   command->add_option("--plugin", options->plugins, "also those of this library; may stand several times")
       ->allow_extra_args(false);
+  command->add_option("--cell", options->cell,
+                      "with this cell's libraries, and ports as its components have them");
   command->add_flag("--json", options->json, "print it as JSON, with the fields of the data and their units");
   command->callback([options] { types(*options); });
 }
