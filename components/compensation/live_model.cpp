@@ -6,8 +6,11 @@
 #include <string_view>
 
 #include "core/compensation/component_file.hpp"
+#include "core/compensation/error_map_model.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
+#include "core/metrology/components.hpp"
+#include "core/model/model_file.hpp"
 
 namespace invar::compensation {
 
@@ -130,10 +133,8 @@ std::string refusal_of_zone(const std::string& zone) {
   return "it needs the temperature of `" + zone + "`: name it below `zones` and connect it";
 }
 
-void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
-  const ThermalPlace place = read_place(yaml.root());
-  const metrology::ThermalError model = read_thermal(yaml.root());
-  yaml.finish();
+void take_thermal(LiveModel& live, const metrology::ThermalError& model, const ThermalPlace& place,
+                  const ModelLimits& limits) {
   if (!place.axis && limits.axes > 1) {
     live.refusal = "it does not say which axis it is of: calibrate with --axis";
     return;
@@ -213,10 +214,38 @@ void read_components_into(LiveModel& live, const config::Yaml& yaml, const Model
   live.refusal = refusal_of(*live.components, limits);
 }
 
+void read_thermal_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
+  const ThermalPlace place = read_place(yaml.root());
+  const metrology::ThermalError model = read_thermal(yaml.root());
+  yaml.finish();
+  take_thermal(live, model, place, limits);
+}
+
+/// What `invar diagnose` found in the readings of one axis: the whole of its error, so it stands above no geometric model.
+void read_diagnosed_into(LiveModel& live, const config::Yaml& yaml, const ModelLimits& limits) {
+  const auto diagnosed = model::read(yaml);
+  yaml.finish();
+  live.checksum = checksum_number(checksum(yaml.text()));
+  live.text = yaml.text();
+  if (diagnosed.plant != physics::Plant::error_map) {
+    live.refusal = "it is a model of plant " + std::string{physics::name_of(diagnosed.plant)} +
+                   ", not of an axis's position error";
+    return;
+  }
+  const auto axis = metrology::axis_named(diagnosed.baseline.axis);
+  if (!axis && (limits.axes > 1 || !diagnosed.baseline.axis.empty())) {
+    live.refusal = "it does not say which axis it is of: add `axis: x` (or y, z) to the file";
+    return;
+  }
+  live.refusal = why_not_corrected(diagnosed);
+  if (live.refusal.empty()) take_thermal(live, thermal_error_of(diagnosed), {axis, 0}, limits);
+}
+
 }  // namespace
 
 void load_live_model(const std::filesystem::path& file, const ModelLimits& limits, LiveModel& live) {
   const auto yaml = config::Yaml::load(file);
+  if (yaml.root().has("invar_model")) return read_diagnosed_into(live, yaml, limits);
   live.checksum = check_seal(yaml);
   live.text = yaml.text();
   (void)yaml.root().integer("invar_compensation", 1, 1);

@@ -1,4 +1,4 @@
-// LiveModel: a compensation.yaml checked against the machine and compiled for the loop.
+// LiveModel: a compensation.yaml, or a diagnosed error map, checked against the machine and compiled for the loop.
 #pragma once
 
 #include <array>

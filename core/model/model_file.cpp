@@ -404,6 +404,9 @@ physics::Model read(const config::Yaml& yaml) {
     model.baseline.errors = root["baseline"].required("errors").as_numbers("m");
     if (model.baseline.positions.empty() || model.baseline.positions.size() != model.baseline.errors.size())
       root["baseline"].fault("positions and errors differ in number", "write one error a position");
+    model.baseline.axis = root.text("axis", "");
+    if (root["range"].has("temperature"))
+      model.baseline.temperature = root["range"]["temperature"].as_range("degC");
   }
   for (const auto& node : root["noise"].children()) {
     const auto sigma = node.as_number("", Range::not_negative());
@@ -438,6 +441,12 @@ std::string patched(const config::Yaml& original, const physics::Model& changed)
   }
   root["terms"] = YAML::Node{YAML::NodeType::Sequence};
   for (const auto& term : changed.terms) root["terms"].push_back(term_yaml(term, changed));
+  if (const auto& covered = changed.baseline.temperature) {
+    YAML::Node range;
+    for (const double end : {covered->lower, covered->upper}) range.push_back(end);
+    range.SetStyle(YAML::EmitterStyle::Flow);
+    root["range"]["temperature"] = range;
+  }
   YAML::Emitter out;
   out << root;
   return std::string{out.c_str()} + "\n";

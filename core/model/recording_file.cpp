@@ -357,8 +357,9 @@ class Reader {
       if (reference[i] != reference[i - 1]) moved = i;
     const auto& time = table.find(model_.signal("time")->column)->values;
     const auto end = std::upper_bound(time.begin(), time.end(), time[moved] + 0.5) - time.begin();
-    if (moved > 0)
-      for (auto& column : table.columns) column.values.resize(static_cast<std::size_t>(end));
+    if (moved == 0) return table;
+    table.behind += table.rows() - static_cast<std::size_t>(end);
+    for (auto& column : table.columns) column.values.resize(static_cast<std::size_t>(end));
     return table;
   }
 
@@ -374,6 +375,7 @@ class Reader {
       if (i - since >= still) begin = i - still + 1;
     }
     if (begin <= 1) return table;
+    table.before += begin;
     for (auto& column : table.columns)
       column.values.erase(column.values.begin(), column.values.begin() + static_cast<std::ptrdiff_t>(begin));
     return table;

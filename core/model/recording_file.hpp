@@ -18,7 +18,8 @@ namespace invar::model {
 /// controller's law does not account for.
 /// Rows in which that topic says that its axis is not enabled are left out; each stretch between is a table of its own,
 /// the longest first, and stretches under a twentieth of it are dropped. One that was enabled before the recording began
-/// starts where the axis stands still. Of the rest behind the last motion half a second is kept.
+/// starts where the axis stands still. Of the rest behind the last motion half a second is kept. How many rows that cost
+/// stands in the tables.
 /// Throws InputError: no such topic or field, no stamp, more than `most_lost` of the cycles missing, each n-th cycle alone
 /// recorded, a loop of another rate than the model's controller.
 std::vector<recording::Table> read_recording(const std::filesystem::path& file, const physics::Model& model);

@@ -93,18 +93,33 @@ class AxisPlant {
     }
   };
 
+  /// One effect of a term, ready to be asked: its function and its numbers.
+  template <class Function>
+  struct Effect {
+    Function function;
+    const double* parameters;
+  };
+  using PointEffect = Effect<double (*)(const AxisPoint&, const double*)>;
+  using NumberEffect = Effect<double (*)(double, const double*)>;
+
   [[nodiscard]] double variable(int code, const AxisPoint& at) const noexcept;
-  [[nodiscard]] double push(const AxisPoint& at) const noexcept;  // all forces but dry friction and swing
-  [[nodiscard]] double hold(double speed) const noexcept;         // dry friction
+  [[nodiscard]] double push(const AxisPoint& at) const noexcept;    // all forces but dry friction and swing
+  [[nodiscard]] double hold(double speed) const noexcept;           // dry friction
+  [[nodiscard]] double pushed(const AxisPoint& at) const noexcept;  // the same two for the innermost loop
+  [[nodiscard]] double held(double speed) const noexcept;
   [[nodiscard]] Slope slope(const State& s, double time, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced(const State& s, double h, double direction, bool stuck) const noexcept;
+  [[nodiscard]] State advanced_with_mode(const State& s, double h, double direction,
+                                         bool stuck) const noexcept;
   void drive(double command, double dt) noexcept;  // one held command behind the delay
   void move(double h) noexcept;                    // one sub-step with current_mean_
   [[nodiscard]] double delayed_position(double age) const noexcept;
 
   AxisParameters parameters_;
   std::vector<AxisTerm> terms_;
-  std::vector<const AxisTerm*> forces_, motors_, commands_, frictions_, readings_, bristles_;
+  std::vector<PointEffect> forces_, motors_;
+  std::vector<NumberEffect> frictions_, readings_;
+  std::vector<const AxisTerm*> commands_, bristles_;
   std::vector<std::pair<const AxisTerm*, int>> force_curves_, motor_curves_, reading_curves_;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;

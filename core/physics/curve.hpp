@@ -18,8 +18,13 @@ struct Curve {
     if (knots.empty()) return 0.0;
     if (!(x > knots.front())) return values.front();
     if (x >= knots.back()) return values.back();
-    const auto above =
-        static_cast<std::size_t>(std::upper_bound(knots.begin(), knots.end(), x) - knots.begin());
+    // The first knot beyond x; knots at equal steps, as a diagnosis lays them, are met at once or beside.
+    const double steps = static_cast<double>(knots.size() - 1);
+    auto above =
+        1 + std::min(knots.size() - 2,
+                     static_cast<std::size_t>((x - knots.front()) / (knots.back() - knots.front()) * steps));
+    while (knots[above - 1] > x) --above;
+    while (knots[above] <= x) ++above;
     const double share = (x - knots[above - 1]) / (knots[above] - knots[above - 1]);
     return values[above - 1] + share * (values[above] - values[above - 1]);
   }

@@ -57,6 +57,8 @@ struct ThermalLayout {
 /// Last calibration of an error map: a natural cubic spline through these points.
 struct Baseline {
   std::vector<double> positions, errors;
+  std::string axis;                  // of the cell: "x"; empty: the file does not say
+  std::optional<Range> temperature;  // [degC] that the recordings of the terms covered
 };
 
 /// A model written down as expressions.

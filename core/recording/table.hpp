@@ -46,6 +46,8 @@ class Table {
 
   std::vector<Column> columns;
   std::filesystem::path file;  // where it was read from, for messages
+  std::size_t before = 0,
+              behind = 0;  // rows of a cell's recording that were not taken, in front of these and after
 };
 
 }  // namespace invar::recording

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # `invar job apply` reaches every component that takes a model: a diagnosed head into a dispenser, whose next pattern aims by it,
-# and out of it; compensation taken out. Simulated time at a pace, so that no host is too slow for it.
+# and out of it; compensation taken out, a diagnosed error map into it. Simulated time at a pace, so that no host is too slow for it.
 # apply.sh INVAR SOURCE_DIR
 set -euo pipefail
 invar=$1 source=$2
@@ -21,6 +21,18 @@ parameters:
 terms:
   - {term: valve_delay, delay: {value: 3e-4, unit: s}}
 MODEL
+cat >map.yaml <<'MODEL'
+invar_model: 1
+plant: error_map
+axis: x
+columns: {position: x, time: t, temperature: T, error: e}
+range: {temperature: [20, 26]}
+baseline: {positions: [0, 0.2], errors: [0, 0]}
+parameters: {reference_temperature: {value: 20, unit: degC}}
+terms:
+  - {term: periodic_error, amplitude: {value: 3.0e-7, unit: m, sigma: 1e-8}, pitch: {value: 0.02, unit: m, sigma: 0}, phase: {value: 0, unit: rad, sigma: 0}}
+  - {term: thermal_expansion, coefficient: {value: 1.0e-6, unit: 1/K, sigma: 1e-8}}
+MODEL
 "$invar" run $cell --simulated --pace 2 >cell.log 2>&1 &
 cell_pid=$!
 trap 'kill $cell_pid 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
@@ -33,6 +45,8 @@ says() { # WORDS ARGUMENTS...
 }
 says "dispenser: $PWD/head.yaml is active" $cell dispenser --model head.yaml
 says "dispenser: no model any more" $cell dispenser --none
+says "compensation: no model any more" $cell compensation --none
+says "compensation: $PWD/map.yaml is active" $cell compensation --model map.yaml
 says "compensation: no model any more" $cell compensation --none
 kill -INT $cell_pid
 wait $cell_pid || fail "the cell did not end in order"

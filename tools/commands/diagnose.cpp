@@ -96,6 +96,8 @@ int run(const Options& options) {
     auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
     for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
+    if (model.plant == physics::Plant::error_map)
+      if (const auto range = diagnose::covered(data, "temperature")) changed.baseline.temperature = range;
     write_text(options.out / (is_retuned ? "retuned.yaml" : "patched.yaml"), model::patched(yaml, changed));
   }
   diagnose::write_page(data, diagnosis, options.model.string(), options.out / "report.html");

@@ -1,5 +1,5 @@
-// `invar job apply`: a model into a running component - a diagnosis's into a stage, which feeds forward its forces; a
-// calibration's into the compensation or the dispenser - or out of it.
+// `invar job apply`: a model into a running component - a diagnosis's into a stage, which feeds forward its forces, a
+// dispenser or the compensation; a calibration's into the compensation or the dispenser - or out of it.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -12,6 +12,7 @@
 #include <random>
 
 #include "core/compensation/droplet_model.hpp"
+#include "core/compensation/error_map_model.hpp"
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/axis_feedforward.hpp"
@@ -44,16 +45,24 @@ struct Taker {
 constexpr Taker takers[] = {
     {physics::Plant::axis, "stage", ""},
     {physics::Plant::droplet, "dispenser", ""},
-    {physics::Plant::error_map, "",
-     "give compensation what `invar calibrate thermal` or `geometric` makes of the same readings"},
+    {physics::Plant::error_map, "compensation", ""},
     {physics::Plant::sensor, "", "give fusion what `invar calibrate fusion` makes of the same readings"},
     {physics::Plant::thermal, "",
      "the component thermal has gains, no model; `invar simulate` runs this one"},
     {physics::Plant::equations, "", "`invar simulate` runs it"}};
 
-std::string_view why_not_used(const physics::Term& term, physics::Plant plant) {
-  return plant == physics::Plant::axis ? physics::why_not_fed_forward(term)
-                                       : compensation::why_not_aimed_by(term);
+/// Why the component that takes it has no use for a term, in words that follow on what it cannot do; empty: it has.
+std::string why_not_used(const physics::Term& term, physics::Plant plant) {
+  const bool axis = plant == physics::Plant::axis, map = plant == physics::Plant::error_map;
+  const std::string_view why = axis  ? physics::why_not_fed_forward(term)
+                               : map ? compensation::why_not_corrected(term)
+                                     : compensation::why_not_aimed_by(term);
+  if (why.empty()) return {};
+  const std::string name = "`" + std::string{term.info->name} + "`";
+  return (axis  ? "a stage cannot feed " + name + " forward: "
+          : map ? "compensation cannot correct " + name + ": "
+                : "a dispenser cannot aim by " + name + ": ") +
+         std::string{why};
 }
 
 /// The file's faults are said here, before anything is asked of the cell. Returns the type of component that takes it; empty:
@@ -77,13 +86,12 @@ std::string_view check_model(const std::filesystem::path& file, bool partly) {
   std::vector<Fault> faults;
   for (std::size_t i = 0; i < model.terms.size(); ++i)
     if (const auto why = why_not_used(model.terms[i], model.plant); !why.empty() && !partly)
-      faults.push_back(
-          {file.string() + ": terms[" + std::to_string(i) + "]",
-           (model.plant == physics::Plant::axis ? "a stage cannot feed `" : "a dispenser cannot aim by `") +
-               std::string{model.terms[i].info->name} +
-               (model.plant == physics::Plant::axis ? "` forward: " : "`: ") + std::string{why},
-           "take it out, or give --partly for the rest"});
+      faults.push_back({file.string() + ": terms[" + std::to_string(i) + "]", why,
+                        "take it out, or give --partly for the rest"});
   if (!faults.empty()) throw InputError{faults};
+  if (model.plant == physics::Plant::error_map)
+    if (const auto why = compensation::why_not_corrected(model); !why.empty())
+      throw InputError{file.string(), "cannot be corrected by: " + why, "then apply it again"};
   return taker.type;
 }
 
@@ -250,8 +258,9 @@ void add_job_apply(CLI::App& job) {
       "         invar job apply deployment/cell.yaml compensation --none\n"
       "A stage feeds forward the forces of an axis's model.yaml, and refuses one that leaves too little "
       "current for its servo;\n"
-      "a dispenser aims by a model.yaml of plant droplet; compensation, dispenser and fusion take a\n"
-      "compensation.yaml of their kind. With a folder `state`, what a compensation was "
+      "a dispenser aims by a model.yaml of plant droplet, compensation corrects an axis by one of plant\n"
+      "error_map; compensation, dispenser and fusion take a compensation.yaml of their kind. With a folder "
+      "`state`, what a compensation was "
       "given here - also\n"
       "none - is what it starts with next time.\n"
       "Exit status: 0 done; 1 refused or no answer; 2 a fault of the call or a file");
@@ -260,7 +269,7 @@ void add_job_apply(CLI::App& job) {
   auto* model =
       command->add_option("--model", options->model,
                           "model.yaml as `invar diagnose` writes it, or a calibration's compensation.yaml");
-  command->add_flag("--partly", options->partly, "leave out the terms that a stage cannot feed forward");
+  command->add_flag("--partly", options->partly, "leave out the terms that the component has no use for");
   command->add_flag("--json", options->json, "print the component's answer as JSON");
   auto* rollback = command->add_flag("--rollback", options->rollback, "back to the model before");
   command->add_flag("--none", options->none, "take the models out")->excludes(rollback)->excludes(model);

@@ -214,6 +214,7 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
+  data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
@@ -253,6 +254,16 @@ Case make_case(const physics::Model& model, const std::vector<recording::Table>&
   auto data = empty_case(model);
   for (const auto& table : tables) add(data, model, table, tables.size());
   return data;
+}
+
+std::optional<Range> covered(const Case& data, std::string_view signal) {
+  std::optional<Range> range;
+  for (const auto& recording : data.recordings)
+    if (const auto* values = recording.inputs.find(signal); values != nullptr)
+      for (const double v : *values)
+        if (std::isfinite(v))
+          range = range ? Range{std::min(range->lower, v), std::max(range->upper, v)} : Range{v, v};
+  return range;
 }
 
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {

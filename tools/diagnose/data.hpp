@@ -4,17 +4,20 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/model/record_file.hpp"
 #include "core/physics/simulation.hpp"
+#include "tools/diagnose/remembered.hpp"
 
 namespace invar::diagnose {
 
 struct DataCount {
   std::size_t rows = 0, used = 0, missing = 0, outliers = 0, duplicates = 0, out_of_order = 0, gaps = 0;
-  std::size_t shortened = 0;  // rows of long recordings that are not run through
+  std::size_t shortened = 0;                           // rows of long recordings that are not run through
+  std::size_t before_standstill = 0, behind_rest = 0;  // rows of a cell's recording that were not taken
 };
 
 /// One recording, ready to be simulated and compared.
@@ -37,12 +40,16 @@ struct Case {
   DataCount count;
   bool is_time_series = true;     // rows follow one another; false for droplets
   std::function<bool()> stopped;  // asked before each simulation; empty: never
+  std::shared_ptr<Remembered> remembered = std::make_shared<Remembered>();
 };
 
 /// Reads and cleans. Throws InputError for what is unusable.
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files);
 /// The same of tables that are read already.
 Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables);
+
+/// From where to where a signal goes in the recordings; nothing where none has a number of it.
+std::optional<Range> covered(const Case& data, std::string_view signal);
 
 /// Marks lone values far from their neighbours in the residual (measured - simulated) as unusable and counts them.
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated);

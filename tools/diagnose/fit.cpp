@@ -123,6 +123,15 @@ void for_neighbours(const std::vector<Freedom>& free, F f) {
 }  // namespace
 
 std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
+  Remembered::Simulations recordings;
+  for (const auto& recording : data.recordings) recordings.push_back(recording.simulation);
+  if (auto known = data.remembered->find(model, recordings)) return std::move(*known);
+  auto all = simulate_once(data, model);
+  data.remembered->keep(model, recordings, all);
+  return all;
+}
+
+std::vector<physics::Outputs> simulate_once(const Case& data, const Model& model) {
   if (data.stopped && data.stopped()) throw Stopped{};
   std::vector<physics::Outputs> all(data.recordings.size());
   for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
@@ -214,7 +223,7 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
     if (value + step > free[j].bounds.upper) step = -step;
     set(changed, free[j], value + step);
     auto column = columns.col(static_cast<Eigen::Index>(j));
-    column = (differences(data, simulate(data, changed)) - at) / step;
+    column = (differences(data, simulate_once(data, changed)) - at) / step;
     column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   });
   return columns;

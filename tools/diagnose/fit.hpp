@@ -44,6 +44,8 @@ struct Weighing {
 Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured = true);
 
 std::vector<physics::Outputs> simulate(const Case& data, const physics::Model& model);
+/// The same of a model that nobody will ask for again; it pushes no other out of what is remembered.
+std::vector<physics::Outputs> simulate_once(const Case& data, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
                          const std::vector<physics::Outputs>& simulated);

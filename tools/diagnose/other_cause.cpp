@@ -77,13 +77,20 @@ double lost_share(const Case& data, const Fit& base, const Fit& named, const Fit
 
 }  // namespace
 
-std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::size_t term) {
-  const Weighing plain = weigh(data, simulate(data, best.model), false);
-  const Fit named = fit(data, plain, best.model, data.model, 4, &best);
-  auto starts = unmodelled_starts(data, named);
-  if (starts.empty()) return std::nullopt;
-  const auto beside = screen(data, plain, named, starts, 1);
-  if (beside.empty() || beside[0].merit < claim_margin || beside[0].columns.size() == 0) return std::nullopt;
+Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
+  Beside one;
+  one.plain = weigh(data, simulate(data, best.model), false);
+  one.fit = fit(data, one.plain, best.model, data.model, 4, &best);
+  const auto starts = unmodelled_starts(data, spanned != nullptr ? *spanned : one.fit);
+  one.courses = screen(data, one.plain, one.fit, starts, 3);
+  return one;
+}
+
+std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, std::size_t term) {
+  const auto& [plain, named, courses] = beside;
+  if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
+    return std::nullopt;
+  const auto starts = unmodelled_starts(data, named);
   auto without_term = named.model;
   without_term.terms.erase(without_term.terms.begin() + static_cast<std::ptrdiff_t>(term));
   const Fit base = fit(data, plain, without_term, data.model, 6);
@@ -97,7 +104,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::si
     one.fit = fit(data, plain, start.model, data.model, 4, &start);
     one.lead = lead(data, one.fit, named);
     // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
-    const bool is_form = is_course_of(s.start.term, best.model.terms[term]);
+    const bool is_form = is_course_of(s.start.term, named.model.terms[term]);
     if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }

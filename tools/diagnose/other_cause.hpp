@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "tools/diagnose/diagnosis.hpp"
+#include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
 
@@ -15,13 +16,22 @@ double lead(const Case& data, const Fit& one, const Fit& other);
 /// more of it than independent rows give.
 double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
 
+/// A model with every row counted alike, and what free courses would gain beside it, best first; three carry their columns.
+struct Beside {
+  Weighing plain;
+  Fit fit;
+  std::vector<Screened> courses;
+};
+/// The courses go from where to where the variables go with `spanned`; the fit itself where it is not given.
+Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned = nullptr);
+
 struct OtherCause {
   Fit fit;
   double lead = 0.0;  // over the named model
 };
 
-/// The free course that does clearly better in place of named term `term` of `best` (the other terms stay). None is tried
-/// where no course would gain beside the name: what helps in its place helps beside it too.
-std::optional<OtherCause> other_cause(const Case& data, const Fit& best, std::size_t term);
+/// The free course that does clearly better in place of named term `term` of `named.fit` (the other terms stay). None is
+/// tried where no course would gain beside the name: what helps in its place helps beside it too.
+std::optional<OtherCause> other_cause(const Case& data, const Beside& named, std::size_t term);
 
 }  // namespace invar::diagnose

@@ -30,7 +30,7 @@ std::string readable(std::string_view name);
 std::string place_of(const Case& data, const physics::Term& term);
 /// "amplitude 2.40 +- 0.01 N, pitch ..."
 std::string sizes_of(const Case& data, const Finding& finding);
-/// Which part of a long recording the fits ran through; empty where they saw all of it.
+/// Which part of a recording the fits did not run through, and why; empty where they saw all of it.
 std::string what_was_looked_at(const Case& data);
 /// What to do next, in a sentence.
 std::string next_experiment(const Case& data, const Diagnosis& diagnosis);

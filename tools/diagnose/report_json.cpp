@@ -154,8 +154,10 @@ std::string report_json(const Case& data, const Diagnosis& d) {
        {{"nan", data.count.missing}, {"outlier", data.count.outliers}, {"duplicate", data.count.duplicates}}},
       {"reordered", data.count.out_of_order},
       {"gaps", data.count.gaps},
+      {"before_standstill", data.count.before_standstill},
+      {"behind_rest", data.count.behind_rest},
       {"not_run_through", data.count.shortened}};
-  if (data.count.shortened > 0) report["data"]["looked_at"] = what_was_looked_at(data);
+  if (const auto part = what_was_looked_at(data); !part.empty()) report["data"]["looked_at"] = part;
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);
 }

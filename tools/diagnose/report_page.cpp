@@ -331,7 +331,7 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
                  std::to_string(data.count.outliers) + " outliers, " + std::to_string(data.count.duplicates) +
                  " repeated rows; " + std::to_string(data.count.out_of_order) + " rows put in order, " +
                  std::to_string(data.count.gaps) + " gaps bridged" +
-                 (data.count.shortened == 0 ? "." : "; " + what_was_looked_at(data) + "."));
+                 (what_was_looked_at(data).empty() ? "." : "; " + what_was_looked_at(data) + "."));
   page.write(file);
 }
 

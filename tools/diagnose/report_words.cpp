@@ -123,10 +123,30 @@ std::string sizes_of(const Case& data, const Finding& finding) {
   return text;
 }
 
+namespace {
+
+std::string of_a_cell(const DataCount& count) {
+  std::string text;
+  if (count.before_standstill > 0)
+    text =
+        std::to_string(count.before_standstill) +
+        " rows at the beginning are left out: the loop ran before the recording did, and what its controller "
+        "remembers is known where the axis stands still alone";
+  if (count.behind_rest > 0)
+    text += (text.empty() ? "" : "; ") + std::to_string(count.behind_rest) +
+            " rows at the end are left out: half a second behind the last motion an axis that stands says no "
+            "more";
+  return text;
+}
+
+}  // namespace
+
 std::string what_was_looked_at(const Case& data) {
-  if (data.count.shortened == 0) return "";
-  return "a long recording: of " + std::to_string(data.count.rows) + " rows " + how_shortened(data.model) +
-         " looked at, " + std::to_string(data.count.shortened) + " are not run through";
+  const std::string cut = of_a_cell(data.count);
+  if (data.count.shortened == 0) return cut;
+  return (cut.empty() ? "" : cut + "; ") + "a long recording: of " + std::to_string(data.count.rows) +
+         " rows " + how_shortened(data.model) + " looked at, " + std::to_string(data.count.shortened) +
+         " are not run through";
 }
 
 std::string next_experiment(const Case& data, const Diagnosis& d) {
@@ -164,6 +184,8 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
                   : std::string{"None is needed: see what patched.yaml makes of the other recording"}) +
              (data.model.plant == physics::Plant::axis
                   ? "; then give it to the running stage (invar job apply)."
+              : data.model.plant == physics::Plant::error_map
+                  ? "; then give it to the running compensation (invar job apply)."
                   : ".");
   }
 }

@@ -62,7 +62,7 @@ Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::Vecto
     }
     model.terms.push_back(term);
     auto column = columns.col(static_cast<Eigen::Index>(d));
-    column = (differences(data, simulate(data, model)) - at) / by;
+    column = (differences(data, simulate_once(data, model)) - at) / by;
     column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   }
   return columns;

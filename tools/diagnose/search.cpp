@@ -51,6 +51,7 @@ class Search {
       return step();
     } catch (const Stopped&) {
       std::tie(d_, rivals_) = kept;
+      beside_.reset();
       return false;
     }
   }
@@ -64,6 +65,7 @@ class Search {
   Diagnosis d_;
   std::vector<std::vector<Term>> rivals_;  // by finding: other terms that were nearly as good in its place
   std::vector<Screened> last_screen_;
+  std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
 
 void Search::prepare() {
@@ -102,13 +104,11 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   }
   progress_(share + 0.04, "fitting the short list");
   // A few steps each; those that lag far behind the leader are not driven further.
-  std::vector<Fit> fits;
+  std::vector<Fit> fits(shortlist.size());
+  in_parallel(fits.size(),
+              [&](std::size_t i) { fits[i] = fit_with(data_, weighing, base, *shortlist[i], 3); });
   double leader = -1e300;
-  for (const auto* s : shortlist) {
-    if (stopped()) break;
-    fits.push_back(fit_with(data_, weighing, base, *s, 3));
-    leader = std::max(leader, fits.back().evidence);
-  }
+  for (const auto& f : fits) leader = std::max(leader, f.evidence);
   for (auto& f : fits) {
     if (stopped()) break;
     const double gained = std::max(1.0, leader - base.evidence);
@@ -131,15 +131,22 @@ bool Search::add_named(double round) {
     const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
     const Fit base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
     auto fits = shortlisted(weighing, base, 0.1 + 0.2 * round + (coloured ? 0.0 : 0.1));
-    double best_gain = -1e300;
-    std::size_t winner = 0;
-    Weighing own_weighing;
-    Fit own_fit, own_base;
+    std::vector<std::size_t> leaders;
     std::set<std::string> tried;
-    for (std::size_t i = 0; i < fits.size() && tried.size() < 3 && !stopped(); ++i) {
+    for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {
       if (fits[i].evidence < base.evidence + 2.0) break;
       if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
       if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
+      leaders.push_back(i);
+    }
+    struct Settled {
+      Weighing weighing;
+      Fit with, without;
+      double gain = -1e300;
+    };
+    std::vector<Settled> settled_fits(leaders.size());
+    in_parallel(leaders.size(), [&](std::size_t k) {
+      const std::size_t i = leaders[k];
       // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
       Weighing plain = weigh(data_, simulate(data_, fits[i].model), false);
       auto settled = fit(data_, plain, fits[i].model, data_.model, 6, &fits[i]);
@@ -160,13 +167,20 @@ bool Search::add_named(double round) {
       const double gain = advantage(data_, own, with_term, without);
       // A further claim must be one that an engineer would see in the residual.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
-      if (gain > best_gain &&
-          (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)) &&
-          least_ratio(data_, with_term, without) < ratio) {
-        best_gain = gain, winner = i;
-        own_weighing = own, own_fit = std::move(with_term), own_base = std::move(without);
+      if ((!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)) &&
+          least_ratio(data_, with_term, without) < ratio)
+        settled_fits[k] = {own, std::move(with_term), std::move(without), gain};
+    });
+    double best_gain = -1e300;
+    std::size_t winner = 0;
+    Weighing own_weighing;
+    Fit own_fit, own_base;
+    for (std::size_t k = 0; k < leaders.size(); ++k)
+      if (auto& one = settled_fits[k]; one.gain > best_gain) {
+        best_gain = one.gain, winner = leaders[k];
+        own_weighing = std::move(one.weighing), own_fit = std::move(one.with),
+        own_base = std::move(one.without);
       }
-    }
     if (best_gain < margin()) {
       for (const auto& f : fits)
         d_.reject(std::string{f.model.terms.back().info->name}, "its gain does not pay for its numbers",
@@ -272,8 +286,10 @@ void Search::weigh_alternatives() {
 void Search::doubt() {
   progress_(0.75, "trying other causes in place of names");
   for (std::size_t i = d_.findings.size(); i-- > 0;) {
-    const auto other = other_cause(data_, d_.best, given() + i);
+    if (!beside_) beside_ = courses_beside(data_, d_.best);
+    const auto other = other_cause(data_, *beside_, given() + i);
     if (!other) continue;
+    beside_.reset();
     d_.reject(
         std::string{d_.best.model.terms[given() + i].info->name},
         "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
@@ -313,7 +329,12 @@ Diagnosis Search::run() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   if (options_.refuses) take([&] { return doubt(), true; });
   progress_(0.78, "looking for physics without a name");
-  take([&] { return add_unnamed(data_, d_), true; });
+  take([&] {
+    // Only of equations the spans go with the model; all else was looked at already.
+    if (!beside_ || data_.model.plant == physics::Plant::equations)
+      beside_ = courses_beside(data_, d_.best, &d_.best);
+    return add_unnamed(data_, d_, *beside_), true;
+  });
   d_.is_partial = stopped();
   data_.stopped = {};
   const bool curved = d_.is_unnamed || d_.has_rest;

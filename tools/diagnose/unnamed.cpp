@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "tools/diagnose/claim.hpp"
-#include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
@@ -55,15 +54,12 @@ void sharpen(const Case& data, Curved& found) {
 
 }  // namespace
 
-void add_unnamed(const Case& data, Diagnosis& d) {
+void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
-  const auto starts = unmodelled_starts(data, d.best);
-  if (starts.empty()) return;
-  const auto best_curve = [&](const Fit& base) {
+  if (beside_best.courses.empty()) return;
+  const auto best_curve = [&](const Fit& base, const Beside& looked) {
     Curved best;
-    const Weighing plain = weigh(data, simulate(data, base.model), false);
-    const Fit under_plain = fit(data, plain, base.model, data.model, 4, &base);
-    const auto screened = screen(data, plain, under_plain, starts, 3);
+    const auto& [plain, under_plain, screened] = looked;
     int tried = 0;
     for (const auto& s : screened) {
       if (tried++ >= 3 || s.merit < claim_margin) break;
@@ -91,9 +87,9 @@ void add_unnamed(const Case& data, Diagnosis& d) {
   };
   const bool named = d.best.model.terms.size() > given;
   const double margin = 2.0 * claim_margin_of(d.weighing);
-  auto beside = best_curve(d.best);
+  auto beside = best_curve(d.best, beside_best);
   if (named) {
-    auto instead = best_curve(d.retuned);
+    auto instead = best_curve(d.retuned, courses_beside(data, d.retuned, &d.best));
     if (instead.gain > margin) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
       if (instead.fit.evidence > named_there.evidence + margin &&

@@ -191,6 +191,33 @@ TEST(LiveCompensation, ALagThatIsActivatedLateBeginsWhereTheBodyIs) {
   EXPECT_NEAR(cell.correction.latest()->heating_rate(), 2e-3, 1e-5);
 }
 
+// What `invar diagnose` writes of the same axis: patched.yaml of plant error_map.
+TEST(LiveCompensation, CorrectsByADiagnosedErrorMap) {
+  LiveCell cell;
+  const auto map = [&](const std::string& name, const std::string& axis, const std::string& coefficient) {
+    cell.folder.write(name, "invar_model: 1\nplant: error_map\n" + axis +
+                                "columns: {position: x, time: t, temperature: T, error: e}\n"
+                                "range: {temperature: [26, 30]}\n"
+                                "baseline: {positions: [0, 0.2], errors: [0, 0]}\n"
+                                "parameters: {reference_temperature: {value: 26, unit: degC}}\n"
+                                "terms: [{term: thermal_expansion, coefficient: {value: " +
+                                coefficient + ", unit: 1/K, sigma: 1e-7}}]\n");
+    return cell.folder / name;
+  };
+  cell.bring_up();
+  cell.run_for(0.1);
+  ASSERT_EQ(cell.use(map("patched.yaml", "axis: x\n", "1e-5")).state(), MODEL_ACTIVE)
+      << cell.status.latest()->text().c_str();
+  EXPECT_NEAR(cell.run_for(1.0).correction(), -1e-5 * 2.0 * 0.1, 5e-9);  // 28 degC at 100 mm
+  EXPECT_NE(cell.correction.latest()->sigma(), 0.0);
+  EXPECT_EQ(cell.tell(MODEL_STAGE, map("large.yaml", "axis: x\n", "1e-4")).state(), MODEL_REFUSED);
+  EXPECT_THAT(cell.status.latest()->text().c_str(), HasSubstr("beyond the bound"));
+  EXPECT_EQ(cell.tell(MODEL_STAGE, map("of-none.yaml", "", "1e-5")).state(), MODEL_REFUSED);
+  EXPECT_THAT(cell.status.latest()->text().c_str(), HasSubstr("does not say which axis"));
+  EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_NONE);
+  EXPECT_NEAR(cell.run_for(1.0).correction(), 0.0, 1e-15);
+}
+
 TEST(LiveCompensation, TakesBackTheModelsOfATransactionWhoseOwnerFellSilent) {
   LiveCell cell;
   cell.period = 1e-2;

@@ -202,6 +202,33 @@ TEST(NoTrick, WhatFollowsTheInputsIsNotCalledNoise) {
   }
 }
 
+// A shaking that no course describes, because its mean is zero everywhere: only its size goes with the speed.
+TEST(NoTrick, WhatIsLouderInMotionIsNotCalledNoise) {
+  for (const unsigned seed : {1005U, 2005U}) {
+    auto machine = make("sensor", "none", 1.0, seed);
+    EXPECT_EQ(names(diagnosed(machine)).front(), "no_mismatch") << seed;
+    const auto model = model_of(machine);
+    const auto &place = model.signal("true_position")->column, &reading = model.signal("encoder")->column;
+    double square = 0.0;
+    for (const double v : machine.noise.at(reading)) square += v * v;
+    const double noise = std::sqrt(square / static_cast<double>(machine.noise.at(reading).size()));
+    Draw draw{seed};
+    for (auto& table : machine.recordings) {
+      std::vector<double> speed(table.rows(), 0.0);
+      const auto& x = table.find(place)->values;
+      for (std::size_t i = 1; i < x.size(); ++i)
+        if (std::isfinite(x[i] - x[i - 1])) speed[i] = std::abs(x[i] - x[i - 1]);
+      const double fastest = *std::max_element(speed.begin(), speed.end());
+      for (auto& column : table.columns)
+        for (std::size_t i = 0; column.name == reading && i < column.values.size(); ++i)
+          column.values[i] += draw.normal(4.0 * noise * speed[i] / fastest);
+    }
+    const auto d = diagnosed(machine);
+    EXPECT_EQ(names(d).front(), "unknown_physics") << seed;
+    EXPECT_THAT(d.findings, ::testing::IsEmpty()) << seed;
+  }
+}
+
 TEST(NoTrick, AGapInTheRecordingOfALoopIsNoPhysics) {
   Trouble trouble;
   trouble.faults = true;

@@ -120,6 +120,7 @@ TEST_F(RecordedAxis, SimulatedWithTheTruthIsWhatWasRecorded) {
     auto tables = read_recording(file, truth);
     ASSERT_EQ(tables.size(), 1U);
     EXPECT_NEAR(static_cast<double>(tables[0].rows()), static_cast<double>(rows), is_whole ? 0.0 : 1.0);
+    EXPECT_GT(tables[0].behind, 500U);  // and it says so
     auto record = to_record(tables[0], truth, true).record;
     const auto measured = record.signals;
     for (const char* name : {"position", "current"})
@@ -160,6 +161,18 @@ TEST_F(RecordedAxis, IsCutWhereTheAxisIsNotEnabled) {
   EXPECT_GT(tables[0].rows(), 9'500U);
   EXPECT_NEAR(static_cast<double>(tables[1].rows()), 4500.0, 500.0);
   EXPECT_EQ(tables[1].find("stage_z.state.at")->values[0], 0.0);
+}
+
+// Its controller's memory is known at rest alone, so a recording that begins within a motion begins where that has ended.
+TEST_F(RecordedAxis, BegunWithinAMotionItSaysHowMuchWasLeftOut) {
+  move_about();
+  std::size_t moving = 0, still = 0;
+  while (!states[moving].enabled() || states[moving].setpoint_position() < 0.05) ++moving;
+  for (still = moving; states[still].setpoint_position() != states[still + 1].setpoint_position();) ++still;
+  const auto tables = read_recording(record([](std::size_t) { return true; }, moving), model());
+  ASSERT_EQ(tables.size(), 1U);
+  EXPECT_NEAR(static_cast<double>(tables[0].before), static_cast<double>(still - moving), 2.0);
+  EXPECT_EQ(tables[0].before + tables[0].rows() + tables[0].behind, states.size() - moving);
 }
 
 TEST_F(RecordedAxis, WhatCannotBeUsedIsSaidInOneLine) {
