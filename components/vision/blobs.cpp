@@ -19,7 +19,7 @@ constexpr double round_enough =
 
 constexpr double least_support = 0.18;  // of its circumference, in outline points; a circle with less is none
 
-constexpr double finest = 2.9;  // px of a reduced image; smaller radii are looked for in a finer one
+constexpr double finest = 2.4;  // px of a reduced image; smaller radii are looked for in a finer one
 
 struct Side {
   int polarity = +1;
