@@ -446,6 +446,18 @@ class Running(unittest.TestCase):
         self.assertIn(b"\r\x1b[K", screen)
         self.assertRegex(screen, rb"\d+ %  \S")
 
+    def test_what_was_not_granted_and_what_came_late_is_in_the_table(self):
+        # The samples are of the cycle before: a millisecond old, where a hundredth is declared.
+        file = self.cell("ungranted", [("latency: {{feedback: 1.0}}", "latency: {{feedback: 1.0e-5}}")])
+        words = [INVAR, "run", file, "--real-time", "--duration", "2"]
+        if os.geteuid() == 0:  # root without the right to real-time priorities
+            words = ["setpriv", "--bounding-set=-sys_nice", "--inh-caps=-sys_nice", *words]
+        run = subprocess.run(words, cwd=file.parent, capture_output=True, text=True, timeout=200)
+        self.assertEqual(run.returncode, 0, run.stderr)
+        self.assertRegex(run.stdout, r"not granted +motion: realtime.priority: SCHED_FIFO priority 20 not granted")
+        self.assertRegex(run.stdout, r"late input +stage_x.feedback: \d+ of \d+ steps read a sample older than 0.01 ms")
+        self.assertNotRegex(run.stdout, r"^(report|recording)")
+
     def test_a_run_that_fails_names_only_what_is_there(self):
         # Nothing settles within one cycle: the job fails before it measures.
         file = self.cell("failing", [("settle_timeout: 60", "settle_timeout: 0.01")])
