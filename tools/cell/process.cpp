@@ -12,6 +12,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "components/recorder/recorder.hpp"
@@ -378,7 +379,8 @@ class RunningProcess {
   void record_topic(const Port& port) {
     if (port.direction() != Port::Direction::output || !recorder_->is_wanted(port.topic)) return;
     const auto* type = dds::WireTypes::all().find(port.type());
-    if (type == nullptr) return;
+    // Notices of several components go by one topic: one reader has them all.
+    if (type == nullptr || !recorded_.insert(port.topic).second) return;
     dds::Profile profile = node_.profile(port.profile);
     profile.deadline = {};  // a recorder takes what comes
     const recorder::Source from = source(port.topic, type->name(), port.profile);
@@ -423,6 +425,7 @@ class RunningProcess {
   recorder::Recorder* recorder_ = nullptr;
   supervisor::Supervisor* supervisor_ = nullptr;
   std::vector<std::unique_ptr<dds::Connection>> topics_;
+  std::set<std::string> recorded_;
   ProcessStatus status_;
   bool runs_job_ = false;
   std::function<void()> start_job_;
