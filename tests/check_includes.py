@@ -35,7 +35,7 @@ COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "cor
              "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
 MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["OpenCV", "core/model", "core/recording"],
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
-            "stage": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
+            "stage": ["core/model"], "compensation": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 

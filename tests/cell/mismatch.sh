@@ -130,7 +130,7 @@ case $part in
       printf 'invar_model: 1\nplant: %s\n%b\n' "$1" "$2" >other.yaml
     }
     model error_map 'columns: {time: t, position: x, error: e}\nparameters: {reference_temperature: {value: 20, unit: degC}}\nbaseline: {positions: [0, 0.1, 0.2], errors: [0, 1e-6, 0]}'
-    refuses 2 "is of plant error_map, which no component takes; give compensation what" $cell stage_x --model other.yaml
+    refuses 2 "is for a compensation; \`stage_x\` is of type stage; the cell has no compensation" $cell stage_x --model other.yaml
     model sensor 'columns: {time: t, true_position: x, encoder: e}\nparameters: {resolution: {value: 1e-6, unit: m}}'
     refuses 2 "is of plant sensor, which no component takes; give fusion what" $cell stage_x --model other.yaml
     model thermal 'columns: {time: t}\nnodes: {slide: {column: s, capacity: {value: 850, unit: J/K}, loss: {value: 9, unit: W/K}}}\nheaters: {pad: {node: slide, column: p, gain: {value: 1, unit: W/W}}}\nambient: a'
