@@ -1,6 +1,7 @@
 #include "core/dds/discovery.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "core/base/clock.hpp"
 
@@ -11,6 +12,14 @@ constexpr std::size_t alarms_kept = 1000;
 // A busy host may be late to say that nobody is there; meanwhile nothing else is received on that thread.
 constexpr Duration patience = Duration::milliseconds(10);
 constexpr Duration between_looks = Duration::milliseconds(200);
+
+/// Whether two participants that receive at one address may be of one process. Those of Cyclone DDS share the sockets of their
+/// process and four octets of their prefix (vendor, process); with others eight say as much (vendor, PC, process).
+bool may_share_a_process(const std::string& one, const std::string& other) {
+  constexpr std::string_view cyclone = "01.10.";
+  const std::size_t alike = (one.starts_with(cyclone) ? 4 : 8) * std::string_view{"00."}.size();
+  return one.size() > alike && one.compare(0, alike, other, 0, alike) == 0;
+}
 }  // namespace
 
 void Discovery::add_participant(const std::string& id, const std::string& name,
@@ -118,7 +127,7 @@ bool Discovery::is_gone(const std::string& participant) {
     Peer& peer = found->second;
     for (const auto& [id, other] : participants_)
       peer.gone = peer.gone || (other.number > peer.number && !peer.addresses.empty() &&
-                                other.addresses == peer.addresses);
+                                other.addresses == peer.addresses && !may_share_a_process(participant, id));
     const Instant now = monotonic_now();
     if (peer.gone || now - peer.looked < between_looks) return peer.gone;
     peer.looked = now;

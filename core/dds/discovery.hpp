@@ -62,7 +62,7 @@ class Discovery {
   [[nodiscard]] std::string name_of(const std::string& participant) const;
   /// Whose a writer is, and how strong.
   [[nodiscard]] Claimant claimant(const std::string& writer) const;
-  /// Whether a participant has ended, though its lease runs on: others use its addresses, or nobody. Looked up five times a
+  /// Whether a participant has ended, though its lease runs on: another process uses its addresses, or nobody. Looked up five times a
   /// second at most; may take some milliseconds.
   [[nodiscard]] bool is_gone(const std::string& participant);
 

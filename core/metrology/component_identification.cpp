@@ -15,7 +15,11 @@ namespace invar::metrology {
 
 namespace {
 
-constexpr double cell = 0.05;          // of a state's range: readings within it are averaged
+// Readings within a cell are averaged. Cells grow where a log holds more than so many: a fit takes their number's cube.
+constexpr double finest_places = 1e4;  // of the travel
+constexpr double enough_places = 64.0;
+constexpr double finest_levels = 20.0;  // of a state's range
+constexpr std::size_t most_means = 700;
 constexpr double far_off = 5.0;        // robust deviations
 constexpr double standard_errors = 2;  // that a further input must gain
 constexpr int most_centres = 33;       // over the position
@@ -25,23 +29,39 @@ constexpr double width_of_state = 2.0;  // of its range
 
 using Key = std::vector<long>;
 
-/// Means of the readings that are not left out, by place and state.
-ComponentReadings averaged(const ComponentReadings& readings, const std::vector<bool>& kept) {
+using Groups = std::map<Key, std::vector<Eigen::Index>>;
+
+/// The readings that are not left out, by place and state.
+Groups grouped(const ComponentReadings& readings, const std::vector<bool>& kept, double places,
+               double levels) {
   const Eigen::Index states = readings.state.rows();
   std::vector<Range> ranges;
   for (Eigen::Index s = 0; s < states; ++s)
     ranges.push_back({readings.state.row(s).minCoeff(), readings.state.row(s).maxCoeff()});
-  const double travel = readings.position.maxCoeff() - readings.position.minCoeff();
-  std::map<Key, std::vector<Eigen::Index>> groups;
+  const double first = readings.position.minCoeff(), travel = readings.position.maxCoeff() - first;
+  Groups groups;
   for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
     if (!kept[static_cast<std::size_t>(i)]) continue;
-    Key key{std::lround((readings.position[i] - readings.position.minCoeff()) / travel * 1e4)};
+    Key key{std::lround((readings.position[i] - first) / travel * places)};
     for (Eigen::Index s = 0; s < states; ++s) {
       const Range& range = ranges[static_cast<std::size_t>(s)];
-      key.push_back(
-          range.width() > 0.0 ? std::lround((readings.state(s, i) - range.lower) / range.width() / cell) : 0);
+      key.push_back(range.width() > 0.0
+                        ? std::lround((readings.state(s, i) - range.lower) / range.width() * levels)
+                        : 0);
     }
     groups[key].push_back(i);
+  }
+  return groups;
+}
+
+/// Means of the readings that are not left out, by place and state.
+ComponentReadings averaged(const ComponentReadings& readings, const std::vector<bool>& kept) {
+  const Eigen::Index states = readings.state.rows();
+  double places = finest_places, levels = finest_levels;
+  Groups groups = grouped(readings, kept, places, levels);
+  while (groups.size() > most_means) {
+    (places > enough_places ? places : levels) /= 2.0;
+    groups = grouped(readings, kept, places, levels);
   }
   ComponentReadings means;
   const auto count = static_cast<Eigen::Index>(groups.size());
@@ -84,6 +104,21 @@ numerics::RidgeFit fit_over(const ComponentReadings& means, const std::vector<st
     options.spacings.push_back(std::max(1.0, width_of_state * (options.counts.back() - 1)));
   }
   return numerics::fit_ridge(inputs, means.value, options);
+}
+
+/// Means end up to half a cell before the readings do; so far the network goes on as it is.
+void reach_ends(const ComponentReadings& readings, const std::vector<bool>& kept,
+                ComponentNetwork& component) {
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
+    if (!kept[static_cast<std::size_t>(i)]) continue;
+    const auto reach = [](Range& range, double value) {
+      range = {std::min(range.lower, value), std::max(range.upper, value)};
+    };
+    reach(component.network.range[0], readings.position[i]);
+    for (std::size_t k = 0; k < component.states.size(); ++k)
+      reach(component.network.range[k + 1],
+            readings.state(static_cast<Eigen::Index>(component.states[k]), i));
+  }
 }
 
 std::vector<double> squared(const Eigen::VectorXd& values) {
@@ -130,6 +165,7 @@ ComponentFit identify_component(const ComponentReadings& readings) {
       fit = std::move(*best);
     }
     result.component = {fit.network, states, 0.0, fit.rms_slope};
+    reach_ends(readings, result.kept, result.component);
     double variance = 0.0;
     for (Eigen::Index i = 0; i < means.position.size(); ++i) {
       Eigen::VectorXd input(1 + static_cast<Eigen::Index>(states.size()));

@@ -627,6 +627,23 @@ class Components(unittest.TestCase):
             self.assertAlmostEqual(row["error_y [m]"], across, delta=max(1.5e-7, 4 * row["sigma_y [m]"]))
             self.assertLess(row["sigma_y [m]"], 2e-7)
 
+    def test_what_nothing_depends_on_is_none_of_the_model(self):
+        noise = random.Random(6)
+        head = self.HEAD.replace("temperature", "temperature_room [degC],temperature")
+        rows = [",".join([*row.split(",")[:4], str(20 + noise.random()), row.split(",")[4]]) for row in self.rows]
+        status, out, err = self.calibrate(rows, head)
+        self.assertEqual((status, err), (0, ""), out)
+        report = json.loads((FOLDER / "components/report.json").read_text())
+        self.assertEqual({c["name"]: c["depends_on"] for c in report["components"]}, {"ECY": ["temperature"], "EYX": []})
+        (FOLDER / "points.csv").write_text("x [m],y [m],temperature [degC]\n0.2,0.1,26\n")
+        status, _, err = invar("predict", "--model", "components/compensation.yaml", "--inputs", "points.csv", "--output",
+                               "field.csv")
+        self.assertEqual((status, err), (0, ""))
+        header, line = (FOLDER / "field.csv").read_text().splitlines()
+        row = dict(zip(header.split(","), map(float, line.split(","))))
+        across = self.straightness(0.2) + self.yaw(0.1, 26) * 0.2 - 30e-6 * 0.2
+        self.assertAlmostEqual(row["error_y [m]"], across, delta=1.5e-7)
+
     def test_bad_readings_are_told_and_nothing_is_written(self):
         faults = [
             (["EQX,10,1,,20"], "column `component`, row 1: `EQX` is no error motion"),

@@ -1,5 +1,5 @@
-/* A plant's program that gives one command over Cyclone DDS and ends: cyclone_commander DOMAIN TOPIC STRENGTH ID clean|killed|held.
- * It takes its leave, or kills itself, or stays for a minute. */
+/* A plant's program that gives one command over Cyclone DDS and ends: cyclone_commander DOMAIN TOPIC STRENGTH ID clean|killed|held|twin.
+ * It takes its leave, or kills itself, or stays for a minute, or that with a second participant that says nothing. */
 #include <dds/dds.h>
 #include <signal.h>
 #include <stdio.h>
@@ -36,6 +36,10 @@ int main(int count, char** words) {
   order.kind = invar_stage_AXIS_COMMAND_MOVE;
   if (dds_write(writer, &order) != 0) return 1;
   (void)dds_wait_for_acks(writer, DDS_SECS(5));
+  if (strcmp(words[5], "twin") == 0) {
+    (void)dds_create_participant((dds_domainid_t)atoi(words[1]), NULL, NULL);
+    dds_sleepfor(DDS_SECS(60));
+  }
   if (strcmp(words[5], "held") == 0) dds_sleepfor(DDS_SECS(60));
   if (strcmp(words[5], "killed") == 0) raise(SIGKILL);
   dds_delete(participant);

@@ -166,6 +166,18 @@ TEST(CycloneDds, APeerThatIsNotObeyedIsToldOfAndAStrongerOneIsObeyedAtOnce) {
   EXPECT_TRUE(eventually([&] { return has(cell, 3); }));
 }
 
+// Both participants of its process receive at one address.
+TEST(CycloneDds, APeerWithASecondParticipantIsNotTakenForOneThatHasASuccessor) {
+  Cell cell;
+  const auto known = [&] { return cell.node().snapshot().participants.size(); };
+  const std::size_t before = known();
+  const auto owner = commander(1, "twin", 30);
+  ASSERT_TRUE(eventually([&] { return has(cell, 1) && known() >= before + 2; }));
+  const auto weaker = commander(2, "clean", 20);
+  ASSERT_TRUE(eventually([&] { return weaker->has_ended(); }));
+  EXPECT_FALSE(eventually([&] { return has(cell, 2); }, 0.5));
+}
+
 class WrongQos : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};
 
 TEST_P(WrongQos, OfAForeignReaderRaisesAnAlarm) {

@@ -1,5 +1,8 @@
 #include "tools/cell/last_words.hpp"
 
+#include <spdlog/spdlog.h>
+
+#include <exception>
 #include <fstream>
 
 namespace invar::tools {
@@ -9,11 +12,18 @@ std::filesystem::path progress_file(const std::filesystem::path& outcome) {
   return outcome.empty() ? file : file += ".progress";
 }
 
-void write_whole(const std::filesystem::path& file, const nlohmann::json& json) {
-  std::filesystem::path part = file;
-  part += ".part";
-  std::ofstream{part} << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-  std::filesystem::rename(part, file);
+void write_whole(const std::filesystem::path& file, const nlohmann::json& json) noexcept {
+  try {
+    std::filesystem::path part = file;
+    part += ".part";
+    std::ofstream stream{part};
+    stream << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
+    stream.close();
+    if (stream) return std::filesystem::rename(part, file);
+    std::filesystem::remove(part);
+  } catch (const std::exception& error) {
+    spdlog::warn("{} was not written: {}", file.string(), error.what());
+  }
 }
 
 nlohmann::json loop_outcome(const ProcessStatus& status, Duration period) {

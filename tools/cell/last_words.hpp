@@ -14,8 +14,8 @@ namespace invar::tools {
 /// Where the process that leaves `outcome` says how far its job is.
 [[nodiscard]] std::filesystem::path progress_file(const std::filesystem::path& outcome);
 
-/// The file is there as a whole or not at all.
-void write_whole(const std::filesystem::path& file, const nlohmann::json& json);
+/// The file is there as a whole or not at all: a full disk, or a folder that somebody cleared away, stops no cell.
+void write_whole(const std::filesystem::path& file, const nlohmann::json& json) noexcept;
 
 /// How the loop did: cycles, what was late, what real time was not granted.
 [[nodiscard]] nlohmann::json loop_outcome(const ProcessStatus& status, Duration period);

@@ -65,6 +65,29 @@ void evaluate(ComponentsResult& result) {
   result.field_sigma = std::sqrt(result.field_sigma);
 }
 
+/// A state that no component depends on is none of the model: whoever uses that need not know it.
+void drop_unused_states(ComponentsResult& result) {
+  std::vector<std::size_t> kept;
+  for (std::size_t s = 0; s < result.model.states.size(); ++s)
+    if (std::any_of(result.fits.begin(), result.fits.end(), [s](const auto& fit) {
+          return fit && std::find(fit->component.states.begin(), fit->component.states.end(), s) !=
+                            fit->component.states.end();
+        }))
+      kept.push_back(s);
+  std::vector<metrology::MachineState> states;
+  for (const std::size_t s : kept) states.push_back(result.model.states[s]);
+  result.model.states = std::move(states);
+  for (int c = 0; c < component_count; ++c) {
+    auto& fit = result.fits[index(c)];
+    if (!fit) continue;
+    Eigen::MatrixXd& readings = result.readings[index(c)]->state;
+    readings = Eigen::MatrixXd{readings(kept, Eigen::all)};
+    for (std::size_t& state : fit->component.states)
+      state = static_cast<std::size_t>(std::find(kept.begin(), kept.end(), state) - kept.begin());
+    result.model.components[index(c)] = fit->component;
+  }
+}
+
 nlohmann::json report_of(const ComponentsResult& result) {
   nlohmann::json report;
   report["kind"] = "components";
@@ -105,8 +128,8 @@ void calibrate(const Options& options) {
     for (int c = 0; c < component_count; ++c) {
       if (!result.readings[index(c)]) continue;
       result.fits[index(c)] = metrology::identify_component(*result.readings[index(c)]);
-      result.model.components[index(c)] = result.fits[index(c)]->component;
     }
+    drop_unused_states(result);
   }
   evaluate(result);
   compensation::ModelText text{"components", {options.machine, options.readings}};

@@ -96,6 +96,30 @@ TEST(PeerAddress, IsAbandonedWhereNobodyReceives) {
   EXPECT_FALSE(are_abandoned({peer, {"no address", 1}})) << "not sure of all";
 }
 
+// Cyclone DDS receives for all participants of a process at one address: the later is no successor of the earlier.
+TEST(Discovery, OneIsGoneWhereAnotherProcessTookItsAddressAndNotWhereItsOwnHasASecondParticipant) {
+  const int end = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  ASSERT_EQ(bind(end, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(getsockname(end, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  const PeerAddress peer{"127.0.0.1", ntohs(address.sin_port)};
+  Discovery discovery;
+  const std::string first = "01.10.5c.01.aa.aa.aa.aa.aa.aa.aa.aa",
+                    second = "01.10.5c.01.bb.bb.bb.bb.bb.bb.bb.bb",
+                    successor = "01.10.77.02.cc.cc.cc.cc.cc.cc.cc.cc";
+  discovery.add_participant(first, "plant", {peer});
+  discovery.add_participant(second, "plant", {peer});
+  EXPECT_FALSE(discovery.is_gone(first));
+  discovery.add_participant(successor, "plant", {peer});
+  EXPECT_TRUE(discovery.is_gone(first));
+  EXPECT_TRUE(discovery.is_gone(second));
+  EXPECT_FALSE(discovery.is_gone(successor));
+  close(end);
+}
+
 TEST(CommandGate, RefusesWhatIsTooOldAndSaysSo) {
   Discovery discovery;
   discovery.add_participant("p", "plant");

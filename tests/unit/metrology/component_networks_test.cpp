@@ -102,6 +102,27 @@ TEST_F(ComponentNetworksTest, DependOnWhatTheReadingsDoAndOnNothingElse) {
   }
 }
 
+// A fit takes the cube of the number of readings: without means, 80 GB here.
+TEST(IdentifyComponent, TakesALogOfAHundredThousandReadings) {
+  constexpr Eigen::Index count = 100'000;
+  const auto value = [](double x, double warmer) { return 3e-6 * std::sin(20.0 * x) + 12e-6 * x * warmer; };
+  std::mt19937_64 random{33};
+  std::uniform_real_distribution<double> part;
+  std::normal_distribution<double> normal;
+  ComponentReadings log{Eigen::VectorXd(count), Eigen::MatrixXd(1, count), Eigen::VectorXd(count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    log.position[i] = 0.2 * part(random);
+    log.state(0, i) = 26.0 + 4.0 * static_cast<double>(i) / count;
+    log.value[i] = value(log.position[i], log.state(0, i) - 28.0) + 5e-8 * normal(random);
+  }
+  const ComponentFit fit = identify_component(log);
+  ASSERT_EQ(fit.component.states, std::vector<std::size_t>{0});
+  for (int i = 0; i <= 20; ++i)
+    for (const double t : {26.0, 27.3, 30.0})
+      EXPECT_NEAR(fit.component.value(0.01 * i, std::array{t}), value(0.01 * i, t - 28.0), 3e-8)
+          << i << ' ' << t;
+}
+
 TEST_F(ComponentNetworksTest, GiveTheFieldOfAWarmMachineAtStatesThatWereNotMeasured) {
   const auto directions = axis_directions(networks.chain, networks.squareness);
   double square = 0.0;
