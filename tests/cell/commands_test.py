@@ -420,6 +420,19 @@ class Running(unittest.TestCase):
         self.assertRegex(ended["summary"]["error after"], r"rms .* max")
         self.assertEqual(ended["recordings"], [])
 
+    def test_processes_that_only_begin_take_the_order_to_stop_and_are_not_killed_by_it(self):
+        for again in range(3):
+            file = self.cell(f"early_{again}")
+            run = subprocess.Popen([INVAR, "run", file, "--real-time", "--json"], cwd=file.parent, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+            children = pathlib.Path(f"/proc/{run.pid}/task/{run.pid}/children")
+            while len(children.read_text().split()) < 3 and run.poll() is None:
+                time.sleep(0.001)
+            run.send_signal(signal.SIGINT)
+            out, err = run.communicate(timeout=60)
+            self.assertEqual((run.returncode, err), (0, ""), out)
+            self.assertEqual([p["status"] for p in json.loads(out)["processes"]], [0, 0, 0], out)
+
     def test_progress_is_lines_in_a_pipe_and_one_line_on_a_terminal(self):
         piped = self.start(self.cell("piped"))
         ours, theirs = pty.openpty()

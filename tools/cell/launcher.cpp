@@ -79,8 +79,13 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   // A group of its own: Ctrl-C reaches the launcher alone, which stops the cell in order.
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGMASK);
   posix_spawnattr_setpgroup(&attributes, 0);
+  // Our orders wait until it takes them: before, they would kill it.
+  sigset_t orders;
+  sigemptyset(&orders);
+  for (const int signal : {SIGTERM, SIGUSR1}) sigaddset(&orders, signal);
+  posix_spawnattr_setsigmask(&attributes, &orders);
   Child child{process};
   const int error = posix_spawn(&child.pid, program.c_str(), nullptr, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);

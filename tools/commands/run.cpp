@@ -60,7 +60,13 @@ int run(Options& options) {
   if (options.launch.quiet) spdlog::set_level(spdlog::level::warn);
   struct sigaction action {};
   action.sa_handler = take_order;
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) sigaction(signal, &action, nullptr);
+  sigset_t taken;
+  sigemptyset(&taken);
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) {
+    sigaction(signal, &action, nullptr);
+    sigaddset(&taken, signal);
+  }
+  sigprocmask(SIG_UNBLOCK, &taken, nullptr);  // the launcher has us begin with them blocked
   if (options.simulated || options.real_time) options.launch.simulated = options.simulated;
   if (!options.process.empty()) return run_one(options);
   JobProgress progress;
