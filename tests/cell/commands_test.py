@@ -433,6 +433,28 @@ class Running(unittest.TestCase):
             self.assertEqual((run.returncode, err), (0, ""), out)
             self.assertEqual([p["status"] for p in json.loads(out)["processes"]], [0, 0, 0], out)
 
+    def test_processes_whose_launcher_was_killed_while_they_began_end(self):
+        file = self.cell("orphan")
+        run = subprocess.Popen([INVAR, "run", file, "--real-time"], cwd=file.parent, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL)
+        children = pathlib.Path(f"/proc/{run.pid}/task/{run.pid}/children")
+        while len(children.read_text().split()) < 3:
+            time.sleep(0.001)
+        begun = [pathlib.Path(f"/proc/{pid}/cmdline") for pid in children.read_text().split()]
+        run.kill()
+        run.wait()
+
+        def alive():
+            return [one for one in begun if one.exists() and str(file).encode() in one.read_bytes()]
+
+        end = time.monotonic() + 30
+        while alive() and time.monotonic() < end:
+            time.sleep(0.05)
+        left = alive()
+        for one in left:
+            os.kill(int(one.parent.name), signal.SIGKILL)
+        self.assertEqual(left, [])
+
     def test_progress_is_lines_in_a_pipe_and_one_line_on_a_terminal(self):
         piped = self.start(self.cell("piped"))
         ours, theirs = pty.openpty()

@@ -67,7 +67,9 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
                                  process,
                                  simulated ? "--simulated" : "--real-time",
                                  "--outcome",
-                                 outcome_of(process, folder).string()};
+                                 outcome_of(process, folder).string(),
+                                 "--launcher",
+                                 std::to_string(getpid())};
   std::filesystem::remove(outcome_of(process, folder));  // of an earlier life
   std::filesystem::remove(progress_file(outcome_of(process, folder)));
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});

@@ -250,7 +250,10 @@ class RunningProcess {
   }
 
   int run_simulated(const std::atomic<bool>& stop) {
-    if (!options_.outcome.empty()) prctl(PR_SET_PDEATHSIG, SIGTERM);  // without `invar run` time stands still
+    if (!options_.outcome.empty()) {
+      prctl(PR_SET_PDEATHSIG, SIGTERM);  // without `invar run` time stands still
+      if (getppid() != parent_) raise(SIGTERM);
+    }
     dds::SimulatedClockClient clock{node_};
     each_port([&](std::size_t index, Port& port) {
       if (port.direction() == Port::Direction::output)
@@ -419,7 +422,7 @@ class RunningProcess {
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
   std::map<std::string, std::int64_t> last_status_;
   std::atomic<bool> asked_to_stop_{false};
-  const pid_t parent_ = getppid();
+  const pid_t parent_ = options_.launcher != 0 ? options_.launcher : getppid();
   std::optional<Instant> orphan_since_;
   bool resting_ = false, told_rest_ = false;
   recorder::Recorder* recorder_ = nullptr;

@@ -1,6 +1,8 @@
 // One process of a cell: its components in their executor, their ports on DDS, brought up and taken down in order.
 #pragma once
 
+#include <sys/types.h>
+
 #include <atomic>
 #include <filesystem>
 #include <string>
@@ -14,6 +16,7 @@ struct ProcessOptions {
   bool paced = false;  // simulated time with somebody beside it, whose commands count
   std::string job;     // started at once where this process has the component that runs it; ends with it
   std::filesystem::path outcome;  // file for what became of it, as JSON; empty: none
+  pid_t launcher = 0;             // who started it, and may have ended before it can ask; 0: its parent
 };
 
 /// What others ask of a process; signal handlers may set both.

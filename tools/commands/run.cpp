@@ -33,6 +33,7 @@ struct Options {
   LaunchOptions launch;
   std::string process;
   std::filesystem::path outcome;
+  pid_t launcher = 0;
   bool simulated = false;
   bool real_time = false;
   bool json = false;
@@ -48,7 +49,8 @@ int run_one(const Options& options) {
                                   .simulated = options.simulated,
                                   .paced = options.launch.pace > 0.0,
                                   .job = options.launch.job,
-                                  .outcome = outcome},
+                                  .outcome = outcome,
+                                  .launcher = options.launcher},
                                  orders);
   if (options.json) std::cout << std::ifstream{outcome}.rdbuf();
   return status;
@@ -113,6 +115,7 @@ void add_run(CLI::App& program) {
                     "print one JSON object at the end: processes, job, report, recordings; implies --quiet");
   command->add_flag("--quiet", options->launch.quiet, "no progress of the job, only what is wrong");
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
+  command->add_option("--launcher", options->launcher, "its process id")->group("");  // for `invar run` alone
   command->callback([options] {
     if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);
   });
