@@ -117,9 +117,9 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
         << "   (lines not fitted)\n"
         << "error after     rms " << si(after.rms, "m") << ", max " << si(after.maximum, "m") << "   ("
         << number(before.rms / after.rms, 2) << " times less)\n";
-    page.callout("On lines that were not used to identify it, the error fell from " + si(before.rms, "m") +
-                     " to " + si(after.rms, "m") + " RMS (largest " + si(before.maximum, "m") + " to " +
-                     si(after.maximum, "m") + ").",
+    page.callout("On lines that were not used to identify it, the error of the machine fell from " +
+                     si(before.rms, "m") + " to " + si(after.rms, "m") + " RMS (largest " +
+                     si(before.maximum, "m") + " to " + si(after.maximum, "m") + ").",
                  after.rms < before.rms ? "good" : "bad");
     add_verification(page, before, after);
   }
