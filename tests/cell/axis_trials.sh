@@ -24,6 +24,8 @@ done
 test -s out/track-fused/tracking.csv || { echo "tracking.csv was not written"; exit 1; }
 "$invar" run deployment/fusion.yaml --job calibrate-fusion | tee summary
 grep -q "fused position of runs not fitted" summary || { echo "the summary does not say what the calibration brought"; exit 1; }
+grep -Eq "^fused after +rms " summary && grep -q "the error of the fused position fell from" out/fusion/report.html ||
+  { echo "the report does not show the fused position before and after"; exit 1; }
 "$invar" calibrate ripple --model deployment/machines/axis-nominal.yaml --recording out/identify-ripple/runs.csv --out offline
 
 /usr/bin/python3 - "$invar" <<'P'

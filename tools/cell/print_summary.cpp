@@ -200,14 +200,33 @@ void add_pictures(const std::filesystem::path& folder, report::Page& page) {
   }
 }
 
+bool holds_print(const std::filesystem::path& folder) {
+  return std::filesystem::exists(folder / "droplets_after.csv") &&
+         std::filesystem::exists(folder / "dispenser_compensation.yaml");
+}
+
 }  // namespace
 
+void add_print_verdict(const std::filesystem::path& folder, report::Page& page) {
+  if (!holds_print(folder)) return;
+  const Prints before{folder / "droplets.csv"}, after{folder / "droplets_after.csv"};
+  std::string text;
+  bool better = true;
+  for (const double height : before.heights()) {
+    const Errors was = errors_at(before, height), is = errors_at(after, height);
+    if (is.count == 0) continue;
+    text += (text.empty() ? "Droplets now land, from " : "; from ") + si(height, "m") + ", " +
+            si(is.rms, "m") + " RMS from their targets instead of " + si(was.rms, "m");
+    better = better && is.rms < was.rms;
+  }
+  if (!text.empty()) page.callout(text + ".", better ? "good" : "bad");
+}
+
 void summarise_print(const std::filesystem::path& folder, report::Page& page, std::ostream& out) {
-  const auto model = folder / "dispenser_compensation.yaml";
-  if (!std::filesystem::exists(folder / "droplets_after.csv") || !std::filesystem::exists(model)) return;
+  if (!holds_print(folder)) return;
   const Prints before{folder / "droplets.csv"};
   const Prints after{folder / "droplets_after.csv"};
-  const auto path = compensation::load_trajectory(model);
+  const auto path = compensation::load_trajectory(folder / "dispenser_compensation.yaml");
   add_trajectory(path, page, out);
 
   page.heading("Droplets before and after (table 5.3)");
@@ -224,7 +243,7 @@ void summarise_print(const std::filesystem::path& folder, report::Page& page, st
         << si(is.rms, "m") << " after (rms from the target, " << is.count << " new droplets)\n";
   }
   page.table({"height", "droplets", "RMS before", "RMS after", "improvement", "largest before",
-              "largest after", "RMS to the first droplet, before", "after"},
+              "largest after", "to the first droplet: RMS before", "RMS after"},
              rows);
   page.plots({scatter(before, "Before"), scatter(after, "After, new droplets")});
   add_sizes({&before, &after}, page, out);

@@ -8,6 +8,9 @@
 
 namespace invar::tools {
 
+/// One sentence, for the head of the page. Nothing where `folder` holds no print.
+void add_print_verdict(const std::filesystem::path& folder, report::Page& page);
+
 /// Nothing where `folder` holds no print.
 void summarise_print(const std::filesystem::path& folder, report::Page& page, std::ostream& out);
 

@@ -10,6 +10,7 @@
 #include "core/recording/export.hpp"
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/table.hpp"
+#include "tools/cell/fusion_summary.hpp"
 #include "tools/cell/heat_summary.hpp"
 #include "tools/cell/motion_summary.hpp"
 #include "tools/cell/print_summary.hpp"
@@ -105,6 +106,8 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
   const std::filesystem::path folder = job.value("result", "");
   out << "job             " << job.value("name", "") << ": " << job.value("text", "") << '\n';
   if (!is_done(job)) return;  // the files there are of an earlier one, or not whole
+  page.paragraph("Job " + job.value("name", "") + ": " + job.value("text", "") + ".");
+  add_print_verdict(folder, page);
   const auto before_file = folder / "verify_before.csv";
   const auto after_file = folder / "verify_after.csv";
   if (std::filesystem::exists(before_file) && std::filesystem::exists(after_file)) {
@@ -114,13 +117,14 @@ void summarise_job(const nlohmann::json& job, report::Page& page, std::ostream& 
         << "   (lines not fitted)\n"
         << "error after     rms " << si(after.rms, "m") << ", max " << si(after.maximum, "m") << "   ("
         << number(before.rms / after.rms, 2) << " times less)\n";
-    page.callout("On lines that were not used to identify it, the error fell from " + si(before.rms, "m") +
-                     " to " + si(after.rms, "m") + " RMS (largest " + si(before.maximum, "m") + " to " +
-                     si(after.maximum, "m") + ").",
+    page.callout("On lines that were not used to identify it, the error of the machine fell from " +
+                     si(before.rms, "m") + " to " + si(after.rms, "m") + " RMS (largest " +
+                     si(before.maximum, "m") + " to " + si(after.maximum, "m") + ").",
                  after.rms < before.rms ? "good" : "bad");
     add_verification(page, before, after);
   }
   summarise_print(folder, page, out);
+  summarise_fusion(folder, page, out);
   summarise_heat(folder, page, out);
   summarise_motion(folder, page, out);
   add_heater(page, folder, out);

@@ -127,6 +127,7 @@ void calibrate_by_ruler(const CameraOptions& options) {
   if (fit->offset_identified)
     std::cout << "outlines lie " << report::number(fit->offset, 3) << " px outside their circles\n";
   if (fit->aspect_identified) std::cout << "aspect " << report::number(camera.aspect, 7) << '\n';
+  std::cout << "wrote " << (options.out / "camera.yaml").string() << ", report.json, report.html\n";
 }
 
 }  // namespace

@@ -189,6 +189,7 @@ void calibrate_by_target(const CameraOptions& options) {
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"
               << (&r == &best ? "  <- chosen" : "") << '\n';
+  std::cout << "wrote " << (options.out / "camera.yaml").string() << ", report.json, report.html\n";
 }
 
 }  // namespace invar::tools

@@ -54,8 +54,9 @@ void measure(const Options& options) {
       rows.diameter.push_back(2.0 * drop.radius * camera->local_scale({drop.x, drop.y}));
     }
     if (options.report) shown.push_back({options.images[i].filename().string(), images[i], found});
-    std::cout << options.images[i].string() << ": " << found.sound() << " droplets, "
-              << found.droplets.size() - found.sound() << " others marked\n";
+    std::cout << options.images[i].string() << ": " << found.sound()
+              << " droplets; not counted: " << found.droplets.size() - found.sound()
+              << " (satellites, dust, cut by the border)\n";
   }
   recording::Table table;
   table.add_texts("image", rows.image);
@@ -78,6 +79,9 @@ void measure(const Options& options) {
     add_droplets(page, shown, camera);
     page.write(*options.report);
   }
+  std::cout << "wrote " << options.output.string();
+  if (options.report) std::cout << ", " << options.report->string();
+  std::cout << '\n';
 }
 
 }  // namespace

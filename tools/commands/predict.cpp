@@ -46,7 +46,19 @@ void predict(const Options& options) {
 void add_predict(CLI::App& program) {
   auto* command = program.add_subcommand("predict", "Evaluate a compensation model on a table of inputs");
   command->footer(
-      "Example: invar predict --model result/compensation.yaml --inputs points.csv --output predicted.csv");
+      "Example: invar predict --model result/compensation.yaml --inputs points.csv --output predicted.csv\n"
+      "What a table needs and what comes of it, by the kind of the model:\n"
+      "  geometric, components  x, y, z [m] of the machine's axes -> error_x, error_y, error_z and their "
+      "sigma_x ...\n"
+      "  thermal                x [m], temperature [degC] -> error, sigma\n"
+      "  dispenser              target_x, target_y, height [m] -> command_x, command_y (where to aim), "
+      "offset_x, ...\n"
+      "  fusion                 t [s], the sensors' columns of its recording -> position, sigma, the "
+      "weights\n"
+      "  thermistor             resistance [ohm] -> temperature\n"
+      "A model of heating rates, zones or a noise level needs those columns too. An infinite sigma: not "
+      "known from the\n"
+      "data. Exit status: 0; 2 a file is unusable.");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "compensation.yaml of any kind")->required();
   command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz")->required();

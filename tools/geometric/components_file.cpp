@@ -38,7 +38,7 @@ struct Rows {
 class Reader {
  public:
   Reader(const std::filesystem::path& file, const metrology::Machine& machine)
-      : table_{recording::Table::read(file, {"component"})}, machine_{machine} {
+      : table_{recording::Table::read(file, {"component", "line"})}, machine_{machine} {
     if (table_.find("component") == nullptr) (void)table_.in("component", "1");  // says what is missing
     position_ = table_.in("position", "m");
     if (!table_.has("translation") && !table_.has("rotation")) (void)table_.in("translation", "m");
