@@ -161,24 +161,35 @@ void take_thermal(LiveModel& live, const metrology::ThermalError& model, const T
   if (live.refusal.empty()) live.thermal.emplace(model, 5e-9);
 }
 
-/// Networks are tried at the ends and the middle of every state's range.
+/// Networks are tried at the ends and the middle of the states' ranges.
 std::string refusal_of(metrology::ComponentTables& tables, const ModelLimits& limits) {
   const metrology::ComponentNetworks& model = tables.model();
   if (std::string why = refusal_of_machine(model.chain, model.travel, limits); !why.empty()) return why;
   if (tables.bound() > most_compiled)
     return "its networks bend too much for the loop's tables: they would differ by " + in_um(tables.bound());
-  std::size_t combinations = 1;
-  for (std::size_t s = 0; s < model.states.size(); ++s) combinations *= 3;
+  // All combinations of few states; of many, each alone at its ends beside the others' middles, and all at once.
+  const std::size_t states = model.states.size();
+  std::vector<std::vector<int>> trials{std::vector<int>(states, 1)};
+  if (states <= 3) {
+    trials.clear();
+    for (int c = 0; c < static_cast<int>(std::lround(std::pow(3, states))); ++c)
+      trials.push_back({c % 3, c / 3 % 3, c / 9});
+  } else {
+    for (const int end : {0, 2}) {
+      trials.emplace_back(states, end);
+      for (std::size_t s = 0; s < states; ++s) (trials.emplace_back(states, 1))[s] = end;
+    }
+  }
   std::string why;
-  for (std::size_t c = 0; c < combinations && why.empty(); ++c) {
-    std::size_t rest = c;
-    for (std::size_t s = 0; s < model.states.size(); ++s, rest /= 3) {
+  for (const auto& levels : trials) {
+    for (std::size_t s = 0; s < states; ++s) {
       const Range& range = model.states[s].range;
-      tables.set(s, range.lower + 0.5 * static_cast<double>(rest % 3) * range.width());
+      tables.set(s, range.lower + 0.5 * levels[s] * range.width());
     }
     why = refusal_of_field(
         model.chain, model.travel, [&](const Eigen::Vector3d& p) { return tables.error(p); },
         [&](const Eigen::Vector3d& p) { return tables.sigma(p); }, limits);
+    if (!why.empty()) break;
   }
   tables.forget();
   return why;

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <exception>
 #include <fstream>
 
@@ -55,6 +56,7 @@ nlohmann::json loop_outcome(const ProcessStatus& status, Duration period) {
 ProgressFile::ProgressFile(const std::filesystem::path& outcome) : file_{progress_file(outcome)} {}
 
 void ProgressFile::leave(double fraction, const std::string& text) {
+  if (!std::isfinite(fraction)) fraction = 0.0;  // JSON has no such number, and a job may say anything
   const auto now = std::chrono::steady_clock::now();
   if (file_.empty() || now - left_ < std::chrono::milliseconds{100}) return;
   if (fraction == fraction_ && text == text_) return;

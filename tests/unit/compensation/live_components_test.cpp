@@ -106,6 +106,11 @@ TEST(LiveComponents, WhatTheLoopCannotKnowIsRefused) {
   };
   refused(growing("temperature_base"), "needs the temperature of `base`");
   refused(growing("load"), "it depends on `load`, which the loop does not know");
+  auto many =
+      growing("temperature");  // beyond the bound at the end of one state of five, the others in the middle
+  for (int s = 0; s < 4; ++s) many.states.push_back({"heating_rate", {-1.0, 1.0}});
+  many.components[0]->network.output_scale *= 12.0;
+  refused(many, "beyond the bound");
   auto other = growing("temperature");
   other.travel[0] = {0.0, 0.4};
   refused(other, "of another machine: its axis x has another travel");
