@@ -176,16 +176,16 @@ ComponentFit identify_component(const ComponentReadings& readings) {
     }
     result.component.sigma = std::sqrt(variance);
     result.left_out = fit.leave_one_out_rms();
-    std::vector<double> rest;
+    result.rest.clear();
     for (Eigen::Index i = 0; i < count; ++i) {
       const Eigen::VectorXd state = readings.state.col(i);
-      rest.push_back(readings.value[i] -
-                     result.component.value(readings.position[i],
-                                            {state.data(), static_cast<std::size_t>(state.size())}));
+      result.rest.push_back(readings.value[i] -
+                            result.component.value(readings.position[i],
+                                                   {state.data(), static_cast<std::size_t>(state.size())}));
     }
-    result.noise = numerics::robust_deviation(rest, 0.0);
+    result.noise = numerics::robust_deviation(result.rest, 0.0);
     std::vector<bool> kept;
-    for (const double each : rest)
+    for (const double each : result.rest)
       kept.push_back(result.noise <= 0.0 || std::abs(each) <= far_off * result.noise);
     if (kept == result.kept) break;
     if (round + 1 < most_rounds) result.kept = kept;

@@ -24,6 +24,7 @@ struct ComponentFit {
   double noise = 0.0;          // of one reading, about the fit
   std::size_t rejected = 0;    // readings further off than five robust deviations
   std::vector<bool> kept;      // N
+  std::vector<double> rest;    // N, reading minus fit, m or rad
 };
 
 /// Least number of readings of a component.

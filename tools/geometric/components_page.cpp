@@ -61,27 +61,11 @@ report::Plot residual_plot(const ComponentsResult& result) {
   plot.title = "Residuals";
   plot.x_label = "residual over the noise of its component";
   plot.y_label = "readings";
-  report::Series bars;
-  bars.style = report::Series::Style::bars;
-  constexpr int reach = 12;
-  std::vector<double> counts(2 * reach + 1, 0.0);
-  for (int c = 0; c < component_count; ++c) {
-    if (!result.fits[index(c)] || result.fits[index(c)]->noise <= 0.0) continue;
-    const auto& readings = *result.readings[index(c)];
-    for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
-      const Eigen::VectorXd state = readings.state.col(i);
-      const double rest = readings.value[i] -
-                          result.fits[index(c)]->component.value(
-                              readings.position[i], {state.data(), static_cast<std::size_t>(state.size())});
-      const long bar = std::lround(rest / result.fits[index(c)]->noise / 0.4);
-      if (std::abs(bar) <= reach) counts[static_cast<std::size_t>(bar + reach)] += 1.0;
-    }
-  }
-  for (int k = -reach; k <= reach; ++k) {
-    bars.x.push_back(0.4 * k);
-    bars.y.push_back(counts[index(k + reach)]);
-  }
-  plot.series = {std::move(bars)};
+  std::vector<double> scaled;
+  for (const auto& fit : result.fits)
+    if (fit && fit->noise > 0.0)
+      for (const double rest : fit->rest) scaled.push_back(rest / fit->noise);
+  plot.series = {report::histogram(scaled, 0.4, 1.0)};
   return plot;
 }
 

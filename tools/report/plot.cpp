@@ -178,6 +178,18 @@ void add_curve(Plot& plot, const Range& range, const std::string& label, const s
   plot.series.push_back(std::move(line));
 }
 
+Series histogram(const std::vector<double>& values, double width, double unit) {
+  constexpr int reach = 12;
+  Series bars;
+  bars.style = Series::Style::bars;
+  for (int k = -reach; k <= reach; ++k) bars.x.push_back(unit * width * k);
+  bars.y.assign(bars.x.size(), 0.0);
+  for (const double value : values)
+    if (const long k = std::lround(value / width); std::abs(k) <= reach)
+      bars.y[static_cast<std::size_t>(k + reach)] += 1.0;
+  return bars;
+}
+
 std::vector<std::string> draw(const std::vector<Plot>& plots) {
   if (plots.empty()) return {};
   const TemporaryFolder folder{"invar-plots"};

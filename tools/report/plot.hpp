@@ -45,6 +45,9 @@ struct CurvePoint {
 void add_curve(Plot& plot, const Range& range, const std::string& label, const std::string& colour,
                const std::function<CurvePoint(double x)>& at);
 
+/// Counts of `values` in 25 bars of `width` about zero, drawn at `unit` times where they lie.
+Series histogram(const std::vector<double>& values, double width, double unit);
+
 /// One <svg> element a plot, in order, drawn by one gnuplot process. Long lines are thinned to about 4000
 /// points by their local extremes, so that a peak is never lost. Throws std::runtime_error when gnuplot is
 /// missing or fails.

@@ -178,17 +178,9 @@ report::Page thermal_page(const std::filesystem::path& file, const ThermalReadin
   histogram.title = "Residuals";
   histogram.x_label = "residual [um]";
   histogram.y_label = "readings";
-  report::Series bars;
-  bars.style = report::Series::Style::bars;
-  const double width = fit.model.noise * 0.4;
-  for (int k = -12; k <= 12; ++k) {
-    bars.x.push_back(1e6 * width * k);
-    double count = 0.0;
-    for (Eigen::Index i = 0; i < readings.x.size(); ++i)
-      if (std::lround((readings.error(i) - fit.predicted(i)) / width) == k) count += 1.0;
-    bars.y.push_back(count);
-  }
-  histogram.series = {std::move(bars)};
+  std::vector<double> rest;
+  for (Eigen::Index i = 0; i < readings.x.size(); ++i) rest.push_back(readings.error(i) - fit.predicted(i));
+  histogram.series = {report::histogram(rest, fit.model.noise * 0.4, 1e6)};
   page.plots({std::move(growth), std::move(histogram)},
              "Outside the calibrated temperatures the value is held and its sigma grows with the slope.");
   return page;
