@@ -8,8 +8,7 @@ set -euo pipefail
 invar=$1 source=$2
 folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
 cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100))
-echo "domain $domain"
+source "$source/tests/support/claims.sh"
 cell=$folder/deployment/axis-trials.yaml
 sed -i "s/^domain: .*/domain: $domain/; s/from: 0.01, to: 0.19, velocity: 0.02/from: 0.03, to: 0.17, velocity: 0.05, verify_velocity: 0.07, passes: 1/
   s/name: track-fused, /name: track-fused, periods: [3.0], cycles: 1, /" "$cell"

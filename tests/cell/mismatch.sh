@@ -8,8 +8,7 @@ invar=$1 source=$2 part=$3
 folder=$(mktemp -d); cell_pid=
 trap 'kill $cell_pid ${record_pid:-} 2>/dev/null || true; wait; rm -rf "$folder"' EXIT
 cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100))
-echo "domain $domain"
+source "$source/tests/support/claims.sh"
 cd "$folder"
 cell=deployment/mismatch.yaml believed=deployment/machines/linear-axis-believed.yaml truth=deployment/machines/linear-axis-true.yaml
 sed -i "s/^domain: .*/domain: $domain/" $cell

@@ -1,10 +1,9 @@
 # Sourced by the tests that run a shipped cell: own_cell NAME SOURCE PORT copies deployment/ into $folder, which goes at the end,
 # and gives deployment/NAME.yaml a domain and, in place of PORT, a Modbus port of its own.
+source "$(dirname "${BASH_SOURCE[0]}")/../support/claims.sh"
 own_cell() {
   folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
   cp -r "$2/deployment" "$folder/deployment"
-  local domain=$((100 + RANDOM % 100)) port=$((20000 + RANDOM % 20000))
-  echo "domain $domain, port $port"
   sed -i "s/^domain: .*/domain: $domain/; s/$3/$port/g" "$folder/deployment/$1.yaml"
 }
 

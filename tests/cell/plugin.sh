@@ -17,7 +17,8 @@ cmake -S "$source/examples/low_pass" -B "$folder/build" -G Ninja -DCMAKE_PREFIX_
 ninja -C "$folder/build" >/dev/null
 mkdir "$folder/cell"; cd "$folder/cell"
 cp "$source"/examples/low_pass/*.yaml "$source/deployment/profiles.yaml" "$folder/build/liblow_pass.so" .
-sed -i "s/^domain: .*/domain: $((100 + RANDOM % 100))/" cell.yaml
+source "$source/tests/support/claims.sh"
+sed -i "s/^domain: .*/domain: $domain/" cell.yaml
 invar=$folder/installed/bin/invar
 "$invar" check cell.yaml
 "$invar" types --plugin liblow_pass.so low_pass | tee types

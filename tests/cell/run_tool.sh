@@ -7,8 +7,7 @@ build=$1 source=$2
 folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
 mkdir "$folder/checkout"
 cp -r "$source/tools" "$source/deployment" "$folder/checkout"
-domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
-echo "domain $domain, port $port"
+source "$source/tests/support/claims.sh"
 sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/g" "$folder"/checkout/deployment/{xy-table,mismatch,print-cell}.yaml
 # The print job without what has tests of its own (main_job.sh, print_job.sh).
 sed -i "s/15030/$((port + 1))/g; s/{prints: 4, pause: 3}/{prints: 0}/; /first: calibrate-geometry/d" "$folder/checkout/deployment/print-cell.yaml"

@@ -7,7 +7,7 @@ build=$1 source=$2 invar=$1/bin/invar
 folder=$(mktemp -d); pid=
 trap '[[ -z $pid ]] || kill "$pid" 2>/dev/null || true; rm -rf "$folder"' EXIT
 cp "$source"/tests/data/vision/* "$source/deployment/profiles.yaml" "$folder"; cd "$folder"
-domain=$((100 + RANDOM % 100)); echo "domain $domain"
+source "$source/tests/support/claims.sh"
 sed -i "s/^domain: .*/domain: $domain/; s/^profiles: .*/profiles: profiles.yaml/" cell.yaml
 
 for run in one two; do

@@ -6,7 +6,7 @@
 set -euo pipefail
 invar=$1 source=$2
 folder=$(mktemp -d)
-domain=$((100 + RANDOM % 100)) port=$((20000 + RANDOM % 20000)); echo "domain $domain, port $port"
+source "$source/tests/support/claims.sh"
 cp "$source/deployment/profiles.yaml" "$source/deployment/maps/heater.yaml" "$folder"
 cat > "$folder/cell.yaml" <<C
 invar_cell: 1

@@ -7,8 +7,7 @@ set -euo pipefail
 invar=$1 source=$2
 folder=$(mktemp -d)
 cp -r "$source/deployment" "$folder/deployment"
-domain=$((100 + RANDOM % 100)); port=$((20000 + RANDOM % 20000))
-echo "domain $domain, port $port"
+source "$source/tests/support/claims.sh"
 cell=$folder/deployment/xy-table.yaml
 # With a job of a minute, and a supervisor that gives a busy host the time to start a process again: what it takes down stays so.
 /usr/bin/python3 - "$cell" "$domain" "$port" <<'P'

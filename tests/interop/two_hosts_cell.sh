@@ -14,7 +14,7 @@ sleep 2  # the kernel says "up" before the first packets pass
 # The shipped cell with a short job, on one PC and on two.
 cp -r "$source/deployment" "$folder/deployment"
 cd "$folder"
-/usr/bin/python3 - deployment/xy-table.yaml "$((100 + RANDOM % 100))" <<'P'
+/usr/bin/python3 - deployment/xy-table.yaml "$domain" <<'P'
 import pathlib, re, sys
 file = pathlib.Path(sys.argv[1])
 text = file.read_text()
