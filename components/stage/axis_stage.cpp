@@ -9,6 +9,7 @@
 
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
+#include "core/physics/axis_stability.hpp"
 
 namespace invar::stage {
 
@@ -59,6 +60,19 @@ Stage::Stage(const Parameters& parameters)
 
 std::vector<Component::Claim> Stage::claims() const {
   return {{"axis " + std::to_string(parameters_.axis), "axis"}};
+}
+
+std::optional<Component::Unfit> Stage::unfit(double period) const {
+  const Control& control = parameters_.control;
+  if (!(control.feedforward_acceleration > 0.0)) return {};
+  const double radius = physics::spectral_radius(settings(control, period), control.feedforward_acceleration,
+                                                 control.feedforward_velocity);
+  if (radius < 1.0) return {};
+  std::array<char, 160> why{};
+  std::snprintf(why.data(), why.size(),
+                "with these gains the loop swings up when it runs at %.6g Hz (by %.3g times a period)",
+                1.0 / period, radius);
+  return Unfit{why.data(), "control", "step it more often, or lower kp, ki and kd (in a cascade kp and kv)"};
 }
 
 void Stage::activate() {

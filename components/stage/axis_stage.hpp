@@ -99,6 +99,8 @@ class Stage final : public Component {
 
   explicit Stage(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
+  /// A loop that swings up at this rate, by the inertia that it is fed forward; without one nothing is said.
+  [[nodiscard]] std::optional<Unfit> unfit(double period) const override;
   void configure() override { model_.open(parameters_.model, "diagnose the axis again"); }
   void activate() override;
   void cleanup() noexcept override { model_.close(); }

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -87,6 +88,15 @@ class Component {
   };
   /// Set-up: what is this component's alone; two that claim the same are a fault of the deployment.
   [[nodiscard]] virtual std::vector<Claim> claims() const { return {}; }
+
+  /// Why a component cannot do its work, and how to mend it.
+  struct Unfit {
+    std::string why;
+    std::string parameter;  // at which it is told
+    std::string mend;
+  };
+  /// Set-up: must it not be stepped every `period` [s]? Then that is a fault of the deployment. Throws nothing.
+  [[nodiscard]] virtual std::optional<Unfit> unfit(double /*period*/) const { return {}; }
 
   /// The name in the deployment ("stage_x"). Set before configure.
   std::string name;

@@ -166,6 +166,19 @@ void check_claims(const LoadedCell& loaded) {
     }
 }
 
+/// Components that cannot work at the rate at which they are stepped.
+void check_rates(const LoadedCell& loaded) {
+  for (const LoadedProcess& process : loaded.processes)
+    for (const LoadedComponent& member : process.components) {
+      if (!member.component) continue;
+      const Duration step = process.file->period * member.file->every;
+      if (const auto unfit = member.component->unfit(step.in_seconds())) {
+        const Node at = member.file->node;
+        (at.has(unfit->parameter) ? at[unfit->parameter] : at).fault(unfit->why, unfit->mend);
+      }
+    }
+}
+
 /// How long it takes until the next sample of an output comes to another process.
 Duration between_samples(const config::CellProcess& writer, const config::CellComponent& component,
                          const std::string& port) {
@@ -221,6 +234,7 @@ void connect_ports(LoadedCell& loaded) {
     }
   check_owners(loaded);
   check_claims(loaded);
+  check_rates(loaded);
   check_latencies(loaded);
 }
 
