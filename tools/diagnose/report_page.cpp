@@ -101,9 +101,9 @@ void add_bars(report::Page& page, const FitRow& row) {
 void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   std::string missing, sure, fit;
   for (const auto& finding : d.findings) {
-    missing += (missing.empty() ? "" : "; ") + readable(finding.term.info->name) + " (" +
-               place_of(data, finding.term) + "): " + sizes_of(data, finding);
-    sure += (sure.empty() ? "" : "; ") + readable(finding.term.info->name) + " " +
+    missing += (missing.empty() ? "" : "; ") + title_of(finding) + " (" + place_of(data, finding.term) +
+               "): " + sizes_of(data, finding);
+    sure += (sure.empty() ? "" : "; ") + title_of(finding) + " " +
             report::number(100.0 * finding.probability) + " %";
   }
   for (const auto& row : d.heldout) {
@@ -160,10 +160,11 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  const std::vector<physics::Outputs>& after) {
   const auto& finding = d.findings[which];
   const auto& info = *finding.term.info;
-  page.paragraph(readable(info.name) + " (" + place_of(data, finding.term) + "; in the model file " +
-                 std::string{info.name} + " at " + site_of(data, finding.term) + "): " +
-                 std::string{info.description} + " " + std::string{info.source} + ". Of the mismatch, " +
-                 report::number(100.0 * finding.share, 3) + " % comes back when it alone is taken out.");
+  page.paragraph(title_of(finding) + " (" + place_of(data, finding.term) + "; in the model file " +
+                 std::string{(finding.stand_in != nullptr ? finding.stand_in : &info)->name} + " at " +
+                 site_of(data, finding.term) + "): " + std::string{info.description} + " " +
+                 std::string{info.source} + ". Of the mismatch, " + report::number(100.0 * finding.share, 3) +
+                 " % comes back when it alone is taken out.");
   auto model = d.best.model;
   model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
   const auto without = simulate(data, model);
@@ -197,7 +198,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
     plot.series[0].colour = orange, plot.series[1].colour = blue;
     if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
   };
-  for (const auto& variable : dependence(data, finding.term)) {
+  for (const auto& variable : dependence(data, finding)) {
     if (variable == "direction" || variable == "speed")
       add("velocity", "velocity");
     else if (data.model.plant == physics::Plant::thermal && variable == "temperature" &&
