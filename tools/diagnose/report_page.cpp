@@ -99,25 +99,26 @@ void add_bars(report::Page& page, const FitRow& row) {
 
 /// What somebody must know who reads no further.
 void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
-  std::string missing, sure, fit;
-  for (const auto& finding : d.findings) {
-    missing += (missing.empty() ? "" : "; ") + title_of(finding) + " (" + place_of(data, finding.term) +
-               "): " + sizes_of(data, finding);
-    sure += (sure.empty() ? "" : "; ") + title_of(finding) + " " +
-            report::number(100.0 * finding.probability) + " %";
-  }
+  Names missing;
+  for (const auto& finding : d.findings)
+    missing.push_back({title_of(finding), place_of(data, finding.term),
+                       report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, finding)});
+  if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
+  std::string fit;
   for (const auto& row : d.heldout) {
     if (is_bare(row)) continue;
-    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + ", refitted " +
-           report::si(row.retuned, row.unit) + ", now " + report::si(row.after, row.unit) + " (noise " +
-           report::si(row.noise_floor, row.unit) + ")";
+    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + " as it is, " +
+           report::si(row.retuned, row.unit) + " with its own parameters refitted" +
+           (d.findings.empty() ? "" : ", " + report::si(row.after, row.unit) + " with what was found") +
+           " (noise " + report::si(row.noise_floor, row.unit) + ")";
   }
   const std::string rest = report::number(d.unexplained, 3) + " times the noise";
-  Names rows{{"what is missing", missing.empty() ? "nothing that this recording shows" : missing}};
-  if (!sure.empty()) rows.push_back({"how sure", sure});
+  Names rows;
+  if (missing.empty() && d.verdict != Verdict::unknown_physics)
+    rows.push_back({"what is missing", "nothing that this recording shows"});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
   rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
-  rows.push_back({"next experiment", next_experiment(data, d)});
+  rows.push_back({"what to do next", next_experiment(data, d)});
   page.table({"in short", ""}, rows);
 }
 

@@ -183,6 +183,10 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
       if (over == "time" || over == "t")
         return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
                "back.";
+      if (over == "history")
+        return "Record again with one input alone in steps, each held until all is at rest, and then in "
+               "quick changes: "
+               "what has no name yet goes with what was before, and this shows for how long.";
       return "Record again with " + (over.empty() ? "one input" : over) +
              " varied on its own and all else held: what has no name yet goes with it, or with something "
              "that "
