@@ -188,7 +188,20 @@ void read_thermal(const Node& root, Model& model) {
     model.signals.push_back({"ambient", ambient.as_text(), "degC", false});
 }
 
-std::string si_unit_or_as_is(const Node& node) { return node.is_map() ? node.text("unit", "1") : "1"; }
+config::Quantity free_quantity(const Node& node, Range bounds) {
+  if (!node.is_map()) return {node.as_number("", bounds), {}};
+  (void)node.text("unit", "");
+  config::Quantity quantity{node.required("value").as_number("", bounds), {}};
+  if (node.has("sigma")) quantity.sigma = node["sigma"].as_number("", Range::not_negative());
+  return quantity;
+}
+
+/// A number of the user's own expressions, in whatever unit he says.
+void add_own(Model& model, std::string name, const Node& node) {
+  auto unit = node.is_map() ? node.text("unit", "1") : "1";
+  const auto quantity = parse_unit(unit) ? node.as_quantity(unit, {}) : free_quantity(node, {});
+  model.parameters.push_back({std::move(name), std::move(unit), quantity.value, quantity.sigma, {}});
+}
 
 void read_equations(const Node& root, Model& model) {
   for (const auto& node : root["inputs"].children()) {
@@ -205,9 +218,7 @@ void read_equations(const Node& root, Model& model) {
   }
   for (const auto& node : root.required("states").children()) {
     model.equations.states.push_back({node.key(), node.text("derivative")});
-    const auto initial = node.required("initial");
-    const auto unit = si_unit_or_as_is(initial);
-    add_parameter(model, node.key() + ".initial", unit, initial, {});
+    add_own(model, node.key() + ".initial", node.required("initial"));
   }
   for (const auto& node : root.required("outputs").children()) {
     physics::Equations::Output output{node.key(), node.text("expression"), {}};
@@ -215,20 +226,11 @@ void read_equations(const Node& root, Model& model) {
     model.equations.outputs.push_back(output);
     model.signals.push_back({node.key(), node.text("column"), "", true});
   }
-  for (const auto& node : root["parameters"].children())
-    add_parameter(model, node.key(), si_unit_or_as_is(node), node, {});
+  for (const auto& node : root["parameters"].children()) add_own(model, node.key(), node);
   if (root.has("controller")) {
     model.equations.controlled_input = root["controller"].text("output");
     model.equations.control_law = root["controller"].text("expression");
   }
-}
-
-config::Quantity free_quantity(const Node& node, Range bounds) {
-  if (!node.is_map()) return {node.as_number("", bounds), {}};
-  (void)node.text("unit", "");
-  config::Quantity quantity{node.required("value").as_number("", bounds), {}};
-  if (node.has("sigma")) quantity.sigma = node["sigma"].as_number("", Range::not_negative());
-  return quantity;
 }
 
 /// In the user's own equations a term says where it acts; what changes a rate acts on a state.

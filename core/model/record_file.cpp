@@ -1,5 +1,7 @@
 #include "core/model/record_file.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "core/base/unit.hpp"
@@ -8,16 +10,36 @@ namespace invar::model {
 
 namespace {
 
-ColumnUnit unit_of(const recording::Column& column, const std::string& si, const std::string& where) {
+/// Does one of the model's numbers stand in this unit, alone (`cm`) or in another (`cm/s`)?
+bool speaks_in(const physics::Model& model, const std::string& unit) {
+  const auto is_letter = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  return std::any_of(model.parameters.begin(), model.parameters.end(), [&](const physics::Parameter& p) {
+    for (auto at = p.unit.find(unit); at != std::string::npos; at = p.unit.find(unit, at + 1)) {
+      const auto end = at + unit.size();
+      if ((at == 0 || !is_letter(p.unit[at - 1])) && (end == p.unit.size() || !is_letter(p.unit[end])))
+        return true;
+    }
+    return false;
+  });
+}
+
+/// A model in the user's own expressions takes a column in SI, but as it stands where his numbers are in that unit too,
+/// where it is absolute (K), or where the unit is a name of his own.
+ColumnUnit unit_of_expression(const recording::Column& column, const physics::Model& model) {
+  const auto unit = parse_unit(column.unit);
+  if (!unit || column.unit == "K" || speaks_in(model, column.unit)) return {column.unit, 1.0, 0.0};
+  return {column.unit, unit->factor, unit->offset};
+}
+
+ColumnUnit unit_of(const recording::Column& column, const physics::Signal& signal,
+                   const physics::Model& model, const std::string& where) {
+  const auto& si = signal.unit;
   if (column.unit.empty()) return {si, 1.0, 0.0};
-  if (si.empty()) {  // a model in the user's own expressions: whatever the column measures, in SI
-    const auto unit = parse_unit(column.unit);
-    return unit ? ColumnUnit{column.unit, unit->factor, unit->offset} : ColumnUnit{column.unit, 1.0, 0.0};
-  }
+  if (si.empty()) return unit_of_expression(column, model);
   const auto to = conversion(column.unit, si);
   if (!to)
-    throw InputError{where + ": column `" + column.name + "`", "is in " + column.unit + ", which is no " + si,
-                     "give it in a unit like " + si};
+    throw InputError{where + ": column `" + column.name + "`",
+                     "is in `" + column.unit + "`, which is no " + si, "give it in a unit like " + si};
   return {column.unit, to->factor, to->offset};
 }
 
@@ -35,7 +57,7 @@ RecordFile to_record(const recording::Table& table, const physics::Model& model,
                           "add it, or name the right one in the model"});
       continue;
     }
-    const auto unit = unit_of(*column, signal.unit, table.file.string());
+    const auto unit = unit_of(*column, signal, model, table.file.string());
     std::vector<double> values = column->values;
     for (double& value : values) value = unit.factor * value + unit.offset;
     result.units[signal.name] = unit;

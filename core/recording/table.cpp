@@ -127,9 +127,6 @@ Column header(std::string_view cell, const std::string& where) {
       throw InputError{where + ": column `" + std::string{cell} + "`", "the unit's bracket is not closed",
                        "write `" + column.name + " [unit]`"};
     column.unit = std::string{trimmed(cell.substr(open + 1, close - open - 1))};
-    if (!parse_unit(column.unit))
-      throw InputError{where + ": column `" + std::string{cell} + "`", "`" + column.unit + "` is no unit",
-                       "write an SI unit such as [m], [s], [degC] or [rad]"};
   }
   if (column.name.empty()) throw InputError{where, "a column has no name", "write `name [unit]`"};
   return column;
@@ -255,7 +252,9 @@ std::vector<double> Table::in(std::string_view name, std::string_view unit) cons
   const auto convert = conversion(column->unit, unit);
   if (!convert)
     throw InputError{file.string() + ": column `" + column->name + " [" + column->unit + "]`",
-                     "`" + column->unit + "` does not measure the same as " + std::string{unit},
+                     "`" + column->unit +
+                         (parse_unit(column->unit) ? "` does not measure the same as " + std::string{unit}
+                                                   : "` is no unit"),
                      "write the column in " + std::string{unit}};
   for (double& value : values) value = (*convert)(value);
   return values;

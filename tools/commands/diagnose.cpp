@@ -10,7 +10,9 @@
 #include <memory>
 
 #include "core/model/model_file.hpp"
+#include "core/physics/library.hpp"
 #include "tools/command.hpp"
+#include "tools/diagnose/example.hpp"
 #include "tools/diagnose/other_run.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/live/interrupt.hpp"
@@ -115,7 +117,8 @@ void add_diagnose(CLI::App& program) {
   auto* command =
       program.add_subcommand("diagnose", "Find the physics that a model leaves out, and prove it");
   command->footer(
-      "Example: invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis\n"
+      "Example: invar diagnose --example thermal > model.yaml\n"
+      "         invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis\n"
       "In an .mcap a column of the model is component.port.field, that of the time component.port.at:\n"
       "  columns: {time: stage_x.state.at, reference: stage_x.state.setpoint_position + correction,\n"
       "            position: stage_x.state.position, current: stage_x.state.current, feedforward: "
@@ -125,7 +128,23 @@ void add_diagnose(CLI::App& program) {
       "was known by "
       "then and says so");
   auto options = std::make_shared<Options>();
-  command->add_option("--model", options->model, "model.yaml: what you believe")->required();
+  command
+      ->add_option_function<std::string>(
+          "--example",
+          [](const std::string& name) {
+            physics::Plant plant{};
+            if (!physics::plant_by_name(name, plant))
+              throw InputError{"--example", "`" + name + "` is no plant",
+                               "name axis, thermal, error_map, droplet, sensor or equations"};
+            std::cout << diagnose::example_model(plant);
+            throw CLI::Success{};
+          },
+          "print a model.yaml to begin with, and no more: axis, thermal, error_map, droplet, sensor or "
+          "equations (any "
+          "machine, in your own equations)")
+      ->trigger_on_parse();
+  command->add_option("--model", options->model, "model.yaml: what you believe (--example shows one)")
+      ->required();
   command
       ->add_option("--recording", options->recordings,
                    "recording of the machine, .csv, .csv.gz or .mcap; may be repeated")

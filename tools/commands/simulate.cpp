@@ -34,7 +34,10 @@ void add_simulate(CLI::App& program) {
   command->footer(
       "Example: invar simulate --model model.yaml --inputs test_inputs.csv.gz --output simulated.csv");
   auto options = std::make_shared<Options>();
-  command->add_option("--model", options->model, "model.yaml or patched.yaml")->required();
+  command
+      ->add_option("--model", options->model,
+                   "model.yaml or patched.yaml (invar diagnose --example shows one)")
+      ->required();
   command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz, or the cell's .mcap")
       ->required();
   command->add_option("--output", options->output, "table to write: time and outputs, one row per input row")

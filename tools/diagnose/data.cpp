@@ -216,6 +216,11 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   auto content = model::to_record(table, model, true);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
+  for (auto& signal : data.model.signals)  // the user's own expressions are in the units of his columns
+    if (const auto unit = content.units.find(signal.name);
+        unit != content.units.end() && signal.unit.empty() && unit->second.factor == 1.0 &&
+        unit->second.offset == 0.0)
+      signal.unit = unit->second.unit;
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
     if (const auto noise = model.noise.find(name); noise != model.noise.end())

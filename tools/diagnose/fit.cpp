@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/common_factor.hpp"
+
 namespace invar::diagnose {
 
 using physics::Model;
@@ -367,6 +369,16 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       hessian(k, k + 1) -= weight, hessian(k + 1, k) -= weight;
     });
   };
+  // Along the factor that the data leave open a damped step only creeps: it is taken at once.
+  const auto take_factor = [&] {
+    const double factor = take_common_factor(best.model, best.free, priors);
+    if (factor == 1.0) return;
+    const auto goes = with_common_factor(best.model, best.free);
+    for (Eigen::Index k = 0; k < n; ++k)
+      if (goes[static_cast<std::size_t>(k)]) j.col(k) /= factor, best.columns.col(k) /= factor;
+    best.cost = best.data_cost + priors(best.model);
+  };
+  take_factor();
   derive();
   double damping = 1e-3;
   int failures = 0;
@@ -405,6 +417,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       raw = raw_tried;
       best.cost = cost;
       best.data_cost = data_cost;
+      take_factor();
       damping = std::max(1e-9, 0.1 * damping);
       const bool settled = gained < 0.2;
       if (settled && (verified || iterations < 4)) break;

@@ -270,6 +270,31 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
   return false;
 }
 
+std::vector<double> far_share(const Case& data, const Fit& fit, double times) {
+  constexpr double trifle = 0.005;  // of what the output does: integration and rounding leave as much
+  std::vector<double> shares(data.outputs.size(), 0.0);
+  if (data.model.plant != physics::Plant::thermal && data.model.plant != physics::Plant::equations)
+    return shares;
+  const auto simulated = simulate(data, fit.model);
+  const auto weighing = weigh(data, simulated);
+  const auto spread = [](const std::vector<Series>& all) {
+    double sum = 0.0, square = 0.0, rows = 0.0;
+    for (const auto& one : all)
+      for (double v : one)
+        if (std::isfinite(v)) sum += v, square += v * v, rows += 1.0;
+    return rows > enough ? std::sqrt(std::max(0.0, square / rows - sum * sum / (rows * rows))) : 0.0;
+  };
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<Series> measured;
+    for (const auto& recording : data.recordings) measured.push_back(recording.measured[o]);
+    const double given = data.given_noise[o], left = spread(left_of(data, simulated, o));
+    const double noise =
+        std::isfinite(given) ? std::max(given, weighing.filters[o].sigma) : weighing.filters[o].sigma;
+    if (left > times * noise && left > trifle * spread(measured)) shares[o] = 1.0 - std::pow(noise / left, 2);
+  }
+  return shares;
+}
+
 bool is_above_noise(const Case& data, const Fit& fit) {
   const auto simulated = simulate(data, fit.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {

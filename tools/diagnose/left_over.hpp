@@ -11,6 +11,11 @@ namespace invar::diagnose {
 /// are in both. 0 where it is no more than chance.
 std::vector<double> followed_share(const Case& data, const Fit& fit);
 
+/// By output, the share of its power that is more than `times` the size of what cannot be told from the row before, where
+/// it is as large as that: noise that wanders for long is, and a model that misses the greater part. 0 where nothing is in
+/// proportion to what the output itself does. For plants that are simulated freely.
+std::vector<double> far_share(const Case& data, const Fit& fit, double times);
+
 /// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
 bool is_louder_in_motion(const Case& data, const Fit& fit);
 

@@ -22,8 +22,11 @@ std::string summary(const Case& data, const Diagnosis& diagnosis);
 
 /// "axis.force"; of a term in equations "equations.x1".
 std::string site_of(const Case& data, const physics::Term& term);
-/// The signals on which a term depends.
+/// The signals on which a term, or a finding, depends.
 std::vector<std::string> dependence(const Case& data, const physics::Term& term);
+std::vector<std::string> dependence(const Case& data, const Finding& finding);
+/// "stribeck friction", or for what has no name "an effect without a name".
+std::string title_of(const Finding& finding);
 /// "coulomb friction"
 std::string readable(std::string_view name);
 /// Where a term acts, for somebody who does not know the library: "temperature sensor of pad".

@@ -47,7 +47,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   report["ambiguity"] = json::array();
   for (const auto& finding : d.findings) {
     const auto& term = finding.term;
-    const auto depends = dependence(data, term);
+    const auto depends = dependence(data, finding);
     json where = json::object();
     if (!term.curve.knots.empty()) {
       // Where the curve is more than a third of its peak.
@@ -90,6 +90,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
                   {"parameters", parameters},
                   {"alternatives", alternatives},
                   {"description", term.info->description}};
+    if (finding.stand_in != nullptr) entry["stand_in"] = finding.stand_in->name;
     if (!term.on.empty()) entry["on"] = term.on;
     if (!term.with.empty()) entry["with"] = term.with;
     if (!term.curve.knots.empty())

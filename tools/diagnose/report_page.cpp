@@ -99,25 +99,26 @@ void add_bars(report::Page& page, const FitRow& row) {
 
 /// What somebody must know who reads no further.
 void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
-  std::string missing, sure, fit;
-  for (const auto& finding : d.findings) {
-    missing += (missing.empty() ? "" : "; ") + readable(finding.term.info->name) + " (" +
-               place_of(data, finding.term) + "): " + sizes_of(data, finding);
-    sure += (sure.empty() ? "" : "; ") + readable(finding.term.info->name) + " " +
-            report::number(100.0 * finding.probability) + " %";
-  }
+  Names missing;
+  for (const auto& finding : d.findings)
+    missing.push_back({title_of(finding), place_of(data, finding.term),
+                       report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, finding)});
+  if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
+  std::string fit;
   for (const auto& row : d.heldout) {
     if (is_bare(row)) continue;
-    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + ", refitted " +
-           report::si(row.retuned, row.unit) + ", now " + report::si(row.after, row.unit) + " (noise " +
-           report::si(row.noise_floor, row.unit) + ")";
+    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + " as it is, " +
+           report::si(row.retuned, row.unit) + " with its own parameters refitted" +
+           (d.findings.empty() ? "" : ", " + report::si(row.after, row.unit) + " with what was found") +
+           " (noise " + report::si(row.noise_floor, row.unit) + ")";
   }
   const std::string rest = report::number(d.unexplained, 3) + " times the noise";
-  Names rows{{"what is missing", missing.empty() ? "nothing that this recording shows" : missing}};
-  if (!sure.empty()) rows.push_back({"how sure", sure});
+  Names rows;
+  if (missing.empty() && d.verdict != Verdict::unknown_physics)
+    rows.push_back({"what is missing", "nothing that this recording shows"});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
   rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
-  rows.push_back({"next experiment", next_experiment(data, d)});
+  rows.push_back({"what to do next", next_experiment(data, d)});
   page.table({"in short", ""}, rows);
 }
 
@@ -160,10 +161,11 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  const std::vector<physics::Outputs>& after) {
   const auto& finding = d.findings[which];
   const auto& info = *finding.term.info;
-  page.paragraph(readable(info.name) + " (" + place_of(data, finding.term) + "; in the model file " +
-                 std::string{info.name} + " at " + site_of(data, finding.term) + "): " +
-                 std::string{info.description} + " " + std::string{info.source} + ". Of the mismatch, " +
-                 report::number(100.0 * finding.share, 3) + " % comes back when it alone is taken out.");
+  page.paragraph(title_of(finding) + " (" + place_of(data, finding.term) + "; in the model file " +
+                 std::string{(finding.stand_in != nullptr ? finding.stand_in : &info)->name} + " at " +
+                 site_of(data, finding.term) + "): " + std::string{info.description} + " " +
+                 std::string{info.source} + ". Of the mismatch, " + report::number(100.0 * finding.share, 3) +
+                 " % comes back when it alone is taken out.");
   auto model = d.best.model;
   model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
   const auto without = simulate(data, model);
@@ -197,7 +199,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
     plot.series[0].colour = orange, plot.series[1].colour = blue;
     if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
   };
-  for (const auto& variable : dependence(data, finding.term)) {
+  for (const auto& variable : dependence(data, finding)) {
     if (variable == "direction" || variable == "speed")
       add("velocity", "velocity");
     else if (data.model.plant == physics::Plant::thermal && variable == "temperature" &&

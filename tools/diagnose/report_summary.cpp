@@ -45,7 +45,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
   std::vector<std::vector<std::string>> rows;
   if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
   for (const auto& finding : d.findings)
-    rows.push_back({std::string{finding.term.info->name}, place_of(data, finding.term),
+    rows.push_back({title_of(finding), place_of(data, finding.term),
                     report::number(100.0 * finding.probability) + " %", sizes_of(data, finding)});
   out += aligned(rows);
   rows.clear();

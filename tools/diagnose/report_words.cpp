@@ -35,6 +35,12 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
   return names;
 }
 
+std::vector<std::string> dependence(const Case& data, const Finding& finding) {
+  auto term = finding.term;
+  if (finding.stand_in != nullptr) term.info = finding.stand_in;
+  return dependence(data, term);
+}
+
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
   const std::string unit{term.info->parameters[parameter].unit};
   if (unit != "*") return unit;
@@ -68,6 +74,11 @@ std::string readable(std::string_view name) {
   std::string text{name};
   std::replace(text.begin(), text.end(), '_', ' ');
   return text;
+}
+
+std::string title_of(const Finding& finding) {
+  return finding.term.info->name == "unmodelled" ? "an effect without a name"
+                                                 : readable(finding.term.info->name);
 }
 
 std::string place_of(const Case& data, const physics::Term& term) {
@@ -110,6 +121,9 @@ std::string place_of(const Case& data, const physics::Term& term) {
 
 std::string sizes_of(const Case& data, const Finding& finding) {
   const auto& info = *finding.term.info;
+  if (finding.stand_in != nullptr)
+    return "no known term describes it; patched.yaml has " + readable(finding.stand_in->name) +
+           " in its place";
   std::string text;
   for (std::size_t i = 0; i < info.parameter_count(); ++i)
     text += (i == 0 ? "" : ", ") + readable(info.parameters[i].name) + " " +
@@ -169,6 +183,10 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
       if (over == "time" || over == "t")
         return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
                "back.";
+      if (over == "history")
+        return "Record again with one input alone in steps, each held until all is at rest, and then in "
+               "quick changes: "
+               "what has no name yet goes with what was before, and this shows for how long.";
       return "Record again with " + (over.empty() ? "one input" : over) +
              " varied on its own and all else held: what has no name yet goes with it, or with something "
              "that "
@@ -230,8 +248,8 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   std::string names;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
-    names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) +
-             readable(finding.term.info->name) + " (" + place_of(data, finding.term) + ")";
+    names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) + title_of(finding) + " (" +
+             place_of(data, finding.term) + ")";
   }
   switch (d.verdict) {
     case Verdict::no_mismatch:
@@ -259,8 +277,17 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
                (d.suspect && !d.suspect->place.empty() ? "; it looks most like the " + d.suspect->place
                                                        : std::string{}) +
                ".";
-      return "Unknown physics: something acts at " + site_of(data, d.findings.front().term) +
-             " that depends on " + d.findings.front().term.curve.over + " and that no known term describes.";
+      if (d.findings.front().stand_in != nullptr) {
+        std::string places;
+        for (const auto& f : d.findings)
+          if (const auto place = place_of(data, f.term); places.find(place) == std::string::npos)
+            places += (places.empty() ? "" : " and the ") + place;
+        return "Unknown physics: something is missing, most likely at the " + places +
+               ", that no known term describes.";
+      }
+      return "Unknown physics: something acts at the " + place_of(data, d.findings.front().term) + " (" +
+             site_of(data, d.findings.front().term) + ") that depends on " +
+             d.findings.front().term.curve.over + " and that no known term describes.";
   }
   return "";
 }

@@ -7,6 +7,7 @@
 namespace invar::diagnose {
 
 double median(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -14,13 +15,11 @@ double median(std::vector<double> values) {
 }
 
 double robust_sigma(const std::vector<double>& values) {
-  std::vector<double> finite;
-  for (double v : values)
-    if (std::isfinite(v)) finite.push_back(v);
-  if (finite.empty()) return 0.0;
-  const double center = median(finite);
-  for (double& v : finite) v = std::abs(v - center);
-  return 1.4826 * median(finite);
+  const double center = median(values);
+  if (!std::isfinite(center)) return 0.0;
+  auto apart = values;
+  for (double& v : apart) v = std::abs(v - center);
+  return 1.4826 * median(std::move(apart));
 }
 
 double spread_of_differences(const std::vector<double>& values) {

@@ -5,6 +5,7 @@
 
 namespace invar::diagnose {
 
+/// NaN are skipped; NaN where nothing else is there.
 double median(std::vector<double> values);
 /// 1.4826 times the median absolute deviation; NaN are skipped.
 double robust_sigma(const std::vector<double>& values);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/physics/library.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/probability.hpp"
@@ -169,10 +170,22 @@ double odds_of_other_site(const Finding& finding) {
   return std::exp(0.5 * (is_current ? price : -price));
 }
 
+/// Leaves the name away.
+void stand_in(Finding& finding) {
+  finding.stand_in = finding.term.info;
+  finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
+  finding.probability = 1.0 - finding.probability;
+  finding.sigmas.clear();
+  finding.alternatives.clear();
+}
+
 }  // namespace
 
 void conclude(const Case& data, Diagnosis& d) {
-  const auto followed = followed_share(data, d.best);
+  auto followed = followed_share(data, d.best);
+  // Beside a name that is right little is left; without one, noise may wander far.
+  const auto far = far_share(data, d.best, d.findings.empty() ? 5.0 : 3.0);
+  for (std::size_t o = 0; o < far.size(); ++o) followed[o] = std::max(followed[o], far[o]);
   const double most_followed = *std::max_element(followed.begin(), followed.end());
   d.still_follows = share_left(data, d, followed);
   if (most_followed > 0.5) d.unexplained_over = {"history"};
@@ -209,6 +222,11 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
+  for (auto& finding : d.findings)
+    if (finding.term.curve.knots.empty() && finding.probability < 0.1) stand_in(finding);
+  const bool nameless =
+      !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
+                                         [](const Finding& f) { return f.stand_in != nullptr; });
   bool ambiguous = false;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives) ambiguous = ambiguous || a.log_odds > -ambiguous_margin;
@@ -218,7 +236,7 @@ void conclude(const Case& data, Diagnosis& d) {
                     ? Verdict::unknown_physics
                 : d.parameter_excursion > 3.0 ? Verdict::parameters_only
                                               : Verdict::no_mismatch;
-  else if (d.is_unnamed)
+  else if (d.is_unnamed || nameless)
     d.verdict = Verdict::unknown_physics;
   else if (ambiguous)
     d.verdict = Verdict::ambiguous;

@@ -26,6 +26,13 @@ TEST(Whitening, FindsThePoleAndTheSizeOfAutoregressiveNoise) {
   EXPECT_NEAR(filter.sigma, 1.0, 0.03);
 }
 
+TEST(Median, OfWhatWasMeasuredAlone) {
+  const double nothing = std::nan("");
+  EXPECT_EQ(median({nothing, 3.0, nothing, 1.0, 2.0, nothing, nothing}), 2.0);
+  EXPECT_NEAR(robust_sigma({1.0, nothing, 2.0, 3.0, nothing}), 1.4826, 1e-12);
+  EXPECT_EQ(robust_sigma({nothing, nothing}), 0.0);
+}
+
 TEST(Whitening, LeavesWhiteNoiseAsItIs) {
   const auto filter = fit_whitening({coloured(0.0, 12, 20000)}, 8);
   EXPECT_LE(filter.a.size(), 3U);

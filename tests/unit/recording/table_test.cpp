@@ -93,7 +93,6 @@ TEST_F(TableTest, SaysOfAPackedFileThatItIsCutOffRatherThanWhatItsLastLineLacks)
 TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m],y [m]\n1,2\n3\n")), HasSubstr("in.csv:3: this row has 1 cells"));
   EXPECT_THAT(fault_of(make("x [m]\n1\nabc\n")), HasSubstr("in.csv:3: column `x`: `abc` is not a number"));
-  EXPECT_THAT(fault_of(make("x [furlong]\n1\n")), HasSubstr("`furlong` is no unit"));
   EXPECT_THAT(fault_of(make("x,x\n1,2\n")), HasSubstr("stands twice"));
   EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
   EXPECT_THAT(fault_of(make("")), HasSubstr("is empty"));
@@ -104,6 +103,17 @@ TEST_F(TableTest, SaysWhichColumnIsMissingOrMeasuresSomethingElse) {
   const auto table = Table::read(make("x [s]\n1\n"));
   EXPECT_THROW((void)table.in("y", "m"), InputError);
   EXPECT_THROW((void)table.in("x", "m"), InputError);
+}
+
+TEST_F(TableTest, AUnitThatNobodyKnowsIsAFaultOnlyWhereAUnitIsAskedFor) {
+  const auto table = Table::read(make("x [furlong]\n1\n"));
+  EXPECT_EQ(table.find("x")->unit, "furlong");
+  try {
+    (void)table.in("x", "m");
+    ADD_FAILURE() << "no fault";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("`furlong` is no unit"));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,46 @@
+// The model files to begin with are models, and simulate.
+#include "tools/diagnose/example.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/model/model_file.hpp"
+#include "core/model/record_file.hpp"
+#include "core/physics/library.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+class Example : public ::testing::TestWithParam<physics::Plant> {};
+
+TEST_P(Example, IsAModelThatSimulatesAndNamesEveryTerm) {
+  const auto text = example_model(GetParam());
+  const auto yaml = config::Yaml::parse(text, "model.yaml");
+  const auto model = model::read(yaml);
+  yaml.finish();
+  EXPECT_EQ(model.plant, GetParam());
+  for (const auto* info : physics::terms_of(GetParam()))
+    EXPECT_THAT(text, ::testing::HasSubstr("#   " + std::string{info->name} + " (")) << info->name;
+  recording::Table table;
+  for (const auto& signal : model.signals) {
+    std::vector<double> values(50, signal.name == "height" ? 0.01 : 0.0);
+    if (signal.name == "time")
+      for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.001 * static_cast<double>(i);
+    table.add(signal.column, signal.unit, values);
+  }
+  const auto inputs = model::to_record(table, model, true);
+  physics::Outputs outputs;
+  physics::prepare(model, inputs.record)->run(model, outputs);
+  ASSERT_EQ(outputs.size(), model.outputs().size());
+  for (const auto& output : outputs)
+    for (const double v : output) ASSERT_TRUE(std::isfinite(v));
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryPlant, Example,
+                         ::testing::Values(physics::Plant::axis, physics::Plant::thermal,
+                                           physics::Plant::error_map, physics::Plant::droplet,
+                                           physics::Plant::sensor, physics::Plant::equations));
+
+}  // namespace
+}  // namespace invar::diagnose

@@ -1,0 +1,92 @@
+// Machines that no name of the library describes: no name is claimed for them, and what is left is not called noise.
+#include <gmock/gmock.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "core/model/model_file.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tools/diagnose/left_over.hpp"
+#include "tools/diagnose/report.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+constexpr double step = 0.005;
+constexpr std::size_t rows = 2400;
+
+physics::Model rigid_motor() {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: volt}\n"
+      "states: {w: {derivative: 'k*u - a*w', initial: {value: 0, unit: rad/s, sigma: 1}}}\n"
+      "outputs: {speed: {column: speed, expression: w}}\n"
+      "parameters: {k: {value: 12, unit: 1, sigma: 4}, a: {value: 3, unit: 1/s, sigma: 2}}\n",
+      "model.yaml");
+  auto model = model::read(yaml);
+  yaml.finish();
+  return model;
+}
+
+/// Two inertias on an elastic shaft, the far one measured: what leaves `rigid_motor` ringing at 6 Hz.
+recording::Table elastic_motor(unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> noise{0.0, 0.1};
+  std::uniform_real_distribution<double> level{-6.0, 6.0};
+  std::array<double, 3> x{};
+  std::vector<double> time, volt, speed;
+  double u = 0.0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (i % 60 == 0) u = level(random);
+    time.push_back(step * static_cast<double>(i));
+    volt.push_back(u);
+    // A cell that nobody filled now and then: what is missing must not hide what is left over.
+    speed.push_back(i % 50 == 7 ? std::nan("") : x[1] + noise(random));
+    constexpr int parts = 100;
+    for (int part = 0; part < parts; ++part) {  // small steps of Euler's rule, for a truth of its own
+      const double torque = 900.0 * x[2] + 1.2 * (x[0] - x[1]), h = step / parts;
+      x = {x[0] + h * (20.0 * u - 4.0 * x[0] - torque), x[1] + h * (torque - 0.5 * x[1]) / 0.6,
+           x[2] + h * (x[0] - x[1])};
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("volt", "V", volt);
+  table.add("speed", "rad/s", speed);
+  return table;
+}
+
+TEST(WithoutAName, AnElasticShaftIsNeitherNoiseNorADelay) {
+  testing::TemporaryFolder folder;
+  elastic_motor(3).write(folder / "recording.csv");
+  auto data = load_case(rigid_motor(), {folder / "recording.csv"});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_TRUE(d.verdict == Verdict::unknown_physics || d.verdict == Verdict::partly_explained)
+      << name_of(d.verdict);
+  EXPECT_GT(d.unexplained, 2.0);
+  for (const auto& finding : d.findings)
+    EXPECT_TRUE(finding.term.info->name == "unmodelled" || finding.probability < 0.5)
+        << finding.term.info->name;
+  const auto report = nlohmann::json::parse(report_json(data, d));
+  for (const auto& finding : report["findings"])
+    if (finding.contains("stand_in")) {
+      EXPECT_EQ(finding["term"], "unmodelled");
+      EXPECT_TRUE(finding["parameters"].empty());
+      EXPECT_FALSE(report["location"].empty());
+    }
+}
+
+TEST(WithoutAName, WhatIsLeftFarAboveTheNoiseIsSeenBesideMissingValues) {
+  testing::TemporaryFolder folder;
+  elastic_motor(4).write(folder / "recording.csv");
+  auto data = load_case(rigid_motor(), {folder / "recording.csv"});
+  const auto weighing = weigh(data, simulate(data, data.model), false);
+  const auto rigid = fit(data, weighing, data.model, data.model, 12);
+  EXPECT_GT(far_share(data, rigid, 3.0).front(), 0.8);
+  EXPECT_GT(followed_share(data, rigid).front(), 0.05);
+}
+
+}  // namespace
+}  // namespace invar::diagnose

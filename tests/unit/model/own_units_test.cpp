@@ -1,0 +1,54 @@
+// Units of models in the user's own expressions: a column is taken as his numbers are written.
+#include <gmock/gmock.h>
+
+#include "core/model/model_file.hpp"
+#include "core/model/record_file.hpp"
+
+namespace invar::model {
+namespace {
+
+physics::Model read_own(const std::string& state_unit, const std::string& parameter_unit) {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
+      "states: {x: {derivative: 'k*u - x', initial: {value: 438, unit: " +
+          state_unit +
+          ", sigma: 2}}}\n"
+          "outputs: {y: {column: out, expression: x}}\n"
+          "parameters: {k: {value: 3, unit: " +
+          parameter_unit + "}}\n",
+      "model.yaml");
+  auto model = read(yaml);
+  yaml.finish();
+  return model;
+}
+
+double first(const std::string& column_unit, const physics::Model& model) {
+  recording::Table table;
+  table.add("t", "min", {0.0, 1.0});
+  table.add("in", "V", {1.0, 1.0});
+  table.add("out", column_unit, {40.0, 41.0});
+  const auto file = to_record(table, model, true);
+  EXPECT_EQ(file.record.time[1], 60.0);  // time is in seconds, always
+  return file.record.signals.at("y").front();
+}
+
+TEST(OwnUnits, AnAbsoluteTemperatureStaysAbsolute) {
+  EXPECT_EQ(first("K", read_own("K", "K/V")), 40.0);
+  EXPECT_EQ(first("K", read_own("\"1\"", "\"1\"")), 40.0);
+  EXPECT_EQ(first("degC", read_own("degC", "\"1\"")), 40.0);
+}
+
+TEST(OwnUnits, AColumnStandsInTheUnitOfTheModelsNumbersOrElseInSi) {
+  EXPECT_EQ(first("cm", read_own("cm", "\"1\"")), 40.0);
+  EXPECT_EQ(first("cm", read_own("\"1\"", "cm/V")), 40.0);
+  EXPECT_DOUBLE_EQ(first("cm", read_own("m", "m/V")), 0.4);
+  EXPECT_DOUBLE_EQ(first("m", read_own("mm", "\"1\"")), 40.0);  // `mm` is another unit than `m`
+}
+
+TEST(OwnUnits, ANameOfTheUsersOwnIsALabel) {
+  EXPECT_EQ(first("counts", read_own("counts", "counts/V")), 40.0);
+  EXPECT_EQ(read_own("counts", "counts/V").find("k")->unit, "counts/V");
+}
+
+}  // namespace
+}  // namespace invar::model
