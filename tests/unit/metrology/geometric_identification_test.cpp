@@ -135,6 +135,20 @@ TEST(Identification, BridgesABeamBreakOfALineReadOnce) {
   EXPECT_LT(left_over(machine, &found.model).rms, 2.0 * sound + 1.0e-6);
 }
 
+// A laser read while the axis moves: tens of thousands of places on a line, none of them twice.
+TEST(Identification, TakesReadingsOnTheFly) {
+  std::mt19937_64 random{24};
+  RecordProperty("seed", 24);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  Laser laser;
+  laser.passes = 2;
+  laser.outliers = 0.01;
+  const auto lines = measured(machine, recipe_lines(machine, 1), 20000, random, laser);
+  const auto found = identify(machine, lines);
+  for (const auto& line : found.lines) EXPECT_LE(line.points.size(), 401U);
+  EXPECT_LT(left_over(machine, &found.model).rms, 0.3e-6);
+}
+
 TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {
   std::mt19937_64 random{14};
   RecordProperty("seed", 14);
