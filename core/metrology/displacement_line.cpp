@@ -13,7 +13,9 @@ namespace invar::metrology {
 namespace {
 
 constexpr double point_tolerance = 1e-7;  // m, commanded positions nearer than this are one point
-constexpr double steady = 0.02;           // K, a temperature that varies less stands still
+constexpr int most_points =
+    400;  // of a line: a laser that is read while the axis moves gives more places than a curve has
+constexpr double steady = 0.02;  // K, a temperature that varies less stands still
 
 /// Regressor of the expansion about the line's mean temperature, where the temperature changed within the line.
 void add_expansion(LineFit& work) {
@@ -41,6 +43,44 @@ void add_expansion(LineFit& work) {
   }
 }
 
+/// Which readings are of one point: those at the same place, or, where a line has more places than a curve needs, those
+/// that are neighbours along the beam; such a point stands where the reading in its middle does.
+void find_points(LineFit& work) {
+  using Key = std::array<long, 6>;
+  const auto group = [&](auto key_of) {
+    work.point_of.clear();
+    work.first_row.clear();
+    std::map<Key, int> known;
+    for (const Reading& reading : work.line->readings) {
+      Key key = key_of(reading);
+      for (int k = 0; k < 3; ++k)
+        key[static_cast<std::size_t>(k) + 3] = std::lround(reading.tool[k] / point_tolerance);
+      const auto [found, is_new] = known.try_emplace(key, work.points());
+      if (is_new) work.first_row.push_back(static_cast<int>(work.point_of.size()));
+      work.point_of.push_back(found->second);
+    }
+  };
+  group([](const Reading& reading) {
+    Key key{};
+    for (int k = 0; k < 3; ++k)
+      key[static_cast<std::size_t>(k)] = std::lround(reading.position[k] / point_tolerance);
+    return key;
+  });
+  if (work.points() <= most_points) return;
+  const auto place = [&](const Reading& reading) {
+    return work.beam.direction.dot(reading.position - work.beam.start) / work.beam.length * most_points;
+  };
+  group([&](const Reading& reading) { return Key{std::lround(place(reading))}; });
+  const auto off_middle = [&](std::size_t row) {
+    const double at = place(work.line->readings[row]);
+    return std::abs(at - std::round(at));
+  };
+  for (std::size_t i = 0; i < work.point_of.size(); ++i)
+    if (int& middle = work.first_row[static_cast<std::size_t>(work.point_of[i])];
+        off_middle(i) < off_middle(static_cast<std::size_t>(middle)))
+      middle = static_cast<int>(i);
+}
+
 LineFit prepare(const DisplacementLine& line) {
   LineFit work;
   work.line = &line;
@@ -49,17 +89,9 @@ LineFit prepare(const DisplacementLine& line) {
   work.y.resize(rows);
   work.weights = Eigen::VectorXd::Ones(rows);
   work.regressors.resize(rows, nuisances);
-  std::map<std::array<long, 6>, int> known;
+  find_points(work);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Reading& reading = line.readings[static_cast<std::size_t>(i)];
-    std::array<long, 6> key{};
-    for (int k = 0; k < 3; ++k) {
-      key[static_cast<std::size_t>(k)] = std::lround(reading.position[k] / point_tolerance);
-      key[static_cast<std::size_t>(k) + 3] = std::lround(reading.tool[k] / point_tolerance);
-    }
-    const auto [found, is_new] = known.try_emplace(key, work.points());
-    if (is_new) work.first_row.push_back(static_cast<int>(i));
-    work.point_of.push_back(found->second);
     const Eigen::Vector3d moved = reading.position + reading.tool - work.beam.start - work.beam.start_tool;
     work.y[i] = reading.displacement - work.beam.direction.dot(moved);
     const double t = rows > 1 ? 2.0 * static_cast<double>(i) / static_cast<double>(rows - 1) - 1.0 : 0.0;

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/numerics/robust.hpp"
 
@@ -20,21 +21,29 @@ double standardised_scale(const LineFit& work) {
   return 1.4826 * numerics::median(size) * std::sqrt(rows / work.degrees);
 }
 
-/// From neighbours in time, which steps and drift hardly touch.
+/// From neighbours in time, which steps and drift hardly touch. Readings in coarse counts repeat to the count: then it
+/// is the count's own scatter.
 double first_scale(LineFit& work) {
   std::vector<std::vector<double>> of_point(work.first_row.size());
   for (int i = 0; i < work.rows(); ++i)
     of_point[static_cast<std::size_t>(work.point_of[static_cast<std::size_t>(i)])].push_back(work.y[i]);
   std::vector<double> middle;
   middle.reserve(of_point.size());
-  for (const auto& values : of_point) middle.push_back(numerics::median(values));
+  double count = std::numeric_limits<double>::infinity();
+  for (const auto& values : of_point) {
+    middle.push_back(numerics::median(values));
+    for (std::size_t i = 1; i < values.size(); ++i)
+      if (const double step = std::abs(values[i] - values[i - 1]); step > 1e-11)
+        count = std::min(count, step);
+  }
   work.residual.resize(work.rows());
   for (int i = 0; i < work.rows(); ++i)
     work.residual[i] =
         work.y[i] - middle[static_cast<std::size_t>(work.point_of[static_cast<std::size_t>(i)])];
   std::vector<double> steps;
   for (int i = 1; i < work.rows(); ++i) steps.push_back(std::abs(work.residual[i] - work.residual[i - 1]));
-  return 1.4826 * numerics::median(steps) / std::sqrt(2.0);
+  const double scale = 1.4826 * numerics::median(steps) / std::sqrt(2.0);
+  return std::isfinite(count) ? std::max(scale, count / std::sqrt(12.0)) : scale;
 }
 
 void huber_weights(LineFit& work) {
@@ -44,47 +53,157 @@ void huber_weights(LineFit& work) {
   }
 }
 
-/// Adds the step that explains most, if it explains more than chance: returns whether one was found.
-bool find_break(LineFit& work) {
-  constexpr double significance = 36.0;  // chi-square of one parameter: six sigma
+/// The points in their order along the beam, and by how much neighbours differ as a rule.
+void order_points(LineFit& work) {
+  const auto place = [&](int j) {
+    const Reading& at =
+        work.line->readings[static_cast<std::size_t>(work.first_row[static_cast<std::size_t>(j)])];
+    return work.beam.direction.dot(at.position + at.tool);
+  };
+  work.along.resize(work.first_row.size());
+  std::iota(work.along.begin(), work.along.end(), 0);
+  std::sort(work.along.begin(), work.along.end(), [&](int a, int b) { return place(a) < place(b); });
+  std::vector<double> steps;
+  for (int i = 1; i < work.rows(); ++i)
+    if (work.point_of[static_cast<std::size_t>(i)] != work.point_of[static_cast<std::size_t>(i) - 1])
+      steps.push_back(std::abs(work.y[i] - work.y[i - 1]));
+  work.neighbours = std::max(1.4826 * numerics::median(steps), work.scale);
+}
+
+/// Huber's function: what a deviation of z scales adds to the chi-square, an outlier linearly.
+double huber(double z) { return std::abs(z) < 2.0 ? z * z : 4.0 * std::abs(z) - 4.0; }
+
+/// Chi-square of the fit: of the readings, of the nuisances as expected, and of the means of neighbouring points. Those
+/// decide where repeats leave it open: a step on the way there looks like one on the way back at the same place.
+double cost(const LineFit& work, const Eigen::VectorXd& prior_variance) {
+  double sum = work.nuisance.cwiseAbs2().cwiseQuotient(prior_variance).sum();
+  for (const double residual : work.residual) sum += huber(residual / work.scale);
+  // A reading less its residual and the regressors is the mean of its point.
+  Eigen::VectorXd mean(work.points());
+  for (int i = 0; i < work.rows(); ++i)
+    mean[work.point_of[static_cast<std::size_t>(i)]] =
+        work.y[i] - work.residual[i] - work.regressors.row(i).dot(work.nuisance);
+  for (std::size_t j = 1; j < work.along.size(); ++j)
+    sum += huber((mean[work.along[j]] - mean[work.along[j - 1]]) / work.neighbours);
+  return sum;
+}
+
+/// What a step from each row on would gain, chi-square: its part that means and regressors cannot follow, against
+/// residuals (of weight one).
+std::vector<double> step_gains(const LineFit& work, const Eigen::VectorXd& residual,
+                               const Eigen::VectorXd& prior_variance) {
   const int rows = work.rows();
-  double best = significance;
-  int where = 0;
-  Eigen::VectorXd mass = Eigen::VectorXd::Constant(work.points(), 1e-12);
-  for (int i = 0; i < rows; ++i) mass[work.point_of[static_cast<std::size_t>(i)]] += work.weights[i];
-  Eigen::VectorXd above = Eigen::VectorXd::Zero(work.points());
-  // A step against means and regressors: its part that they cannot follow.
-  Eigen::MatrixXd centred(rows, work.regressors.cols());
+  const double variance = work.scale * work.scale;
+  Eigen::VectorXd mass = Eigen::VectorXd::Zero(work.points());
   Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(work.points(), work.regressors.cols());
-  for (int i = 0; i < rows; ++i)
-    cross.row(work.point_of[static_cast<std::size_t>(i)]) += work.weights[i] * work.regressors.row(i);
+  for (int i = 0; i < rows; ++i) {
+    const int j = work.point_of[static_cast<std::size_t>(i)];
+    mass[j] += 1.0;
+    cross.row(j) += work.regressors.row(i);
+  }
+  Eigen::MatrixXd centred(rows, work.regressors.cols());
   for (int i = 0; i < rows; ++i) {
     const int j = work.point_of[static_cast<std::size_t>(i)];
     centred.row(i) = work.regressors.row(i) - cross.row(j) / mass[j];
   }
+  Eigen::MatrixXd normal = centred.transpose() * centred;
+  normal.diagonal() += variance * prior_variance.cwiseInverse();
+  const Eigen::MatrixXd inverse =
+      normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+  std::vector<double> gains(static_cast<std::size_t>(rows), 0.0);
+  Eigen::VectorXd above = Eigen::VectorXd::Zero(work.points());
   Eigen::VectorXd shared = Eigen::VectorXd::Zero(work.regressors.cols());
   double moment = 0.0;
   double energy = 0.0;
   for (int b = rows - 1; b > 1; --b) {  // the step from row b on
     const int j = work.point_of[static_cast<std::size_t>(b)];
-    const double w = work.weights[b];
-    moment += w * work.residual[b];
-    shared += w * centred.row(b).transpose();
-    energy += w - (2.0 * above[j] * w + w * w) / mass[j];
-    above[j] += w;
-    if (rows - b < 3) continue;
-    const double left = energy - shared.dot(work.nuisance_covariance * shared);
-    if (left < 1e-3) continue;
-    const double gain = moment * moment / left / (work.scale * work.scale);
-    if (gain > best) {
-      best = gain;
-      where = b;
-    }
+    moment += residual[b];
+    shared += centred.row(b).transpose();
+    energy += 1.0 - (2.0 * above[j] + 1.0) / mass[j];
+    above[j] += 1.0;
+    const double left = energy - shared.dot(inverse * shared);
+    if (rows - b >= 3 && left > 1e-3 * energy && left > 1e-3)
+      gains[static_cast<std::size_t>(b)] = moment * moment / left / variance;
   }
-  if (where == 0) return false;
-  work.breaks.push_back(where);
+  return gains;
+}
+
+constexpr double significance = 36.0;  // chi-square of one parameter: six sigma
+/// The rows from which on a step promises most, not next to one another.
+void add_promising(std::vector<double> gains, std::vector<int>& rows) {
+  for (int choice = 0; choice < 4; ++choice) {
+    const auto top = std::max_element(gains.begin(), gains.end());
+    if (*top < significance) return;
+    const auto row = static_cast<int>(top - gains.begin());
+    if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
+    std::fill(top - std::min<std::ptrdiff_t>(top - gains.begin(), 2),
+              top + std::min<std::ptrdiff_t>(gains.end() - top, 3), 0.0);
+  }
+}
+
+LineFit with_step(LineFit work, int row, const std::array<double, drift_terms>& drift) {
+  work.breaks.push_back(row);
   work.regressors.conservativeResize(Eigen::NoChange, work.regressors.cols() + 1);
-  for (int i = 0; i < rows; ++i) work.regressors(i, work.regressors.cols() - 1) = i >= where ? 1.0 : 0.0;
+  for (int i = 0; i < work.rows(); ++i) work.regressors(i, work.regressors.cols() - 1) = i >= row ? 1.0 : 0.0;
+  const Eigen::VectorXd prior = prior_variances(work, drift);
+  for (int i = 0; i < 5; ++i) {
+    fit(work, prior);
+    huber_weights(work);
+  }
+  return work;
+}
+
+/// Adds the step that explains most, if it explains more than chance: returns whether one was found. Where the fit
+/// without it is torn, neither its residuals nor those of plain least squares need point at it: each row they name is tried.
+bool find_break(LineFit& work, const std::array<double, drift_terms>& drift) {
+  const Eigen::VectorXd prior = prior_variances(work, drift);
+  const double bound = 2.0 * work.scale;
+  LineFit plain = work;
+  plain.weights.setOnes();
+  fit(plain, prior);
+  std::vector<int> rows;
+  add_promising(step_gains(work, work.residual.cwiseMax(-bound).cwiseMin(bound), prior), rows);
+  add_promising(step_gains(work, plain.residual, prior), rows);
+  const double before = cost(work, prior);
+  double least = before;
+  LineFit best;
+  const auto consider = [&](int row) {
+    LineFit trial = with_step(work, row, drift);
+    const double after = cost(trial, prior_variances(trial, drift));
+    if (!(after < least)) return false;
+    least = after;
+    best = std::move(trial);
+    return true;
+  };
+  for (const int row : rows) consider(row);
+  if (best.rows() == 0) return false;
+  for (const int way : {-1, 1})
+    while (best.breaks.back() + way > 1 && best.breaks.back() + way < work.rows() &&
+           consider(best.breaks.back() + way)) {
+    }
+  const double scale = standardised_scale(best);
+  const double wider = std::isfinite(scale) ? std::max(scale / work.scale, 1.0) : 1.0;
+  if (before - least < significance * wider * wider) return false;
+  work = std::move(best);
+  return true;
+}
+
+/// Adds the largest step of a line that was read once, if between two readings it changes by 30 times what neighbours
+/// differ by and the readings beside do not: no rail does that. How large it is, the other lines tell.
+bool find_tear(LineFit& work, const std::array<double, drift_terms>& drift) {
+  constexpr double limit = 30.0;
+  const auto change = [&](int i) { return std::abs(work.y[i] - work.y[i - 1]); };
+  double largest = limit * work.neighbours;
+  int row = 0;
+  for (int i = 2; i + 1 < work.rows(); ++i) {
+    const double alone = change(i) - std::max(change(i - 1), change(i + 1));
+    const bool known = std::find(work.breaks.begin(), work.breaks.end(), i) != work.breaks.end();
+    if (known || alone <= largest) continue;
+    largest = alone;
+    row = i;
+  }
+  if (row == 0) return false;
+  work = with_step(std::move(work), row, drift);
   return true;
 }
 
@@ -144,18 +263,17 @@ Eigen::VectorXd prior_variances(const LineFit& work, const std::array<double, dr
 }
 
 void fit_robustly(LineFit& work, const std::array<double, drift_terms>& drift, double floor) {
+  // The scale stands still while steps are looked for: it would grow with them, and hide them.
   work.scale = std::max(first_scale(work), floor);
   huber_weights(work);
-  for (int attempt = 0; attempt < 4; ++attempt) {
-    for (int i = 0; i < 4; ++i) {
-      fit(work, prior_variances(work, drift));
-      huber_weights(work);
-    }
+  for (int i = 0; i < 5; ++i) {
     fit(work, prior_variances(work, drift));
-    if (const double scale = standardised_scale(work); std::isfinite(scale))
-      work.scale = std::max(scale, floor);
-    if (work.degrees < 10.0 || !find_break(work)) break;
+    huber_weights(work);
   }
+  order_points(work);
+  const bool repeats = work.rows() - work.points() >= 10;
+  for (int attempt = 0; attempt < 4; ++attempt)
+    if (!(repeats ? find_break(work, drift) : find_tear(work, drift))) break;
   for (int i = 0; i < 6; ++i) {
     if (const double scale = standardised_scale(work); std::isfinite(scale))
       work.scale = std::max(scale, floor);

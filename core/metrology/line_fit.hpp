@@ -21,6 +21,8 @@ struct LineFit {
   Beam beam;
   std::vector<int> point_of;
   std::vector<int> first_row;  // of each point
+  std::vector<int> along;      // the points in their order along the beam
+  double neighbours = 0.0;     // m, scale by which the means of neighbouring points differ
   Eigen::VectorXd y;           // reading minus nominal
   Eigen::MatrixXd regressors;  // rows x (reversal, drift, steps)
   std::vector<int> breaks;

@@ -259,7 +259,8 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
   last.use(final.terms);
   last.reweigh(identifier.weights());
   const double noise = std::exp(final.hyper.at("noise"));
-  fit.model = last.model(final.posterior, noise);
+  const double unexplained = last.unexplained(final.posterior);
+  fit.model = last.model(final.posterior, noise, unexplained);
   fit.predicted = last.predicted(final.posterior);
   fit.kept = last.judged(readings.error - fit.predicted).cwiseProduct(identifier.weights());
   set_slopes(fit.model, temperature_varies);
@@ -274,6 +275,14 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
   if (!temperature_varies)
     fit.notes.push_back(text("the temperature varies by %.2f K only: its effect cannot be told",
                              identifier.shape().temperature.width()));
+  if (unexplained > 0.0)
+    fit.notes.push_back(
+        text("%.0f nm RMS of what is left goes on from one reading to the next: something that these columns "
+             "do not tell "
+             "moves the axis (sigma holds it)",
+             1e9 * unexplained) +
+        (readings.time ? "" : "; with the times `t [s]` a lag behind the thermistor could be told") +
+        (readings.heating_rate ? "" : "; with `heating_rate [K/s]` heating and cooling could be told apart"));
   if (auto branches = compare_branches(readings, readings.error - fit.predicted, fit.kept))
     fit.notes.push_back(*branches);
   return fit;

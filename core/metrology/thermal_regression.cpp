@@ -32,6 +32,8 @@ Eigen::MatrixXd covariance_factor(Eigen::Index count, double step, double length
   return k.llt().matrixL();
 }
 
+constexpr double finest = 1e-9;  // m, what no reading of a machine is better than
+
 double robust_size(const Eigen::VectorXd& values) {
   const std::vector<double> list{values.begin(), values.end()};
   return numerics::robust_deviation(list, numerics::median(list));
@@ -134,7 +136,7 @@ void ThermalRegression::search(ThermalHyper& hyper, double step) const {
 
 Eigen::VectorXd ThermalRegression::judged(const Eigen::VectorXd& residual) const {
   const double sigma = robust_size(residual);
-  return (residual.array().abs() <= 4.5 * std::max(sigma, 1e-15)).cast<double>();
+  return (residual.array().abs() <= 4.5 * std::max(sigma, finest)).cast<double>();
 }
 
 void ThermalRegression::reject_outliers() {
@@ -144,7 +146,7 @@ void ThermalRegression::reject_outliers() {
     hyper["noise"] = std::log(std::max(0.3 * robust_size(residual), 1e-12));
     const Posterior p = fit(hyper, false);
     residual = readings_.error - rows_ * p.mean;
-    const double sigma = std::max(robust_size(residual), 1e-15);
+    const double sigma = std::max(robust_size(residual), finest);
     reweigh((1.0 + (residual.array() / (2.0 * sigma)).square()).inverse());
   }
   reweigh(judged(residual));
@@ -208,7 +210,22 @@ double ThermalRegression::held_out_rms(const ThermalHyper& hyper) const {
   return std::sqrt(squares / std::max(count, 1.0));
 }
 
-ThermalError ThermalRegression::model(const Posterior& p, double noise) const {
+double ThermalRegression::unexplained(const Posterior& p) const {
+  const Eigen::VectorXd residual = readings_.error - rows_ * p.mean;
+  double together = 0.0;
+  double pairs = 0.0;
+  double squares = 0.0;
+  for (Eigen::Index i = 1; i < residual.size(); ++i) {
+    if (weights_(i) <= 0.0 || weights_(i - 1) <= 0.0) continue;
+    together += residual(i) * residual(i - 1);
+    squares += residual(i) * residual(i);
+    pairs += 1.0;
+  }
+  // Of white residuals the sum of products has the standard deviation `squares` / sqrt(pairs).
+  return together > 3.0 * squares / std::sqrt(pairs) ? std::sqrt(together / pairs) : 0.0;
+}
+
+ThermalError ThermalRegression::model(const Posterior& p, double noise, double unexplained) const {
   ThermalError result = shape_;
   result.terms = terms_;
   result.noise = noise;
@@ -230,7 +247,7 @@ ThermalError ThermalRegression::model(const Posterior& p, double noise) const {
           const Eigen::VectorXd columns = basis(state, 0.0);
           most = std::max(most, columns.dot(p.covariance * columns));
         }
-        return std::sqrt(most);
+        return std::hypot(std::sqrt(most), unexplained);
       }};
   return result;
 }

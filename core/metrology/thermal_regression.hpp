@@ -47,8 +47,11 @@ class ThermalRegression {
   /// RMS of what is left of the readings of each pass - from one turn of the axis to the next - by a fit without that pass
   /// (every fifth pass at a time). Neighbours in time share the heat's error, so leaving out single readings flatters.
   [[nodiscard]] double held_out_rms(const ThermalHyper& hyper) const;
-  /// The model with its weights and its table of standard deviations.
-  [[nodiscard]] ThermalError model(const numerics::Posterior& p, double noise) const;
+  /// What neighbours in time share of the residuals, RMS [m]: error that a hidden state (a lag, a branch, another body's
+  /// temperature) makes and noise does not. 0 where it is no more than chance (three standard errors).
+  [[nodiscard]] double unexplained(const numerics::Posterior& p) const;
+  /// The model with its weights and its table of standard deviations, `unexplained` in them.
+  [[nodiscard]] ThermalError model(const numerics::Posterior& p, double noise, double unexplained) const;
 
   [[nodiscard]] Eigen::VectorXd predicted(const numerics::Posterior& p) const { return rows_ * p.mean; }
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }

@@ -152,6 +152,9 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
     };
     split(line, cells);
     if (table.columns.empty()) {
+      if (cells.size() == 1 && line.find_first_of(";\t") != std::string_view::npos)
+        refuse(where(), "the cells are parted by semicolons or tabs",
+               "part them by commas, and write decimal points");
       std::set<std::string> names;
       for (const auto cell : cells) {
         table.columns.push_back(header(cell, where()));

@@ -34,6 +34,12 @@ testing::Left left_over(const Machine& machine, const GeometricModel* model) {
   return testing::left_over(machine, model, 7);
 }
 
+/// m, RMS over the volume.
+double left_of(const Machine& machine, const std::vector<DisplacementLine>& lines) {
+  const auto found = identify(machine, lines);
+  return left_over(machine, &found.model).rms;
+}
+
 TEST(Identification, FindsTheFieldOfAnXyTableToTheNoise) {
   std::mt19937_64 random{1};
   RecordProperty("seed", 1);
@@ -89,6 +95,58 @@ TEST(Identification, SurvivesOutliersReversalDriftAndABeamBreak) {
   EXPECT_NEAR(found.model.reversal[0], 3e-6, 4e-7);
   EXPECT_NEAR(found.lines[0].noise.drift, 2e-6, 1e-6);
   EXPECT_NEAR(found.noise, std::hypot(1e-6, 0.5e-6), 0.2e-6);
+}
+
+// A beam that is cut makes the count jump anywhere, by micrometres or most of a millimetre, whatever the passes.
+TEST(Identification, BridgesABeamBreakOfAnySizeAnywhere) {
+  const int seed = static_cast<int>(std::random_device{}() % 1000000U);
+  RecordProperty("seed", seed);
+  std::mt19937_64 random{static_cast<unsigned>(seed)};
+  std::uniform_real_distribution<double> uniform;
+  for (int trial = 0; trial < 24; ++trial) {
+    const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+    Laser laser;
+    laser.passes = 2 + trial % 4;
+    laser.reversal = 1e-6;
+    auto lines = measured(machine, recipe_lines(machine, 2), 21, random, laser);
+    const double sound = left_of(machine, lines);
+    auto& broken = lines[static_cast<std::size_t>(trial) % lines.size()].readings;
+    const double jump = 1e-5 * std::pow(90.0, uniform(random)) * (uniform(random) < 0.5 ? -1.0 : 1.0);  // m
+    const auto row =
+        static_cast<std::size_t>((0.1 + 0.8 * uniform(random)) * static_cast<double>(broken.size()));
+    for (std::size_t i = row; i < broken.size(); ++i) broken[i].displacement += jump;
+    EXPECT_LT(left_of(machine, lines), sound + 1.0e-6)
+        << "seed " << seed << ", trial " << trial << ", " << laser.passes << " passes, " << jump
+        << " m before row " << row;
+  }
+}
+
+TEST(Identification, BridgesABeamBreakOfALineReadOnce) {
+  std::mt19937_64 random{23};
+  RecordProperty("seed", 23);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  Laser laser;
+  laser.passes = 1;
+  auto lines = measured(machine, recipe_lines(machine, 2), 21, random, laser);
+  const double sound = left_of(machine, lines);
+  for (std::size_t i = 12; i < lines[3].readings.size(); ++i) lines[3].readings[i].displacement -= 7e-4;
+  const auto found = identify(machine, lines);
+  ASSERT_EQ(found.lines[3].noise.breaks, std::vector<int>{12});
+  EXPECT_LT(left_over(machine, &found.model).rms, 2.0 * sound + 1.0e-6);
+}
+
+// A laser read while the axis moves: tens of thousands of places on a line, none of them twice.
+TEST(Identification, TakesReadingsOnTheFly) {
+  std::mt19937_64 random{24};
+  RecordProperty("seed", 24);
+  const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+  Laser laser;
+  laser.passes = 2;
+  laser.outliers = 0.01;
+  const auto lines = measured(machine, recipe_lines(machine, 1), 20000, random, laser);
+  const auto found = identify(machine, lines);
+  for (const auto& line : found.lines) EXPECT_LE(line.points.size(), 401U);
+  EXPECT_LT(left_over(machine, &found.model).rms, 0.3e-6);
 }
 
 TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {

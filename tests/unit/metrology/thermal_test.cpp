@@ -14,6 +14,7 @@ namespace invar::metrology {
 namespace {
 
 using ::testing::Contains;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(Thermistor, HasTheGoldenResistances) {
@@ -131,6 +132,26 @@ TEST(ThermalIdentification, TakesHeatingRateAndHysteresisWhereTheDataShowThem) {
   }
 }
 
+// Heating and cooling differ, but no column says which it was: nothing can tell them apart, and sigma has to say so.
+TEST(ThermalIdentification, SigmaHoldsWhatTheColumnsDoNotTell) {
+  Stage stage{3};
+  stage.hysteresis = 2e-6;
+  ThermalReadings readings = record(stage, 3, {1e-4, -1e-4, 1e-4, -1e-4}, 0.3e-6);
+  readings.heating_rate.reset();
+  const ThermalFit fit = identify_thermal(readings);
+  int covered = 0;
+  int total = 0;
+  for (double x = 0.001; x < 0.2; x += 0.004)
+    for (double t = 27.1; t < 30.0; t += 0.37)
+      for (const double rate : {1e-4, -1e-4}) {
+        const double apart = fit.model.value({x, t, 0.0}) - stage.error(x, t, rate);
+        covered += std::abs(apart) <= 2.0 * fit.model.sigma({x, t, 0.0}) ? 1 : 0;
+        ++total;
+      }
+  EXPECT_GT(static_cast<double>(covered) / total, 0.88);
+  EXPECT_THAT(fit.notes, Contains(HasSubstr("heating_rate [K/s]")));
+}
+
 TEST(ThermalIdentification, HoldsTheValueOutsideAndLetsSigmaGrow) {
   const ThermalFit fit = identify_thermal(record(Stage{2}, 2, {0.0, 0.0}, 0.3e-6));
   const Range& range = fit.model.temperature;
@@ -181,6 +202,7 @@ struct HeatedLine {
   double lag = 0.0;          // s
   double rate_effect = 0.0;  // m s/(K m)
   unsigned seed = 1;
+  double noise = 2e-7;  // m; of the thermistor in proportion, 3 mK
 };
 
 ThermalReadings read_while_heated(const HeatedLine& world) {
@@ -204,7 +226,7 @@ ThermalReadings read_while_heated(const HeatedLine& world) {
     const double before = slide;
     slide += step / 15.0 * (wanted(now) - slide);  // the heater follows its trace a little late
     scale = world.lag > 0.0 ? lag_step(scale, before, slide, step, world.lag) : slide;
-    const double measured = slide + 3e-3 * normal(random);
+    const double measured = slide + 1.5e4 * world.noise * normal(random);
     if (k % 2 == 0) trace.add(now, measured);
     if (k % 20 == 0) {
       readings.history.time.push_back(now);
@@ -217,7 +239,7 @@ ThermalReadings read_while_heated(const HeatedLine& world) {
       x.push_back(position), t.push_back(measured), r.push_back(trace.rate()), at.push_back(now);
       d.push_back(place < 21 ? 1.0 : -1.0);
       e.push_back(1.4e-6 * std::sin(37.0 * position + 0.7) - (19e-6 * position + 2e-7) * warmth +
-                  world.rate_effect * position * trace.rate() + 2e-7 * normal(random));
+                  world.rate_effect * position * trace.rate() + world.noise * normal(random));
     }
     next = now + 1.7 + (++i % 42 == 0 ? 20.0 : 0.0);
   }
@@ -231,6 +253,11 @@ ThermalReadings read_while_heated(const HeatedLine& world) {
 
 const ThermalCandidate& chosen_of(const ThermalFit& fit) {
   return *std::find_if(fit.candidates.begin(), fit.candidates.end(), [](const auto& c) { return c.chosen; });
+}
+
+TEST(ThermalIdentification, KeepsReadingsWithoutNoise) {
+  const ThermalFit fit = identify_thermal(read_while_heated({.seed = 4, .noise = 0.0}));
+  EXPECT_GT(fit.kept.mean(), 0.99);
 }
 
 TEST(ThermalIdentification, ChoosesTheBodyThatLagsOrTheHeatingRateAsTheWorldHasIt) {

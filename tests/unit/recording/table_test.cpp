@@ -94,6 +94,7 @@ TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m],y [m]\n1,2\n3\n")), HasSubstr("in.csv:3: this row has 1 cells"));
   EXPECT_THAT(fault_of(make("x [m]\n1\nabc\n")), HasSubstr("in.csv:3: column `x`: `abc` is not a number"));
   EXPECT_THAT(fault_of(make("x,x\n1,2\n")), HasSubstr("stands twice"));
+  EXPECT_THAT(fault_of(make("x [m];y [m]\n1,5;2,5\n")), HasSubstr("parted by semicolons"));
   EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
   EXPECT_THAT(fault_of(make("")), HasSubstr("is empty"));
   EXPECT_THAT(fault_of(folder / "none.csv"), HasSubstr("cannot be read"));
