@@ -55,8 +55,8 @@ Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::Vecto
       for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
         if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
           term.values[i] = 0.0;
-        if (term.info->parameters[i].role == Role::phase)
-          term.values[i] = direction.quadrature ? 0.5 * std::numbers::pi : 0.0;
+        if (term.info->parameters[i].role == Role::phase && direction.quadrature)
+          term.values[i] += 0.5 * std::numbers::pi;
       }
       by = term.values[direction.amplitude];
     }
