@@ -99,7 +99,8 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
         d_.reject(std::string{s.start.term.info->name}, "would need an impossible sign", s.merit);
       continue;
     }
-    if (s.merit < -3.0 || shortlist.size() >= 9) break;
+    // What first order cannot tell apart goes on together.
+    if (s.merit < -3.0 || (shortlist.size() >= 9 && s.merit < shortlist.back()->merit - 0.5)) break;
     if (seen[label(s.start.term)]++ < 2) shortlist.push_back(&s);
   }
   progress_(share + 0.04, "fitting the short list");
