@@ -1,6 +1,7 @@
 // Which pitch or frequency would explain most of an axis's residual: the residual is carried back through the
 // closed loop to the force (or the reading) that would have caused it, and that is looked at along position and time.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -84,11 +85,8 @@ std::vector<double> carried_back(const Case& data, const Fit& fitted,
   return out;
 }
 
-/// Peaks of a power spectrum that stand out of their neighbourhood, best first; bins below `from` are left out.
-std::vector<double> peaks(const std::vector<double>& power, std::size_t from, std::size_t to,
-                          std::size_t most) {
-  std::vector<std::pair<double, double>> found;
-  to = std::min(to, power.size() - 1);
+/// The level of a power spectrum about each bin of from..to - 1, whatever peaks stand there.
+std::vector<double> levels(const std::vector<double>& power, std::size_t from, std::size_t to) {
   std::vector<double> level(power.size(), 0.0);
   for (std::size_t block = from; block < to;) {
     const std::size_t half = std::max<std::size_t>(12, block / 4);
@@ -98,6 +96,15 @@ std::vector<double> peaks(const std::vector<double>& power, std::size_t from, st
     const std::size_t until = std::min(to, block + std::max<std::size_t>(1, half / 4));
     for (; block < until; ++block) level[block] = local;
   }
+  return level;
+}
+
+/// Peaks of a power spectrum that stand out of their neighbourhood, best first; bins below `from` are left out.
+std::vector<double> peaks(const std::vector<double>& power, std::size_t from, std::size_t to,
+                          std::size_t most) {
+  std::vector<std::pair<double, double>> found;
+  to = std::min(to, power.size() - 1);
+  const auto level = levels(power, from, to);
   for (std::size_t k = std::max<std::size_t>(1, from); k + 1 < to; ++k)
     if (power[k] > power[k - 1] && power[k] >= power[k + 1] && level[k] > 0.0) {
       // The top of the parabola through three bins.
@@ -112,6 +119,73 @@ std::vector<double> peaks(const std::vector<double>& power, std::size_t from, st
     places.push_back(place);
   }
   return places;
+}
+
+/// The spectrum of a series that waves for long, its bin `place` between the whole ones.
+Complex between(const Spectrum& spectrum, double place) {
+  const auto k = static_cast<std::size_t>(place);
+  const Complex a = spectrum[k], b = spectrum[k + 1];
+  if (!(std::abs(a) > 0.0) || !(std::abs(b) > 0.0)) return a;
+  // Neighbours of a padded spectrum turn against each other: sizes and turns are interpolated apart.
+  const double share = place - std::floor(place), turn = std::arg(b / a);
+  return std::polar((1.0 - share) * std::abs(a) + share * std::abs(b), std::arg(a) + share * turn);
+}
+
+struct Square {
+  double place = 0.0, phase = 0.0, gain = 0.0;  // bin, phase where the spectrum begins [rad]
+};
+
+/// The square wave about `place` that would explain most. Its odd waves count together, each with its size and phase and by
+/// the noise where it stands: in a closed loop the higher ones may stand out more than the first. `answer`: the power of
+/// the answer to a push, bin by bin.
+Square square_at(const Spectrum& spectrum, const std::vector<double>& answer,
+                 const std::vector<double>& level, double place) {
+  constexpr int waves = 8, phases = 128;
+  const auto top = static_cast<double>(level.size() - 2);
+  double expected = 0.0;
+  std::array<Complex, waves> part{};
+  for (int wave = 0; wave < waves; ++wave) {
+    const double order = 2.0 * wave + 1.0, bin = order * place;
+    if (bin >= top) break;
+    const auto k = static_cast<std::size_t>(bin);
+    const double worth = level[k] > 0.0 ? answer[k] / level[k] : 0.0;
+    part[static_cast<std::size_t>(wave)] = between(spectrum, bin) * worth * Complex{0.0, 1.0} / order;
+    expected += answer[k] * worth / (order * order);
+  }
+  Square best{place, 0.0, 0.0};
+  for (int i = 0; i < phases && expected > 0.0; ++i) {
+    const double phase = 2.0 * std::numbers::pi * i / phases;
+    const Complex back = std::polar(1.0, -phase), twice = back * back;
+    Complex turn = back;
+    double sum = 0.0;
+    for (const auto& one : part) sum += (one * turn).real(), turn *= twice;
+    if (const double gain = sum > 0.0 ? sum * sum / expected : 0.0; gain > best.gain)
+      best.gain = gain, best.phase = phase;
+  }
+  return best;
+}
+
+/// Square waves of which a line of the spectrum may be the first, third, fifth or seventh wave, best first.
+std::vector<Square> squares(const Spectrum& spectrum, const std::vector<double>& answer,
+                            const std::vector<double>& level, const std::vector<double>& lines) {
+  std::vector<Square> found;
+  for (const double line : lines)
+    for (const double order : {1.0, 3.0, 5.0, 7.0}) {
+      if (line / order < 8.0) break;
+      Square best;
+      for (double off = -0.4; off < 0.41; off += 0.05)
+        if (const auto one = square_at(spectrum, answer, level, line / order + off); one.gain > best.gain)
+          best = one;
+      const auto same = std::find_if(found.begin(), found.end(),
+                                     [&](const Square& s) { return std::abs(s.place - best.place) < 2.0; });
+      if (same == found.end())
+        found.push_back(best);
+      else if (best.gain > same->gain)
+        *same = best;
+    }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
+  if (found.size() > 2) found.resize(2);
+  return found;
 }
 
 }  // namespace
@@ -191,11 +265,30 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     const std::size_t rows = forces[r].size(), size = power_of_two(4 * rows);
     const double period = (data.recordings[r].inputs.time.back() - data.recordings[r].inputs.time.front()) /
                           static_cast<double>(rows - 1);
-    const auto spectrum = transform(forces[r], size);
+    // Tapered: what a strong line leaks must not be the level that others, or itself, are held against.
+    auto tapered = forces[r];
+    for (std::size_t i = 0; i < rows; ++i)
+      tapered[i] *=
+          1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rows));
+    const auto spectrum = transform(std::move(tapered), size);
     std::vector<double> power(size / 2);
     for (std::size_t k = 0; k < power.size(); ++k) power[k] = std::norm(spectrum[k]);
-    for (double k : peaks(power, 8, power.size(), 3))
-      periods.force_frequency.push_back(k / (static_cast<double>(size) * period));
+    const double hertz = 1.0 / (static_cast<double>(size) * period);
+    const auto lines = peaks(power, 8, power.size(), 6);
+    for (std::size_t k = 0; k < std::min<std::size_t>(3, lines.size()); ++k)
+      periods.force_frequency.push_back(lines[k] * hertz);
+    std::vector<double> answer(power.size(), 0.0);
+    for (const auto& response : force) {
+      const auto one = transform(response, size);
+      for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += std::norm(one[k]);
+    }
+    const double begin = data.recordings[r].inputs.time.front();
+    for (const auto& square : squares(spectrum, answer, levels(power, 8, power.size() - 1), lines)) {
+      const double turns = square.place * hertz * begin;
+      periods.squares.emplace_back(
+          square.place * hertz,
+          std::remainder(square.phase - 2.0 * std::numbers::pi * turns, 2.0 * std::numbers::pi));
+    }
   }
   return periods;
 }

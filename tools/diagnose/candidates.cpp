@@ -257,10 +257,15 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
       if (info->name == "periodic_error" && shapes.empty()) continue;
       add_starts(starts, term, shapes);
       if (info->name == "additive_disturbance") {  // and as a square wave
-        const auto square = info->index_of("squareness");
+        const auto square = info->index_of("squareness"), phase = info->index_of("phase");
         term.values[square] = 1.0;
         term.given[square] = true;
-        add_starts(starts, term, shapes);
+        for (const auto& [frequency, at] : periods.squares) {
+          // Two square waves a quarter apart make none between them, as sines do: each begins with a phase.
+          add_starts(starts, term, {frequency});
+          starts.back().term.values[phase] = at;
+          starts.back().directions.resize(1);
+        }
       }
       if (info->name == "periodic_disturbance")  // from a later recording on
         for (std::size_t r = 1; r < data.recordings.size(); ++r) {

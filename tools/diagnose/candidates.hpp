@@ -44,6 +44,7 @@ void add_starts(std::vector<Start>& starts, physics::Term term, const std::vecto
 /// Pitches or frequencies at which a periodic term would explain most, best first (axis: by the adjoint of the loop).
 struct Periods {
   std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency;
+  std::vector<std::pair<double, double>> squares;  // frequency, and phase at time zero
 };
 /// Pitches of a sensor's residual along its position, best first.
 std::vector<double> sensor_pitches(const Case& data, const Fit& fitted);

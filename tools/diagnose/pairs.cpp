@@ -5,6 +5,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/diagnosis.hpp"
+#include "tools/diagnose/other_cause.hpp"
 
 namespace invar::diagnose {
 
@@ -43,33 +44,42 @@ Settled settle(const Case& data, Fit start, int rounds) {
 Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const ScreenedPair& pair) {
   physics::Model best;
   double least = 1e300;
-  for (const double share : {1.0, 0.4, 0.15}) {
-    auto tried = with(base, {&pair.first, &pair.second}, share);
-    const double square = residual(data, weighing, tried).squaredNorm();
-    if (square < least) least = square, best = std::move(tried);
-  }
+  for (const double share : {1.0, 0.4, 0.15})
+    for (const double given_way : {1.0, 0.0}) {  // the other numbers give way, as they did to first order
+      auto tried = with(base, {&pair.first, &pair.second}, share);
+      for (std::size_t k = 0; k < base.free.size() && given_way > 0.0; ++k) {
+        const auto& f = base.free[k];
+        set(tried, f, f.bounds.clamp(get(tried, f) + share * pair.shift(static_cast<Eigen::Index>(k))));
+      }
+      const double square = residual(data, weighing, tried).squaredNorm();
+      if (square < least) least = square, best = std::move(tried);
+    }
   return fit(data, weighing, best, data.model, 8, &base);
 }
 
 }  // namespace
 
 std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
-                                     const std::set<std::string, std::less<>>& without) {
+                                     const std::set<std::string, std::less<>>& without, const Fit* rival) {
   const Weighing plain = weigh(data, simulate(data, base.model), false);
   const Fit under = fit(data, plain, base.model, data.model, 4, &base);
-  const auto pairs = screen_pairs(data, plain, under, named_starts(data, plain, under, without), 10);
-  std::vector<Fit> rough;
-  for (const auto& pair : pairs) rough.push_back(begin(data, plain, under, pair));
+  // A model of the user's own equations offers many terms of one kind, and is quick to simulate.
+  const bool own = data.model.plant == physics::Plant::equations;
+  const auto pairs =
+      screen_pairs(data, plain, under, named_starts(data, plain, under, without), own ? 10 : 6);
+  std::vector<Fit> rough(pairs.size());
+  in_parallel(pairs.size(), [&](std::size_t i) { rough[i] = begin(data, plain, under, pairs[i]); });
   std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
   // What swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
-  const bool quick = data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
-  std::vector<Settled> settled;
-  for (std::size_t i = 0; i < std::min<std::size_t>(3, rough.size()); ++i)
-    settled.push_back(settle(data, std::move(rough[i]), quick ? 12 : 3));
+  const bool quick = own && data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
+  std::vector<Settled> settled(std::min<std::size_t>(3, rough.size()));
+  in_parallel(settled.size(),
+              [&](std::size_t i) { settled[i] = settle(data, std::move(rough[i]), quick ? 12 : 3); });
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   const std::size_t given = data.model.terms.size();
   for (auto& best : settled) {
     const std::size_t first = best.fit.model.terms.size() - 2;
+    if (rival != nullptr && lead(data, best.fit, *rival) < claim_margin) continue;
     if (first < given || !stands(data, best.fit, first) || !stands(data, best.fit, first + 1)) continue;
     // Neither alone: an engineer must see what the other adds.
     bool needed = true;
@@ -85,8 +95,8 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
     claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
     if (least_ratio(data, best.fit, claim.fit) < 0.9)
       claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 0, &best.fit);
-    const auto rival = fit(data, claim.weighing, base.model, data.model, 6, &base);
-    if (claim.fit.evidence - rival.evidence < 2.0 * claim_margin_of(claim.weighing)) continue;
+    const auto neither = fit(data, claim.weighing, base.model, data.model, 6, &base);
+    if (claim.fit.evidence - neither.evidence < 2.0 * claim_margin_of(claim.weighing)) continue;
     claim.rivals.resize(2);
     for (const auto& other : settled) {
       if (&other == &best) continue;

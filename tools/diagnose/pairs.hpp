@@ -18,8 +18,9 @@ struct JointClaim {
 };
 
 /// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size of
-/// what is left both say so.
+/// what is left both say so. `rival`: what one by one came to, which a pair must clearly better.
 std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
-                                     const std::set<std::string, std::less<>>& without);
+                                     const std::set<std::string, std::less<>>& without,
+                                     const Fit* rival = nullptr);
 
 }  // namespace invar::diagnose

@@ -55,8 +55,8 @@ Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::Vecto
       for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
         if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
           term.values[i] = 0.0;
-        if (term.info->parameters[i].role == Role::phase)
-          term.values[i] = direction.quadrature ? 0.5 * std::numbers::pi : 0.0;
+        if (term.info->parameters[i].role == Role::phase && direction.quadrature)
+          term.values[i] += 0.5 * std::numbers::pi;
       }
       by = term.values[direction.amplitude];
     }
@@ -149,7 +149,9 @@ double price(const Start& start, double observations) {
 
 std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighing, const Fit& base,
                                        const std::vector<Start>& starts, std::size_t most) {
-  // Of each term the two starts that gain most alone. What repeats shows alone, at its own place in the spectrum.
+  // Of each term the two starts that gain most alone. In the user's equations, which have many places, what repeats is left
+  // to the search one by one: it shows alone, at its own place in the spectrum.
+  const bool may_repeat = data.model.plant != physics::Plant::equations;
   const auto single = screen(data, weighing, base, starts, 0);
   std::vector<Start> chosen;
   for (const auto& s : single) {
@@ -157,7 +159,7 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
       const auto &a = start.term, &b = s.start.term;
       return a.info == b.info && a.on == b.on && a.with == b.with;
     });
-    if (same < 2 && s.start.directions.size() == 1) chosen.push_back(s.start);
+    if (same < 2 && (may_repeat || s.start.directions.size() == 1)) chosen.push_back(s.start);
   }
   const auto n = nuisance(data, weighing, base);
   const Eigen::VectorXd at = differences(data, simulate(data, base.model));
@@ -198,9 +200,24 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
       pair.first.start = chosen[i], pair.second.start = chosen[k];
       pair.first.strength = strength.head(second),
       pair.second.strength = strength.tail(strength.size() - second);
+      pair.shift = -n.hessian.solve(b(Eigen::all, places) * strength);
       pairs.push_back(std::move(pair));
     }
   std::sort(pairs.begin(), pairs.end(), [](const auto& x, const auto& y) { return x.merit > y.merit; });
+  if (may_repeat) {  // of two names their best beginning: where few places are, others should have their turn
+    const auto same = [](const Start& x, const Start& y) {
+      return x.term.info == y.term.info && x.term.on == y.term.on && x.term.with == y.term.with;
+    };
+    std::vector<ScreenedPair> best;
+    for (auto& pair : pairs)
+      if (best.size() < most && std::none_of(best.begin(), best.end(), [&](const ScreenedPair& other) {
+            return (same(pair.first.start, other.first.start) &&
+                    same(pair.second.start, other.second.start)) ||
+                   (same(pair.first.start, other.second.start) && same(pair.second.start, other.first.start));
+          }))
+        best.push_back(std::move(pair));
+    return best;
+  }
   if (pairs.size() > most) pairs.resize(most);
   return pairs;
 }

@@ -20,6 +20,7 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
 
 struct ScreenedPair {
   Screened first, second;  // with the strengths that they have together
+  Eigen::VectorXd shift;   // of the base's own numbers, in the order of its freedoms
   double merit = 0.0;
 };
 

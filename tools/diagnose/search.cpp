@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
@@ -34,8 +35,14 @@ class Search {
   /// Candidates fitted on top of `base`, best first.
   std::vector<Fit> shortlisted(const Weighing& weighing, const Fit& base, double share);
   bool add_named(double round);
-  /// Two terms at once, where neither does anything alone; where a simulation is cheap enough to try many.
-  bool add_pair();
+  /// Two terms at once, where neither does anything alone. `rival`: what the search one by one came to.
+  bool add_pair(const Fit* rival = nullptr);
+  /// Names one by one, weighed against each other, on top of what is claimed.
+  void name(int first_round);
+  /// What has no name, what holds on held-out stretches, and the verdict.
+  void finish();
+  /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
+  void try_pairs(const Diagnosis& begun);
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
@@ -99,7 +106,8 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
         d_.reject(std::string{s.start.term.info->name}, "would need an impossible sign", s.merit);
       continue;
     }
-    if (s.merit < -3.0 || shortlist.size() >= 9) break;
+    // What first order cannot tell apart goes on together.
+    if (s.merit < -3.0 || (shortlist.size() >= 9 && s.merit < shortlist.back()->merit - 0.5)) break;
     if (seen[label(s.start.term)]++ < 2) shortlist.push_back(&s);
   }
   progress_(share + 0.04, "fitting the short list");
@@ -303,10 +311,9 @@ void Search::doubt() {
   }
 }
 
-bool Search::add_pair() {
-  if (data_.model.plant != physics::Plant::equations) return false;
-  progress_(0.05, "screening pairs");
-  auto claim = claim_pair(data_, d_.best, options_.without);
+bool Search::add_pair(const Fit* rival) {
+  progress_(rival == nullptr ? 0.05 : 0.9, "screening pairs");
+  auto claim = claim_pair(data_, d_.best, options_.without, rival);
   if (!claim) return false;
   d_.best = std::move(claim->fit);
   d_.weighing = std::move(claim->weighing);
@@ -315,17 +322,17 @@ bool Search::add_pair() {
   return true;
 }
 
-Diagnosis Search::run() {
-  prepare();
-  data_.stopped = options_.stopped;
-  const bool paired = take([&] { return add_pair(); });
-  for (int round = paired ? 2 : 0; round < 3; ++round)
+void Search::name(int first_round) {
+  for (int round = first_round; round < 3; ++round)
     if (!take([&] { return add_named(round); })) break;
   if (options_.refuses) take([&] { return prune(), true; });
   if (!take([&] { return weigh_alternatives(), true; })) {
     data_.stopped = {};
     weigh_alternatives();  // the terms as they stand
   }
+}
+
+void Search::finish() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   if (options_.refuses) take([&] { return doubt(), true; });
   progress_(0.78, "looking for physics without a name");
@@ -349,6 +356,45 @@ Diagnosis Search::run() {
   }
   smallest_effects(last_screen_, d_);
   conclude(data_, d_);
+}
+
+void Search::try_pairs(const Diagnosis& begun) {
+  const bool has_rest = d_.verdict == Verdict::unknown_physics || d_.verdict == Verdict::partly_explained ||
+                        (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
+  if (!has_rest || !options_.refuses || stopped()) return;
+  auto single = std::exchange(d_, begun);
+  const auto screened = std::exchange(last_screen_, {});
+  rivals_.clear();
+  beside_.reset();
+  data_.stopped = options_.stopped;
+  if (take([&] { return add_pair(&single.best); })) {
+    name(2);
+    finish();
+  }
+  data_.stopped = {};
+  if (d_.findings.size() < 2 || d_.is_unnamed || lead(data_, d_.best, single.best) < claim_margin) {
+    single.is_partial = single.is_partial || stopped();
+    d_ = std::move(single);
+    return;
+  }
+  for (const auto& r : single.rejected) d_.reject(r.term, r.why, r.gain);
+  std::erase_if(d_.rejected, [&](const Rejection& r) {
+    return std::any_of(d_.findings.begin(), d_.findings.end(),
+                       [&](const Finding& f) { return f.term.info->name == r.term; });
+  });
+  d_.detectable.clear();
+  smallest_effects(screened, d_);
+}
+
+Diagnosis Search::run() {
+  prepare();
+  data_.stopped = options_.stopped;
+  const Diagnosis begun = d_;
+  const bool in_equations = data_.model.plant == physics::Plant::equations;
+  const bool paired = in_equations && take([&] { return add_pair(); });
+  name(paired ? 2 : 0);
+  finish();
+  if (!in_equations) try_pairs(begun);
   progress_(1.0, "done");
   return d_;
 }
