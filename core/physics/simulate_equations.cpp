@@ -338,15 +338,25 @@ class Machine {
   double shortest_lag_ = 0.0;
 };
 
-/// Of each value a share arrives by way of a first-order store, in balance at the start.
-void follow(const std::vector<double>& time, std::vector<double>& values, double time_constant,
-            double share) {
+/// Of each value a share arrives by way of a first-order store, in balance at the start. What is held from row to row
+/// counts with the mean over its row's step, as a machine feels it; what is smooth goes straight from row to row.
+void follow(const std::vector<double>& time, std::vector<double>& values, double time_constant, double share,
+            bool held) {
   double z = values.front(), last = values.front();
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const double now = values[i], h = time[i] - time[i - 1];
-    z = last + (z - last) * std::exp(-h / time_constant);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double now = values[i];
+    const std::size_t end = held ? std::min(i + 1, values.size() - 1) : i;
+    const double h = end > 0 ? time[end] - time[end - 1] : 0.0, kept = std::exp(-h / time_constant);
+    double felt = z;
+    if (held) {
+      felt = h > 0.0 ? now + (z - now) * (1.0 - kept) * time_constant / h : z;
+      z = now + (z - now) * kept;
+    } else if (h > 0.0) {
+      const double behind = (now - last) / h * time_constant;
+      felt = z = now - behind + (z - last + behind) * kept;
+    }
     last = now;
-    values[i] = now + share * (z - now);
+    values[i] = now + share * (felt - now);
   }
 }
 
@@ -370,7 +380,7 @@ void run_over(const Model& model, const std::vector<std::string>& names,
 
 /// What terms at inputs and outputs do to a whole column.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
-          std::vector<double>& values) {
+          std::vector<double>& values, bool held) {
   for (const auto& term : model.terms) {
     if (term.on != on) continue;
     const double p = term.values[0];
@@ -385,10 +395,10 @@ void bend(const Model& model, const std::string& on, const std::vector<double>& 
         for (double& v : values) v -= std::clamp(v, -p, p);
         break;
       case EquationsMemory::lag:
-        if (p > 0.0) follow(time, values, p, 1.0);
+        if (p > 0.0) follow(time, values, p, 1.0, held);
         break;
       case EquationsMemory::hidden_state:
-        follow(time, values, term.values[1], p);
+        follow(time, values, term.values[1], p, held);
         break;
       case EquationsMemory::delay: {
         if (!(p > 0.0)) break;
@@ -435,7 +445,8 @@ class OwnEquations final : public Simulation {
     std::vector<std::string> input_names, output_names;
     for (const auto& input : equations.inputs) input_names.push_back(input.symbol);
     for (const auto& output : equations.outputs) output_names.push_back(output.name);
-    for (std::size_t i = 0; i < inputs.size(); ++i) bend(model, input_names[i], time_, inputs[i]);
+    for (std::size_t i = 0; i < inputs.size(); ++i)
+      bend(model, input_names[i], time_, inputs[i], !equations.inputs[i].linear);
     run_over(model, input_names, inputs);
     outputs.resize(equations.outputs.size());
     for (auto& output : outputs) output.assign(n, 0.0);
@@ -480,7 +491,7 @@ class OwnEquations final : public Simulation {
     run_over(model, output_names, outputs);
     for (std::size_t o = 0; o < outputs.size(); ++o) {
       const auto& output = equations.outputs[o];
-      bend(model, output.name, time_, outputs[o]);
+      bend(model, output.name, time_, outputs[o], false);
       for (double& value : outputs[o]) value = output.limits.clamp(value);
     }
     const std::scoped_lock lock{mutex_};

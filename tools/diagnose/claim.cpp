@@ -214,6 +214,84 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
   return least < 1e-5;
 }
 
+/// The step between readings that stand on a lattice: what divides all their distances (Euclid). 0: nothing does.
+double step_of(std::vector<double> values) {
+  std::erase_if(values, [](double v) { return !std::isfinite(v); });
+  if (values.size() < 2) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double fine = 1e-8 * (values.back() - values.front());
+  double step = 0.0;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    double rest = values[i] - values[i - 1];
+    if (step == 0.0 && rest > fine) step = rest;
+    while (rest > fine && std::abs(std::remainder(rest, step)) > 0.01 * step) {
+      const double smaller = std::abs(std::remainder(rest, step));
+      rest = step, step = smaller;
+    }
+    if (step > 0.0 && step < fine) return 0.0;
+  }
+  return step;
+}
+
+/// Would readings rounded to their own steps show the wave without it? Steps beat against the distance between rows and
+/// against the steps of the instrument itself.
+bool is_rounding(const Case& data, const physics::Model& model, std::size_t term) {
+  if (angles_of(data, model, model.terms[term], 0).empty()) return false;
+  auto free = model;
+  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  const auto with = simulate(data, model), without = simulate(data, free);
+  const auto to_steps = [](double value, double step) {
+    return step > 0.0 ? step * std::round(value / step) : value;
+  };
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    const double known = data.outputs[o] == "encoder" ? data.resolution : 0.0;
+    std::complex<double> seen, rounded;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& y = data.recordings[r].measured[o];
+      const double step = step_of(y);
+      if (!(step > 0.0)) continue;
+      const std::size_t n = y.size();
+      std::vector<double> noise(n);
+      double square = 0.0;
+      for (std::size_t i = 0; i < n; ++i) {
+        noise[i] = std::isfinite(y[i]) ? y[i] - with[r][o][i] : 0.0;
+        square += noise[i] * noise[i] / static_cast<double>(n);
+      }
+      // What is left holds the rounding already; that much of it is taken away.
+      const double fine = (step * step + known * known) / 12.0;
+      const double share = std::sqrt(std::max(0.0, 1.0 - fine / std::max(square, 1e-300)));
+      const auto angles = angles_of(data, model, model.terms[term], r);
+      for (std::size_t i = 0; i < n; ++i) {
+        if (!std::isfinite(y[i])) continue;
+        const auto turn = std::polar(1.0, -angles[i]);
+        seen += (y[i] - without[r][o][i]) * turn;
+        constexpr std::size_t shifts = 5;  // of the noise against the motion
+        for (std::size_t k = 1; k <= shifts; ++k) {
+          const double level =
+              to_steps(without[r][o][i] + share * noise[(i + k * n / (shifts + 1)) % n], known);
+          rounded += (to_steps(level, step) - level) * turn / static_cast<double>(shifts);
+        }
+      }
+    }
+    if (std::abs(rounded) > 0.4 * std::abs(seen)) return true;
+  }
+  return false;
+}
+
+/// A store through which the whole of a signal goes is a lag: what makes it a store, the part that passes it by, is zero.
+bool is_lag(const Fit& fit, std::size_t term) {
+  const auto& store = fit.model.terms[term];
+  const auto& states = fit.model.equations.states;
+  if (store.info->plant != physics::Plant::equations || store.info->name != "hidden_state" ||
+      std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == store.on; }))
+    return false;
+  double sigma = 0.0;
+  for (std::size_t k = 0; k < fit.free.size(); ++k)
+    if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 0)
+      sigma = fit.sigma(static_cast<Eigen::Index>(k));
+  return store.values[0] > 1.0 - std::max(0.05, 3.0 * sigma);
+}
+
 }  // namespace
 
 bool is_affordable(const Case& data, const Fit& fit) {
@@ -243,8 +321,9 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
        is_known_better(data, fit, term) || !acts(data, fit.model, fit.model.terms[term])))
     return false;
   if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term) ||
-      is_its_own(data, fit.model, term))
+      is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term))
     return false;
+  if (is_lag(fit, term)) return false;
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
 

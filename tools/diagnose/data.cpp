@@ -183,7 +183,7 @@ Case empty_case(const physics::Model& model) {
   // Rounding to the resolution is noise to a fit, not a step.
   for (auto& parameter : data.model.parameters)
     if (model.plant == physics::Plant::sensor && parameter.name == "resolution")
-      parameter.value = 0.0, parameter.sigma = 0.0;
+      data.resolution = parameter.value, parameter.value = 0.0, parameter.sigma = 0.0;
   return data;
 }
 

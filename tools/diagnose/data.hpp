@@ -37,6 +37,7 @@ struct Case {
   std::vector<Recording> recordings;
   std::vector<std::string> outputs;  // signals
   std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
+  double resolution = 0.0;  // of an encoder, SI, as the user believes; the model itself does not round
   DataCount count;
   bool is_time_series = true;     // rows follow one another; false for droplets
   std::function<bool()> stopped;  // asked before each simulation; empty: never

@@ -26,7 +26,8 @@ bool are_kin(const physics::Term& one, const physics::Term& other) {
          });
 }
 
-/// The same with fewer knots: a course that bends a little costs little.
+}  // namespace
+
 Start coarser(Start start, std::size_t knots) {
   auto& curve = start.term.curve;
   const double low = curve.knots.front(), high = curve.knots.back();
@@ -39,8 +40,6 @@ Start coarser(Start start, std::size_t knots) {
   }
   return start;
 }
-
-}  // namespace
 
 bool is_course_of(const physics::Term& curve, const physics::Term& term) {
   const auto& info = *term.info;

@@ -7,6 +7,9 @@
 
 namespace invar::diagnose {
 
+/// The same curve with fewer knots: a course that bends a little costs little.
+Start coarser(Start start, std::size_t knots);
+
 /// May this curve stand for another course of the term's own effect?
 bool is_course_of(const physics::Term& curve, const physics::Term& term);
 

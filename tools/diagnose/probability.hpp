@@ -6,6 +6,9 @@
 
 namespace invar::diagnose {
 
+/// With more than these a name is not stated: it is right in three cases of ten at most.
+inline constexpr double unlikely_odds = 7.0 / 3.0;
+
 /// Odds of "some other cause" against a claimed name: they fall with the log evidence by which the name wins (a small
 /// effect looks like many things; the evidence is counted in independent rows) and rise with the share of the mismatch
 /// that the name leaves and that still follows the recording. The three numbers were fitted to claims on made machines,

@@ -12,8 +12,10 @@
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
+#include "tools/diagnose/shape.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/verdict.hpp"
+#include "tools/diagnose/wander.hpp"
 
 namespace invar::diagnose {
 
@@ -172,7 +174,8 @@ bool Search::add_named(double round) {
       if (least_ratio(data_, settled, with_term) < 0.9)
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
-      const double gain = advantage(data_, own, with_term, without);
+      const double gain = std::min(advantage(data_, own, with_term, without),
+                                   advantage_over_wander(data_, own, with_term, without));
       // A further claim must be one that an engineer would see in the residual.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
       if ((!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)) &&
@@ -278,6 +281,7 @@ void Search::weigh_alternatives() {
           d_.best = std::move(f);
           continue;
         }
+        if (options_.refuses && !stands(data_, f, place)) continue;
         kept.push_back(f.model.terms[place]);
         finding.alternatives.push_back({f.model.terms[place], odds});
       }
@@ -296,7 +300,11 @@ void Search::doubt() {
   for (std::size_t i = d_.findings.size(); i-- > 0;) {
     if (!beside_) beside_ = courses_beside(data_, d_.best);
     const auto other = other_cause(data_, *beside_, given() + i);
-    if (!other) continue;
+    if (!other) {
+      const auto shape = other_shape(data_, *beside_, given() + i);
+      d_.findings[i].other_shape = shape.share, d_.findings[i].shape_lead = shape.lead;
+      continue;
+    }
     beside_.reset();
     d_.reject(
         std::string{d_.best.model.terms[given() + i].info->name},
@@ -395,6 +403,19 @@ Diagnosis Search::run() {
   name(paired ? 2 : 0);
   finish();
   if (!in_equations) try_pairs(begun);
+  if (options_.refuses && !d_.is_partial) {
+    const auto stated = d_;
+    if (set_aside(data_, d_)) {
+      d_.heldout.clear();
+      d_.train.clear();
+      d_.parameter_excursion = 0.0;
+      hold_out(data_, d_);
+      if (d_.findings.empty())
+        d_ = stated;  // the curve does not hold
+      else
+        conclude(data_, d_);
+    }
+  }
   progress_(1.0, "done");
   return d_;
 }

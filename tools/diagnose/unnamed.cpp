@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/probability.hpp"
 #include "tools/diagnose/screen.hpp"
+#include "tools/diagnose/wander.hpp"
 
 namespace invar::diagnose {
 
@@ -52,44 +55,46 @@ void sharpen(const Case& data, Curved& found) {
   weighing = own;
 }
 
+/// The curve that explains most beside `base`, of what was looked at.
+Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
+  Curved best;
+  const auto& [plain, under_plain, screened] = looked;
+  int tried = 0;
+  for (const auto& s : screened) {
+    if (tried++ >= 3 || s.merit < claim_margin) break;
+    const Fit near = with_columns(data, under_plain, s);
+    if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) continue;
+    auto rough = fit(data, plain, near.model, data.model, 2, &near);
+    const Weighing own = weigh(data, simulate(data, rough.model));
+    auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+    // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
+    if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
+    const auto without = fit(data, own, base.model, data.model, 4, &base);
+    const double gain =
+        std::min(curved.evidence - without.evidence, advantage_over_wander(data, own, curved, without));
+    // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
+    // independent rows.
+    if ((s.start.term.curve.over == "time" || s.start.term.curve.over == "t") &&
+        least_ratio(data, rough, under_plain) > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)
+      continue;
+    // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
+    if (gain > claim_margin && rough.evidence > best.plain)
+      best = {std::move(curved), own, gain, rough.evidence};
+  }
+  if (best.gain > claim_margin) sharpen(data, best);
+  return best;
+}
+
 }  // namespace
 
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
   if (beside_best.courses.empty()) return;
-  const auto best_curve = [&](const Fit& base, const Beside& looked) {
-    Curved best;
-    const auto& [plain, under_plain, screened] = looked;
-    int tried = 0;
-    for (const auto& s : screened) {
-      if (tried++ >= 3 || s.merit < claim_margin) break;
-      const Fit near = with_columns(data, under_plain, s);
-      if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) continue;
-      auto rough = fit(data, plain, near.model, data.model, 2, &near);
-      const Weighing own = weigh(data, simulate(data, rough.model));
-      auto curved = fit(data, own, rough.model, data.model, 3, &rough);
-      // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
-      if (least_ratio(data, rough, curved) < 0.97)
-        curved = fit(data, own, rough.model, data.model, 0, &rough);
-      const auto without = fit(data, own, base.model, data.model, 4, &base);
-      const double gain = curved.evidence - without.evidence;
-      // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
-      // independent rows.
-      if ((s.start.term.curve.over == "time" || s.start.term.curve.over == "t") &&
-          least_ratio(data, rough, under_plain) > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)
-        continue;
-      // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
-      if (gain > claim_margin && rough.evidence > best.plain)
-        best = {std::move(curved), own, gain, rough.evidence};
-    }
-    if (best.gain > claim_margin) sharpen(data, best);
-    return best;
-  };
   const bool named = d.best.model.terms.size() > given;
   const double margin = 2.0 * claim_margin_of(d.weighing);
-  auto beside = best_curve(d.best, beside_best);
+  auto beside = best_curve(data, d.best, beside_best);
   if (named) {
-    auto instead = best_curve(d.retuned, courses_beside(data, d.retuned, &d.best));
+    auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
     if (instead.gain > margin) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
       if (instead.fit.evidence > named_there.evidence + margin &&
@@ -116,6 +121,51 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   finding.term = d.best.model.terms.back();
   d.findings.push_back(finding);
   d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+}
+
+bool set_aside(const Case& data, Diagnosis& d) {
+  const std::size_t given = data.model.terms.size();
+  auto model = d.best.model;
+  std::vector<Finding> kept;
+  std::optional<Finding> nearest;  // of the names that go
+  for (std::size_t i = d.findings.size(); i-- > 0;) {
+    const auto& finding = d.findings[i];
+    const bool is_curve = !finding.term.curve.knots.empty();
+    if (!is_curve && !(finding.other_cause > unlikely_odds)) {
+      kept.insert(kept.begin(), finding);
+      continue;
+    }
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given + i));
+    if (!is_curve && (!nearest || finding.gain > nearest->gain)) nearest = finding;
+  }
+  if (!nearest) return false;
+  const auto plain = weigh(data, simulate(data, d.best.model), false);
+  const Fit base = fit(data, plain, model, data.model, 6);
+  const auto left = [&](const Fit& fit) { return residual(data, plain, fit.model).squaredNorm(); };
+  const double without = left(base), worked = without - left(d.best);
+  // The curves must do the work of the name: drops move in two directions, and heat in several nodes.
+  Curved found;
+  found.fit = base;
+  std::size_t curves = 0;
+  while (curves < 3 && without - left(found.fit) < 0.8 * worked) {
+    auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
+    if (next.gain < 2.0 * claim_margin_of(d.weighing)) break;
+    found = std::move(next);
+    ++curves;
+  }
+  if (curves == 0 || without - left(found.fit) < 0.6 * worked) return false;
+  d.best = std::move(found.fit);
+  d.weighing = std::move(found.weighing);
+  (kept.empty() ? d.is_unnamed : d.has_rest) = true;
+  d.findings = std::move(kept);
+  for (std::size_t k = curves; k > 0; --k) {
+    Finding finding;
+    finding.term = d.best.model.terms[d.best.model.terms.size() - k];
+    finding.alternatives.push_back({nearest->term, -2.0 * std::log(nearest->other_cause)});
+    d.findings.push_back(finding);
+  }
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  return true;
 }
 
 }  // namespace invar::diagnose

@@ -1,0 +1,20 @@
+// Has what a name explains the name's own shape? A relative of the right law fits well and leaves a course over the same
+// variable, or the trace of a second time constant.
+#pragma once
+
+#include "tools/diagnose/other_cause.hpp"
+
+namespace invar::diagnose {
+
+struct OtherShape {
+  double lead =
+      0.0;  // log likelihood in independent rows that a freer shape has over the name's, its price paid
+  double share =
+      0.0;  // of what the freer shape explains, how much the name leaves; 0 where the lead is chance
+};
+
+/// Freer shapes of named term `term` of `named.fit`: a course over its own variable beside it, and, of what comes late, a
+/// second time constant. To first order, the other numbers free.
+OtherShape other_shape(const Case& data, const Beside& named, std::size_t term);
+
+}  // namespace invar::diagnose

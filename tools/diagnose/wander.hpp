@@ -1,0 +1,23 @@
+// Noise that wanders: what a smooth term explains, a slow walk of the noise may be too.
+#pragma once
+
+#include "tools/diagnose/fit.hpp"
+
+namespace invar::diagnose {
+
+/// White noise of variance 1 and a slow wander beside it, a first-order memory.
+struct Wander {
+  double rows = 1.0;    // that the memory lasts
+  double driven = 0.0;  // variance that enters it in a row; 0: there is none
+};
+
+/// The wander, no louder than the white part, that makes these numbers likeliest. NaN: nothing was measured.
+Wander wander_of(const std::vector<std::vector<double>>& series);
+/// Log likelihood of the numbers as such noise, of whatever scale; comparable between series over the same rows.
+double likelihood(const std::vector<std::vector<double>>& series, const Wander& wander);
+
+/// The evidence of `one` over `other`, both under `weighing`, were the noise to wander as it still does in what `one` leaves,
+/// and for as much longer as `one` would hide.
+double advantage_over_wander(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
+
+}  // namespace invar::diagnose
