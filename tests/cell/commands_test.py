@@ -602,6 +602,43 @@ class Planning(unittest.TestCase):
             self.assertIn(words, page)
         self.assertNotRegex(page, r'(src|href)="http')
 
+    def test_a_plan_is_a_job_that_a_cell_takes(self):
+        (FOLDER / "table.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+        status, out, err = invar("calibrate", "plan", "--machine", "table.yaml", "--accuracy", "1.5e-6",
+                                 "--output", "plan.yaml")
+        self.assertEqual((status, err), (0, ""), out)
+        job = "".join("          " + line for line in (FOLDER / "plan.yaml").read_text().splitlines(True))
+        self.assertIn(f"measure {job.count('from: [')} lines", out)
+        at = f"{SOURCE}/deployment/"
+        cell = (SOURCE / "deployment/xy-table.yaml").read_text()
+        for name in ("profiles.yaml", "machines/", "maps/"):
+            cell = cell.replace(" " + name, " " + at + name)
+        before, rest = cell.split("          - name: calibrate-geometry\n")
+        after = rest[rest.index("  recorder:\n"):]
+        (FOLDER / "planned.yaml").write_text(before + job + after)
+        status, out, err = invar("check", "planned.yaml")
+        self.assertEqual((status, err), (0, ""), out)
+
+    def test_the_very_readings_of_a_line_count_once(self):
+        rows = ["line,x [mm],y [mm],displacement [mm]"]
+        for name in ("X", "Y", "X again"):
+            for i in list(range(7)) + list(range(6, -1, -1)):
+                place = (0, 10 * i) if name == "Y" else (10 * i, 0)
+                rows.append(f"{name},{place[0]},{place[1]},{10 * i + 1e-4 * i * i + 1e-5 * (len(rows) % 14 % 3)}")
+        (FOLDER / "twice.csv").write_text("\n".join(rows) + "\n")
+        status, out, err = invar("calibrate", "geometric", "--machine", "machine.yaml", "--lines", "twice.csv",
+                                 "--out", "once")
+        self.assertEqual((status, err), (0, ""), out)
+        self.assertIn("2 lines, ", out)
+        self.assertIn("left out: line X again, the very readings of another line", out)
+
+    def test_a_sensor_that_is_no_thermistor_is_refused(self):
+        (FOLDER / "pt100.csv").write_text("temperature [degC],resistance [ohm]\n20,107.7\n30,111.6\n40,115.4\n")
+        status, _, err = invar("calibrate", "thermistor", "--readings", "pt100.csv", "--out", "pt100")
+        self.assertEqual(status, 2)
+        self.assertIn("does not fall as the temperature rises", err)
+        self.assertFalse((FOLDER / "pt100").exists())
+
     def test_what_is_out_of_reach_is_said_and_nothing_is_written(self):
         status, out, _ = invar("calibrate", "plan", "--machine", "machine.yaml", "--accuracy", "1e-9",
                                "--output", "none.csv", "--report", "none.html")

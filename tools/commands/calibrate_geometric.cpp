@@ -66,9 +66,21 @@ void add_calibrate_geometric(CLI::App& group) {
       group.add_subcommand("geometric", "Identify the geometric errors of a machine from displacement lines");
   command->footer(
       "Example: invar calibrate geometric --machine machine.yaml --lines lines.csv --out result\n"
-      "Lines: name, commanded position and the laser's displacement, in the order of measurement; `invar "
-      "calibrate\n"
-      "plan` proposes which to measure.");
+      "Lines, one row a reading, in the order of measurement: line (its name), x [m], y [m], z [m] "
+      "(commanded), "
+      "displacement\n"
+      "[m] (the whole way along the beam, 0 at the line's start, not its error); optional cycle, direction "
+      "(1 or "
+      "-1),\n"
+      "temperature [degC], tool_x [m] ... [mm], [um], ... are converted. `invar calibrate plan` proposes "
+      "which to "
+      "measure.\n"
+      "machine.yaml, the chain in the order of motion from the workpiece:\n"
+      "  invar_machine: 1\n"
+      "  chain: [y, x, z]\n"
+      "  travel: {x: [0, 0.2], y: [0, 0.2], z: [-0.1, 0]}   # m; two axes for an XY table\n"
+      "  tool: {x: 0, y: 0, z: -0.05}                       # m, from the last axis to the reflector; "
+      "optional");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--lines", options->lines, "readings of displacement lines, .csv or .csv.gz")

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "core/base/fault.hpp"
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/line_search.hpp"
 #include "core/recording/table.hpp"
@@ -41,7 +44,10 @@ struct Options {
 
 std::string um(double value) { return report::number(1e6 * value, 3) + " um"; }
 
-void write_lines(const PlanChoice& choice, const std::filesystem::path& file) {
+/// To the nanometre, so that 0.1 + 0.2 is written as 0.3.
+double rounded(double value) { return std::round(1e9 * value) / 1e9; }
+
+void write_table(const PlanChoice& choice, const std::filesystem::path& file) {
   recording::Table table;
   std::vector<std::string> names;
   std::array<std::vector<double>, 9> columns;
@@ -50,9 +56,9 @@ void write_lines(const PlanChoice& choice, const std::filesystem::path& file) {
   for (const PlannedLine& line : choice.lines) {
     names.push_back(line.name);
     for (int k = 0; k < 3; ++k) {
-      columns[static_cast<std::size_t>(k)].push_back(line.from[k]);
-      columns[static_cast<std::size_t>(k) + 3].push_back(line.to[k]);
-      columns[static_cast<std::size_t>(k) + 6].push_back(line.tool[k]);
+      columns[static_cast<std::size_t>(k)].push_back(rounded(line.from[k]));
+      columns[static_cast<std::size_t>(k) + 3].push_back(rounded(line.to[k]));
+      columns[static_cast<std::size_t>(k) + 6].push_back(rounded(line.tool[k]));
     }
     const int points = metrology::points_of(line, choice.effort.interval);
     interval.push_back((line.to - line.from).norm() / (points - 1));
@@ -65,6 +71,29 @@ void write_lines(const PlanChoice& choice, const std::filesystem::path& file) {
   table.add("interval", "m", interval);
   table.add("passes", "", passes);
   table.write(file);
+}
+
+/// What the component `calibration` of a cell takes as one of its `jobs`; a cycle is a pass forth and back.
+void write_job(const PlanChoice& choice, const metrology::Machine& machine, const Options& options) {
+  const auto place = [&](const Eigen::Vector3d& at) {
+    std::string text;
+    for (int k = 0; k < 3; ++k)
+      if (machine.chain.has(k)) text += (text.empty() ? "[" : ", ") + report::number(rounded(at[k]), 9);
+    return text + "]";
+  };
+  std::string text =
+      "# One of the `jobs` of the component `calibration`; add `verify`: lines that are not fitted.\n";
+  text += "- name: calibrate-geometry\n  machine: " + options.machine.string() +
+          "\n  interval: " + report::number(choice.effort.interval, 6) +
+          "\n  cycles: " + std::to_string(choice.effort.passes / 2) + "\n  lines:\n";
+  for (const PlannedLine& line : choice.lines)
+    text +=
+        "    - {name: \"" + line.name + "\", from: " + place(line.from) + ", to: " + place(line.to) + "}\n";
+  std::ofstream file{options.output};
+  file << text;
+  if (!file.flush())
+    throw InputError{options.output.string(), "cannot be written",
+                     "check the folder, its permissions and the space left"};
 }
 
 /// Machine, and what is known or assumed of it.
@@ -175,7 +204,10 @@ void propose(const Options& options) {
     throw CLI::RuntimeError(1);
   }
   print_best(*plan.best);
-  if (!options.output.empty()) write_lines(*plan.best, options.output);
+  if (options.output.extension() == ".yaml")
+    write_job(*plan.best, plan.machine, options);
+  else if (!options.output.empty())
+    write_table(*plan.best, options.output);
   if (options.report.empty()) return;
   plan_page(plan).write(options.report);
   std::cout << "report: " << options.report.string() << '\n';
@@ -188,7 +220,10 @@ void add_calibrate_plan(CLI::App& group) {
       group.add_subcommand("plan", "Propose the displacement lines to measure for a wanted accuracy");
   command->footer(
       "Example: invar calibrate plan --machine machine.yaml --accuracy 1.5e-6 --search --output plan.csv "
-      "--report plan.html");
+      "--report plan.html\n"
+      "machine.yaml: see invar calibrate geometric --help. Exit status: 0; 1 the accuracy is out of reach; 2 "
+      "a file is "
+      "unusable.");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
@@ -215,7 +250,8 @@ void add_calibrate_plan(CLI::App& group) {
       ->capture_default_str();
   command->add_option("--reading", options->reading_seconds, "time a reading takes [s]")
       ->capture_default_str();
-  command->add_option("--output", options->output, "table of the lines to measure, .csv");
+  command->add_option("--output", options->output,
+                      "the lines to measure: a table, .csv, or a job of the cell, .yaml");
   command->add_option("--report", options->report,
                       "page to take to the machine, .html: lines, set-up, what to expect, what stays open");
   command->callback([options] { propose(*options); });

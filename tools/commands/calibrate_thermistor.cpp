@@ -38,7 +38,12 @@ ThermistorFit fit_of(const Options& options, const std::vector<double>& temperat
   if (*high - *low < 1.0)
     throw InputError{file + ": column `temperature`", "varies by less than 1 K",
                      "read the thermistor at temperatures some kelvins apart"};
-  return metrology::fit_thermistor(vector_of(temperature), vector_of(resistance), options.base_temperature);
+  const ThermistorFit fit =
+      metrology::fit_thermistor(vector_of(temperature), vector_of(resistance), options.base_temperature);
+  if (!(fit.thermistor.coefficient_percent > 0.0))
+    throw InputError{file + ": column `resistance`", "does not fall as the temperature rises",
+                     "the equation is that of an NTC thermistor; check that the columns are not exchanged"};
+  return fit;
 }
 
 report::Page page_of(const Options& options, const std::vector<double>& temperature,

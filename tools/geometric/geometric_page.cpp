@@ -33,30 +33,25 @@ void write_machine(report::Page& page, const GeometricResult& result) {
 
 void write_lines(report::Page& page, const GeometricResult& result) {
   const bool full = result.method == "full" && result.found.lines.size() > 1;
-  std::vector<std::string> header{"line",       "length [mm]", "readings",      "outliers",
-                                  "breaks",     "noise [um]",  "reversal [um]", "drift [um]",
-                                  "before RMS", "before max",  "after RMS",     "after max"};
-  if (full) header.insert(header.end(), {"unseen RMS", "unseen max"});
-  std::vector<std::vector<std::string>> rows;
+  std::vector<std::vector<std::string>> readings;
+  std::vector<std::vector<std::string>> errors;
   for (std::size_t l = 0; l < result.found.lines.size(); ++l) {
     const auto& line = result.found.lines[l];
+    const auto& noise = line.noise;
+    readings.push_back({line.name, number(1e3 * line.beam.length, 4), std::to_string(noise.readings),
+                        std::to_string(noise.outliers), std::to_string(noise.breaks.size()),
+                        micro(noise.noise), micro(noise.reversal), micro(noise.drift)});
     const auto& f = result.figures[l];
-    std::vector<std::string> row{line.name,
-                                 number(1e3 * line.beam.length, 4),
-                                 std::to_string(line.noise.readings),
-                                 std::to_string(line.noise.outliers),
-                                 std::to_string(line.noise.breaks.size()),
-                                 micro(line.noise.noise),
-                                 micro(line.noise.reversal),
-                                 micro(line.noise.drift),
-                                 micro(f.before_rms),
-                                 micro(f.before_max),
-                                 micro(f.after_rms),
-                                 micro(f.after_max)};
-    if (full) row.insert(row.end(), {micro(f.unseen_rms), micro(f.unseen_max)});
-    rows.push_back(std::move(row));
+    errors.push_back(
+        {line.name, micro(f.before_rms), micro(f.before_max), micro(f.after_rms), micro(f.after_max)});
+    if (full) errors.back().insert(errors.back().end(), {micro(f.unseen_rms), micro(f.unseen_max)});
   }
-  page.table(header, rows);
+  page.table({"line", "length [mm]", "readings", "outliers", "beam breaks", "noise [um]", "reversal [um]",
+              "drift [um]"},
+             readings);
+  std::vector<std::string> header{"line", "before RMS", "before max", "after RMS", "after max"};
+  if (full) header.insert(header.end(), {"unseen RMS", "unseen max"});
+  page.table(header, errors);
   if (full)
     page.paragraph(
         "Errors of displacement in um. \"Unseen\" is the line predicted from the others alone, as it would "
@@ -197,6 +192,8 @@ report::Page report_page(const GeometricResult& result) {
     page.paragraph("Temperature" + words.substr(std::string{"temperature"}.size()) + ".");
   for (const auto& name : result.input.without_length)
     page.callout("Line " + name + " has no length and was left out.", "warn");
+  for (const auto& name : result.input.repeated)
+    page.callout("Line " + name + " holds the very readings of another line: it was left out.", "warn");
   if (result.input.far_off > 0)
     page.callout(std::to_string(result.input.far_off) + " readings far off were left out.", "warn");
   page.heading("Machine");

@@ -284,6 +284,8 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   out << " (RMS)\nexpected over the volume: " << micro(result.knowledge.volumetric_rms)
       << " um (RMS of the vector)\n";
   if (const std::string words = temperature_words(result); !words.empty()) out << words << '\n';
+  for (const auto& name : result.input.repeated)
+    out << "left out: line " << name << ", the very readings of another line\n";
   for (const auto& one : result.knowledge.unidentified) out << "not identified: " << one.words() << '\n';
   if (const auto* chosen = interval_to_choose(result))
     out << "data interval to choose: " << report::si(chosen->interval, "m") << ", expected "

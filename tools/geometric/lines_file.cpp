@@ -52,6 +52,13 @@ std::vector<Eigen::Vector3d> read_positions(const recording::Table& table,
   return positions;
 }
 
+/// No laser reads the same noise twice: such a line is a copy.
+bool same_readings(const DisplacementLine& a, const DisplacementLine& b) {
+  return std::ranges::equal(a.readings, b.readings, [](const Reading& one, const Reading& other) {
+    return one.position == other.position && one.tool == other.tool && one.displacement == other.displacement;
+  });
+}
+
 /// Keeps the points that lie on multiples of `interval` from the start.
 void thin(DisplacementLine& line, double interval) {
   const Eigen::Vector3d start = line.readings.front().position;
@@ -114,6 +121,19 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
   if (first_value == table.rows())
     throw InputError{file.string() + ": column `displacement`", "holds no number at all", "add the readings"};
 
+  for (std::size_t i = 1; i < result.lines.size();) {
+    const auto line = result.lines.begin() + static_cast<std::ptrdiff_t>(i);
+    const bool copy = line->readings.size() > 3 &&
+                      std::any_of(result.lines.begin(), line, [&](const DisplacementLine& earlier) {
+                        return same_readings(earlier, *line);
+                      });
+    if (copy) {
+      result.repeated.push_back(line->name);
+      result.lines.erase(line);
+    } else {
+      ++i;
+    }
+  }
   for (DisplacementLine& line : result.lines) {
     if (interval > 0.0) thin(line, interval);
     const auto beam = metrology::beam_of(line);
@@ -138,10 +158,12 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
     const auto dropped = before - line.readings.size();
     result.far_off += static_cast<int>(dropped);
     if (dropped * 5 > before)
-      throw InputError{file.string() + ": column `displacement`, line " + line.name,
-                       std::to_string(dropped) + " of " + std::to_string(before) +
-                           " readings differ from the commanded distance by more than a hundredth",
-                       "check the unit, the sign (along the beam, start = 0) and the beam's direction"};
+      throw InputError{
+          file.string() + ": column `displacement`, line " + line.name,
+          std::to_string(dropped) + " of " + std::to_string(before) +
+              " readings differ from the commanded distance by more than a hundredth",
+          "check the unit, the sign (the whole way along the beam, 0 at its start, not the error alone) "
+          "and the beam's direction"};
   }
   std::erase_if(result.lines, [](const DisplacementLine& line) {
     return line.readings.size() < 2 || metrology::beam_of(line).length == 0.0;

@@ -18,6 +18,7 @@ struct LinesFile {
   int without_value = 0;  // rows with an empty displacement
   int far_off = 0;        // rows so wrong that no statistics are needed (1 % of the line and more)
   std::vector<std::string> without_length;  // lines that were left out
+  std::vector<std::string> repeated;        // lines left out that hold the very readings of another
   std::optional<Range> temperature;         // degC, of all readings; nothing without the column
 };
 
