@@ -246,6 +246,23 @@ TEST(NoTrick, ASineInTimeDoesNotSayWhereItEnters) {
         << finding.term.info->name;
 }
 
+TEST(Named, ASquareWaveOnTheCurrentIsNoSumOfSines) {
+  constexpr unsigned seed = 22015;
+  const auto machine = make("axis", "additive_disturbance", 1.0, seed, {});
+  const auto d = diagnosed(machine);
+  ASSERT_EQ(d.findings.size(), 1U) << "seed " << seed;
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(term.info->name, "additive_disturbance") << "seed " << seed;
+  EXPECT_GT(term.values[term.info->index_of("squareness")], 0.5) << "seed " << seed;
+}
+
+TEST(Named, TwoEffectsOfWhichNeitherDoesAnythingAloneAreFoundTogether) {
+  constexpr unsigned seed = 1002;  // a heater at its limit makes the missing coupling look negative
+  const auto all = names(diagnosed(make("thermal", "node_coupling+heater_saturation", 1.0, seed, {})));
+  EXPECT_THAT(all, ::testing::UnorderedElementsAre("explained", "node_coupling", "heater_saturation"))
+      << "seed " << seed;
+}
+
 physics::Record long_record(std::size_t rows, double step) {
   physics::Record record;
   for (std::size_t i = 0; i < rows; ++i) {
