@@ -79,10 +79,6 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
       row.rejected += "    " + std::string{finding.term.info->name} + "." +
                       std::string{finding.term.info->parameters[i].name} + " = " +
                       std::to_string(finding.term.values[i]) + "\n";
-    if (finding.shape_lead > 0.0) {
-      std::snprintf(text, sizeof text, " {%.0f %.4f}", finding.shape_lead, finding.other_shape);
-      row.findings += text;
-    }
     for (const auto& a : finding.alternatives) {
       std::snprintf(text, sizeof text, " [%s %.1f]", std::string{a.term.info->name}.c_str(), a.log_odds);
       row.findings += text;

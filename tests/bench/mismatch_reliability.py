@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Do stated probabilities mean what they say? Reads the claims that bench_mismatch and bench_mismatch_cases wrote with
---claims (case, name, probability, odds of the other names, gain, share left, credit), prints a reliability table, and
+--claims (case, name, probability, odds of the other names, gain, share left, credit, share of a freer shape), prints a reliability table, and
 with --fit the numbers of tools/diagnose/probability.hpp that make these claims likeliest.
 
     tests/bench/mismatch_reliability.py claims.txt [...] [--fit]
@@ -14,31 +14,34 @@ def read(files):
     for file in files:
         with open(file, encoding="utf-8") as lines:
             for line in lines:
-                case, name, p, others, gain, left, credit = line.split()
-                claims.append((float(p), float(others), float(gain), float(left), float(credit)))
+                p, others, gain, left, credit, shape = (float(field) for field in line.split()[2:])
+                claims.append((p, others, gain, left, credit, shape))
     return claims
 
 
-def odds(numbers, gain, left):
-    at_100, slope, by_left = numbers
-    return at_100 * (max(gain, 1.0) / 100.0) ** -slope + by_left * left
+USUAL = (0.03, 0.5, 10.0, 0.5)
+
+
+def odds(numbers, gain, left, shape):
+    at_100, slope, by_left, by_shape = numbers
+    return at_100 * (max(gain, 1.0) / 100.0) ** -slope + by_left * (left + shape) + (by_shape if shape > 0.0 else 0.0)
 
 
 def loss(numbers, claims):
     """-log likelihood; a relative counts half. A weak prior (one claim's worth each) keeps the numbers finite."""
-    total = sum(0.5 * math.log(n / usual) ** 2 for n, usual in zip(numbers, (0.03, 0.5, 10.0)))
-    for _, others, gain, left, credit in claims:
-        p = min(0.999, max(0.001, 1.0 / (1.0 + others + odds(numbers, gain, left))))
+    total = sum(0.5 * math.log(n / usual) ** 2 for n, usual in zip(numbers, USUAL))
+    for _, others, gain, left, credit, shape in claims:
+        p = min(0.999, max(0.001, 1.0 / (1.0 + others + odds(numbers, gain, left, shape))))
         total -= credit * math.log(p) + (1.0 - credit) * math.log(1.0 - p)
     return total
 
 
 def fitted(claims):
-    numbers, step = [0.03, 0.5, 10.0], 0.5
+    numbers, step = list(USUAL), 0.5
     best = loss(numbers, claims)
     while step > 0.01:
         moved = False
-        for k in range(3):
+        for k in range(len(numbers)):
             for factor in (math.exp(step), math.exp(-step)):
                 tried = list(numbers)
                 tried[k] *= factor
@@ -71,8 +74,8 @@ def main():
     table(claims, [c[0] for c in claims])
     if given.fit:
         numbers = fitted(claims)
-        print("at_100 = {:.3g}, slope = {:.3g}, by_left = {:.3g}".format(*numbers))
-        table(claims, [min(0.995, 1.0 / (1.0 + c[1] + odds(numbers, c[2], c[3]))) for c in claims])
+        print("at_100 = {:.3g}, slope = {:.3g}, by_left = {:.3g}, by_shape = {:.3g}".format(*numbers))
+        table(claims, [min(0.995, 1.0 / (1.0 + c[1] + odds(numbers, c[2], c[3], c[5]))) for c in claims])
 
 
 if __name__ == "__main__":

@@ -24,8 +24,7 @@ struct Finding {
   /// nearest that there is.
   const physics::TermInfo* stand_in = nullptr;
   double other_shape =
-      0.0;                  // of what a freer shape of the same name explains, the share that the name leaves
-  double shape_lead = 0.0;  // log likelihood by which that shape is seen
+      0.0;  // of what a freer shape of the same name explains, the share that the name leaves
   double other_cause = 0.0;  // odds that it is none of the names that were tried
   std::vector<Alternative> alternatives;
 };

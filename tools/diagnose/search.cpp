@@ -303,8 +303,7 @@ void Search::doubt() {
     if (!beside_) beside_ = courses_beside(data_, d_.best);
     const auto other = other_cause(data_, *beside_, given() + i);
     if (!other) {
-      const auto shape = other_shape(data_, *beside_, given() + i);
-      d_.findings[i].other_shape = shape.share, d_.findings[i].shape_lead = shape.lead;
+      d_.findings[i].other_shape = other_shape(data_, *beside_, given() + i).share;
       continue;
     }
     beside_.reset();

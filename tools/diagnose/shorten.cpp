@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tools/diagnose/statistics.hpp"
+
 namespace invar::diagnose {
 
 namespace {
@@ -70,15 +72,40 @@ std::size_t stillest(const std::vector<double>& place, std::size_t first, std::s
 
 }  // namespace
 
+namespace {
+
+/// Rows behind a gap in which a heater was switched: that heat came in nobody knows when, and the nodes keep it for long.
+std::vector<std::size_t> switched_in_gaps(const physics::Model& model, const Record& record) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < record.rows(); ++i) steps.push_back(record.time[i] - record.time[i - 1]);
+  const double gap = 2.5 * median(steps);
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 1; i < record.rows(); ++i) {
+    if (!(steps[i - 1] > gap)) continue;
+    if (std::any_of(model.thermal.heaters.begin(), model.thermal.heaters.end(), [&](const auto& heater) {
+          const auto& power = record.signals.at(heater.name);
+          return std::abs(power[i] - power[i - 1]) >
+                 0.02 * std::max(std::abs(power[i]), std::abs(power[i - 1]));
+        }))
+      rows.push_back(i);
+  }
+  return rows;
+}
+
+}  // namespace
+
 std::vector<Stretch> without_pauses(const physics::Model& model, Record record) {
   std::vector<Stretch> out;
-  constexpr double longest_bridge = 10000.0;  // ticks
-  constexpr std::size_t least_rows = 2 * until_forgotten;
+  constexpr double longest_bridge = 10000.0;                 // ticks
+  const bool heat = model.plant == physics::Plant::thermal;  // begins anew with what its nodes show
+  const std::size_t forget = heat ? 0 : until_forgotten, least_rows = heat ? 100 : 2 * until_forgotten;
   std::vector<std::size_t> begins{0};
   if (model.plant == physics::Plant::axis && model.controller)
     for (std::size_t i = 1; i < record.rows(); ++i)
       if ((record.time[i] - record.time[i - 1]) * model.controller->rate > longest_bridge)
         begins.push_back(i);
+  if (heat)
+    for (const std::size_t row : switched_in_gaps(model, record)) begins.push_back(row);
   begins.push_back(record.rows());
   std::size_t longest = 0;
   const auto rows_of = [&](std::size_t part) { return begins[part + 1] - begins[part]; };
@@ -90,7 +117,7 @@ std::vector<Stretch> without_pauses(const physics::Model& model, Record record) 
   }
   for (std::size_t k = 0; k + 1 < begins.size(); ++k)
     if (k == longest || rows_of(k) >= least_rows)
-      out.push_back({cut(record, begins[k], rows_of(k)), k > 0 ? until_forgotten : 0});
+      out.push_back({cut(record, begins[k], rows_of(k)), k > 0 ? forget : 0});
   return out;
 }
 

@@ -18,7 +18,8 @@ struct Stretch {
 };
 
 /// A loop is simulated tick by tick, also where nothing was recorded: its recording falls apart where more is missing than a
-/// simulation should bridge. Parts too short to say anything are left out. Other plants: the recording itself.
+/// simulation should bridge, and one of heat where a heater was switched in a gap. Parts too short to say anything are left
+/// out. Other plants: the recording itself.
 std::vector<Stretch> without_pauses(const physics::Model& model, physics::Record record);
 
 /// The recording itself where it has at most `most` rows. Else, by plant: an axis and a sensor in stretches spread over the

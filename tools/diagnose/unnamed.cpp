@@ -141,19 +141,17 @@ bool set_aside(const Case& data, Diagnosis& d) {
   if (!nearest) return false;
   const auto plain = weigh(data, simulate(data, d.best.model), false);
   const Fit base = fit(data, plain, model, data.model, 6);
-  const auto left = [&](const Fit& fit) { return residual(data, plain, fit.model).squaredNorm(); };
-  const double without = left(base), worked = without - left(d.best);
-  // The curves must do the work of the name: drops move in two directions, and heat in several nodes.
+  // The curves must do better than the name: drops move in two directions, and heat in several nodes.
   Curved found;
   found.fit = base;
   std::size_t curves = 0;
-  while (curves < 3 && without - left(found.fit) < 0.8 * worked) {
+  while (curves < 3 && lead(data, found.fit, d.best) < 0.0) {
     auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
-    if (next.gain < 2.0 * claim_margin_of(d.weighing)) break;
+    if (next.gain < 2.0 * claim_margin_of(d.weighing)) return false;
     found = std::move(next);
     ++curves;
   }
-  if (curves == 0 || without - left(found.fit) < 0.6 * worked) return false;
+  if (curves == 0 || lead(data, found.fit, d.best) < 0.0) return false;
   d.best = std::move(found.fit);
   d.weighing = std::move(found.weighing);
   (kept.empty() ? d.is_unnamed : d.has_rest) = true;

@@ -9,7 +9,7 @@ namespace invar::diagnose {
 /// place. `beside_best` is that of the best model.
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best);
 
-/// Puts a curve in the place of names for which another cause is far likelier (`unlikely_odds`), where one does as well; the
+/// Puts a curve in the place of names for which another cause is far likelier (`unlikely_odds`), where it does better; the
 /// nearest name stays as its alternative. False: nothing changed.
 bool set_aside(const Case& data, Diagnosis& d);
 

@@ -211,8 +211,9 @@ void conclude(const Case& data, Diagnosis& d) {
     sum += odds_of_other_site(finding);
     const auto rival = fit(data, d.weighing, without, data.model, 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
-    finding.other_cause =
-        finding.term.curve.knots.empty() ? odds_of_another_cause(finding.gain, d.still_follows) : 0.0;
+    finding.other_cause = finding.term.curve.knots.empty()
+                              ? odds_of_another_cause(finding.gain, d.still_follows, finding.other_shape)
+                              : 0.0;
     sum += finding.other_cause;
     finding.probability = std::min(0.995, 1.0 / sum);
   }

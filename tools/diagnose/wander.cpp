@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "tools/diagnose/diagnosis.hpp"
+
 namespace invar::diagnose {
 
 namespace {
@@ -60,8 +62,6 @@ Wander wander_of(const std::vector<std::vector<double>>& series) {
          gain *= 2.0) {  // by which a reading moves the estimate in the long run
       const double steady = gain / (1.0 - gain);
       const Wander tried{rows, steady - std::exp(-2.0 / rows) * steady * (1.0 - gain)};
-      if (tried.driven > 1.0 - std::exp(-2.0 / rows))
-        break;  // louder than the white part: that asks for a cause
       const double now = likelihood(series, tried);
       if (now > most) most = now, best = tried;
       if (now < before - 2.0) break;  // one hill
@@ -73,7 +73,8 @@ Wander wander_of(const std::vector<std::vector<double>>& series) {
 
 double advantage_over_wander(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other) {
   const double evidence = one.evidence - other.evidence;
-  if (!data.is_time_series) return evidence;
+  // What wanders louder than all that is left asks for a cause.
+  if (!data.is_time_series || least_ratio(data, one, other) < 0.7) return evidence;
   const double prices = (one.evidence + one.data_cost) - (other.evidence + other.data_cost);
   double likelier = 0.0;
   bool any = false;

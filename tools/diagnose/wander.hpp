@@ -11,7 +11,7 @@ struct Wander {
   double driven = 0.0;  // variance that enters it in a row; 0: there is none
 };
 
-/// The wander, no louder than the white part, that makes these numbers likeliest. NaN: nothing was measured.
+/// The wander that makes these numbers likeliest. NaN: nothing was measured.
 Wander wander_of(const std::vector<std::vector<double>>& series);
 /// Log likelihood of the numbers as such noise, of whatever scale; comparable between series over the same rows.
 double likelihood(const std::vector<std::vector<double>>& series, const Wander& wander);

@@ -236,6 +236,45 @@ TEST(NoTrick, AGapInTheRecordingOfALoopIsNoPhysics) {
     EXPECT_THAT(diagnosed(make("axis", "none", 1.0, seed, trouble)).findings, ::testing::IsEmpty()) << seed;
 }
 
+// A smooth term of few numbers fits any slow walk, and two roundings beat against each other.
+TEST(NoTrick, NoiseThatWandersAndStepsThatBeatAreNoPhysics) {
+  Trouble wander, steps;
+  wander.colour = Colour::wander;
+  steps.quantised = true;
+  auto coarse = wander, faulty = wander;
+  coarse.quantised = true, faulty.faults = true;
+  const auto found = [](const char* plant, const char* effect, unsigned seed, const Trouble& trouble) {
+    return diagnosed(make(plant, effect, 1.0, seed, trouble)).findings;
+  };
+  EXPECT_THAT(found("error_map", "none", 7005, faulty), ::testing::IsEmpty());
+  EXPECT_THAT(found("error_map", "none", 7028, coarse), ::testing::IsEmpty());
+  EXPECT_THAT(found("thermal", "none", 7008, coarse), ::testing::IsEmpty());
+  EXPECT_THAT(found("thermal", "parameter", 3019, faulty), ::testing::IsEmpty());
+  EXPECT_THAT(found("sensor", "none", 3003, steps), ::testing::IsEmpty());
+}
+
+// A third power for a second, a store for a lag: what is left over the name's own variable tells.
+TEST(NoTrick, ARelativeIsNotStatedWithConfidence) {
+  constexpr Known kin[] = {{"equations", "quadratic", 11004}, {"equations", "lag", 1004}};
+  for (const auto& k : kin) {
+    const auto machine = make(k.plant, k.effect, 1.0, k.seed);
+    diagnose::Options options;
+    options.without = {k.effect};
+    for (const auto& finding : diagnosed(machine, options).findings)
+      EXPECT_TRUE(finding.term.info->name == "unmodelled" || finding.probability < confident)
+          << k.effect << ": " << finding.term.info->name << ' ' << finding.probability;
+  }
+}
+
+// Heat that was switched in a gap came in nobody knows when.
+TEST(NoTrick, AHeaterSwitchedInAGapIsNoPhysics) {
+  Trouble trouble;
+  trouble.faults = true;
+  EXPECT_THAT(diagnosed(make("thermal", "parameter", 1.0, 9032, trouble)).findings, ::testing::IsEmpty());
+  trouble.colour = Colour::heavy;
+  EXPECT_THAT(diagnosed(make("thermal", "none", 1.0, 11001, trouble)).findings, ::testing::IsEmpty());
+}
+
 // A sine in time shows in one recording whether it enters at the motor or at the carriage, but not where.
 TEST(NoTrick, ASineInTimeDoesNotSayWhereItEnters) {
   const auto machine = make("axis", "periodic_disturbance", 1.0, 6);
