@@ -304,7 +304,7 @@ void Search::doubt() {
 }
 
 bool Search::add_pair() {
-  if (data_.model.plant != physics::Plant::equations) return false;
+  if (data_.model.plant != physics::Plant::equations && data_.model.plant != physics::Plant::thermal) return false;
   progress_(0.05, "screening pairs");
   auto claim = claim_pair(data_, d_.best, options_.without);
   if (!claim) return false;
