@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/base/unit.hpp"
+#include "core/model/own_expressions.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/static_plants.hpp"
 
@@ -397,6 +398,7 @@ physics::Model read(const config::Yaml& yaml) {
       break;
     case Plant::equations:
       read_equations(root, model);
+      check_own_expressions(root, model);
       break;
     default:
       read_parameters(root, model);

@@ -74,6 +74,7 @@ int run(const Options& options) {
   const auto progress = [&](double share, const std::string& what) { line.show(share, what); };
   progress(0.0, "reading");
   auto data = diagnose::load_case(model, options.recordings);
+  diagnose::check_runs(data, model, 0.5, options.model);  // the fit may mend a model that runs away late
   std::vector<diagnose::OtherRun> checks;  // read before the search: what is unusable is said at once
   for (std::size_t i = 0; i < options.checks.size(); ++i)
     checks.push_back(diagnose::read_other_run(
@@ -85,6 +86,7 @@ int run(const Options& options) {
   (void)interrupted();
   auto diagnosis = diagnose::search(data, progress, how);
   line.clear();
+  diagnose::check_runs(data, diagnosis.best.model, 0.0, options.model);
   for (auto& run : checks) {
     diagnose::compare(data, diagnosis, run);
     diagnosis.other_runs.push_back(std::move(run));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <sstream>
 
 #include "core/model/recording_file.hpp"
 #include "tools/diagnose/shorten.hpp"
@@ -211,6 +212,45 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
   data.recordings.push_back(std::move(recording));
 }
 
+/// What is so large is no reading, and squares of it are no numbers.
+void drop_absurd(physics::Record& record) {
+  for (auto& [name, values] : record.signals)
+    for (double& v : values)
+      if (!(std::abs(v) < 1e100)) v = nothing;
+}
+
+/// Throws where there is nothing to compare, or nothing that drives the model.
+void check_filled(const physics::Model& model, const physics::Record& record,
+                  const std::filesystem::path& file) {
+  const auto filled = [&](const std::string& signal) {
+    const auto& values = record.signals.at(signal);
+    return std::count_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  };
+  std::ptrdiff_t readings = 0;
+  std::string columns;
+  for (const auto& signal : model.signals) {
+    if (signal.is_output) {
+      readings += filled(signal.name);
+      columns += (columns.empty() ? "`" : ", `") + signal.column + "`";
+    }
+    const bool drives =
+        signal.name == "reference" || signal.name == "true_position" ||
+        std::any_of(model.equations.inputs.begin(), model.equations.inputs.end(),
+                    [&](const auto& one) {
+                      return one.signal == signal.name && one.symbol != model.equations.controlled_input;
+                    }) ||
+        std::any_of(model.thermal.heaters.begin(), model.thermal.heaters.end(),
+                    [&](const auto& one) { return one.name == signal.name; });
+    if (drives && filled(signal.name) == 0)
+      throw InputError{file.string() + ": column `" + signal.column + "`", "has no number",
+                       "record it, or name another column for `" + signal.name + "`"};
+  }
+  if (readings < 8)
+    throw InputError{file.string() + ": column " + columns,
+                     readings == 0 ? "has no number" : "has only " + std::to_string(readings) + " numbers",
+                     "record what the model is to be compared with"};
+}
+
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
@@ -227,7 +267,15 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
       data.given_noise[static_cast<std::size_t>(&name - data.outputs.data())] =
           noise->second * content.units.at(name).factor;
   auto record = std::move(content.record);
+  drop_absurd(record);
+  check_filled(model, record, table.file);
+  const std::size_t before = data.count.out_of_order, rows = record.rows();
   put_in_order(record, data.count);
+  // Points of a map and drops may stand in any order.
+  const bool is_course = model.plant != physics::Plant::error_map && model.plant != physics::Plant::droplet;
+  if (is_course && 2 * (data.count.out_of_order - before) > rows)
+    throw InputError{table.file.string() + ": column `" + model.signal("time")->column + "`",
+                     "goes back at most of its rows", "name the column of the time, and sort the rows by it"};
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
@@ -247,6 +295,28 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
 }
 
 }  // namespace
+
+void check_runs(const Case& data, const physics::Model& model, double most,
+                const std::filesystem::path& file) {
+  if (model.plant != physics::Plant::equations) return;  // elsewhere a missing input makes a missing output
+  for (const auto& recording : data.recordings) {
+    physics::Outputs outputs;
+    recording.simulation->run(model, outputs);
+    for (std::size_t o = 0; o < outputs.size(); ++o) {
+      std::size_t from = outputs[o].size();  // of what ran away no row comes back
+      while (from > 0 && !std::isfinite(outputs[o][from - 1])) --from;
+      const std::size_t lost = outputs[o].size() - from;
+      if (static_cast<double>(lost) <= most * static_cast<double>(outputs[o].size())) continue;
+      std::ostringstream when;
+      when << recording.inputs.time[from];
+      throw InputError{
+          file.string(),
+          "simulated on " + recording.name + ", output `" + data.outputs[o] + "` is no number from t = " +
+              when.str() + " s on",
+          "look for a division by zero, or begin with values with which the model does not run away"};
+    }
+  }
+}
 
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files) {
   auto data = empty_case(model);

@@ -44,6 +44,10 @@ struct Case {
   std::shared_ptr<Remembered> remembered = std::make_shared<Remembered>();
 };
 
+/// Throws InputError, naming the model's file, where a model in the user's own equations gives no numbers from some row on
+/// to the end, for more than this share of a recording.
+void check_runs(const Case& data, const physics::Model& model, double most,
+                const std::filesystem::path& file);
 /// Reads and cleans. Throws InputError for what is unusable.
 Case load_case(const physics::Model& model, const std::vector<std::filesystem::path>& files);
 /// The same of tables that are read already.

@@ -42,7 +42,7 @@ Settled settle(const Case& data, Fit start, int rounds) {
 }
 
 Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const ScreenedPair& pair) {
-  physics::Model best;
+  auto best = with(base, {&pair.first, &pair.second}, 0.15);  // stays where none gives numbers
   double least = 1e300;
   for (const double share : {1.0, 0.4, 0.15})
     for (const bool gives_way : {true, false}) {  // the other numbers, as they did to first order

@@ -222,6 +222,32 @@ TEST(SimulateEquations, ACurveOverAStateIsTheRateThatItDraws) {
     EXPECT_NEAR(out[i], std::exp(-3.5 * 0.01 * static_cast<double>(i)), 1e-7) << i;
 }
 
+/// A thousand times faster than its rows, and across a gap of days: at its balance, not run away.
+TEST(SimulateEquations, WhatIsFarFasterThanTheRowsIsAtItsBalance) {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
+      "states:\n  x: {derivative: '1000*(u - x)', initial: {value: 0, unit: V}}\n"
+      "  z: {derivative: '0.3*(x - z)', initial: {value: 0, unit: V}}\n"
+      "outputs: {fast: {column: a, expression: x}, slow: {column: b, expression: z}}\n",
+      "model.yaml");
+  const auto model = model::read(yaml);
+  yaml.finish();
+  physics::Record inputs;
+  for (int i = 0; i < 40; ++i) {
+    inputs.time.push_back(i < 20 ? i : 3e5 + i);
+    inputs.signals["u"].push_back(i % 5 == 0 ? 2.0 : -1.0);
+  }
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  double z = 0.0;
+  for (std::size_t i = 1; i < 40; ++i) {
+    const double u = inputs.signals["u"][i - 1], h = inputs.time[i] - inputs.time[i - 1];
+    z = u + (z - u) * std::exp(-0.3 * h);
+    EXPECT_NEAR(out[0][i], u, 1e-6) << i;
+    EXPECT_NEAR(out[1][i], z, 5e-3) << i;
+  }
+}
+
 TEST(EquationsModel, SaysWhereATermCannotAct) {
   const std::string head =
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: pump}\nstates:\n"

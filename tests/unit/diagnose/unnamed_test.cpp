@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <random>
 
@@ -86,6 +87,34 @@ TEST(WithoutAName, WhatIsLeftFarAboveTheNoiseIsSeenBesideMissingValues) {
   const auto rigid = fit(data, weighing, data.model, data.model, 12);
   EXPECT_GT(far_share(data, rigid, 3.0).front(), 0.8);
   EXPECT_GT(followed_share(data, rigid).front(), 0.05);
+}
+
+std::string fault_of(const std::function<void(recording::Table&)>& spoil) {
+  testing::TemporaryFolder folder;
+  auto table = elastic_motor(5);
+  spoil(table);
+  table.write(folder / "recording.csv");
+  try {
+    const auto data = load_case(rigid_motor(), {folder / "recording.csv"});
+    check_runs(data, data.model, 0.5, "model.yaml");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Recording, ThatSaysNothingIsRefused) {
+  using ::testing::HasSubstr;
+  EXPECT_EQ(fault_of([](recording::Table&) {}), "none");
+  EXPECT_THAT(fault_of([](auto& t) { t.columns[2].values.assign(rows, std::nan("")); }),
+              HasSubstr("column `speed`: has no number"));
+  EXPECT_THAT(fault_of([](auto& t) { t.columns[2].values.assign(rows, 1e300); }), HasSubstr("has no number"));
+  EXPECT_THAT(fault_of([](auto& t) { t.columns[1].values.assign(rows, std::nan("")); }),
+              HasSubstr("column `volt`: has no number"));
+  EXPECT_THAT(fault_of([](auto& t) {
+                for (double& v : t.columns[0].values) v = -v;
+              }),
+              HasSubstr("goes back at most of its rows"));
 }
 
 }  // namespace

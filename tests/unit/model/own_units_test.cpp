@@ -50,5 +50,44 @@ TEST(OwnUnits, ANameOfTheUsersOwnIsALabel) {
   EXPECT_EQ(read_own("counts", "counts/V").find("k")->unit, "counts/V");
 }
 
+std::string fault_of(const std::string& derivative, const std::string& parameters,
+                     const std::string& rest = "") {
+  try {
+    const auto yaml = config::Yaml::parse(
+        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
+        "states: {x: {derivative: '" +
+            derivative +
+            "', initial: {value: 1, unit: V}}}\noutputs: {y: {column: out, expression: x}}\nparameters: {" +
+            parameters + "}\n" + rest,
+        "model.yaml");
+    (void)read(yaml);
+    yaml.finish();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(OwnExpressions, ANameStandsForOneThing) {
+  using ::testing::HasSubstr;
+  EXPECT_EQ(fault_of("k*(u - x) + max(0, x >= 2)", "k: {value: 1}"), "none");
+  EXPECT_THAT(fault_of("u - x", "x: {value: 1}"), HasSubstr("`x` is a state already"));
+  EXPECT_THAT(fault_of("u - x", "u: {value: 1}"), HasSubstr("`u` is an input already"));
+  EXPECT_THAT(fault_of("u - x", "pi: {value: 1}"), HasSubstr("`pi` means something else"));
+  EXPECT_THAT(fault_of("u - x", "sin: {value: 1}"), HasSubstr("`sin` means something else"));
+  EXPECT_THAT(fault_of("u - x", "a-b: {value: 1}"), HasSubstr("`a-b` is no name"));
+}
+
+TEST(OwnExpressions, AnExpressionGivesOneValueAndALoopDoesNotFollowItself) {
+  using ::testing::HasSubstr;
+  EXPECT_THAT(fault_of("x = 5", ""), HasSubstr("`=` has no place"));
+  EXPECT_THAT(fault_of("u, x", ""), HasSubstr("`,` has no place"));
+  EXPECT_THAT(fault_of("u - x", "", "controller: {output: u, expression: 2*u}\n"),
+              HasSubstr("follows from itself"));
+  EXPECT_THAT(fault_of("u - x", "", "controller: {output: w, expression: 2*x}\n"),
+              HasSubstr("no input of this model"));
+  EXPECT_EQ(fault_of("u - x", "", "controller: {output: u, expression: 2 - x}\n"), "none");
+}
+
 }  // namespace
 }  // namespace invar::model
