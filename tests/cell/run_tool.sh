@@ -22,7 +22,7 @@ cat wrong
 checkout/tools/run >summary 2>&1 || { cat summary; exit 1; }
 cat summary
 for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'error after +rms [0-9.]+ nm' 'heater +[0-9.]+ degC' '^6 lines, 288 readings' \
-  '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force_ripple ' '^  coulomb_friction ' '^\.\.\. patched +rms .* times less' \
+  '^motion +1000 Hz +[0-9]+ ' '^time +' '^  force ripple ' '^  coulomb friction ' '^\.\.\. patched +rms .* times less' \
   'from 20 mm +[0-9.]+ um before, [0-9.]+ um after'; do
   grep -Eq "$words" summary || { echo "the summary lacks: $words"; exit 1; }
 done
