@@ -311,8 +311,8 @@ void check_runs(const Case& data, const physics::Model& model, double most,
       when << recording.inputs.time[from];
       throw InputError{
           file.string(),
-          "simulated on " + recording.name + ", output `" + data.outputs[o] + "` is no number from t = " +
-              when.str() + " s on",
+          "simulated on " + recording.name + ", output `" + data.outputs[o] +
+              "` is no number from t = " + when.str() + " s on",
           "look for a division by zero, or begin with values with which the model does not run away"};
     }
   }
