@@ -79,15 +79,22 @@ TEST_F(Owners, EachInstanceHasItsOwnAndTheLongestIdleIsForgotten) {
   EXPECT_EQ(ownership.last(axis_2), at(0.1));
 }
 
-TEST(PeerAddress, IsAbandonedWhereNobodyReceives) {
-  const int end = socket(AF_INET, SOCK_DGRAM, 0);
+/// A socket of the loopback on which somebody receives, and its address.
+void listen(int& end, PeerAddress& peer) {
+  end = socket(AF_INET, SOCK_DGRAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   ASSERT_EQ(bind(end, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
   socklen_t size = sizeof address;
   ASSERT_EQ(getsockname(end, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  const PeerAddress peer{"127.0.0.1", ntohs(address.sin_port)};
+  peer = {"127.0.0.1", ntohs(address.sin_port)};
+}
+
+TEST(PeerAddress, IsAbandonedWhereNobodyReceives) {
+  int end = -1;
+  PeerAddress peer;
+  ASSERT_NO_FATAL_FAILURE(listen(end, peer));
   EXPECT_FALSE(are_abandoned({peer}));
   close(end);
   // The kernel may take its time; that it ever says so of an abandoned port is the point.
@@ -98,14 +105,9 @@ TEST(PeerAddress, IsAbandonedWhereNobodyReceives) {
 
 // Cyclone DDS receives for all participants of a process at one address: the later is no successor of the earlier.
 TEST(Discovery, OneIsGoneWhereAnotherProcessTookItsAddressAndNotWhereItsOwnHasASecondParticipant) {
-  const int end = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  ASSERT_EQ(bind(end, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  socklen_t size = sizeof address;
-  ASSERT_EQ(getsockname(end, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  const PeerAddress peer{"127.0.0.1", ntohs(address.sin_port)};
+  int end = -1;
+  PeerAddress peer;
+  ASSERT_NO_FATAL_FAILURE(listen(end, peer));
   Discovery discovery;
   const std::string first = "01.10.5c.01.aa.aa.aa.aa.aa.aa.aa.aa",
                     second = "01.10.5c.01.bb.bb.bb.bb.bb.bb.bb.bb",
