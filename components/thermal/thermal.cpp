@@ -59,6 +59,7 @@ void Thermal::activate() {
   told_unsound_ = told_undriven_ = told_stuck_ = false;
   unsound_since_.reset();
   stuck_since_.reset();
+  full_since_.reset();
 }
 
 void Thermal::deactivate() noexcept {
@@ -194,6 +195,23 @@ void Thermal::look_at_delivery(const Tick& tick) noexcept {
   }
 }
 
+/// Below full power a temperature that stands still may be the one that is held; at full power it never is.
+void Thermal::look_at_response(const Tick& tick) noexcept {
+  const auto& [rise, within] = parameters_.response;
+  if (!(power_ > 0.0 && power_ >= parameters_.power_limit)) return full_since_.reset();
+  if (!full_since_ || temperature_ - full_from_ >= rise) full_since_ = tick.now, full_from_ = temperature_;
+  if (tick.now - *full_since_ < Duration::seconds(within)) return;
+  latched_ = true;
+  full_since_.reset();
+  std::array<char, 240> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      "%.4g W for %.4g s have not warmed the slide by %.4g K (it reads %.4g degC): a thermistor that is "
+      "off or frozen, or a pad that is dead or too weak; the heater is off until a command resets the latch",
+      power_, within, rise, temperature_);
+  notices_.say(event::SEVERITY_TRIP, text.data());
+}
+
 void Thermal::step(const Tick& tick) noexcept {
   ThermalCommand command;
   while (command_.take(command)) obey(command);
@@ -216,6 +234,7 @@ void Thermal::step(const Tick& tick) noexcept {
   } else if (enable) {
     told_undriven_ = false;
   }
+  look_at_response(tick);
   client_.send(tick.now);
   look_at_delivery(tick);
 

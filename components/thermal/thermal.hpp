@@ -21,7 +21,8 @@ namespace invar::thermal {
 /// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go when readings are stale or outside
 /// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
 /// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature`, or when
-/// the device latches at a limit of its own (register `over_temperature`). It holds until a command resets it, and the device
+/// the device latches at a limit of its own (register `over_temperature`), or when full power does not show in the temperature
+/// (`response`: a thermistor that came off or froze, a pad that is dead or too weak). It holds until a command resets it, and the device
 /// with it (register `reset_alarms`). A controller that delivers power though it was told to be off is said, too. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
 /// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component {
@@ -49,6 +50,16 @@ class Thermal final : public Component {
       p(coefficient_percent, "coefficient", "%/K", Range{1e-3, 20.0}, "loss of resistance per kelvin there");
     }
   };
+  struct Response {
+    double rise = 0.5;
+    double within = 120.0;
+    void describe(auto& p) {
+      p(rise, "rise", "K", Range{1e-3, 50.0}, "by which the slide must warm at full power ...",
+        while_running);
+      p(within, "within", "s", Range{1.0, 1e5}, "... each time this has passed, or the latch lets go",
+        while_running);
+    }
+  };
   /// A further thermistor of the controller: register <name>_resistance.
   struct Zone {
     std::string name;
@@ -66,6 +77,7 @@ class Thermal final : public Component {
     double setpoint = 30.0;
     double power_limit = 60.0;
     double over_temperature = 60.0;
+    Response response;
     Range measurable{-40.0, 250.0};
     static constexpr Range setpoints{-20.0, 150.0};
     void describe(auto& p) {
@@ -77,6 +89,7 @@ class Thermal final : public Component {
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
       p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0},
         "the latch lets go of the heater above it");
+      p(response, "response", "of the thermistor to full power");
       p(measurable, "measurable", "degC", "what the thermistors may show; beyond it one is open or short");
       if constexpr (requires { p.node(); })
         if (setpoint >= over_temperature)
@@ -101,6 +114,7 @@ class Thermal final : public Component {
   void tell(bool sound, const Tick& tick) noexcept;
   void latch(bool sound, const Tick& tick) noexcept;
   void look_at_delivery(const Tick& tick) noexcept;
+  void look_at_response(const Tick& tick) noexcept;
 
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // before the first reading
   const Parameters& parameters_;
@@ -137,6 +151,8 @@ class Thermal final : public Component {
   std::optional<Instant> stuck_since_;    // power flows, and none was asked for
   std::optional<Instant> unsound_since_;  // the device answers, and its sensor cannot be
   double power_ = 0.0;
+  std::optional<Instant> full_since_;  // full power
+  double full_from_ = 0.0;             // temperature then [degC]
 };
 
 }  // namespace invar::thermal

@@ -102,6 +102,13 @@ struct Bench final : Component {
     sample.enabled(enabled);
     command.write(sample);
   }
+  void reset_latch(double setpoint = 30.0) {
+    ThermalCommand reset;
+    reset.setpoint(setpoint);
+    reset.enabled(true);
+    reset.reset_latch(true);
+    command.write(reset);
+  }
   NodeTemperature run_for(double seconds) {
     NodeTemperature last;
     for (const Instant end = at() + Duration::seconds(seconds); at() < end;) last = cycle_once();
@@ -200,11 +207,7 @@ TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   state = bench.run_for(600.0);
   EXPECT_TRUE(state.over_temperature());
   EXPECT_EQ(state.heater_power(), 0.0);
-  ThermalCommand reset;
-  reset.setpoint(24.0);
-  reset.enabled(true);
-  reset.reset_latch(true);
-  bench.command.write(reset);
+  bench.reset_latch(24.0);
   EXPECT_FALSE(bench.cycle_once().over_temperature());
 }
 
@@ -221,11 +224,7 @@ TEST(Thermal, DeviceThatLatchesAtItsOwnLimitIsSaidAndResetWithTheLoopsLatch) {
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("switched the heater off at its own limit")));
   for (int i = 0; i < 6000; ++i) ASSERT_FALSE(bench.cycle_once().enabled()) << i;
   EXPECT_THAT(bench.said(), IsEmpty());
-  ThermalCommand reset;
-  reset.setpoint(30.0);
-  reset.enabled(true);
-  reset.reset_latch(true);
-  bench.command.write(reset);
+  bench.reset_latch(30.0);
   double power = 0.0;
   for (int i = 0; i < 20 && power == 0.0; ++i) {
     bench.cycle_once();
@@ -249,6 +248,30 @@ TEST(Thermal, HeaterThatStaysOnThoughItWasToldToBeOffIsSaidOnce) {
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("W though it was told to be off: cut its supply")));
   bench.run_for(20.0);
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("the heater is off as it was told")));
+}
+
+TEST(Thermal, FullPowerThatDoesNotShowInTheTemperatureLatches) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench{folder.write("faults.yaml",
+                           "invar_modbus_faults: 1\nfaults:\n"
+                           "  - {at: 20, for: 100000, do: freeze, register: slide_resistance}\n")};
+  bench.thermal_parameters.response.within = 60.0;
+  bench.bring_up();
+  double full = 0.0;  // seconds at full power since the reading stands still
+  NodeTemperature state;
+  for (int i = 0; i < 12000 && !state.over_temperature(); ++i) {
+    state = bench.cycle_once();
+    if (i > 200) full = state.heater_power() >= 120.0 ? full + Bench::period : 0.0;
+  }
+  ASSERT_TRUE(state.over_temperature());
+  EXPECT_LE(full, 60.1);
+  EXPECT_GE(full, 55.0);  // the half kelvin before the freeze may have been some seconds old
+  EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("120 W for 60 s have not warmed the slide by 0.5 K")));
+  EXPECT_FALSE(bench.run_for(5.0).enabled());
+  EXPECT_EQ(bench.heater_power(), 0.0);
+  bench.reset_latch();
+  EXPECT_TRUE(bench.run_for(5.0).enabled());  // and tries anew
+  EXPECT_THAT(bench.said(), IsEmpty());
 }
 
 TEST(Thermal, CommandWhoseSetpointCannotBeIsRefusedAndTheLoopGoesOn) {
