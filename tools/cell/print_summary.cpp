@@ -84,8 +84,7 @@ Plot scatter(const Prints& prints, const std::string& title) {
   plot.title = title;
   plot.x_label = "x from target [um]";
   plot.y_label = "y from target [um]";
-  plot.equal_axes = true;
-  plot.height = 420;
+  plot.height = 480;
   for (const double level : prints.heights()) {
     Series series;
     series.label = si(level, "m");
@@ -97,6 +96,7 @@ Plot scatter(const Prints& prints, const std::string& title) {
       }
     plot.series.push_back(std::move(series));
   }
+  report::centre(plot);
   return plot;
 }
 

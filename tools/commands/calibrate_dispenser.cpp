@@ -59,8 +59,7 @@ report::Plot scatter_plot(const Droplets& drops, const TrajectoryFit& fit, bool 
   plot.title = after ? "Landing after compensation" : "Landing before compensation";
   plot.x_label = "x from target [um]";
   plot.y_label = "y from target [um]";
-  plot.equal_axes = true;
-  plot.height = 460;
+  plot.height = 480;
   report::Series kept[2];
   kept[0].label = "lowest height";
   kept[1].label = "other heights";
@@ -79,6 +78,7 @@ report::Plot scatter_plot(const Droplets& drops, const TrajectoryFit& fit, bool 
     series->style = report::Series::Style::points;
     plot.series.push_back(std::move(*series));
   }
+  report::centre(plot);
   return plot;
 }
 

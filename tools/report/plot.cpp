@@ -157,6 +157,16 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
 
 }  // namespace
 
+void centre(Plot& plot) {
+  double farthest = 0.0;
+  for (const Series& series : plot.series)
+    for (const auto* values : {&series.x, &series.y})
+      for (const double value : *values)
+        if (std::isfinite(value)) farthest = std::max(farthest, std::abs(value));
+  plot.equal_axes = true;
+  if (farthest > 0.0) plot.x_range = plot.y_range = Range{-1.05 * farthest, 1.05 * farthest};
+}
+
 void add_curve(Plot& plot, const Range& range, const std::string& label, const std::string& colour,
                const std::function<CurvePoint(double x)>& at) {
   Series band;

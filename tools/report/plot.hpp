@@ -36,6 +36,9 @@ struct Plot {
   int height = 360;  // px
 };
 
+/// Both axes from -m to m and of one scale, where m takes in every point: a target with its hits.
+void centre(Plot& plot);
+
 /// What a curve is worth at a place, in the plot's units.
 struct CurvePoint {
   double value = 0.0;
