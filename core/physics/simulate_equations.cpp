@@ -107,7 +107,25 @@ class Machine {
     compiled_.symbols.back() = t;
   }
 
+  /// The rates here, held by limits.
   State slope(const State& s, double t) {
+    State d = free_slope(s, t);
+    for (const auto& rub : frictions_)
+      d[rub.use.on] = rub.stuck ? 0.0 : d[rub.use.on] - rub.direction * rub.use.p[0];
+    for (const auto& term : overflows_)
+      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) {
+        if (term.with < states_ && term.with != term.on) d[term.with] += term.p[1] * d[term.on];
+        d[term.on] = 0.0;
+      }
+    for (const auto& term : uppers_)
+      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) d[term.on] = 0.0;
+    for (const auto& term : lowers_)
+      if (s[term.on] <= term.p[0] && d[term.on] < 0.0) d[term.on] = 0.0;
+    return d;
+  }
+
+  /// The rates as they would be without friction and limits: those jump, and what jumps has no rate of change.
+  State free_slope(const State& s, double t) {
     show(s, t);
     bend_states(s, t);
     State d{};
@@ -122,17 +140,6 @@ class Machine {
     }
     for (std::size_t k = 0; k < lags_.size(); ++k)
       d[first_lag() + k] = (s[lags_[k].on] - s[first_lag() + k]) / time_constant(lags_[k]);
-    for (const auto& rub : frictions_)
-      d[rub.use.on] = rub.stuck ? 0.0 : d[rub.use.on] - rub.direction * rub.use.p[0];
-    for (const auto& term : overflows_)
-      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) {
-        if (term.with < states_ && term.with != term.on) d[term.with] += term.p[1] * d[term.on];
-        d[term.on] = 0.0;
-      }
-    for (const auto& term : uppers_)
-      if (s[term.on] >= term.p[0] && d[term.on] > 0.0) d[term.on] = 0.0;
-    for (const auto& term : lowers_)
-      if (s[term.on] <= term.p[0] && d[term.on] < 0.0) d[term.on] = 0.0;
     return d;
   }
 
@@ -157,7 +164,7 @@ class Machine {
   double output(std::size_t i) { return compiled_.outputs[i].Eval(); }
   double law() { return compiled_.law.front().Eval(); }
 
-  /// Of the rates of all states here.
+  /// Of the rates of all states here, as far as they do not jump.
   Eigen::MatrixXd jacobian(const State& s, double t) {
     const auto n = static_cast<Eigen::Index>(all_states());
     Eigen::MatrixXd all(n, n);
@@ -166,7 +173,7 @@ class Machine {
       const auto at = static_cast<std::size_t>(j);
       const double by = 1e-6 * std::max(1e-3, std::abs(s[at]));
       up[at] += by, down[at] -= by;
-      const State a = slope(up, t), b = slope(down, t);
+      const State a = free_slope(up, t), b = free_slope(down, t);
       for (Eigen::Index i = 0; i < n; ++i)
         all(i, j) = (a[static_cast<std::size_t>(i)] - b[static_cast<std::size_t>(i)]) / (2.0 * by);
     }
