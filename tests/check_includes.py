@@ -10,7 +10,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 LIBRARIES = {
     "yaml-cpp/": "yaml-cpp", "Eigen/": "Eigen", "ceres/": "Ceres", "opencv2/": "OpenCV", "modbus.h": "libmodbus",
     "modbus/": "libmodbus", "fastdds/": "Fast DDS", "fastrtps/": "Fast DDS", "fastcdr/": "Fast DDS", "zlib.h": "compression",
-    "zstd.h": "compression", "lz4": "compression", "CLI/": "CLI11", "nlohmann/": "nlohmann-json",
+    "zstd.h": "compression", "lz4": "compression", "CLI/": "CLI11", "nlohmann/": "nlohmann-json", "muParser": "muParser",
     "spdlog/": "spdlog", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
 }
 
@@ -22,7 +22,7 @@ ROOMS = {
     "core/metrology": ["core/base", "core/numerics", "Eigen", "Ceres"],
     "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "yaml-cpp", "Eigen"],
     "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "Eigen", "compression"],
-    "core/physics": ["core/base", "core/numerics", "Eigen"],
+    "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
     "core/executor": ["core/base", "core/config", "core/component", "idl"],

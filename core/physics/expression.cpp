@@ -1,11 +1,13 @@
 #include "core/physics/expression.hpp"
 
+#include <muParser.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <limits>
-#include <map>
 #include <numbers>
 
 #include "core/base/fault.hpp"
@@ -20,174 +22,142 @@ double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
 }  // namespace
 
-/// Recursive descent over one formula.
-class FormulaReader {
+/// What muParser calls while it works a formula out: every operation is written down, and its value is the slot of its
+/// result. So a formula is read once, by muParser, and run many times, on many columns.
+class FormulaRecorder {
  public:
   using Operation = Expressions::Operation;
 
-  FormulaReader(Expressions& into, Expressions::Section section, std::string_view formula)
-      : into_{into}, section_{section}, text_{formula} {}
+  FormulaRecorder(Expressions& into, Expressions::Section section) : into_{into}, section_{section} {
+    parser_.ClearFun();
+    parser_.ClearInfixOprt();
+    parser_.EnableBuiltInOprt(false);
+    parser_.EnableOptimizer(false);  // it works with values, and here are none
+    parser_.AddValIdent(number);
+    constexpr bool as_it_stands = false;
+    const auto name = [](std::string_view word) { return std::string{word}; };
+    for (const auto& [word, call] : functions_of_one) parser_.DefineFun(name(word), call, as_it_stands);
+    for (const auto& [word, call] : functions_of_more) parser_.DefineFun(name(word), call, as_it_stands);
+    parser_.DefineFun(name(choice), choose, as_it_stands);
+    for (const auto& [word, call, precedence, associativity] : operators)
+      parser_.DefineOprt(name(word), call, precedence, associativity, as_it_stands);
+    parser_.DefineInfixOprt("-", one<Operation::negate>, mu::prINFIX, as_it_stands);
+    parser_.DefineInfixOprt(
+        "+", [](double a) { return a; }, mu::prINFIX, as_it_stands);
+    slots_.resize(into.names_.size());
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      slots_[i] = static_cast<double>(i);
+      parser_.DefineVar(into.names_[i], &slots_[i]);
+    }
+    const auto& names = into.names_;
+    if (std::find(names.begin(), names.end(), "pi") == names.end())
+      parser_.DefineConst("pi", static_cast<double>(into.number(std::numbers::pi)));
+  }
 
-  /// Throws std::string: what is wrong.
-  std::size_t whole() {
-    const std::size_t slot = choice();
-    skip();
-    if (at_ < text_.size()) throw "`" + std::string{text_.substr(at_)} + "` is not understood";
-    return slot;
+  /// The slot of the formula's value. Throws mu::ParserError.
+  std::size_t record(const std::string& formula) {
+    if (formula.find('?') != std::string::npos)
+      throw mu::ParserError{"`?` has no place in it; write if(condition, yes, no)"};
+    now_ = this;
+    parser_.SetExpr(formula);
+    int results = 0;
+    const double* slot = parser_.Eval(results);
+    if (results != 1) throw mu::ParserError{"it is more than one formula"};
+    return static_cast<std::size_t>(*slot);
+  }
+
+  static constexpr std::string_view choice = "if";
+  static std::vector<std::string_view> words() {
+    std::vector<std::string_view> all{"pi", choice};
+    for (const auto& [word, call] : functions_of_one) all.push_back(word);
+    for (const auto& [word, call] : functions_of_more) all.push_back(word);
+    return all;
   }
 
  private:
-  void skip() {
-    while (at_ < text_.size() && std::isspace(static_cast<unsigned char>(text_[at_]))) ++at_;
+  double make(Operation operation, double a, double b = 0.0, double c = 0.0) {
+    return static_cast<double>(into_.result(section_, operation, static_cast<std::size_t>(a),
+                                            static_cast<std::size_t>(b), static_cast<std::size_t>(c)));
   }
-  bool take(std::string_view word) {
-    skip();
-    if (text_.substr(at_, word.size()) != word) return false;
-    at_ += word.size();
-    return true;
+  template <Operation operation>
+  static double one(double a) {
+    return now_->make(operation, a);
   }
-  void need(char c) {
-    if (!take(std::string_view{&c, 1}))
-      throw std::string{"`"} + c + "` is missing" +
-          (at_ < text_.size() ? " before `" + std::string{text_.substr(at_)} + "`" : " at its end");
+  template <Operation operation>
+  static double two(double a, double b) {
+    return now_->make(operation, a, b);
   }
-  std::size_t make(Operation operation, std::size_t a, std::size_t b = 0, std::size_t c = 0) {
-    return into_.result(section_, operation, a, b, c);
-  }
-
-  std::size_t choice() {
-    const std::size_t when = either();
-    if (!take("?")) return when;
-    const std::size_t yes = choice();
-    need(':');
-    return make(Operation::choose, when, yes, choice());
-  }
-  std::size_t either() {
-    std::size_t a = both();
-    while (take("||")) a = make(Operation::either, a, both());
-    return a;
-  }
-  std::size_t both() {
-    std::size_t a = comparison();
-    while (take("&&")) a = make(Operation::both, a, comparison());
-    return a;
-  }
-  std::size_t comparison() {
-    std::size_t a = sum();
-    for (;;) {
-      if (take("<="))
-        a = make(Operation::at_most, a, sum());
-      else if (take(">="))
-        a = make(Operation::at_least, a, sum());
-      else if (take("=="))
-        a = make(Operation::equal, a, sum());
-      else if (take("!="))
-        a = make(Operation::differs, a, sum());
-      else if (take("<"))
-        a = make(Operation::less, a, sum());
-      else if (take(">"))
-        a = make(Operation::greater, a, sum());
-      else
-        return a;
-    }
-  }
-  std::size_t sum() {
-    std::size_t a = product();
-    for (;;) {
-      if (take("+"))
-        a = make(Operation::add, a, product());
-      else if (take("-"))
-        a = make(Operation::subtract, a, product());
-      else
-        return a;
-    }
-  }
-  std::size_t product() {
-    std::size_t a = signed_one();
-    for (;;) {
-      if (take("*"))
-        a = make(Operation::multiply, a, signed_one());
-      else if (take("/"))
-        a = make(Operation::divide, a, signed_one());
-      else
-        return a;
-    }
-  }
-  std::size_t signed_one() {
-    if (take("-")) return make(Operation::negate, signed_one());
-    if (take("+")) return signed_one();
-    const std::size_t base = single();
-    return take("^") ? make(Operation::power, base, signed_one()) : base;
-  }
-
-  std::size_t single() {
-    if (++depth_ > 200) throw std::string{"is nested too deeply"};
-    struct Out {
-      int& depth;
-      ~Out() { --depth; }
-    } out{depth_};
-    skip();
-    if (at_ == text_.size()) throw std::string{"something is missing at its end"};
-    const char c = text_[at_];
-    if (c == '(') {
-      ++at_;
-      const std::size_t inner = choice();
-      need(')');
-      return inner;
-    }
-    if (std::isdigit(static_cast<unsigned char>(c)) || c == '.') {
-      double value = 0.0;
-      const auto [end, error] = std::from_chars(text_.data() + at_, text_.data() + text_.size(), value);
-      if (error != std::errc{}) throw "`" + std::string{text_.substr(at_)} + "` is no number";
-      at_ = static_cast<std::size_t>(end - text_.data());
-      return into_.number(value);
-    }
-    const std::size_t begin = at_;
-    while (at_ < text_.size() && (std::isalnum(static_cast<unsigned char>(text_[at_])) || text_[at_] == '_'))
-      ++at_;
-    const std::string name{text_.substr(begin, at_ - begin)};
-    if (name.empty()) throw "`" + std::string{text_.substr(begin)} + "` is not understood";
-    skip();
-    if (at_ < text_.size() && text_[at_] == '(') return call(name);
-    const auto& names = into_.names_;
-    if (const auto found = std::find(names.begin(), names.end(), name); found != names.end())
-      return static_cast<std::size_t>(found - names.begin());
-    if (name == "pi" || name == "_pi") return into_.number(std::numbers::pi);
-    if (name == "_e") return into_.number(std::numbers::e);
-    throw "`" + name + "` is no state, input or parameter";
-  }
-
-  std::size_t call(const std::string& name) {
-    static const std::map<std::string, Operation> functions{
-        {"sin", Operation::sine},         {"cos", Operation::cosine},
-        {"tan", Operation::tangent},      {"asin", Operation::arc_sine},
-        {"acos", Operation::arc_cosine},  {"atan", Operation::arc_tangent},
-        {"sinh", Operation::sinh},        {"cosh", Operation::cosh},
-        {"tanh", Operation::tanh},        {"exp", Operation::exponential},
-        {"log", Operation::logarithm},    {"ln", Operation::logarithm},
-        {"log2", Operation::logarithm_2}, {"log10", Operation::logarithm_10},
-        {"sqrt", Operation::root},        {"abs", Operation::absolute},
-        {"sign", Operation::sign},        {"min", Operation::least},
-        {"max", Operation::most}};
-    const auto found = functions.find(name);
-    if (found == functions.end()) throw "`" + name + "` is no function";
-    need('(');
-    std::size_t value = choice();
-    const bool many = found->second == Operation::least || found->second == Operation::most;
-    if (!many)
-      value = make(found->second, value);
-    else
-      while (take(",")) value = make(found->second, value, choice());
-    need(')');
+  template <Operation operation>
+  static double many(const double* values, int count) {
+    double value = values[0];
+    for (int i = 1; i < count; ++i) value = now_->make(operation, value, values[i]);
     return value;
   }
+  static double choose(double when, double yes, double no) {
+    return now_->make(Operation::choose, when, yes, no);
+  }
+  static int number(const char* text, int* position, double* slot) {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(text, text + std::strlen(text), value);
+    if (error != std::errc{} || !(*text == '.' || std::isdigit(static_cast<unsigned char>(*text)))) return 0;
+    *position += static_cast<int>(end - text);
+    *slot = static_cast<double>(now_->into_.number(value));
+    return 1;
+  }
 
+  struct OfOne {
+    std::string_view word;
+    double (*call)(double);
+  };
+  struct OfMore {
+    std::string_view word;
+    double (*call)(const double*, int);
+  };
+  struct Between {
+    std::string_view word;
+    double (*call)(double, double);
+    unsigned precedence;
+    mu::EOprtAssociativity associativity;
+  };
+  static constexpr OfOne functions_of_one[]{
+      {"sin", one<Operation::sine>},         {"cos", one<Operation::cosine>},
+      {"tan", one<Operation::tangent>},      {"asin", one<Operation::arc_sine>},
+      {"acos", one<Operation::arc_cosine>},  {"atan", one<Operation::arc_tangent>},
+      {"sinh", one<Operation::sinh>},        {"cosh", one<Operation::cosh>},
+      {"tanh", one<Operation::tanh>},        {"exp", one<Operation::exponential>},
+      {"log", one<Operation::logarithm>},    {"ln", one<Operation::logarithm>},
+      {"log2", one<Operation::logarithm_2>}, {"log10", one<Operation::logarithm_10>},
+      {"sqrt", one<Operation::root>},        {"abs", one<Operation::absolute>},
+      {"sign", one<Operation::sign>}};
+  static constexpr OfMore functions_of_more[]{{"min", many<Operation::least>},
+                                              {"max", many<Operation::most>}};
+  static constexpr Between operators[]{{"+", two<Operation::add>, mu::prADD_SUB, mu::oaLEFT},
+                                       {"-", two<Operation::subtract>, mu::prADD_SUB, mu::oaLEFT},
+                                       {"*", two<Operation::multiply>, mu::prMUL_DIV, mu::oaLEFT},
+                                       {"/", two<Operation::divide>, mu::prMUL_DIV, mu::oaLEFT},
+                                       {"^", two<Operation::power>, mu::prPOW, mu::oaRIGHT},
+                                       {"<", two<Operation::less>, mu::prCMP, mu::oaLEFT},
+                                       {">", two<Operation::greater>, mu::prCMP, mu::oaLEFT},
+                                       {"<=", two<Operation::at_most>, mu::prCMP, mu::oaLEFT},
+                                       {">=", two<Operation::at_least>, mu::prCMP, mu::oaLEFT},
+                                       {"==", two<Operation::equal>, mu::prCMP, mu::oaLEFT},
+                                       {"!=", two<Operation::differs>, mu::prCMP, mu::oaLEFT},
+                                       {"&&", two<Operation::both>, mu::prLAND, mu::oaLEFT},
+                                       {"||", two<Operation::either>, mu::prLOR, mu::oaLEFT}};
+
+  static thread_local FormulaRecorder* now_;  // muParser's callbacks take numbers alone
   Expressions& into_;
   Expressions::Section section_;
-  std::string_view text_;
-  std::size_t at_ = 0;
-  int depth_ = 0;
+  std::vector<double> slots_;  // of the names; the parser points to them
+  mu::Parser parser_;
 };
+
+thread_local FormulaRecorder* FormulaRecorder::now_ = nullptr;
+
+const std::vector<std::string_view>& expression_words() {
+  static const auto words = FormulaRecorder::words();
+  return words;
+}
 
 Expressions::Expressions(const std::vector<std::string>& variables, const std::vector<std::string>& constants)
     : names_{variables}, start_(variables.size() + constants.size(), 0.0), changes_(variables.size(), true) {
@@ -222,11 +192,13 @@ std::size_t Expressions::result(Section section, Operation operation, std::size_
   return start_.size() - 1;
 }
 
-std::size_t Expressions::add(Section section, std::string_view formula, const std::string& where) {
+std::size_t Expressions::add(Section section, const std::string& formula, const std::string& where) {
   try {
-    return FormulaReader{*this, section, formula}.whole();
-  } catch (const std::string& what) {
-    throw InputError{where, "`" + std::string{formula} + "`: " + what,
+    return FormulaRecorder{*this, section}.record(formula);
+  } catch (const mu::ParserError& error) {
+    std::string what = error.GetMsg();
+    if (what.ends_with('.')) what.pop_back();
+    throw InputError{where, "`" + formula + "`: " + what,
                      "use states, inputs, parameters, t, pi and the functions of the contract"};
   }
 }

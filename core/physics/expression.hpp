@@ -8,7 +8,7 @@
 
 namespace invar::physics {
 
-/// Formulas over named numbers: + - * / ^, comparisons, `a ? b : c`, sin cos tan asin acos atan sinh cosh tanh exp log ln log2
+/// Formulas over named numbers, read by muParser: + - * / ^, comparisons, && ||, if(condition, yes, no), sin cos tan asin acos atan sinh cosh tanh exp log ln log2
 /// log10 sqrt abs sign min max, pi. `-x^2` is -(x^2), `x^y^z` is x^(y^z). The root of what is negative is 0, the logarithm of
 /// what is not positive that of the smallest positive number, the sign of zero 0: an empty tank does not run.
 /// Equal parts of the formulas of one section are worked out once.
@@ -21,7 +21,7 @@ class Expressions {
   Expressions(const std::vector<std::string>& variables, const std::vector<std::string>& constants);
 
   /// The slot of the value of a formula. Throws InputError naming `where` for what is none.
-  std::size_t add(Section section, std::string_view formula, const std::string& where);
+  std::size_t add(Section section, const std::string& formula, const std::string& where);
 
   [[nodiscard]] std::size_t slots() const { return start_.size(); }
   /// The slots of one column before any run: the numbers that stand in the formulas.
@@ -32,7 +32,7 @@ class Expressions {
   void run(Section section, double* slots) const;
 
  private:
-  friend class FormulaReader;
+  friend class FormulaRecorder;
   enum class Operation {
     add,
     subtract,
@@ -82,5 +82,8 @@ class Expressions {
   std::vector<std::size_t> numbers_;  // slots of what stands in the formulas
   std::vector<Instruction> code_[sections];
 };
+
+/// What means something in a formula by itself, and so names no state, input or parameter.
+const std::vector<std::string_view>& expression_words();
 
 }  // namespace invar::physics
