@@ -1,10 +1,12 @@
 #include "core/model/own_expressions.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <map>
 #include <string>
+#include <string_view>
+
+#include "core/physics/expression.hpp"
 
 namespace invar::model {
 
@@ -12,10 +14,10 @@ namespace {
 
 using config::Node;
 
-constexpr std::array reserved{"t",     "pi",   "sin",  "cos",   "tan",   "asin",  "acos",  "atan",
-                              "atan2", "sinh", "cosh", "tanh",  "asinh", "acosh", "atanh", "exp",
-                              "ln",    "log",  "log2", "log10", "sqrt",  "sign",  "rint",  "abs",
-                              "min",   "max",  "sum",  "avg",   "_pi",   "_e"};
+bool is_reserved(std::string_view name) {
+  const auto& words = physics::expression_words();
+  return name == "t" || std::find(words.begin(), words.end(), name) != words.end();
+}
 
 bool is_letter(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
 
@@ -27,7 +29,7 @@ class Names {
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) != 0 ||
         !std::all_of(name.begin(), name.end(), is_letter))
       node.fault("`" + name + "` is no name for an expression", "use letters, digits and _, a letter first");
-    else if (std::find(reserved.begin(), reserved.end(), name) != reserved.end())
+    else if (is_reserved(name))
       node.fault("`" + name + "` means something else in an expression", "give it another name");
     else if (const auto [at, is_new] = seen_.emplace(name, what); !is_new)
       node.fault("`" + name + "` is " + at->second + " already", "give one of the two another name");

@@ -32,6 +32,12 @@ class Simulation {
  public:
   virtual ~Simulation() = default;
   virtual void run(const Model& model, Outputs& outputs) const = 0;
+  /// The same of several models. Where they differ in numbers alone some plants step through them together, with steps as
+  /// short as the fastest of them asks for.
+  virtual void run_all(const std::vector<const Model*>& models, std::vector<Outputs>& outputs) const {
+    outputs.resize(models.size());
+    for (std::size_t i = 0; i < models.size(); ++i) run(*models[i], outputs[i]);
+  }
 };
 
 /// `structure` may later be run with other values and other terms, but with the same signals.

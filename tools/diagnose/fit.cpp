@@ -214,20 +214,46 @@ Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const Model
   return residual(data, weighing, simulate(data, model));
 }
 
+Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& models) {
+  Eigen::Index rows = 0;
+  for (const auto& recording : data.recordings)
+    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
+  Eigen::MatrixXd columns(rows, static_cast<Eigen::Index>(models.size()));
+  const std::size_t together = data.model.plant == physics::Plant::equations ? 8 : 1;
+  in_parallel((models.size() + together - 1) / together, [&](std::size_t group) {
+    if (data.stopped && data.stopped()) throw Stopped{};
+    const std::size_t begin = group * together, end = std::min(models.size(), begin + together);
+    std::vector<const Model*> some;
+    for (std::size_t k = begin; k < end; ++k) some.push_back(&models[k]);
+    std::vector<std::vector<physics::Outputs>> all(some.size(),
+                                                   std::vector<physics::Outputs>(data.recordings.size()));
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      std::vector<physics::Outputs> outputs;
+      data.recordings[r].simulation->run_all(some, outputs);
+      for (std::size_t k = 0; k < some.size(); ++k) all[k][r] = std::move(outputs[k]);
+    }
+    for (std::size_t k = begin; k < end; ++k)
+      columns.col(static_cast<Eigen::Index>(k)) = differences(data, all[k - begin]);
+  });
+  return columns;
+}
+
 Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
   const Eigen::VectorXd at = differences(data, simulate(data, model));
-  Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(free.size()));
-  in_parallel(free.size(), [&](std::size_t j) {
-    Model changed = model;
+  std::vector<Model> changed(free.size(), model);
+  Eigen::VectorXd steps(static_cast<Eigen::Index>(free.size()));
+  for (std::size_t j = 0; j < free.size(); ++j) {
     const double value = get(model, free[j]);
     // Equations that swing for long answer in phase: there a larger step would not be small.
     double step = (model.plant == physics::Plant::equations ? 1e-4 : 1e-2) * free[j].scale;
     if (value + step > free[j].bounds.upper) step = -step;
-    set(changed, free[j], value + step);
-    auto column = columns.col(static_cast<Eigen::Index>(j));
-    column = (differences(data, simulate_once(data, changed)) - at) / step;
-    column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
-  });
+    set(changed[j], free[j], value + step);
+    steps(static_cast<Eigen::Index>(j)) = step;
+  }
+  Eigen::MatrixXd columns = differences_of(data, changed);
+  for (Eigen::Index j = 0; j < columns.cols(); ++j)
+    columns.col(j) =
+        ((columns.col(j) - at) / steps(j)).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
   return columns;
 }
 

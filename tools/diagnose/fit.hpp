@@ -49,6 +49,8 @@ std::vector<physics::Outputs> simulate_once(const Case& data, const physics::Mod
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
                          const std::vector<physics::Outputs>& simulated);
+/// measured - simulated of each model, a column each. Runs on all processors.
+Eigen::MatrixXd differences_of(const Case& data, const std::vector<physics::Model>& models);
 /// Columns: change of measured - simulated by each freedom, row by row as they stand. Runs on all processors.
 Eigen::MatrixXd sensitivities(const Case& data, const physics::Model& model,
                               const std::vector<Freedom>& free);

@@ -36,36 +36,48 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   return n;
 }
 
-Eigen::MatrixXd columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at, const Start& start) {
-  Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(start.directions.size()));
-  for (std::size_t d = 0; d < start.directions.size(); ++d) {
-    const auto& direction = start.directions[d];
-    physics::Model model = base.model;
-    Term term = start.term;
-    double by = 1.0;
-    if (!term.curve.knots.empty()) {
-      by = data.model.plant == physics::Plant::axis ? 0.05 : 1e-6;
-      if (data.model.plant == physics::Plant::thermal) by = 0.1;
-      if (term.info->site == "actuator" || term.info->site == "thermal" || term.info->site == "measurement")
-        by = 1e-3;
-      if (data.model.plant == physics::Plant::sensor) by = 1e-7;
-      if (start.step > 0.0) by = start.step;
-      term.curve.values[direction.knot] = by;
-    } else if (direction.amplitude < none) {
-      for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
-        if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
-          term.values[i] = 0.0;
-        if (term.info->parameters[i].role == Role::phase && direction.quadrature)
-          term.values[i] += 0.5 * std::numbers::pi;
+/// Of all directions of all starts, one after another: terms of one kind at one place run together.
+std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at,
+                                        const std::vector<Start>& starts) {
+  std::vector<physics::Model> models;
+  std::vector<double> steps;
+  for (const auto& start : starts)
+    for (const auto& direction : start.directions) {
+      auto& model = models.emplace_back(base.model);
+      Term term = start.term;
+      double by = 1.0;
+      if (!term.curve.knots.empty()) {
+        by = data.model.plant == physics::Plant::axis ? 0.05 : 1e-6;
+        if (data.model.plant == physics::Plant::thermal) by = 0.1;
+        if (term.info->site == "actuator" || term.info->site == "thermal" || term.info->site == "measurement")
+          by = 1e-3;
+        if (data.model.plant == physics::Plant::sensor) by = 1e-7;
+        if (start.step > 0.0) by = start.step;
+        term.curve.values[direction.knot] = by;
+      } else if (direction.amplitude < none) {
+        for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
+          if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
+            term.values[i] = 0.0;
+          if (term.info->parameters[i].role == Role::phase && direction.quadrature)
+            term.values[i] += 0.5 * std::numbers::pi;
+        }
+        by = term.values[direction.amplitude];
       }
-      by = term.values[direction.amplitude];
+      model.terms.push_back(std::move(term));
+      steps.push_back(by);
     }
-    model.terms.push_back(term);
-    auto column = columns.col(static_cast<Eigen::Index>(d));
-    column = (differences(data, simulate_once(data, model)) - at) / by;
-    column = column.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+  const Eigen::MatrixXd differences = differences_of(data, models);
+  std::vector<Eigen::MatrixXd> all;
+  Eigen::Index next = 0;
+  for (const auto& start : starts) {
+    auto& columns = all.emplace_back(at.size(), static_cast<Eigen::Index>(start.directions.size()));
+    for (Eigen::Index d = 0; d < columns.cols(); ++d, ++next)
+      columns.col(d) =
+          ((differences.col(next) - at) / steps[static_cast<std::size_t>(next)]).unaryExpr([](double v) {
+            return std::isfinite(v) ? v : 0.0;
+          });
   }
-  return columns;
+  return all;
 }
 
 /// Fills strength and gain of a set of columns with the nuisance taken out.
@@ -94,35 +106,44 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   const Eigen::VectorXd at = differences(data, simulate(data, base.model));
   std::vector<Screened> all(starts.size());
   const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
-  in_parallel(starts.size(), [&](std::size_t i) {
-    auto& s = all[i];
-    s.start = starts[i];
-    s.columns = columns_of(data, base, at, s.start);
-    s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
-    const auto& info = *s.start.term.info;
-    if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
-        s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
-      // A term without a strength is there once, not eight times: the gain of one.
-      const double full = s.strength(0);
-      s.gain *= (2.0 * full - 1.0) / (full * full);
-      s.strength(0) = 1.0;
-    }
-    // An amplitude without a phase has one possible sign where its bounds say so.
-    bool periodic = false;
-    std::size_t shapes = 0;
-    for (std::size_t k = 0; k < info.parameter_count(); ++k) {
-      periodic = periodic || info.parameters[k].role == Role::phase;
-      shapes += info.parameters[k].role == Role::shape ? 1U : 0U;
-    }
-    if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
-      const auto& d = s.start.directions.front();
-      const double lower = d.amplitude < none ? info.parameters[d.amplitude].bounds.lower : 0.0;
-      s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
-    }
-    const double numbers = static_cast<double>(s.start.directions.size() + shapes);
-    s.merit = s.gain - 0.5 * numbers * std::log(observations);
-    if (keep == 0 || s.merit < 0.0) s.columns.resize(0, 0);
-  });
+  // So many at a time: their columns are as long as the recording.
+  const std::size_t most = data.model.plant == physics::Plant::equations ? 64 : 16;
+  for (std::size_t begin = 0; begin < starts.size(); begin += most) {
+    const std::size_t end = std::min(starts.size(), begin + most);
+    auto found = columns_of(data, base, at,
+                            {starts.begin() + static_cast<std::ptrdiff_t>(begin),
+                             starts.begin() + static_cast<std::ptrdiff_t>(end)});
+    for (std::size_t i = begin; i < end; ++i) all[i].columns = std::move(found[i - begin]);
+    in_parallel(end - begin, [&](std::size_t of) {
+      const std::size_t i = begin + of;
+      auto& s = all[i];
+      s.start = starts[i];
+      s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
+      const auto& info = *s.start.term.info;
+      if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
+          s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
+        // A term without a strength is there once, not eight times: the gain of one.
+        const double full = s.strength(0);
+        s.gain *= (2.0 * full - 1.0) / (full * full);
+        s.strength(0) = 1.0;
+      }
+      // An amplitude without a phase has one possible sign where its bounds say so.
+      bool periodic = false;
+      std::size_t shapes = 0;
+      for (std::size_t k = 0; k < info.parameter_count(); ++k) {
+        periodic = periodic || info.parameters[k].role == Role::phase;
+        shapes += info.parameters[k].role == Role::shape ? 1U : 0U;
+      }
+      if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
+        const auto& d = s.start.directions.front();
+        const double lower = d.amplitude < none ? info.parameters[d.amplitude].bounds.lower : 0.0;
+        s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
+      }
+      const double numbers = static_cast<double>(s.start.directions.size() + shapes);
+      s.merit = s.gain - 0.5 * numbers * std::log(observations);
+      if (keep == 0 || s.merit < 0.0) s.columns.resize(0, 0);
+    });
+  }
   std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
   for (std::size_t i = std::min(keep, all.size()); i < all.size(); ++i) all[i].columns.resize(0, 0);
   return all;
@@ -167,9 +188,9 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
   for (const auto& start : chosen)
     begins.push_back(begins.back() + static_cast<Eigen::Index>(start.directions.size()));
   Eigen::MatrixXd columns(at.size(), begins.back());
-  in_parallel(chosen.size(), [&](std::size_t i) {
-    columns.middleCols(begins[i], begins[i + 1] - begins[i]) = columns_of(data, base, at, chosen[i]);
-  });
+  const auto found = columns_of(data, base, at, chosen);
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    columns.middleCols(begins[i], begins[i + 1] - begins[i]) = found[i];
   columns = whitened(data, weighing, columns);
   const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
   const Eigen::MatrixXd all = weighing.temper * (columns.transpose() * columns);

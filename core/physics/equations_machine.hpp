@@ -1,0 +1,421 @@
+// EquationsMachine: a model in the user's own equations with its terms, advanced from row to row for several sets of
+// numbers at once.
+#pragma once
+
+#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include "core/physics/expression.hpp"
+#include "core/physics/model.hpp"
+#include "core/physics/static_plants.hpp"
+
+namespace invar::physics {
+
+/// The formulas of a model, read once: reading them takes a hundred times as long as a step.
+class CompiledEquations {
+ public:
+  explicit CompiledEquations(const Model& model) {
+    const auto& equations = model.equations;
+    for (const auto& state : equations.states) names_.push_back(state.name);
+    for (const auto& input : equations.inputs) names_.push_back(input.symbol);
+    names_.emplace_back("t");
+    std::vector<std::string> constants;
+    for (std::size_t i = 0; i < model.parameters.size(); ++i)
+      if (model.parameters[i].name.find('.') == std::string::npos) {
+        parameters.push_back(i);
+        constants.push_back(model.parameters[i].name);
+      }
+    formulas = std::make_unique<Expressions>(names_, constants);
+    for (const auto& state : equations.states)
+      rates.push_back(formulas->add(Expressions::rates, state.derivative, "states." + state.name));
+    for (const auto& output : equations.outputs)
+      outputs.push_back(formulas->add(Expressions::outputs, output.expression, "outputs." + output.name));
+    if (!equations.controlled_input.empty())
+      law = formulas->add(Expressions::law, equations.control_law, "controller.expression");
+  }
+
+  /// The slot of a symbol; variables() where there is none of it.
+  [[nodiscard]] std::size_t place(const std::string& symbol) const {
+    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), symbol) - names_.begin());
+  }
+  [[nodiscard]] std::size_t variables() const { return names_.size(); }
+
+  std::unique_ptr<Expressions> formulas;
+  std::vector<std::size_t> parameters;      // places in the model
+  std::vector<std::size_t> rates, outputs;  // slots
+  std::size_t law = 0;
+
+ private:
+  std::vector<std::string> names_;  // states, inputs, t
+};
+
+/// The equations with the numbers of `lanes` models that have the same terms at the same places.
+template <std::size_t lanes>
+class EquationsMachine {
+ public:
+  static constexpr std::size_t most_states = 16;
+  using Lane = std::array<double, lanes>;
+  using State = std::array<Lane, most_states>;
+  using Models = std::array<const Model*, lanes>;
+
+  EquationsMachine(const CompiledEquations& compiled, const Models& models)
+      : compiled_{compiled},
+        states_{models[0]->equations.states.size()},
+        controlled_{compiled.place(models[0]->equations.controlled_input)},
+        slots_(compiled.formulas->slots() * lanes) {
+    const auto& start = compiled.formulas->start();
+    for (std::size_t s = 0; s < start.size(); ++s)
+      for (std::size_t l = 0; l < lanes; ++l) slot(s)[l] = start[s];
+    for (std::size_t i = 0; i < compiled.parameters.size(); ++i)
+      for (std::size_t l = 0; l < lanes; ++l)
+        slot(compiled.variables() + i)[l] = models[l]->parameters[compiled.parameters[i]].value;
+    compiled.formulas->template run<lanes>(Expressions::fixed, slots_.data());
+    for (std::size_t t = 0; t < models[0]->terms.size(); ++t) add(models, t);
+  }
+
+  [[nodiscard]] std::size_t states() const { return states_; }
+  [[nodiscard]] std::size_t all_states() const { return states_ + hidden_.size() + lags_.size(); }
+  [[nodiscard]] std::size_t controlled() const { return controlled_; }
+
+  void set_input(std::size_t i, std::size_t lane, double value) { slot(states_ + i)[lane] = value; }
+
+  void show(const State& s, double t) {
+    for (std::size_t i = 0; i < states_; ++i) std::copy_n(s[i].begin(), lanes, slot(i));
+    std::fill_n(slot(compiled_.variables() - 1), lanes, t);
+  }
+
+  /// The rates here, held by limits and friction.
+  State slope(const State& s, double t) {
+    State d = free_slope(s, t);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      for (const auto& rub : frictions_) {
+        double& rate = d[rub.use.on][l];
+        rate = rub.stuck[l] ? 0.0 : rate - rub.direction[l] * rub.use.p[l][0];
+      }
+      for (const auto& term : overflows_) {
+        double& rate = d[term.on][l];
+        if (!(s[term.on][l] >= term.p[l][0] && rate > 0.0)) continue;
+        if (term.with < states_ && term.with != term.on) d[term.with][l] += term.p[l][1] * rate;
+        rate = 0.0;
+      }
+      for (const auto& term : uppers_)
+        if (s[term.on][l] >= term.p[l][0] && d[term.on][l] > 0.0) d[term.on][l] = 0.0;
+      for (const auto& term : lowers_)
+        if (s[term.on][l] <= term.p[l][0] && d[term.on][l] < 0.0) d[term.on][l] = 0.0;
+    }
+    return d;
+  }
+
+  void advance(State& s, double t, double h, int parts) {
+    h /= parts;
+    shortest_lag_ = h / 2.5;
+    for (int part = 0; part < parts; ++part, t += h) {
+      for (auto& late : delays_) late.past.emplace_back(t, s[late.use.on]);
+      if (frictions_.empty())
+        s = moved(s, t, h);
+      else
+        slide(s, t, h);
+      for (std::size_t l = 0; l < lanes; ++l) {
+        for (const auto& term : uppers_) s[term.on][l] = std::min(s[term.on][l], term.p[l][0]);
+        for (const auto& term : lowers_) s[term.on][l] = std::max(s[term.on][l], term.p[l][0]);
+        for (const auto& term : overflows_) {  // what ran over within the step
+          const double surplus = std::max(0.0, s[term.on][l] - term.p[l][0]);
+          s[term.on][l] -= surplus;
+          if (term.with < states_ && term.with != term.on) s[term.with][l] += term.p[l][1] * surplus;
+        }
+      }
+    }
+    for (auto& rub : frictions_) rub.direction.fill(0.0), rub.stuck.fill(false);
+  }
+
+  /// Of all outputs of what was shown.
+  void work_out_outputs() { compiled_.formulas->template run<lanes>(Expressions::outputs, slots_.data()); }
+  [[nodiscard]] const double* output(std::size_t i) { return slot(compiled_.outputs[i]); }
+  const double* law() {
+    compiled_.formulas->template run<lanes>(Expressions::law, slots_.data());
+    return slot(compiled_.law);
+  }
+
+  /// The largest rate of change of anything of any lane [1/s]: the spectral radius of the Jacobian here. A jump (the sign of
+  /// a speed that is zero) has none: it would only make steps short.
+  double fastest(const State& s, double t) {
+    auto fine = jacobian(s, t, 1e-6);
+    const auto coarse = jacobian(s, t, 1e-4);
+    double most = 0.0;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      for (Eigen::Index k = 0; k < fine[l].size(); ++k)
+        if (std::abs(fine[l](k)) > 30.0 * std::abs(coarse[l](k))) fine[l](k) = coarse[l](k);
+      if (fine[l].allFinite()) most = std::max(most, fine[l].eigenvalues().cwiseAbs().maxCoeff());
+    }
+    return most;
+  }
+  /// Steps are longer than an explicit rule bears.
+  void set_stiff(bool stiff) { stiff_ = stiff; }
+
+  void balance_hidden(State& s) const {
+    for (std::size_t h = 0; h < hidden_.size(); ++h) s[states_ + h] = s[hidden_[h].on];
+    for (std::size_t k = 0; k < lags_.size(); ++k) s[first_lag() + k] = s[lags_[k].on];
+  }
+
+ private:
+  struct Use {
+    const EquationsTermKind* kind;
+    std::size_t on, with;
+    std::array<const double*, lanes> p;
+  };
+  struct Course {
+    std::size_t on, with;
+    std::array<const Curve*, lanes> curve;
+  };
+  struct Friction {
+    Use use;
+    Lane direction{};
+    std::array<bool, lanes> stuck{};
+  };
+  struct Delay {
+    Use use;
+    std::vector<std::pair<double, Lane>> past;  // time, value
+  };
+
+  [[nodiscard]] double* slot(std::size_t s) { return slots_.data() + s * lanes; }
+  [[nodiscard]] std::size_t first_lag() const { return states_ + hidden_.size(); }
+  /// Never so short that a step could not follow; what is shorter is blended out.
+  [[nodiscard]] double time_constant(const Use& lag, std::size_t l) const {
+    return std::max(lag.p[l][0], shortest_lag_);
+  }
+
+  /// The rates as they would be without friction and limits: those jump, and what jumps has no rate of change.
+  State free_slope(const State& s, double t) {
+    show(s, t);
+    bend_states(s, t);
+    compiled_.formulas->template run<lanes>(Expressions::rates, slots_.data());
+    State d;
+    for (std::size_t i = 0; i < states_; ++i) std::copy_n(slot(compiled_.rates[i]), lanes, d[i].begin());
+    for (const auto& term : rate_terms_)
+      for (std::size_t l = 0; l < lanes; ++l) d[term.on][l] += term.kind->rate(slot(term.with)[l], term.p[l]);
+    for (const auto& [on, with, curve] : curves_)
+      for (std::size_t l = 0; l < lanes; ++l) d[on][l] += (*curve[l])(slot(with)[l]);
+    for (std::size_t h = 0; h < hidden_.size(); ++h) {
+      const auto& term = hidden_[h];
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double difference = s[states_ + h][l] - s[term.on][l];
+        d[term.on][l] += term.p[l][0] * difference;
+        d[states_ + h][l] = -difference / term.p[l][1];
+      }
+    }
+    for (std::size_t k = 0; k < lags_.size(); ++k)
+      for (std::size_t l = 0; l < lanes; ++l)
+        d[first_lag() + k][l] = (s[lags_[k].on][l] - s[first_lag() + k][l]) / time_constant(lags_[k], l);
+    return d;
+  }
+
+  /// What the rates see of a state behind a dead zone, a lag or a delay; outputs show the state itself.
+  void bend_states(const State& s, double t) {
+    for (const auto& zone : dead_zones_)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        double& seen = slot(zone.on)[l];
+        seen -= std::clamp(seen, -zone.p[l][0], zone.p[l][0]);
+      }
+    for (std::size_t k = 0; k < lags_.size(); ++k)
+      for (std::size_t l = 0; l < lanes; ++l)
+        slot(lags_[k].on)[l] -=
+            lags_[k].p[l][0] / time_constant(lags_[k], l) * (s[lags_[k].on][l] - s[first_lag() + k][l]);
+    for (const auto& late : delays_)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double by = late.use.p[l][0], when = t - by;
+        const auto& past = late.past;
+        if (past.empty() || !(by > 0.0)) continue;
+        const auto after = std::upper_bound(past.begin(), past.end(), when,
+                                            [](double time, const auto& one) { return time < one.first; });
+        double& seen = slot(late.use.on)[l];
+        if (after == past.begin()) {
+          seen = past.front().second[l];
+          continue;
+        }
+        const double t0 = (after - 1)->first, s0 = (after - 1)->second[l];
+        const double t1 = after == past.end() ? t : after->first,
+                     s1 = after == past.end() ? seen : after->second[l];
+        seen = t1 > t0 ? s0 + (s1 - s0) * (when - t0) / (t1 - t0) : s1;
+      }
+  }
+
+  /// Of the rates of all states here, as far as they do not jump, lane by lane; from steps of `share` of each state.
+  std::array<Eigen::MatrixXd, lanes> jacobian(const State& s, double t, double share) {
+    const auto n = static_cast<Eigen::Index>(all_states());
+    std::array<Eigen::MatrixXd, lanes> all;
+    for (auto& one : all) one.resize(n, n);
+    for (Eigen::Index j = 0; j < n; ++j) {
+      State up = s, down = s;
+      const auto at = static_cast<std::size_t>(j);
+      Lane by;
+      for (std::size_t l = 0; l < lanes; ++l) {
+        by[l] = share * std::max(1e-3, std::abs(s[at][l]));
+        up[at][l] += by[l], down[at][l] -= by[l];
+      }
+      const State a = free_slope(up, t), b = free_slope(down, t);
+      for (std::size_t l = 0; l < lanes; ++l)
+        for (Eigen::Index i = 0; i < n; ++i)
+          all[l](i, j) =
+              (a[static_cast<std::size_t>(i)][l] - b[static_cast<std::size_t>(i)][l]) / (2.0 * by[l]);
+    }
+    return all;
+  }
+
+  /// One step of Rosenbrock's rule of second order, L-stable: what is far faster than the step is at its balance after it.
+  State eased(const State& s, double t, double h) {
+    constexpr double gamma = 1.0 - 0.5 * std::numbers::sqrt2;
+    const auto n = static_cast<Eigen::Index>(all_states());
+    const auto column = [n](const State& state, std::size_t l) {
+      Eigen::VectorXd one(n);
+      for (Eigen::Index i = 0; i < n; ++i) one(i) = state[static_cast<std::size_t>(i)][l];
+      return one;
+    };
+    const auto rates = jacobian(s, t, 1e-6);
+    const Eigen::MatrixXd eye = Eigen::MatrixXd::Identity(n, n);
+    std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> matrix;
+    std::vector<Eigen::VectorXd> first, second;
+    const State here = slope(s, t);
+    State next = s;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      matrix.push_back((eye - gamma * h * rates[l]).partialPivLu());
+      first.push_back(matrix[l].solve(column(here, l)));
+      for (Eigen::Index i = 0; i < n; ++i) next[static_cast<std::size_t>(i)][l] += h * first[l](i);
+    }
+    const State there = slope(next, t + h);
+    next = s;
+    for (std::size_t l = 0; l < lanes; ++l) {
+      second.push_back(matrix[l].solve(column(there, l) - 2.0 * first[l]));
+      for (Eigen::Index i = 0; i < n; ++i)
+        next[static_cast<std::size_t>(i)][l] += h * (1.5 * first[l](i) + 0.5 * second[l](i));
+    }
+    return next;
+  }
+
+  /// One step of the classical Runge-Kutta rule.
+  State moved(const State& s, double t, double h) {
+    if (stiff_) return eased(s, t, h);
+    const std::size_t n = all_states();
+    const auto by = [&](const State& rate, double share) {
+      State next;
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t l = 0; l < lanes; ++l) next[i][l] = s[i][l] + share * rate[i][l];
+      return next;
+    };
+    const State a = slope(s, t), b = slope(by(a, 0.5 * h), t + 0.5 * h),
+                c = slope(by(b, 0.5 * h), t + 0.5 * h), d = slope(by(c, h), t + h);
+    State next;
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t l = 0; l < lanes; ++l)
+        next[i][l] = s[i][l] + h / 6.0 * (a[i][l] + 2.0 * (b[i][l] + c[i][l]) + d[i][l]);
+    return next;
+  }
+
+  static double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
+
+  /// Which way each friction acts from here; at rest it holds up to its level. One lane alone.
+  void turn(const State& s, double t) {
+    for (auto& rub : frictions_) {
+      const double speed = s[rub.use.on][0];
+      rub.direction[0] = sign_of(speed);
+      rub.stuck[0] = false;
+      if (speed != 0.0) continue;
+      const double push = slope(s, t)[rub.use.on][0];
+      rub.stuck[0] = std::abs(push) <= rub.use.p[0][0];
+      rub.direction[0] = rub.stuck[0] ? 0.0 : sign_of(push);
+    }
+  }
+
+  /// A step under dry friction: reversals are found, so that what comes out is smooth in every number. One lane alone: each
+  /// has its reversals at a time of its own.
+  void slide(State& s, double t, double h) {
+    static_assert(lanes >= 1);
+    for (int events = 0; events < 8 && h > 0.0; ++events) {
+      turn(s, t);
+      State next = moved(s, t, h);
+      double taken = h;
+      for (auto& rub : frictions_) {
+        const std::size_t on = rub.use.on;
+        if (rub.stuck[0] || !(next[on][0] * rub.direction[0] < 0.0)) continue;
+        if (s[on][0] == 0.0) {  // would slide back at once: it stays
+          rub.stuck[0] = true;
+          next = moved(s, t, taken);
+          continue;
+        }
+        double low = 0.0, low_speed = s[on][0], high = taken, high_speed = next[on][0];
+        for (int i = 0; i < 6 && std::abs(next[on][0]) > 1e-13 * std::abs(s[on][0]); ++i) {  // regula falsi
+          taken = low + (high - low) * low_speed / (low_speed - high_speed);
+          next = moved(s, t, taken);
+          (next[on][0] * rub.direction[0] > 0.0 ? low : high) = taken;
+          (next[on][0] * rub.direction[0] > 0.0 ? low_speed : high_speed) = next[on][0];
+        }
+        next[on][0] = 0.0;
+      }
+      s = next;
+      t += taken;
+      h -= taken;
+    }
+  }
+
+  void add(const Models& models, std::size_t t) {
+    const Term& term = models[0]->terms[t];
+    const auto* kind = equations_kind(*term.info);
+    const std::size_t on = compiled_.place(term.on),
+                      with = std::min(term.with.empty() ? on : compiled_.place(term.with),
+                                      compiled_.variables() - 1);
+    if (on >= states_) return;  // at an input or output: the simulation bends those
+    if (!term.curve.knots.empty()) {
+      Course course{on, std::min(compiled_.place(term.curve.over), compiled_.variables() - 1), {}};
+      for (std::size_t l = 0; l < lanes; ++l) course.curve[l] = &models[l]->terms[t].curve;
+      curves_.push_back(course);
+      return;
+    }
+    Use use{kind, on, with, {}};
+    for (std::size_t l = 0; l < lanes; ++l) use.p[l] = models[l]->terms[t].values.data();
+    if (kind->rate != nullptr) rate_terms_.push_back(use);
+    switch (kind->memory) {
+      case EquationsMemory::dry_friction:
+        frictions_.push_back({use});
+        break;
+      case EquationsMemory::upper_limit:
+        uppers_.push_back(use);
+        break;
+      case EquationsMemory::lower_limit:
+        lowers_.push_back(use);
+        break;
+      case EquationsMemory::overflow:
+        overflows_.push_back(use);
+        break;
+      case EquationsMemory::hidden_state:
+        if (all_states() < most_states) hidden_.push_back(use);
+        break;
+      case EquationsMemory::lag:
+        if (all_states() < most_states) lags_.push_back(use);
+        break;
+      case EquationsMemory::delay:
+        delays_.push_back({use, {}});
+        break;
+      case EquationsMemory::dead_zone:
+        dead_zones_.push_back(use);
+        break;
+      default:
+        break;
+    }
+  }
+
+  const CompiledEquations& compiled_;
+  std::size_t states_, controlled_;
+  std::vector<double> slots_;  // slot by slot, the lanes of one beside one another
+  std::vector<Friction> frictions_;
+  std::vector<Delay> delays_;
+  std::vector<Course> curves_;
+  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
+  double shortest_lag_ = 0.0;
+  bool stiff_ = false;
+};
+
+}  // namespace invar::physics
