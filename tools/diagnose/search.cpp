@@ -9,6 +9,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
@@ -48,6 +49,8 @@ class Search {
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
+  /// Takes off the readings what their noise makes of the claims so far, and fits anew.
+  void quieten();
   /// Takes back names in whose place a free course over another variable does clearly better.
   void doubt();
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
@@ -56,10 +59,12 @@ class Search {
   bool take(Step step) {
     if (stopped()) return false;
     const auto kept = std::tuple{d_, rivals_};
+    const auto readings = noise_->now();
     try {
       return step();
     } catch (const Stopped&) {
       std::tie(d_, rivals_) = kept;
+      noise_->put(readings);
       beside_.reset();
       return false;
     }
@@ -74,6 +79,7 @@ class Search {
   Diagnosis d_;
   std::vector<std::vector<Term>> rivals_;  // by finding: other terms that were nearly as good in its place
   std::vector<Screened> last_screen_;
+  std::optional<LoopNoise> noise_;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
 
@@ -81,6 +87,7 @@ void Search::prepare() {
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
+  noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
@@ -200,6 +207,11 @@ bool Search::add_named(double round) {
                   f.evidence - base.evidence);
       continue;
     }
+    if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95)) {
+      d_.reject(std::string{own_fit.model.terms.back().info->name},
+                "in the noise of this loop its effect would not show", best_gain);
+      continue;
+    }
     // What the wrong form of an earlier term leaves over is no further physics.
     if (!rivals_.empty() && options_.refuses)
       if (const auto other = other_form(data_, own_weighing, own_base, own_fit)) {
@@ -226,6 +238,14 @@ bool Search::add_named(double round) {
     return true;
   }
   return false;
+}
+
+void Search::quieten() {
+  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
+  noise_->take_off(d_.best.model);
+  d_.weighing = weigh(data_, simulate(data_, d_.best.model));
+  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
 }
 
 void Search::prune() {
@@ -333,7 +353,7 @@ bool Search::add_pair(const Fit* rival) {
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
-    if (!take([&] { return add_named(round); })) break;
+    if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
   if (options_.refuses) take([&] { return prune(), true; });
   if (!take([&] { return weigh_alternatives(), true; })) {
     data_.stopped = {};
@@ -355,6 +375,7 @@ void Search::finish() {
   data_.stopped = {};
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
+  auto readings = noise_->put_back();
   hold_out(data_, d_, options_.refuses);
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
@@ -363,6 +384,7 @@ void Search::finish() {
     d_.train.clear();
     hold_out(data_, d_);
   }
+  noise_->put(std::move(readings));
   smallest_effects(last_screen_, d_);
   conclude(data_, d_);
 }
@@ -372,6 +394,7 @@ void Search::try_pairs(const Diagnosis& begun) {
                         (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
   if (!has_rest || !options_.refuses || stopped()) return;
   auto single = std::exchange(d_, begun);
+  auto readings = noise_->put_back();
   const auto screened = std::exchange(last_screen_, {});
   rivals_.clear();
   beside_.reset();
@@ -384,6 +407,7 @@ void Search::try_pairs(const Diagnosis& begun) {
   if (d_.findings.size() < 2 || d_.is_unnamed || lead(data_, d_.best, single.best) < claim_margin) {
     single.is_partial = single.is_partial || stopped();
     d_ = std::move(single);
+    noise_->put(std::move(readings));
     return;
   }
   for (const auto& r : single.rejected) d_.reject(r.term, r.why, r.gain);
@@ -410,13 +434,16 @@ Diagnosis Search::run() {
       d_.heldout.clear();
       d_.train.clear();
       d_.parameter_excursion = 0.0;
+      auto readings = noise_->put_back();
       hold_out(data_, d_);
+      noise_->put(std::move(readings));
       if (d_.findings.empty())
         d_ = stated;  // the curve does not hold
       else
         conclude(data_, d_);
     }
   }
+  (void)noise_->put_back();
   progress_(1.0, "done");
   return d_;
 }
