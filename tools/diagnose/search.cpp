@@ -9,6 +9,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
@@ -49,6 +50,8 @@ class Search {
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
+  /// Another power of the same variable where it does better, the other claims beside it.
+  void put_powers_right();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
   /// Takes back names in whose place a free course over another variable does clearly better.
@@ -133,9 +136,16 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
       f = fit(data_, weighing, f.model, data_.model, 8, &f);
     leader = std::max(leader, f.evidence);
   }
+  const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
+  if (data_.model.plant == physics::Plant::equations && !fits.empty()) {
+    const auto best = std::min_element(fits.begin(), fits.end(), by_evidence);
+    const std::size_t place = best->model.terms.size() - 1;
+    for (const auto& other : other_powers(data_, best->model, place, options_.without))
+      fits.push_back(fit(data_, weighing, other, data_.model, 12));
+  }
   if (options_.refuses)
     std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
-  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
+  std::sort(fits.begin(), fits.end(), by_evidence);
   last_screen_ = std::move(screened);
   return fits;
 }
@@ -282,6 +292,21 @@ void Search::prune() {
   }
 }
 
+void Search::put_powers_right() {
+  for (std::size_t i = 0; i < rivals_.size(); ++i) {
+    const std::size_t place = given() + i;
+    const Term claimed = d_.best.model.terms[place];
+    const auto plain = weigh(data_, simulate(data_, d_.best.model), false);
+    auto other = best_power(data_, plain, fit(data_, plain, d_.best.model, data_.model, 0, &d_.best), place,
+                            options_.without);
+    if (other.model.terms[place].info == claimed.info || !stands(data_, other, place)) continue;
+    rivals_[i].push_back(claimed);
+    d_.weighing = weigh(data_, simulate(data_, other.model));
+    d_.best = fit(data_, d_.weighing, other.model, data_.model, 8, &other);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  }
+}
+
 void Search::weigh_alternatives() {
   progress_(0.7, "comparing with near twins");
   for (int pass = 0; pass < 2; ++pass)
@@ -354,6 +379,7 @@ bool Search::add_pair(const Fit* rival) {
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
     if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
+  take([&] { return put_powers_right(), true; });
   if (options_.refuses) take([&] { return prune(), true; });
   if (!take([&] { return weigh_alternatives(), true; })) {
     data_.stopped = {};

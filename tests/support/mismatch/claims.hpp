@@ -29,10 +29,10 @@ class Claims {
     double others = 0.0;
     for (const auto& a : finding.alternatives) others += std::exp(std::min(0.0, 0.5 * a.log_odds));
     file_ << of << ' ' << finding.term.info->name << ' ' << p << ' ' << others << ' ' << finding.gain << ' '
-          << still_follows << ' ' << credit << ' ' << finding.other_shape << '\n';
+          << still_follows << ' ' << credit << ' ' << finding.other_shape << ' ' << finding.share << '\n';
   }
   /// One line a claim is added to this file: case, name, probability, odds of the other names, gain, share left, credit,
-  /// share that a freer shape explains better.
+  /// share that a freer shape explains better, share of the mismatch.
   void write_to(const std::string& file) { file_.open(file, std::ios::app); }
 
   void print() const {
