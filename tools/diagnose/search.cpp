@@ -50,8 +50,8 @@ class Search {
   /// Drops terms that the others make needless.
   void prune();
   void weigh_alternatives();
-  /// Another power of the same variable where it does better, the other claims beside it.
-  void put_powers_right();
+  /// Another law of the same variable where it does better, the other claims beside it.
+  void put_laws_right();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
   /// Takes back names in whose place a free course over another variable does clearly better.
@@ -140,7 +140,7 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   if (data_.model.plant == physics::Plant::equations && !fits.empty()) {
     const auto best = std::min_element(fits.begin(), fits.end(), by_evidence);
     const std::size_t place = best->model.terms.size() - 1;
-    for (const auto& other : other_powers(data_, best->model, place, options_.without))
+    for (const auto& other : other_laws(data_, best->model, place, options_.without))
       fits.push_back(fit(data_, weighing, other, data_.model, 12));
   }
   if (options_.refuses)
@@ -222,6 +222,11 @@ bool Search::add_named(double round) {
                 "in the noise of this loop its effect would not show", best_gain);
       continue;
     }
+    if (!rivals_.empty() && options_.refuses && is_trifle(data_, d_.retuned, own_base, own_fit)) {
+      d_.reject(std::string{own_fit.model.terms.back().info->name},
+                "less than what the idealised form of the others may leave", best_gain);
+      continue;
+    }
     // What the wrong form of an earlier term leaves over is no further physics.
     if (!rivals_.empty() && options_.refuses)
       if (const auto other = other_form(data_, own_weighing, own_base, own_fit)) {
@@ -292,13 +297,13 @@ void Search::prune() {
   }
 }
 
-void Search::put_powers_right() {
+void Search::put_laws_right() {
   for (std::size_t i = 0; i < rivals_.size(); ++i) {
     const std::size_t place = given() + i;
     const Term claimed = d_.best.model.terms[place];
     const auto plain = weigh(data_, simulate(data_, d_.best.model), false);
-    auto other = best_power(data_, plain, fit(data_, plain, d_.best.model, data_.model, 0, &d_.best), place,
-                            options_.without);
+    auto other = best_law(data_, plain, fit(data_, plain, d_.best.model, data_.model, 0, &d_.best), place,
+                          options_.without);
     if (other.model.terms[place].info == claimed.info || !stands(data_, other, place)) continue;
     rivals_[i].push_back(claimed);
     d_.weighing = weigh(data_, simulate(data_, other.model));
@@ -317,6 +322,8 @@ void Search::weigh_alternatives() {
       std::vector<Term> kept;
       for (const auto& rival : rivals_[i]) {
         if (stopped()) break;
+        const auto is_same = [&](const Term& other) { return label(other) == label(rival); };
+        if (is_same(d_.best.model.terms[place]) || std::any_of(kept.begin(), kept.end(), is_same)) continue;
         Model model = d_.best.model;
         model.terms[place] = rival;
         auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
@@ -379,7 +386,7 @@ bool Search::add_pair(const Fit* rival) {
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
     if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
-  take([&] { return put_powers_right(), true; });
+  take([&] { return put_laws_right(), true; });
   if (options_.refuses) take([&] { return prune(), true; });
   if (!take([&] { return weigh_alternatives(), true; })) {
     data_.stopped = {};

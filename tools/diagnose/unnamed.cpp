@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "tools/diagnose/claim.hpp"
-#include "tools/diagnose/probability.hpp"
+#include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/wander.hpp"
 
