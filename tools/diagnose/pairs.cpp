@@ -68,7 +68,8 @@ bool is_done_by_one(const Case& data, const Weighing& plain, const Fit& under,
     settled[i] = settle(data, fit_with(data, plain, under, singles[i], 8), 3);
   });
   return std::any_of(settled.begin(), settled.end(), [&](const Settled& one) {
-    return lead(data, pair.fit, one.fit) < claim_margin && stands(data, one.fit, one.fit.model.terms.size() - 1);
+    return lead(data, pair.fit, one.fit) < claim_margin &&
+           stands(data, one.fit, one.fit.model.terms.size() - 1);
   });
 }
 

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
@@ -14,8 +15,8 @@
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
-#include "tools/diagnose/shape.hpp"
 #include "tools/diagnose/unnamed.hpp"
+#include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
 #include "tools/diagnose/wander.hpp"
 
@@ -47,15 +48,8 @@ class Search {
   void finish();
   /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
   void try_pairs(const Diagnosis& begun);
-  /// Drops terms that the others make needless.
-  void prune();
-  void weigh_alternatives();
-  /// Another law of the same variable where it does better, the other claims beside it.
-  void put_laws_right();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
-  /// Takes back names in whose place a free course over another variable does clearly better.
-  void doubt();
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
   /// or the step says so.
   template <class Step>
@@ -80,7 +74,7 @@ class Search {
   const std::function<void(double, const std::string&)>& progress_;
   const Options& options_;
   Diagnosis d_;
-  std::vector<std::vector<Term>> rivals_;  // by finding: other terms that were nearly as good in its place
+  Rivals rivals_;
   std::vector<Screened> last_screen_;
   std::optional<LoopNoise> noise_;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
@@ -263,115 +257,6 @@ void Search::quieten() {
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
 }
 
-void Search::prune() {
-  const auto is_friction = [](const Term& term) {
-    return term.info->name.find("friction") != std::string_view::npos;
-  };
-  for (std::size_t i = 0; i < rivals_.size() && rivals_.size() > 1; ++i) {
-    const std::size_t place = given() + i;
-    Model model = d_.best.model;
-    const Term removed = model.terms[place];
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
-    // What one friction law gives up another may take over.
-    for (std::size_t t = given(); t < model.terms.size(); ++t)
-      if (is_friction(removed) && is_friction(model.terms[t])) {
-        model.terms[t].values[0] += 0.7 * removed.values[0];
-        if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
-      }
-    auto without = fit(data_, d_.weighing, model, data_.model, 10);
-    bool possible = true;
-    for (std::size_t t = given(); t < without.model.terms.size(); ++t)
-      possible = possible && stands(data_, without, t);
-    if (!possible) continue;
-    if (advantage(data_, d_.weighing, d_.best, without) > claim_margin_of(d_.weighing) &&
-        least_ratio(data_, d_.best, without) < 0.95)
-      continue;
-    d_.reject(std::string{removed.info->name}, "the others explain it without",
-              d_.best.evidence - without.evidence);
-    d_.best = std::move(without);
-    rivals_.erase(rivals_.begin() + static_cast<std::ptrdiff_t>(i));
-    d_.weighing = weigh(data_, simulate(data_, d_.best.model));
-    d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-    i = static_cast<std::size_t>(-1);
-  }
-}
-
-void Search::put_laws_right() {
-  for (std::size_t i = 0; i < rivals_.size(); ++i) {
-    const std::size_t place = given() + i;
-    const Term claimed = d_.best.model.terms[place];
-    const auto plain = weigh(data_, simulate(data_, d_.best.model), false);
-    auto other = best_law(data_, plain, fit(data_, plain, d_.best.model, data_.model, 0, &d_.best), place,
-                          options_.without);
-    if (other.model.terms[place].info == claimed.info || !stands(data_, other, place)) continue;
-    rivals_[i].push_back(claimed);
-    d_.weighing = weigh(data_, simulate(data_, other.model));
-    d_.best = fit(data_, d_.weighing, other.model, data_.model, 8, &other);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-  }
-}
-
-void Search::weigh_alternatives() {
-  progress_(0.7, "comparing with near twins");
-  for (int pass = 0; pass < 2; ++pass)
-    for (std::size_t i = 0; i < rivals_.size(); ++i) {
-      const std::size_t place = given() + i;
-      if (place >= d_.best.model.terms.size()) break;
-      Finding finding;
-      std::vector<Term> kept;
-      for (const auto& rival : rivals_[i]) {
-        if (stopped()) break;
-        const auto is_same = [&](const Term& other) { return label(other) == label(rival); };
-        if (is_same(d_.best.model.terms[place]) || std::any_of(kept.begin(), kept.end(), is_same)) continue;
-        Model model = d_.best.model;
-        model.terms[place] = rival;
-        auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
-        const double odds = advantage(data_, d_.weighing, f, d_.best);
-        if (odds > 0.5 && stands(data_, f, place)) {  // better after all, beside the other terms
-          kept.push_back(d_.best.model.terms[place]);
-          finding.alternatives.push_back({d_.best.model.terms[place], -odds});
-          for (auto& a : finding.alternatives) a.log_odds -= odds;
-          d_.best = std::move(f);
-          continue;
-        }
-        if (options_.refuses && !stands(data_, f, place)) continue;
-        kept.push_back(f.model.terms[place]);
-        finding.alternatives.push_back({f.model.terms[place], odds});
-      }
-      rivals_[i] = kept;
-      finding.term = d_.best.model.terms[place];
-      if (pass == 1 || rivals_.size() == 1) {
-        if (d_.findings.size() <= i) d_.findings.resize(i + 1);
-        d_.findings[i] = finding;
-      }
-      if (rivals_.size() == 1 && pass == 0) pass = 1;
-    }
-}
-
-void Search::doubt() {
-  progress_(0.75, "trying other causes in place of names");
-  for (std::size_t i = d_.findings.size(); i-- > 0;) {
-    if (!beside_) beside_ = courses_beside(data_, d_.best);
-    const auto other = other_cause(data_, *beside_, given() + i);
-    if (!other) {
-      d_.findings[i].other_shape = other_shape(data_, *beside_, given() + i).share;
-      continue;
-    }
-    beside_.reset();
-    d_.reject(
-        std::string{d_.best.model.terms[given() + i].info->name},
-        "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
-        other->lead);
-    auto model = d_.best.model;
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given() + i));
-    d_.findings.erase(d_.findings.begin() + static_cast<std::ptrdiff_t>(i));
-    d_.weighing = weigh(data_, simulate(data_, other->fit.model));
-    d_.best = fit(data_, d_.weighing, model, data_.model, 8);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-  }
-}
-
 bool Search::add_pair(const Fit* rival) {
   progress_(rival == nullptr ? 0.05 : 0.9, "screening pairs");
   auto claim = claim_pair(data_, d_.best, options_.without, rival);
@@ -380,23 +265,26 @@ bool Search::add_pair(const Fit* rival) {
   d_.weighing = std::move(claim->weighing);
   rivals_ = std::move(claim->rivals);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  quieten();
   return true;
 }
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
     if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
-  take([&] { return put_laws_right(), true; });
-  if (options_.refuses) take([&] { return prune(), true; });
-  if (!take([&] { return weigh_alternatives(), true; })) {
+  take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
+  if (options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
+  progress_(0.7, "comparing with near twins");
+  if (!take([&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
     data_.stopped = {};
-    weigh_alternatives();  // the terms as they stand
+    weigh_alternatives(data_, d_, rivals_, options_.refuses);  // the terms as they stand
   }
 }
 
 void Search::finish() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
-  if (options_.refuses) take([&] { return doubt(), true; });
+  progress_(0.75, "trying other causes in place of names");
+  if (options_.refuses) take([&] { return doubt(data_, d_, beside_), true; });
   progress_(0.78, "looking for physics without a name");
   take([&] {
     // Only of equations the spans go with the model; all else was looked at already.
@@ -437,12 +325,14 @@ void Search::try_pairs(const Diagnosis& begun) {
     finish();
   }
   data_.stopped = {};
+  auto of_pair = noise_->put_back();
   if (d_.findings.size() < 2 || d_.is_unnamed || lead(data_, d_.best, single.best) < claim_margin) {
     single.is_partial = single.is_partial || stopped();
     d_ = std::move(single);
     noise_->put(std::move(readings));
     return;
   }
+  noise_->put(std::move(of_pair));
   for (const auto& r : single.rejected) d_.reject(r.term, r.why, r.gain);
   std::erase_if(d_.rejected, [&](const Rejection& r) {
     return std::any_of(d_.findings.begin(), d_.findings.end(),

@@ -9,6 +9,7 @@
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/suspect.hpp"
+#include "tools/diagnose/unsure.hpp"
 
 namespace invar::diagnose {
 
@@ -156,15 +157,6 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
   return left > 0.0 ? left / (left + won) : 0.0;
 }
 
-/// Leaves the name away.
-void stand_in(Finding& finding) {
-  finding.stand_in = finding.term.info;
-  finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
-  finding.probability = 1.0 - finding.probability;
-  finding.sigmas.clear();
-  finding.alternatives.clear();
-}
-
 }  // namespace
 
 void conclude(const Case& data, Diagnosis& d) {
@@ -204,8 +196,7 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  for (auto& finding : d.findings)
-    if (finding.term.curve.knots.empty() && finding.probability < 0.1) stand_in(finding);
+  leave_unsaid(d);
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
                                          [](const Finding& f) { return f.stand_in != nullptr; });
