@@ -11,6 +11,7 @@
 #include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
+#include "tools/diagnose/claim.hpp"
 
 namespace invar::test::mismatch {
 namespace {
@@ -75,6 +76,11 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
                   finding.term.curve.over.empty() ? "" : ("(" + finding.term.curve.over + ")").c_str(),
                   finding.probability);
     row.findings += text;
+    std::snprintf(text, sizeof text,
+                  "    %s: gain %.1f share %.2g left %.2g shape %.2g, odds %.2g, of relatives %.2g\n",
+                  diagnose::label(finding.term).c_str(), finding.gain, finding.share, row.still_follows,
+                  finding.other_shape, finding.other_cause, finding.relatives);
+    row.rejected += text;
     for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)
       row.rejected += "    " + std::string{finding.term.info->name} + "." +
                       std::string{finding.term.info->parameters[i].name} + " = " +
@@ -200,7 +206,8 @@ int main(int argc, char** argv) {
       ++nulls[plant].first, nulls[plant].second += row.marks.false_claims > 0 ? 1 : 0;
     for (const auto& finding : row.claims)
       claims.add(finding, row.still_follows, credit(row.machine, std::string{finding.term.info->name}),
-                 plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""));
+                 plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),
+                 row.claims.size() > 1);
     seconds.push_back(row.marks.seconds);
   };
   for (const auto& plant : of) {

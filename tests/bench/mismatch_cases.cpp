@@ -64,7 +64,8 @@ struct Study {
       for (const auto& names : truth)
         if (const auto at = names.find(name); at != names.end()) credit = std::max(credit, at->second);
       claims.add(finding, d.still_follows, credit,
-                 folder.filename().string() + (without.empty() ? "" : "-" + *without.begin()));
+                 folder.filename().string() + (without.empty() ? "" : "-" + *without.begin()),
+                 d.findings.size() > 1);
       char text[120];
       std::snprintf(text, sizeof text, "  %s %.3f%s", name.c_str(), finding.probability,
                     name == "unmodelled" ? ""

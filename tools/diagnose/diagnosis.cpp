@@ -20,19 +20,22 @@ void Diagnosis::reject(const std::string& term, const std::string& why, double g
   rejected.push_back({term, why, gain});
 }
 
+std::vector<double> squares_left(const Case& data, const physics::Model& model) {
+  const auto simulated = simulate(data, model);
+  std::vector<double> sums(data.outputs.size(), 0.0);
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    for (std::size_t o = 0; o < sums.size(); ++o)
+      for (std::size_t i = 0; i < simulated[r][o].size(); ++i)
+        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
+          sums[o] += std::pow(y - simulated[r][o][i], 2);
+  return sums;
+}
+
 double least_ratio(const Case& data, const Fit& a, const Fit& b) {
   double least = 1.0;
-  const auto with_a = simulate(data, a.model), with_b = simulate(data, b.model);
-  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    double sum_a = 0.0, sum_b = 0.0;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r)
-      for (std::size_t i = 0; i < with_a[r][o].size(); ++i)
-        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y)) {
-          sum_a += std::pow(y - with_a[r][o][i], 2);
-          sum_b += std::pow(y - with_b[r][o][i], 2);
-        }
-    if (sum_b > 0.0) least = std::min(least, std::sqrt(sum_a / sum_b));
-  }
+  const auto sums_a = squares_left(data, a.model), sums_b = squares_left(data, b.model);
+  for (std::size_t o = 0; o < sums_b.size(); ++o)
+    if (sums_b[o] > 0.0) least = std::min(least, std::sqrt(sums_a[o] / sums_b[o]));
   return least;
 }
 

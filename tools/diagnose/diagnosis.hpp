@@ -26,6 +26,7 @@ struct Finding {
   double other_shape =
       0.0;  // of what a freer shape of the same name explains, the share that the name leaves
   double other_cause = 0.0;  // odds that it is none of the names that were tried
+  double relatives = 0.0;    // odds of names that look the same on this recording, in the library or not
   std::vector<Alternative> alternatives;
 };
 
@@ -95,6 +96,8 @@ inline double claim_margin_of(const Weighing& weighing) {
 /// Alternatives nearer than this cannot be told apart.
 inline constexpr double ambiguous_margin = 3.0;
 
+/// Sum of squares of measured - simulated by output.
+std::vector<double> squares_left(const Case& data, const physics::Model& model);
 /// The smallest ratio of residual RMS of any output, a over b.
 double least_ratio(const Case& data, const Fit& a, const Fit& b);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "tools/diagnose/diagnosis.hpp"
 #include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
@@ -80,6 +81,15 @@ std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, 
       if (is_course_of(screened[i].start.term, base.model.terms[t])) best = {t, fitted.evidence};
   }
   return best;
+}
+
+bool is_trifle(const Case& data, const Fit& retuned, const Fit& base, const Fit& further) {
+  constexpr double share = 4e-4;  // of its power: two percent of its size
+  const auto all = squares_left(data, retuned.model), before = squares_left(data, base.model),
+             after = squares_left(data, further.model);
+  for (std::size_t o = 0; o < all.size(); ++o)
+    if (before[o] - after[o] > share * (all[o] - after[o])) return false;
+  return true;
 }
 
 }  // namespace invar::diagnose

@@ -22,4 +22,8 @@ struct OtherForm {
 std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,
                                     const Fit& further);
 
+/// Is what `further` adds to `base` so small a share of the mismatch, which `retuned` shows, that the form of the terms in
+/// `base` may make it? Laws are idealised: no machine's friction is the same to a percent wherever it rubs.
+bool is_trifle(const Case& data, const Fit& retuned, const Fit& base, const Fit& further);
+
 }  // namespace invar::diagnose

@@ -9,22 +9,6 @@
 
 namespace invar::diagnose {
 
-namespace {
-
-/// Sum of squares of measured - simulated by output.
-std::vector<double> squares_of(const Case& data, const Fit& fit) {
-  const auto simulated = simulate(data, fit.model);
-  std::vector<double> sums(data.outputs.size(), 0.0);
-  for (std::size_t r = 0; r < data.recordings.size(); ++r)
-    for (std::size_t o = 0; o < sums.size(); ++o)
-      for (std::size_t i = 0; i < simulated[r][o].size(); ++i)
-        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
-          sums[o] += std::pow(y - simulated[r][o][i], 2);
-  return sums;
-}
-
-}  // namespace
-
 double lead(const Case& data, const Fit& one, const Fit& other) {
   const auto with_one = simulate(data, one.model), with_other = simulate(data, other.model);
   double sum = 0.0, independent = 0.0;
@@ -68,7 +52,8 @@ namespace {
 /// Of what `course` explains of the residual of `base`, the share of the power that `named` leaves. Terms are idealised:
 /// the machine's own form of one may well differ by a few percent.
 double lost_share(const Case& data, const Fit& base, const Fit& named, const Fit& course) {
-  const auto b = squares_of(data, base), n = squares_of(data, named), c = squares_of(data, course);
+  const auto b = squares_left(data, base.model), n = squares_left(data, named.model),
+             c = squares_left(data, course.model);
   double lost = 0.0, all = 0.0;
   for (std::size_t o = 0; o < c.size(); ++o)
     if (c[o] > 0.0) lost += n[o] / c[o] - 1.0, all += b[o] / c[o] - 1.0;

@@ -59,6 +59,20 @@ Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const Scr
   return fit(data, weighing, best, data.model, 8, &base);
 }
 
+/// Does a single term, of those that do most to first order, do as well as a pair?
+bool is_done_by_one(const Case& data, const Weighing& plain, const Fit& under,
+                    const std::set<std::string, std::less<>>& without, const Settled& pair) {
+  const auto singles = screen(data, plain, under, named_starts(data, plain, under, without), 0);
+  std::vector<Settled> settled(std::min<std::size_t>(4, singles.size()));
+  in_parallel(settled.size(), [&](std::size_t i) {
+    settled[i] = settle(data, fit_with(data, plain, under, singles[i], 8), 3);
+  });
+  return std::any_of(settled.begin(), settled.end(), [&](const Settled& one) {
+    return lead(data, pair.fit, one.fit) < claim_margin &&
+           stands(data, one.fit, one.fit.model.terms.size() - 1);
+  });
+}
+
 }  // namespace
 
 std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
@@ -92,6 +106,8 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
       needed = needed && least_ratio(data, best.fit, single.fit) < 0.8;
     }
     if (!needed) continue;
+    // Two of the late outputs of a machine are one late input.
+    if (rival == nullptr && is_done_by_one(data, plain, under, without, best)) return std::nullopt;
     JointClaim claim;
     claim.weighing = weigh(data, simulate(data, best.fit.model));
     claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);

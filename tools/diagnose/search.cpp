@@ -7,13 +7,16 @@
 #include <tuple>
 #include <utility>
 
+#include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/kin.hpp"
+#include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/screen.hpp"
-#include "tools/diagnose/shape.hpp"
 #include "tools/diagnose/unnamed.hpp"
+#include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
 #include "tools/diagnose/wander.hpp"
 
@@ -45,21 +48,20 @@ class Search {
   void finish();
   /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
   void try_pairs(const Diagnosis& begun);
-  /// Drops terms that the others make needless.
-  void prune();
-  void weigh_alternatives();
-  /// Takes back names in whose place a free course over another variable does clearly better.
-  void doubt();
+  /// Takes off the readings what their noise makes of the claims so far, and fits anew.
+  void quieten();
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
   /// or the step says so.
   template <class Step>
   bool take(Step step) {
     if (stopped()) return false;
     const auto kept = std::tuple{d_, rivals_};
+    const auto readings = noise_->now();
     try {
       return step();
     } catch (const Stopped&) {
       std::tie(d_, rivals_) = kept;
+      noise_->put(readings);
       beside_.reset();
       return false;
     }
@@ -72,8 +74,9 @@ class Search {
   const std::function<void(double, const std::string&)>& progress_;
   const Options& options_;
   Diagnosis d_;
-  std::vector<std::vector<Term>> rivals_;  // by finding: other terms that were nearly as good in its place
+  Rivals rivals_;
   std::vector<Screened> last_screen_;
+  std::optional<LoopNoise> noise_;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
 
@@ -81,6 +84,7 @@ void Search::prepare() {
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
+  noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
@@ -126,9 +130,16 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
       f = fit(data_, weighing, f.model, data_.model, 8, &f);
     leader = std::max(leader, f.evidence);
   }
+  const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
+  if (data_.model.plant == physics::Plant::equations && !fits.empty()) {
+    const auto best = std::min_element(fits.begin(), fits.end(), by_evidence);
+    const std::size_t place = best->model.terms.size() - 1;
+    for (const auto& other : other_laws(data_, best->model, place, options_.without))
+      fits.push_back(fit(data_, weighing, other, data_.model, 12));
+  }
   if (options_.refuses)
     std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
-  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
+  std::sort(fits.begin(), fits.end(), by_evidence);
   last_screen_ = std::move(screened);
   return fits;
 }
@@ -200,6 +211,16 @@ bool Search::add_named(double round) {
                   f.evidence - base.evidence);
       continue;
     }
+    if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95)) {
+      d_.reject(std::string{own_fit.model.terms.back().info->name},
+                "in the noise of this loop its effect would not show", best_gain);
+      continue;
+    }
+    if (!rivals_.empty() && options_.refuses && is_trifle(data_, d_.retuned, own_base, own_fit)) {
+      d_.reject(std::string{own_fit.model.terms.back().info->name},
+                "less than what the idealised form of the others may leave", best_gain);
+      continue;
+    }
     // What the wrong form of an earlier term leaves over is no further physics.
     if (!rivals_.empty() && options_.refuses)
       if (const auto other = other_form(data_, own_weighing, own_base, own_fit)) {
@@ -228,96 +249,12 @@ bool Search::add_named(double round) {
   return false;
 }
 
-void Search::prune() {
-  const auto is_friction = [](const Term& term) {
-    return term.info->name.find("friction") != std::string_view::npos;
-  };
-  for (std::size_t i = 0; i < rivals_.size() && rivals_.size() > 1; ++i) {
-    const std::size_t place = given() + i;
-    Model model = d_.best.model;
-    const Term removed = model.terms[place];
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
-    // What one friction law gives up another may take over.
-    for (std::size_t t = given(); t < model.terms.size(); ++t)
-      if (is_friction(removed) && is_friction(model.terms[t])) {
-        model.terms[t].values[0] += 0.7 * removed.values[0];
-        if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
-      }
-    auto without = fit(data_, d_.weighing, model, data_.model, 10);
-    bool possible = true;
-    for (std::size_t t = given(); t < without.model.terms.size(); ++t)
-      possible = possible && stands(data_, without, t);
-    if (!possible) continue;
-    if (advantage(data_, d_.weighing, d_.best, without) > claim_margin_of(d_.weighing) &&
-        least_ratio(data_, d_.best, without) < 0.95)
-      continue;
-    d_.reject(std::string{removed.info->name}, "the others explain it without",
-              d_.best.evidence - without.evidence);
-    d_.best = std::move(without);
-    rivals_.erase(rivals_.begin() + static_cast<std::ptrdiff_t>(i));
-    d_.weighing = weigh(data_, simulate(data_, d_.best.model));
-    d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-    i = static_cast<std::size_t>(-1);
-  }
-}
-
-void Search::weigh_alternatives() {
-  progress_(0.7, "comparing with near twins");
-  for (int pass = 0; pass < 2; ++pass)
-    for (std::size_t i = 0; i < rivals_.size(); ++i) {
-      const std::size_t place = given() + i;
-      if (place >= d_.best.model.terms.size()) break;
-      Finding finding;
-      std::vector<Term> kept;
-      for (const auto& rival : rivals_[i]) {
-        if (stopped()) break;
-        Model model = d_.best.model;
-        model.terms[place] = rival;
-        auto f = fit(data_, d_.weighing, model, data_.model, 8, &d_.best);
-        const double odds = advantage(data_, d_.weighing, f, d_.best);
-        if (odds > 0.5 && stands(data_, f, place)) {  // better after all, beside the other terms
-          kept.push_back(d_.best.model.terms[place]);
-          finding.alternatives.push_back({d_.best.model.terms[place], -odds});
-          for (auto& a : finding.alternatives) a.log_odds -= odds;
-          d_.best = std::move(f);
-          continue;
-        }
-        if (options_.refuses && !stands(data_, f, place)) continue;
-        kept.push_back(f.model.terms[place]);
-        finding.alternatives.push_back({f.model.terms[place], odds});
-      }
-      rivals_[i] = kept;
-      finding.term = d_.best.model.terms[place];
-      if (pass == 1 || rivals_.size() == 1) {
-        if (d_.findings.size() <= i) d_.findings.resize(i + 1);
-        d_.findings[i] = finding;
-      }
-      if (rivals_.size() == 1 && pass == 0) pass = 1;
-    }
-}
-
-void Search::doubt() {
-  progress_(0.75, "trying other causes in place of names");
-  for (std::size_t i = d_.findings.size(); i-- > 0;) {
-    if (!beside_) beside_ = courses_beside(data_, d_.best);
-    const auto other = other_cause(data_, *beside_, given() + i);
-    if (!other) {
-      d_.findings[i].other_shape = other_shape(data_, *beside_, given() + i).share;
-      continue;
-    }
-    beside_.reset();
-    d_.reject(
-        std::string{d_.best.model.terms[given() + i].info->name},
-        "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
-        other->lead);
-    auto model = d_.best.model;
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given() + i));
-    d_.findings.erase(d_.findings.begin() + static_cast<std::ptrdiff_t>(i));
-    d_.weighing = weigh(data_, simulate(data_, other->fit.model));
-    d_.best = fit(data_, d_.weighing, model, data_.model, 8);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-  }
+void Search::quieten() {
+  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
+  noise_->take_off(d_.best.model);
+  d_.weighing = weigh(data_, simulate(data_, d_.best.model));
+  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
 }
 
 bool Search::add_pair(const Fit* rival) {
@@ -328,22 +265,26 @@ bool Search::add_pair(const Fit* rival) {
   d_.weighing = std::move(claim->weighing);
   rivals_ = std::move(claim->rivals);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  quieten();
   return true;
 }
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
-    if (!take([&] { return add_named(round); })) break;
-  if (options_.refuses) take([&] { return prune(), true; });
-  if (!take([&] { return weigh_alternatives(), true; })) {
+    if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
+  take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
+  if (options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
+  progress_(0.7, "comparing with near twins");
+  if (!take([&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
     data_.stopped = {};
-    weigh_alternatives();  // the terms as they stand
+    weigh_alternatives(data_, d_, rivals_, options_.refuses);  // the terms as they stand
   }
 }
 
 void Search::finish() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
-  if (options_.refuses) take([&] { return doubt(), true; });
+  progress_(0.75, "trying other causes in place of names");
+  if (options_.refuses) take([&] { return doubt(data_, d_, beside_), true; });
   progress_(0.78, "looking for physics without a name");
   take([&] {
     // Only of equations the spans go with the model; all else was looked at already.
@@ -355,6 +296,7 @@ void Search::finish() {
   data_.stopped = {};
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
+  auto readings = noise_->put_back();
   hold_out(data_, d_, options_.refuses);
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
@@ -363,6 +305,7 @@ void Search::finish() {
     d_.train.clear();
     hold_out(data_, d_);
   }
+  noise_->put(std::move(readings));
   smallest_effects(last_screen_, d_);
   conclude(data_, d_);
 }
@@ -372,6 +315,7 @@ void Search::try_pairs(const Diagnosis& begun) {
                         (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
   if (!has_rest || !options_.refuses || stopped()) return;
   auto single = std::exchange(d_, begun);
+  auto readings = noise_->put_back();
   const auto screened = std::exchange(last_screen_, {});
   rivals_.clear();
   beside_.reset();
@@ -381,11 +325,14 @@ void Search::try_pairs(const Diagnosis& begun) {
     finish();
   }
   data_.stopped = {};
+  auto of_pair = noise_->put_back();
   if (d_.findings.size() < 2 || d_.is_unnamed || lead(data_, d_.best, single.best) < claim_margin) {
     single.is_partial = single.is_partial || stopped();
     d_ = std::move(single);
+    noise_->put(std::move(readings));
     return;
   }
+  noise_->put(std::move(of_pair));
   for (const auto& r : single.rejected) d_.reject(r.term, r.why, r.gain);
   std::erase_if(d_.rejected, [&](const Rejection& r) {
     return std::any_of(d_.findings.begin(), d_.findings.end(),
@@ -410,13 +357,16 @@ Diagnosis Search::run() {
       d_.heldout.clear();
       d_.train.clear();
       d_.parameter_excursion = 0.0;
+      auto readings = noise_->put_back();
       hold_out(data_, d_);
+      noise_->put(std::move(readings));
       if (d_.findings.empty())
         d_ = stated;  // the curve does not hold
       else
         conclude(data_, d_);
     }
   }
+  (void)noise_->put_back();
   progress_(1.0, "done");
   return d_;
 }

@@ -44,8 +44,9 @@ double squares_taken(const Weighing& weighing, const Case& data, const Fit& name
   return own > 0 ? left(own) - left(all.cols()) : named.residual.squaredNorm() - left(all.cols());
 }
 
-/// How the effect of what comes late bends with its time: a first-order lag, a pure delay and two stores one behind the other
-/// differ by this.
+}  // namespace
+
+// A first-order lag, a pure delay and two stores one behind the other differ by this.
 Eigen::MatrixXd second_times(const Case& data, const Fit& named, std::size_t term) {
   const auto& info = *named.model.terms[term].info;
   Eigen::MatrixXd columns(named.columns.rows(), 0);
@@ -63,7 +64,19 @@ Eigen::MatrixXd second_times(const Case& data, const Fit& named, std::size_t ter
   return columns;
 }
 
-}  // namespace
+double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd& shift) {
+  if (shift.cols() == 0) return 0.0;
+  const auto plain = weigh(data, simulate(data, named.model), false);
+  const auto left = residual(data, plain, named.model).squaredNorm();
+  Eigen::MatrixXd all(shift.rows(), named.columns.cols() + 1);
+  all << named.columns, shift.rowwise().sum();
+  all = whitened(data, plain, all);
+  const auto own = named.columns.cols();
+  Eigen::VectorXd apart = all.col(own);
+  if (own > 0) apart -= all.leftCols(own) * all.leftCols(own).colPivHouseholderQr().solve(apart).eval();
+  if (!(left > 0.0)) return 0.0;
+  return 0.5 * independent_rows(data, named.model) * std::log1p(apart.squaredNorm() / left);
+}
 
 OtherShape other_shape(const Case& data, const Beside& beside, std::size_t term) {
   const auto& [plain, named, courses] = beside;

@@ -4,14 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "core/numerics/robust.hpp"
+
 namespace invar::diagnose {
 
 double median(std::vector<double> values) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
-  if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return numerics::median(std::move(values));
 }
 
 double robust_sigma(const std::vector<double>& values) {

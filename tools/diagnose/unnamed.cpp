@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "tools/diagnose/claim.hpp"
-#include "tools/diagnose/probability.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/wander.hpp"
 
@@ -14,13 +12,6 @@ namespace invar::diagnose {
 namespace {
 
 using physics::Model;
-
-struct Curved {
-  Fit fit;
-  Weighing weighing;
-  double gain = -1e300;   // over what it was added to, under its own filters
-  double plain = -1e300;  // evidence with every row alike: comparable between curves
-};
 
 /// A dent or a step is narrow: the knots are gathered where the curve is not flat.
 void sharpen(const Case& data, Curved& found) {
@@ -55,7 +46,8 @@ void sharpen(const Case& data, Curved& found) {
   weighing = own;
 }
 
-/// The curve that explains most beside `base`, of what was looked at.
+}  // namespace
+
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   Curved best;
   const auto& [plain, under_plain, screened] = looked;
@@ -84,8 +76,6 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   if (best.gain > claim_margin) sharpen(data, best);
   return best;
 }
-
-}  // namespace
 
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
@@ -121,49 +111,6 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   finding.term = d.best.model.terms.back();
   d.findings.push_back(finding);
   d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
-}
-
-bool set_aside(const Case& data, Diagnosis& d) {
-  const std::size_t given = data.model.terms.size();
-  auto model = d.best.model;
-  std::vector<Finding> kept;
-  std::optional<Finding> nearest;  // of the names that go
-  for (std::size_t i = d.findings.size(); i-- > 0;) {
-    const auto& finding = d.findings[i];
-    const bool is_curve = !finding.term.curve.knots.empty();
-    if (!is_curve && !(finding.other_cause > unlikely_odds)) {
-      kept.insert(kept.begin(), finding);
-      continue;
-    }
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given + i));
-    if (!is_curve && (!nearest || finding.gain > nearest->gain)) nearest = finding;
-  }
-  if (!nearest) return false;
-  const auto plain = weigh(data, simulate(data, d.best.model), false);
-  const Fit base = fit(data, plain, model, data.model, 6);
-  // The curves must do better than the name: drops move in two directions, and heat in several nodes.
-  Curved found;
-  found.fit = base;
-  std::size_t curves = 0;
-  while (curves < 3 && lead(data, found.fit, d.best) < 0.0) {
-    auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
-    if (next.gain < 2.0 * claim_margin_of(d.weighing)) return false;
-    found = std::move(next);
-    ++curves;
-  }
-  if (curves == 0 || lead(data, found.fit, d.best) < 0.0) return false;
-  d.best = std::move(found.fit);
-  d.weighing = std::move(found.weighing);
-  (kept.empty() ? d.is_unnamed : d.has_rest) = true;
-  d.findings = std::move(kept);
-  for (std::size_t k = curves; k > 0; --k) {
-    Finding finding;
-    finding.term = d.best.model.terms[d.best.model.terms.size() - k];
-    finding.alternatives.push_back({nearest->term, -2.0 * std::log(nearest->other_cause)});
-    d.findings.push_back(finding);
-  }
-  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
-  return true;
 }
 
 }  // namespace invar::diagnose

@@ -5,12 +5,18 @@
 
 namespace invar::diagnose {
 
+struct Curved {
+  Fit fit;
+  Weighing weighing;
+  double gain = -1e300;   // over what it was added to, under its own filters
+  double plain = -1e300;  // evidence with every row alike: comparable between curves
+};
+
+/// The curve that explains most beside `base`, of what was looked at.
+Curved best_curve(const Case& data, const Fit& base, const Beside& looked);
+
 /// Adds a curve as a finding where one is plainly needed. One that explains far more than the named terms takes their
 /// place. `beside_best` is that of the best model.
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best);
-
-/// Puts a curve in the place of names for which another cause is far likelier (`unlikely_odds`), where it does better; the
-/// nearest name stays as its alternative. False: nothing changed.
-bool set_aside(const Case& data, Diagnosis& d);
 
 }  // namespace invar::diagnose

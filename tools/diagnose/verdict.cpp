@@ -6,9 +6,10 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/left_over.hpp"
+#include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/other_cause.hpp"
-#include "tools/diagnose/probability.hpp"
 #include "tools/diagnose/suspect.hpp"
+#include "tools/diagnose/unsure.hpp"
 
 namespace invar::diagnose {
 
@@ -156,29 +157,6 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
   return left > 0.0 ? left / (left + won) : 0.0;
 }
 
-/// Odds that a sine in time enters at the other of motor and carriage, where that is not among the alternatives.
-double odds_of_other_site(const Finding& finding) {
-  const auto& term = finding.term;
-  const bool is_current = term.info->name == "additive_disturbance";
-  if (!is_current && (term.info->name != "periodic_disturbance" || term.info->plant != physics::Plant::axis))
-    return 0.0;
-  if (is_current && term.values[term.info->index_of("squareness")] > 0.5) return 0.0;
-  for (const auto& a : finding.alternatives)
-    if (a.term.info->name == "additive_disturbance" || a.term.info->name == "periodic_disturbance")
-      return 0.0;
-  const double price = price_of_current(term.values[term.info->index_of("frequency")]);
-  return std::exp(0.5 * (is_current ? price : -price));
-}
-
-/// Leaves the name away.
-void stand_in(Finding& finding) {
-  finding.stand_in = finding.term.info;
-  finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
-  finding.probability = 1.0 - finding.probability;
-  finding.sigmas.clear();
-  finding.alternatives.clear();
-}
-
 }  // namespace
 
 void conclude(const Case& data, Diagnosis& d) {
@@ -206,16 +184,9 @@ void conclude(const Case& data, Diagnosis& d) {
     const auto lost = residual(data, d.weighing, without).squaredNorm() - d.best.residual.squaredNorm();
     const auto all = residual(data, d.weighing, data.model).squaredNorm() - d.best.residual.squaredNorm();
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
-    double sum = 1.0;
-    for (const auto& a : finding.alternatives) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
-    sum += odds_of_other_site(finding);
     const auto rival = fit(data, d.weighing, without, data.model, 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
-    finding.other_cause = finding.term.curve.knots.empty()
-                              ? odds_of_another_cause(finding.gain, d.still_follows, finding.other_shape)
-                              : 0.0;
-    sum += finding.other_cause;
-    finding.probability = std::min(0.995, 1.0 / sum);
+    weigh_name(data, d, place, finding);
   }
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];
@@ -225,8 +196,7 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  for (auto& finding : d.findings)
-    if (finding.term.curve.knots.empty() && finding.probability < 0.1) stand_in(finding);
+  leave_unsaid(d);
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
                                          [](const Finding& f) { return f.stand_in != nullptr; });

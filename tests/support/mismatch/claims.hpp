@@ -17,7 +17,8 @@ inline constexpr double confident = 0.9;
 class Claims {
  public:
   /// `credit` of the name: 1 right, 0.5 a relative, 0 wrong. A curve without a name is no claim.
-  void add(const diagnose::Finding& finding, double still_follows, double credit, const std::string& of) {
+  void add(const diagnose::Finding& finding, double still_follows, double credit, const std::string& of,
+           bool of_many) {
     if (!finding.term.curve.knots.empty()) return;
     const double p = finding.probability, held = credit > 0.9 ? 1.0 : 0.0;
     auto& bin = bins_[static_cast<std::size_t>(std::min(9.0, 10.0 * p))];
@@ -29,10 +30,12 @@ class Claims {
     double others = 0.0;
     for (const auto& a : finding.alternatives) others += std::exp(std::min(0.0, 0.5 * a.log_odds));
     file_ << of << ' ' << finding.term.info->name << ' ' << p << ' ' << others << ' ' << finding.gain << ' '
-          << still_follows << ' ' << credit << ' ' << finding.other_shape << '\n';
+          << still_follows << ' ' << credit << ' ' << finding.other_shape << ' '
+          << (of_many ? finding.share : 1.0) << ' ' << finding.relatives << '\n';
   }
   /// One line a claim is added to this file: case, name, probability, odds of the other names, gain, share left, credit,
-  /// share that a freer shape explains better.
+  /// share that a freer shape explains better, share of the mismatch (1: the only
+  /// one), odds of relatives.
   void write_to(const std::string& file) { file_.open(file, std::ios::app); }
 
   void print() const {

@@ -1,0 +1,100 @@
+#include "tools/diagnose/among_names.hpp"
+
+#include <algorithm>
+
+#include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/kin.hpp"
+#include "tools/diagnose/other_cause.hpp"
+
+namespace invar::diagnose {
+
+using physics::Model;
+using physics::Term;
+
+void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
+  const auto is_friction = [](const Term& term) {
+    return term.info->name.find("friction") != std::string_view::npos;
+  };
+  for (std::size_t i = 0; i < rivals.size() && rivals.size() > 1; ++i) {
+    const std::size_t place = data.model.terms.size() + i;
+    Model model = d.best.model;
+    const Term removed = model.terms[place];
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    // What one friction law gives up another may take over.
+    for (std::size_t t = data.model.terms.size(); t < model.terms.size(); ++t)
+      if (is_friction(removed) && is_friction(model.terms[t])) {
+        model.terms[t].values[0] += 0.7 * removed.values[0];
+        if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
+      }
+    auto without = fit(data, d.weighing, model, data.model, 10);
+    bool possible = true;
+    for (std::size_t t = data.model.terms.size(); t < without.model.terms.size(); ++t)
+      possible = possible && stands(data, without, t);
+    if (!possible) continue;
+    if (advantage(data, d.weighing, d.best, without) > claim_margin_of(d.weighing) &&
+        least_ratio(data, d.best, without) < 0.95)
+      continue;
+    d.reject(std::string{removed.info->name}, "the others explain it without",
+             d.best.evidence - without.evidence);
+    d.best = std::move(without);
+    rivals.erase(rivals.begin() + static_cast<std::ptrdiff_t>(i));
+    d.weighing = weigh(data, simulate(data, d.best.model));
+    d.best = fit(data, d.weighing, d.best.model, data.model, 4, &d.best);
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+    i = static_cast<std::size_t>(-1);
+  }
+}
+
+void put_laws_right(const Case& data, Diagnosis& d, Rivals& rivals,
+                    const std::set<std::string, std::less<>>& without) {
+  for (std::size_t i = 0; i < rivals.size(); ++i) {
+    const std::size_t place = data.model.terms.size() + i;
+    const Term claimed = d.best.model.terms[place];
+    const auto plain = weigh(data, simulate(data, d.best.model), false);
+    auto other =
+        best_law(data, plain, fit(data, plain, d.best.model, data.model, 0, &d.best), place, without);
+    if (other.model.terms[place].info == claimed.info || !stands(data, other, place)) continue;
+    rivals[i].push_back(claimed);
+    d.weighing = weigh(data, simulate(data, other.model));
+    d.best = fit(data, d.weighing, other.model, data.model, 8, &other);
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  }
+}
+
+void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool refuses) {
+  for (int pass = 0; pass < 2; ++pass)
+    for (std::size_t i = 0; i < rivals.size(); ++i) {
+      const std::size_t place = data.model.terms.size() + i;
+      if (place >= d.best.model.terms.size()) break;
+      Finding finding;
+      std::vector<Term> kept;
+      for (const auto& rival : rivals[i]) {
+        if (data.stopped && data.stopped()) break;
+        const auto is_same = [&](const Term& other) { return label(other) == label(rival); };
+        if (is_same(d.best.model.terms[place]) || std::any_of(kept.begin(), kept.end(), is_same)) continue;
+        Model model = d.best.model;
+        model.terms[place] = rival;
+        auto f = fit(data, d.weighing, model, data.model, 8, &d.best);
+        const double odds = advantage(data, d.weighing, f, d.best);
+        if (odds > 0.5 && stands(data, f, place)) {  // better after all, beside the other terms
+          kept.push_back(d.best.model.terms[place]);
+          finding.alternatives.push_back({d.best.model.terms[place], -odds});
+          for (auto& a : finding.alternatives) a.log_odds -= odds;
+          d.best = std::move(f);
+          continue;
+        }
+        if (refuses && !stands(data, f, place)) continue;
+        kept.push_back(f.model.terms[place]);
+        finding.alternatives.push_back({f.model.terms[place], odds});
+      }
+      rivals[i] = kept;
+      finding.term = d.best.model.terms[place];
+      if (pass == 1 || rivals.size() == 1) {
+        if (d.findings.size() <= i) d.findings.resize(i + 1);
+        d.findings[i] = finding;
+      }
+      if (rivals.size() == 1 && pass == 0) pass = 1;
+    }
+}
+
+}  // namespace invar::diagnose

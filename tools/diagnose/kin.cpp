@@ -1,0 +1,75 @@
+#include "tools/diagnose/kin.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/physics/library.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// The power of the variable: 1, 2, 3; 0: none.
+int power_of(std::string_view name) {
+  if (name == "linear" || name == "coupling") return 1;
+  return name == "quadratic" ? 2 : name == "cubic" ? 3 : 0;
+}
+
+}  // namespace
+
+std::vector<physics::Model> other_laws(const Case& data, const physics::Model& model, std::size_t term,
+                                       const std::set<std::string, std::less<>>& without) {
+  std::vector<physics::Model> others;
+  const auto& found = model.terms[term];
+  const auto name = found.info->name;
+  if (found.info->plant == physics::Plant::equations &&
+      (name == "lag" || name == "delay" || name == "hidden_state")) {
+    const double time = found.values[found.info->index_of(name == "delay" ? "delay" : "time_constant")];
+    std::vector<std::string> places{found.on};
+    for (const auto& input : model.equations.inputs)
+      if (input.symbol != found.on) places.push_back(input.symbol);
+    for (const auto& place : places)
+      for (const char* other : {"lag", "delay"}) {
+        if ((name == other && place == found.on) || without.contains(other)) continue;
+        auto& put = others.emplace_back(model).terms[term];
+        put = {};
+        put.info = physics::find_term(physics::Plant::equations, other);
+        put.on = place;
+        put.values[0] = time;
+        put.given[0] = true;
+      }
+    return others;
+  }
+  const int power = found.info->plant == physics::Plant::equations ? power_of(name) : 0;
+  if (power == 0) return others;
+  // First harmonic of sign(s) |s|^p under s = sin: what a swing feels of each power.
+  constexpr std::array harmonic{0.0, 1.0, 0.8488, 0.75};
+  const auto& over = found.with.empty() ? found.on : found.with;
+  const double swing =
+      0.525 * inner_span_of(data, model, over);  // of a sine whose middle four fifths are so wide
+  if (!(swing > 0.0)) return others;
+  for (const char* instead : {found.with.empty() ? "linear" : "coupling", "quadratic", "cubic"}) {
+    const int other = power_of(instead);
+    if (other == power || without.contains(instead)) continue;
+    const auto from = static_cast<std::size_t>(power), to = static_cast<std::size_t>(other);
+    for (const double larger : {1.0, 1.5}) {
+      auto& put = others.emplace_back(model);
+      put.terms[term].info = physics::find_term(physics::Plant::equations, instead);
+      put.terms[term].values[0] *= std::pow(larger * swing, power - other) * harmonic[from] / harmonic[to];
+    }
+  }
+  return others;
+}
+
+Fit best_law(const Case& data, const Weighing& weighing, Fit start, std::size_t term,
+             const std::set<std::string, std::less<>>& without) {
+  const auto others = other_laws(data, start.model, term, without);
+  std::vector<Fit> fits(others.size());
+  in_parallel(fits.size(), [&](std::size_t i) { fits[i] = fit(data, weighing, others[i], data.model, 12); });
+  for (auto& one : fits)
+    if (one.evidence > start.evidence) start = std::move(one);
+  return start;
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,20 @@
+// Laws that stand for one another: what a fit begins from when one power of a variable takes the place of another.
+#pragma once
+
+#include "tools/diagnose/candidates.hpp"
+
+namespace invar::diagnose {
+
+/// The model with found term `term` put as another law of the same variable: another power, with the strength that gives as
+/// much at the sizes that the variable takes; of what comes late, a lag or a delay of the same
+/// time, there and of each input. A machine that swings for long answers in
+/// phase: from strength zero no such fit arrives. Empty for anything else and outside the user's own equations; without the
+/// names in `without`.
+std::vector<physics::Model> other_laws(const Case& data, const physics::Model& model, std::size_t term,
+                                       const std::set<std::string, std::less<>>& without);
+
+/// The best of `start` and its other laws, each followed to its end under `weighing`.
+Fit best_law(const Case& data, const Weighing& weighing, Fit start, std::size_t term,
+             const std::set<std::string, std::less<>>& without);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,121 @@
+#include "tools/diagnose/loop_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/physics/library.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// The place of the encoder among the outputs; nothing where no loop feeds its noise back.
+std::optional<std::size_t> fed_back(const Case& data) {
+  const auto at = std::find(data.outputs.begin(), data.outputs.end(), "position");
+  if (data.model.plant != physics::Plant::axis || !data.model.controller || at == data.outputs.end())
+    return std::nullopt;
+  return static_cast<std::size_t>(at - data.outputs.begin());
+}
+
+/// How far runs with noise on the encoder lie, on average, from the run without. The noise is what the model leaves of the
+/// readings, shifted against the motion, with either sign: what is linear in it cancels.
+std::vector<physics::Outputs> softened(const Case& data, const LoopNoise::Readings& recorded,
+                                       const physics::Model& model, std::size_t position) {
+  constexpr std::size_t shifts = 4;
+  const auto quiet = simulate(data, model);
+  auto mean = quiet;
+  for (std::size_t r = 0; r < quiet.size(); ++r) {
+    const auto& time = data.recordings[r].inputs.time;
+    const std::size_t n = time.size();
+    std::vector<physics::Outputs> shaken(2 * shifts);
+    in_parallel(shaken.size(), [&](std::size_t k) {
+      if (data.stopped && data.stopped()) throw Stopped{};
+      physics::Model noisy = model;
+      auto& reading = noisy.terms.emplace_back();
+      reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
+      reading.curve.over = "time";
+      reading.curve.knots = time;
+      const std::size_t by = (k / 2 + 1) * n / (shifts + 1);
+      for (std::size_t i = 0; i < n; ++i) {
+        const std::size_t from = (i + by) % n;
+        const double e = recorded[r][position][from] - quiet[r][position][from];
+        reading.curve.values.push_back(std::isfinite(e) ? (k % 2 == 0 ? e : -e) : 0.0);
+      }
+      data.recordings[r].simulation->run(noisy, shaken[k]);
+    });
+    for (std::size_t o = 0; o < mean[r].size(); ++o)
+      for (std::size_t i = 0; i < n; ++i) {
+        double sum = 0.0;
+        for (const auto& one : shaken) sum += one[o][i] - quiet[r][o][i];
+        mean[r][o][i] = sum / static_cast<double>(shaken.size());
+      }
+  }
+  return mean;
+}
+
+/// By output: the sum of squares of readings - simulated - off.
+std::vector<double> squares(const LoopNoise::Readings& readings,
+                            const std::vector<physics::Outputs>& simulated,
+                            const std::vector<physics::Outputs>* off) {
+  std::vector<double> sums(readings.front().size(), 0.0);
+  for (std::size_t r = 0; r < readings.size(); ++r)
+    for (std::size_t o = 0; o < sums.size(); ++o)
+      for (std::size_t i = 0; i < readings[r][o].size(); ++i)
+        if (const double e =
+                readings[r][o][i] - simulated[r][o][i] - (off != nullptr ? (*off)[r][o][i] : 0.0);
+            std::isfinite(e))
+          sums[o] += e * e;
+  return sums;
+}
+
+}  // namespace
+
+LoopNoise::LoopNoise(Case& data) : data_{data} {
+  for (const auto& recording : data.recordings) recorded_.push_back(recording.measured);
+}
+
+LoopNoise::Readings LoopNoise::now() const {
+  Readings readings;
+  for (const auto& recording : data_.recordings) readings.push_back(recording.measured);
+  return readings;
+}
+
+LoopNoise::Readings LoopNoise::put_back() {
+  auto was = now();
+  put(recorded_);
+  return was;
+}
+
+void LoopNoise::put(Readings readings) {
+  for (std::size_t r = 0; r < readings.size(); ++r) data_.recordings[r].measured = std::move(readings[r]);
+}
+
+void LoopNoise::take_off(const physics::Model& model) {
+  const auto position = fed_back(data_);
+  if (!position) return;
+  (void)put_back();
+  const auto off = softened(data_, recorded_, model, *position);
+  const auto simulated = simulate(data_, model);
+  const auto before = squares(recorded_, simulated, nullptr), after = squares(recorded_, simulated, &off);
+  double nearer = 0.0;
+  for (std::size_t o = 0; o < before.size(); ++o)
+    if (before[o] > 0.0 && after[o] > 0.0) nearer += std::log(before[o] / after[o]);
+  if (!(nearer > 0.0)) return;
+  for (std::size_t r = 0; r < off.size(); ++r)
+    for (std::size_t o = 0; o < off[r].size(); ++o)
+      for (std::size_t i = 0; i < off[r][o].size(); ++i) data_.recordings[r].measured[o][i] -= off[r][o][i];
+}
+
+bool LoopNoise::shows(const physics::Model& with, const physics::Model& without, double ratio) const {
+  const auto position = fed_back(data_);
+  if (!position) return true;
+  const auto off = softened(data_, recorded_, with, *position);
+  const auto nearer = squares(recorded_, simulate(data_, with), &off),
+             farther = squares(now(), simulate(data_, without), nullptr);
+  for (std::size_t o = 0; o < nearer.size(); ++o)
+    if (nearer[o] < ratio * ratio * farther[o]) return true;
+  return false;
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,31 @@
+// What the noise of the readings does to a loop with friction, play or a dead zone: it shakes the carriage across them, so
+// that they act more softly than in a run without noise.
+#pragma once
+
+#include "tools/diagnose/fit.hpp"
+
+namespace invar::diagnose {
+
+/// The readings of a case, as they were recorded and without what their own noise makes of a model's bends. A plant without a
+/// loop keeps its readings.
+class LoopNoise {
+ public:
+  using Readings = std::vector<std::vector<std::vector<double>>>;  // by recording, output, row
+
+  explicit LoopNoise(Case& data);
+  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer.
+  void take_off(const physics::Model& model);
+  /// The readings as recorded; what was in their place.
+  Readings put_back();
+  void put(Readings readings);
+  [[nodiscard]] Readings now() const;
+  /// Does `with` lie nearer than `without`, by this ratio of the residual of any output, when it is shaken too? Play that is
+  /// finer than the noise shows in a run without noise alone.
+  [[nodiscard]] bool shows(const physics::Model& with, const physics::Model& without, double ratio) const;
+
+ private:
+  Case& data_;
+  Readings recorded_;
+};
+
+}  // namespace invar::diagnose

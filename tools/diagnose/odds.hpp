@@ -1,0 +1,28 @@
+// How likely a name is the right one: against the other names that were tried, against its relatives, which look the same where
+// a recording does not show what sets them apart, and against a cause that none of these is.
+#pragma once
+
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+/// With more than these another cause is so much likelier that a name is right in three cases of ten at most.
+inline constexpr double unlikely_odds = 7.0 / 3.0;
+
+/// Odds of "some other cause" against a claimed name: they fall with the log evidence by which the name wins (a small
+/// effect looks like many things; the evidence is counted in independent rows), rise with the share of the mismatch that
+/// the name leaves and that still follows the recording, with what a freer shape of the name explains better beyond
+/// chance (`shape`, a share; 0: nothing; a fraction of a percent is a matter of form), and, of a name beside others, as the
+/// share of the mismatch that goes with it comes near what their own idealised form may leave (`share`; 1: it is the only
+/// one). Fitted to claims on made machines, the right names in the library and out of it
+/// (tests/bench/mismatch_reliability.py; figures in README.md there).
+double odds_of_another_cause(double gain, double left, double shape, double share);
+
+/// Odds that a relative of term `place` of the best model is meant, which may be in the library or not: what comes late by a
+/// lag or a delay, friction that slides at once or springs first, a sine that enters at the motor or the carriage.
+double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding);
+
+/// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known.
+void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, Finding& finding);
+
+}  // namespace invar::diagnose

@@ -1,0 +1,88 @@
+#include "tools/diagnose/unsure.hpp"
+
+#include <cmath>
+
+#include "core/physics/library.hpp"
+#include "tools/diagnose/odds.hpp"
+#include "tools/diagnose/shape.hpp"
+#include "tools/diagnose/unnamed.hpp"
+
+namespace invar::diagnose {
+
+void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
+  for (std::size_t i = d.findings.size(); i-- > 0;) {
+    if (!beside) beside = courses_beside(data, d.best);
+    const auto other = other_cause(data, *beside, data.model.terms.size() + i);
+    if (!other) {
+      d.findings[i].other_shape = other_shape(data, *beside, data.model.terms.size() + i).share;
+      continue;
+    }
+    beside.reset();
+    d.reject(
+        std::string{d.best.model.terms[data.model.terms.size() + i].info->name},
+        "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
+        other->lead);
+    auto model = d.best.model;
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + i));
+    d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));
+    d.weighing = weigh(data, simulate(data, other->fit.model));
+    d.best = fit(data, d.weighing, model, data.model, 8);
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  }
+}
+
+bool set_aside(const Case& data, Diagnosis& d) {
+  const std::size_t given = data.model.terms.size();
+  auto model = d.best.model;
+  std::vector<Finding> kept;
+  std::optional<Finding> nearest;  // of the names that go
+  for (std::size_t i = d.findings.size(); i-- > 0;) {
+    const auto& finding = d.findings[i];
+    const bool is_curve = !finding.term.curve.knots.empty();
+    if (!is_curve && !(finding.other_cause > unlikely_odds)) {
+      kept.insert(kept.begin(), finding);
+      continue;
+    }
+    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given + i));
+    if (!is_curve && (!nearest || finding.gain > nearest->gain)) nearest = finding;
+  }
+  if (!nearest) return false;
+  const auto plain = weigh(data, simulate(data, d.best.model), false);
+  const Fit base = fit(data, plain, model, data.model, 6);
+  // The curves must do better than the name: drops move in two directions, and heat in several nodes.
+  Curved found;
+  found.fit = base;
+  std::size_t curves = 0;
+  while (curves < 3 && lead(data, found.fit, d.best) < 0.0) {
+    auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
+    if (next.gain < 2.0 * claim_margin_of(d.weighing)) return false;
+    found = std::move(next);
+    ++curves;
+  }
+  if (curves == 0 || lead(data, found.fit, d.best) < 0.0) return false;
+  d.best = std::move(found.fit);
+  d.weighing = std::move(found.weighing);
+  (kept.empty() ? d.is_unnamed : d.has_rest) = true;
+  d.findings = std::move(kept);
+  for (std::size_t k = curves; k > 0; --k) {
+    Finding finding;
+    finding.term = d.best.model.terms[d.best.model.terms.size() - k];
+    finding.alternatives.push_back({nearest->term, -2.0 * std::log(nearest->other_cause)});
+    d.findings.push_back(finding);
+  }
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  return true;
+}
+
+void leave_unsaid(Diagnosis& d) {
+  for (auto& finding : d.findings) {
+    if (!finding.term.curve.knots.empty() || finding.probability >= 0.1) continue;
+    finding.stand_in = finding.term.info;
+    finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
+    finding.probability = 1.0 - finding.probability;
+    finding.sigmas.clear();
+    finding.alternatives.clear();
+  }
+}
+
+}  // namespace invar::diagnose

@@ -1,0 +1,23 @@
+// Names that are not sure. One rule: a name is said as long as the odds of another cause (odds.hpp) leave it three chances in
+// ten; then free courses take its place where they do better, and it stays as the nearest that has a name. Where none does
+// better it stays, said with its probability, down to one chance in ten; below, what was fitted stays without its name.
+#pragma once
+
+#include <optional>
+
+#include "tools/diagnose/other_cause.hpp"
+
+namespace invar::diagnose {
+
+/// Takes back names in whose place a free course over another variable leads by `claim_margin`: that alone leaves them no
+/// chance. Of the others it notes what a freer shape explains. `beside`: the courses beside the best model, where known.
+void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside);
+
+/// After `conclude`: puts courses in the place of names with odds against them above `unlikely_odds`, where these do better.
+/// False: nothing changed.
+bool set_aside(const Case& data, Diagnosis& d);
+
+/// Leaves the name of what is nine times as likely another cause away.
+void leave_unsaid(Diagnosis& d);
+
+}  // namespace invar::diagnose
