@@ -290,7 +290,10 @@ void Search::finish() {
     // Only of equations the spans go with the model; all else was looked at already.
     if (!beside_ || data_.model.plant == physics::Plant::equations)
       beside_ = courses_beside(data_, d_.best, &d_.best);
-    return add_unnamed(data_, d_, *beside_), true;
+    const auto without_rest = d_;
+    add_unnamed(data_, d_, *beside_);
+    if (d_.has_rest && !noise_->shows(d_.best.model, without_rest.best.model, 0.9)) d_ = without_rest;
+    return true;
   });
   d_.is_partial = stopped();
   data_.stopped = {};

@@ -16,10 +16,10 @@ inline constexpr double confident = 0.9;
 
 class Claims {
  public:
-  /// `credit` of the name: 1 right, 0.5 a relative, 0 wrong. A curve without a name is no claim.
+  /// `credit` of the name: 1 right, 0.5 a relative, 0 wrong. What goes without a name is no claim.
   void add(const diagnose::Finding& finding, double still_follows, double credit, const std::string& of,
            bool of_many) {
-    if (!finding.term.curve.knots.empty()) return;
+    if (!finding.term.curve.knots.empty() || finding.stand_in != nullptr) return;
     const double p = finding.probability, held = credit > 0.9 ? 1.0 : 0.0;
     auto& bin = bins_[static_cast<std::size_t>(std::min(9.0, 10.0 * p))];
     ++bin.count, bin.said += p, bin.held += held;
