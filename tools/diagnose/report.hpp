@@ -14,8 +14,7 @@ namespace invar::diagnose {
 std::string report_json(const Case& data, const Diagnosis& diagnosis);
 
 /// The self-contained page.
-void write_page(const Case& data, const Diagnosis& diagnosis, const std::string& subject,
-                const std::filesystem::path& file);
+std::string page_text(const Case& data, const Diagnosis& diagnosis, const std::string& subject);
 
 /// A few lines for the terminal.
 std::string summary(const Case& data, const Diagnosis& diagnosis);
