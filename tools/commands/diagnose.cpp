@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <iomanip>
@@ -173,7 +174,17 @@ int run(const Options& options) {
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
     if (model.plant == physics::Plant::error_map)
       if (const auto range = diagnose::covered(data, "temperature")) changed.baseline.temperature = range;
-    folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", model::patched(yaml, changed));
+    for (std::size_t i = 0; !is_retuned && i < diagnosis.findings.size(); ++i) {
+      const auto& sigmas = diagnosis.findings[i].sigmas;
+      for (std::size_t k = 0; k < sigmas.size(); ++k)
+        if (sigmas[k] > 0.0 && std::isfinite(sigmas[k]))  // 0: was not fitted
+          changed.terms[model.terms.size() + i].sigmas[k] = sigmas[k];
+    }
+    const std::string made_of =
+        "# " + options.model.filename().string() +
+        (is_retuned ? ", its own parameters refitted, no physics added\n"
+                    : " after `invar diagnose`. " + diagnose::verdict_sentence(data, diagnosis) + "\n");
+    folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", made_of + model::patched(yaml, changed));
   }
   folder.put("report.html", page);
   folder.put("report.json", json + "\n");
