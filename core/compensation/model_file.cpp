@@ -11,6 +11,7 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 
 namespace invar::compensation {
 
@@ -125,17 +126,7 @@ ModelText& ModelText::numbers(const std::string& key, const Eigen::Ref<const Eig
 
 std::string ModelText::sealed() const { return text_ + "checksum: \"" + checksum(text_) + "\"\n"; }
 
-void ModelText::write(const std::filesystem::path& file) const {
-  std::filesystem::path temporary = file;
-  temporary += ".part";
-  std::ofstream out{temporary, std::ios::binary};
-  out << sealed();
-  out.close();
-  if (!out)
-    throw InputError{file.string(), "cannot be written",
-                     "check the folder, its permissions and the space left"};
-  std::filesystem::rename(temporary, file);
-}
+void ModelText::write(const std::filesystem::path& file) const { write_file(file, sealed()); }
 
 std::string checksum(const std::string& text) {
   const auto value = crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size()));

@@ -177,6 +177,7 @@ void read_thermal(const Node& root, Model& model) {
       node["between"].fault("names " + std::to_string(pair.size()) + " nodes", "name two");
       continue;
     }
+    if (pair[0] == pair[1]) node["between"].fault("names `" + pair[0] + "` twice", "name two nodes");
     for (const auto& name : pair) known(node["between"], name);
     model.thermal.couplings.emplace_back(pair[0], pair[1]);
     add_parameter(model, pair[0] + "-" + pair[1] + ".conductance", "W/K", node.required("conductance"),
@@ -301,8 +302,10 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     std::vector<std::string> known;
     for (const auto* info : physics::terms_of(model.plant)) known.emplace_back(info->name);
     const auto meant = config::nearest(name, known);
+    std::string list;
+    for (const auto& one : known) list += (list.empty() ? "" : ", ") + one;
     node["term"].fault("`" + name + "` is no term of plant " + std::string{physics::name_of(model.plant)},
-                       meant.empty() ? "see the contract's table of names" : "did you mean `" + meant + "`?");
+                       meant.empty() ? "it has: " + list : "did you mean `" + meant + "`?");
     node.accept_all();
     return std::nullopt;
   }

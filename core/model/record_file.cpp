@@ -45,16 +45,30 @@ ColumnUnit unit_of(const recording::Column& column, const physics::Signal& signa
 
 }  // namespace
 
+namespace {
+
+/// What the model's own controller decides needs no column.
+bool is_controlled(const physics::Model& model, const physics::Signal& signal) {
+  const auto& inputs = model.equations.inputs;
+  return std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) {
+    return input.signal == signal.name && input.symbol == model.equations.controlled_input;
+  });
+}
+
+}  // namespace
+
 RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed) {
   RecordFile result;
   std::vector<Fault> faults;
+  std::string there;
+  for (const auto& column : table.columns) there += (there.empty() ? "" : ", ") + column.name;
   for (const auto& signal : model.signals) {
     const auto* column = table.find(signal.column);
     if (column == nullptr) {
-      if (!signal.is_output || outputs_needed)
+      if (signal.is_output ? outputs_needed : !is_controlled(model, signal))
         faults.push_back({table.file.string(),
                           "has no column `" + signal.column + "` for `" + signal.name + "`",
-                          "add it, or name the right one in the model"});
+                          "add it, or name the right one in the model (there are: " + there + ")"});
       continue;
     }
     const auto unit = unit_of(*column, signal, model, table.file.string());

@@ -7,6 +7,13 @@
 
 namespace invar::physics {
 
+std::size_t ran_away_at(const std::vector<double>& output) {
+  constexpr double all = 1e30;       // more than any machine reads, in whatever unit
+  std::size_t from = output.size();  // of what ran away no row comes back
+  while (from > 0 && !(std::abs(output[from - 1]) < all)) --from;
+  return from;
+}
+
 std::vector<double> bridged(const std::vector<double>& time, const std::vector<double>& values) {
   std::vector<double> out = values;
   const std::size_t n = out.size();

@@ -43,6 +43,9 @@ class Simulation {
 /// `structure` may later be run with other values and other terms, but with the same signals.
 std::unique_ptr<Simulation> prepare(const Model& structure, const Record& inputs);
 
+/// The row from which on an output is no number, or one beyond 1e30, to the end: the model ran away. The number of rows where it did not.
+std::size_t ran_away_at(const std::vector<double>& output);
+
 /// Linear bridges over missing values, constant at the ends; zeros where all are missing.
 std::vector<double> bridged(const std::vector<double>& time, const std::vector<double>& values);
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 #include "core/recording/cdr.hpp"
 #include "core/recording/columns.hpp"
 #include "core/recording/value_json.hpp"
@@ -18,41 +19,26 @@ namespace invar::recording {
 
 namespace {
 
-/// A file that takes its name when it is finished.
+/// A text on its way out, line by line.
 class Output {
  public:
-  explicit Output(std::filesystem::path target) : target_{std::move(target)}, temporary_{target_} {
-    temporary_ += ".part";
-    stream_.open(temporary_, std::ios::binary);
-    check();
+  explicit Output(const std::filesystem::path& target)
+      : file_{target}, stream_{file_.path(), std::ios::binary} {
+    if (!stream_) file_.refuse();
   }
-  ~Output() {
-    std::error_code ignored;
-    if (!finished_) std::filesystem::remove(temporary_, ignored);
-  }
-  Output(const Output&) = delete;
-  Output& operator=(const Output&) = delete;
 
   void write(const std::string& line) {
     stream_.write(line.data(), static_cast<std::streamsize>(line.size()));
   }
   void finish() {
     stream_.close();
-    check();
-    std::filesystem::rename(temporary_, target_);
-    finished_ = true;
+    if (!stream_) file_.refuse();
+    file_.finish();
   }
 
  private:
-  void check() const {
-    if (!stream_)
-      throw InputError{target_.string(), "cannot be written",
-                       "check the folder, its permissions and the space left"};
-  }
-
-  std::filesystem::path target_, temporary_;
+  NewFile file_;
   std::ofstream stream_;
-  bool finished_ = false;
 };
 
 /// One topic on its way out.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/base/contract.hpp"
+#include "core/base/new_file.hpp"
 #include "core/base/unit.hpp"
 
 namespace invar::recording {
@@ -214,10 +215,9 @@ void Table::write(const std::filesystem::path& target) const {
     }
     text += '\n';
   }
-  std::filesystem::path temporary = target;
-  temporary += ".part";
+  NewFile out{target};
   const bool compress = target.extension() == ".gz";
-  const gzFile stream = gzopen(temporary.c_str(), compress ? "wb6" : "wbT");
+  const gzFile stream = gzopen(out.path().c_str(), compress ? "wb6" : "wbT");
   bool written = stream != nullptr;
   for (std::size_t at = 0; written && at < text.size();) {
     const auto size = static_cast<unsigned>(std::min<std::size_t>(text.size() - at, 1U << 20U));
@@ -225,12 +225,8 @@ void Table::write(const std::filesystem::path& target) const {
     at += size;
   }
   if (stream != nullptr && gzclose(stream) != Z_OK) written = false;
-  if (!written) {
-    std::filesystem::remove(temporary);
-    throw InputError{target.string(), "cannot be written",
-                     "check the folder, its permissions and the space left"};
-  }
-  std::filesystem::rename(temporary, target);
+  if (!written) out.refuse();
+  out.finish();
 }
 
 std::size_t Table::rows() const { return columns.empty() ? 0 : columns.front().values.size(); }

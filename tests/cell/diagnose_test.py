@@ -142,6 +142,55 @@ class Diagnose(unittest.TestCase):
         done = call(self.folder, "simulate", "--model", "d/patched.yaml", "--inputs", "long.csv", "--output", "s.csv")
         self.assertEqual(done.returncode, 0, done.stderr)
 
+    def test_a_model_that_runs_away_is_said_and_writes_nothing(self):
+        (self.folder / "away.yaml").write_text(MODEL.replace("u - k*x", "u + k*x^2"))
+        done = call(self.folder, "simulate", "--model", "away.yaml", "--inputs", "run.csv", "--output", "s.csv")
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertRegex(done.stderr, r"^away.yaml: simulated on run.csv, output `warmth` runs away from t = [0-9.]+ s on; .*\n$")
+        self.assertEqual([file.name for file in self.folder.glob("s.csv*")], [])
+
+    def test_the_output_of_a_controller_that_the_model_has_needs_no_column(self):
+        model = MODEL.replace("inputs: {u: heat}", "inputs: {r: wish, u: heat}").replace(
+            "terms: []", 'controller: {output: u, expression: "2*(r-x)"}\nterms: []')
+        (self.folder / "loop.yaml").write_text(model)
+        tables = []
+        for columns in ("t [s],wish [V],heat [V/s]", "t [s],wish [V]"):
+            rows = "".join(f"{0.05 * i},{1 + i % 2}{',' if 'heat' in columns else ''}\n" for i in range(50))
+            (self.folder / "in.csv").write_text(columns + "\n" + rows)
+            done = call(self.folder, "simulate", "--model", "loop.yaml", "--inputs", "in.csv", "--output", "s.csv")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            tables.append((self.folder / "s.csv").read_text())
+        self.assertEqual(tables[0], tables[1])
+        (self.folder / "in.csv").write_text("t [s],want [V]\n0,1\n1,2\n")
+        done = call(self.folder, "simulate", "--model", "loop.yaml", "--inputs", "in.csv", "--output", "s.csv")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("in.csv: has no column `wish` for `r`; add it, or name the right one in the model (there are: t, want)", done.stderr)
+        self.assertEqual((self.folder / "s.csv").read_text(), tables[0])
+
+    def test_all_files_appear_or_none_and_it_is_said_before_the_search(self):
+        (self.folder / "d/report.html").mkdir(parents=True)
+        (self.folder / "d/patched.yaml").write_text("of before")
+        (self.folder / "file").write_text("mine")
+        for out, said in (("d", "d/report.html: is a folder"), ("file", "file: cannot be made"), ("file/sub", "file/sub: cannot be made")):
+            done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--out", out)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+            self.assertIn(said, done.stderr)
+        self.assertEqual(sorted(file.name for file in (self.folder / "d").iterdir()), ["patched.yaml", "report.html"])
+        self.assertEqual((self.folder / "d/patched.yaml").read_text(), "of before")
+        self.assertEqual((self.folder / "file").read_text(), "mine")
+
+    def test_the_same_call_writes_the_same_bytes_and_prints_them(self):
+        tank(self.folder / "run.csv", 400, 1)
+        texts = []
+        for out in ("one", "two"):
+            done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--out", out, "--seed", "7", "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            texts += [done.stdout, (self.folder / out / "report.json").read_text()]
+        self.assertEqual(len(set(texts)), 1)
+        for file in ("patched.yaml", "retuned.yaml", "report.html"):
+            self.assertEqual((self.folder / "one" / file).read_bytes(), (self.folder / "two" / file).read_bytes())
+
 
 if __name__ == "__main__":
     unittest.main()

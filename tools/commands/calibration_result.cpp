@@ -3,8 +3,9 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <fstream>
 #include <iostream>
+
+#include "core/base/new_file.hpp"
 
 namespace invar::tools {
 
@@ -18,15 +19,6 @@ Progress::~Progress() {
 
 namespace {
 
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path part{file.string() + ".part"};
-  std::ofstream out{part};
-  out << text;
-  out.close();
-  if (!out) throw InputError{file.string(), "cannot be written", "check the space left"};
-  std::filesystem::rename(part, file);
-}
-
 void write_reports(const std::filesystem::path& folder, const nlohmann::json& report,
                    const report::Page& page) {
   std::error_code failed;
@@ -34,7 +26,7 @@ void write_reports(const std::filesystem::path& folder, const nlohmann::json& re
   if (failed || !std::filesystem::is_directory(folder))
     throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
   page.write(folder / "report.html");
-  write_text(folder / "report.json", report.dump(1) + "\n");
+  write_file(folder / "report.json", report.dump(1) + "\n");
 }
 
 }  // namespace
@@ -48,7 +40,7 @@ void write_calibration(const std::filesystem::path& folder, const compensation::
 void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
                        const nlohmann::json& report, const report::Page& page) {
   write_reports(folder, report, page);
-  write_text(folder / name, model);
+  write_file(folder / name, model);
 }
 
 void expect_finite(const std::filesystem::path& file, const std::string& column,

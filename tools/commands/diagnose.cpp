@@ -4,11 +4,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <memory>
+#include <thread>
 
+#include "core/base/new_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
@@ -31,15 +37,80 @@ struct Options {
   unsigned seed = 1;
 };
 
-void write_text(const std::filesystem::path& file, const std::string& text) {
-  const auto temporary = std::filesystem::path{file.string() + ".part"};
-  {
-    std::ofstream out{temporary};
-    out << text;
-    if (!out.flush()) throw InputError{file.string(), "cannot be written", "choose another --out"};
+/// The files of a diagnosis: all of them appear, or none.
+class Folder {
+ public:
+  /// Throws InputError where it takes no files; so it is said before a long search.
+  explicit Folder(std::filesystem::path folder) : folder_{std::move(folder)} {
+    std::error_code failed;
+    is_new_ = std::filesystem::create_directories(folder_, failed);
+    if (failed)
+      throw InputError{folder_.string(), "cannot be made: " + failed.message(), "choose another --out"};
+    try {
+      for (const auto* name : {"report.json", "report.html", "patched.yaml", "retuned.yaml"}) put(name, "");
+    } catch (...) {
+      forget();
+      throw;
+    }
+    files_.clear();
   }
-  std::filesystem::rename(temporary, file);
-}
+  ~Folder() { forget(); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+
+  void put(const char* name, const std::string& text) {
+    auto& file = files_.emplace_back(std::make_unique<NewFile>(folder_ / name));
+    std::ofstream out{file->path(), std::ios::binary};
+    out << text;
+    out.close();
+    if (!out) file->refuse();
+  }
+  void finish() {
+    is_new_ = false;
+    for (const auto& file : files_) file->finish();
+  }
+
+ private:
+  void forget() {
+    files_.clear();
+    std::error_code ignored;
+    if (is_new_) std::filesystem::remove(folder_, ignored);
+  }
+
+  std::filesystem::path folder_;
+  bool is_new_ = false;
+  std::vector<std::unique_ptr<NewFile>> files_;
+};
+
+/// What is known when Ctrl-C comes is put together within a second or so. Where a single simulation takes for ever it is not,
+/// and nobody should have to end the program by hand.
+class Patience {
+ public:
+  Patience() = default;
+  ~Patience() {
+    is_over_ = true;
+    watch_.join();
+  }
+  Patience(const Patience&) = delete;
+  Patience& operator=(const Patience&) = delete;
+
+ private:
+  void watch() const {
+    constexpr std::chrono::milliseconds look{50};
+    std::chrono::milliseconds left{10'000};
+    while (!is_over_) {
+      std::this_thread::sleep_for(look);
+      if (!interrupted()) continue;
+      left -= look;
+      if (left.count() > 0) continue;
+      std::cerr << "invar: stopped before there was anything to say; no report was written" << std::endl;
+      std::_Exit(130);  // nothing is open: the files are written when the patience is over
+    }
+  }
+
+  std::atomic<bool> is_over_{false};
+  std::thread watch_{[this] { watch(); }};
+};
 
 /// `[######--------------]  31 %  fitting the short list`, on a terminal alone; gone when it goes, also by a fault.
 class ProgressLine {
@@ -84,6 +155,8 @@ int run(const Options& options) {
   diagnose::Options how;
   how.stopped = interrupted;
   (void)interrupted();
+  Folder{options.out};
+  auto patience = std::make_unique<Patience>();
   auto diagnosis = diagnose::search(data, progress, how);
   line.clear();
   diagnose::check_runs(data, diagnosis.best.model, 0.0, options.model);
@@ -91,21 +164,31 @@ int run(const Options& options) {
     diagnose::compare(data, diagnosis, run);
     diagnosis.other_runs.push_back(std::move(run));
   }
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error)
-    throw InputError{options.out.string(), "cannot be made: " + error.message(), "choose another --out"};
   const auto json = diagnose::report_json(data, diagnosis);
+  const auto page = diagnose::page_text(data, diagnosis, options.model.string());
+  patience.reset();
+  Folder folder{options.out};
   for (const bool is_retuned : {true, false}) {
     auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
     for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
     if (model.plant == physics::Plant::error_map)
       if (const auto range = diagnose::covered(data, "temperature")) changed.baseline.temperature = range;
-    write_text(options.out / (is_retuned ? "retuned.yaml" : "patched.yaml"), model::patched(yaml, changed));
+    for (std::size_t i = 0; !is_retuned && i < diagnosis.findings.size(); ++i) {
+      const auto& sigmas = diagnosis.findings[i].sigmas;
+      for (std::size_t k = 0; k < sigmas.size(); ++k)
+        if (sigmas[k] > 0.0 && std::isfinite(sigmas[k]))  // 0: was not fitted
+          changed.terms[model.terms.size() + i].sigmas[k] = sigmas[k];
+    }
+    const std::string made_of =
+        "# " + options.model.filename().string() +
+        (is_retuned ? ", its own parameters refitted, no physics added\n"
+                    : " after `invar diagnose`. " + diagnose::verdict_sentence(data, diagnosis) + "\n");
+    folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", made_of + model::patched(yaml, changed));
   }
-  diagnose::write_page(data, diagnosis, options.model.string(), options.out / "report.html");
-  write_text(options.out / "report.json", json + "\n");
+  folder.put("report.html", page);
+  folder.put("report.json", json + "\n");
+  folder.finish();
   if (options.json)
     std::cout << json << '\n';
   else

@@ -6,6 +6,7 @@
 #include "core/model/record_file.hpp"
 #include "core/model/recording_file.hpp"
 #include "tools/command.hpp"
+#include "tools/report/page.hpp"
 
 namespace invar::tools {
 
@@ -17,6 +18,22 @@ struct Options {
   std::filesystem::path output;
 };
 
+/// Of a model in time each row follows from the one before, and missing inputs are bridged: no number is none ever after.
+void expect_numbers(const physics::Model& model, const physics::Record& inputs,
+                    const physics::Outputs& outputs, const Options& options) {
+  if (model.plant != physics::Plant::axis && model.plant != physics::Plant::thermal &&
+      model.plant != physics::Plant::equations)
+    return;
+  const auto names = model.outputs();
+  for (std::size_t o = 0; o < outputs.size(); ++o)
+    if (const auto from = physics::ran_away_at(outputs[o]); from < outputs[o].size())
+      throw InputError{
+          options.model.string(),
+          "simulated on " + options.inputs.filename().string() + ", output `" + names[o] +
+              "` runs away from t = " + report::number(inputs.time[from], 6) + " s on",
+          "look for a division by zero, or begin with values with which the model does not run away"};
+}
+
 void simulate(const Options& options) {
   const auto model = model::load(options.model);
   const auto table = model::read_recording(options.inputs, model).front();
@@ -24,6 +41,7 @@ void simulate(const Options& options) {
   model::check_order(inputs.record, options.inputs);
   physics::Outputs outputs;
   physics::prepare(model, inputs.record)->run(model, outputs);
+  expect_numbers(model, inputs.record, outputs, options);
   model::to_table(model, inputs, outputs).write(options.output);
 }
 

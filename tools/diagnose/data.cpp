@@ -303,8 +303,7 @@ void check_runs(const Case& data, const physics::Model& model, double most,
     physics::Outputs outputs;
     recording.simulation->run(model, outputs);
     for (std::size_t o = 0; o < outputs.size(); ++o) {
-      std::size_t from = outputs[o].size();  // of what ran away no row comes back
-      while (from > 0 && !std::isfinite(outputs[o][from - 1])) --from;
+      const std::size_t from = physics::ran_away_at(outputs[o]);
       const std::size_t lost = outputs[o].size() - from;
       if (static_cast<double>(lost) <= most * static_cast<double>(outputs[o].size())) continue;
       std::ostringstream when;

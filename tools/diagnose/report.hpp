@@ -14,8 +14,7 @@ namespace invar::diagnose {
 std::string report_json(const Case& data, const Diagnosis& diagnosis);
 
 /// The self-contained page.
-void write_page(const Case& data, const Diagnosis& diagnosis, const std::string& subject,
-                const std::filesystem::path& file);
+std::string page_text(const Case& data, const Diagnosis& diagnosis, const std::string& subject);
 
 /// A few lines for the terminal.
 std::string summary(const Case& data, const Diagnosis& diagnosis);
@@ -40,7 +39,9 @@ std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
 /// The motion or recording that would tell two terms apart.
-std::string separating_experiment(const std::string& one, const std::string& other);
+std::string separating_experiment(const Case& data, const physics::Term& one, const physics::Term& other);
+/// A term's name, with its place where `other` is of the same name elsewhere.
+std::string name_beside(const Case& data, const physics::Term& term, const physics::Term& other);
 /// The unit of a term's parameter, by the place it acts on where the library leaves it open.
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter);
 

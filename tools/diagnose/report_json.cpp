@@ -39,9 +39,13 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   double over = 0.0;
   for (const auto& row : d.train)
     over = std::max(over, row.noise_floor > 0.0 ? row.before / row.noise_floor : 1.0);
-  report["mismatch"] = {{"significant", d.mismatch_gain > claim_margin},
-                        {"residual_over_noise", over},
-                        {"p_value", std::exp(-std::max(0.0, std::min(600.0, d.mismatch_gain)))}};
+  // What moves within the user's own uncertainty is no mismatch, however far the residual of his best guess is above the noise.
+  const bool is_believed = d.verdict == Verdict::no_mismatch && !d.is_partial;
+  report["mismatch"] = {
+      {"significant", !is_believed && d.mismatch_gain > claim_margin},
+      {"residual_over_noise", over},
+      {"p_value", is_believed ? std::erfc(d.parameter_excursion / std::sqrt(2.0))
+                              : std::exp(-std::max(0.0, std::min(600.0, d.mismatch_gain)))}};
   report["location"] = json::array();
   report["findings"] = json::array();
   report["ambiguity"] = json::array();
@@ -77,11 +81,10 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     for (const auto& a : finding.alternatives) {
       const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
       if (p > 1e-4) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
-      if (a.log_odds > -ambiguous_margin && a.term.info != term.info)
+      if (a.log_odds > -ambiguous_margin)
         report["ambiguity"].push_back(
-            {{"between", {term.info->name, a.term.info->name}},
-             {"experiment",
-              separating_experiment(std::string{term.info->name}, std::string{a.term.info->name})}});
+            {{"between", {name_beside(data, term, a.term), name_beside(data, a.term, term)}},
+             {"experiment", separating_experiment(data, term, a.term)}});
     }
     json entry = {{"term", term.info->name},
                   {"site", site_of(data, term)},

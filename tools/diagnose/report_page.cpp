@@ -271,8 +271,7 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
 
 }  // namespace
 
-void write_page(const Case& data, const Diagnosis& d, const std::string& subject,
-                const std::filesystem::path& file) {
+std::string page_text(const Case& data, const Diagnosis& d, const std::string& subject) {
   report::Page page{"Why model and machine differ", subject};
   const bool fine = d.verdict == Verdict::no_mismatch && !d.is_partial;
   const bool clear =
@@ -334,7 +333,7 @@ void write_page(const Case& data, const Diagnosis& d, const std::string& subject
                  " repeated rows; " + std::to_string(data.count.out_of_order) + " rows put in order, " +
                  std::to_string(data.count.gaps) + " gaps bridged" +
                  (what_was_looked_at(data).empty() ? "." : "; " + what_was_looked_at(data) + "."));
-  page.write(file);
+  return page.text();
 }
 
 }  // namespace invar::diagnose

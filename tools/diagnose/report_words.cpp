@@ -48,7 +48,16 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
 }
 
-std::string separating_experiment(const std::string& one, const std::string& other) {
+std::string name_beside(const Case& data, const physics::Term& term, const physics::Term& other) {
+  const std::string name{term.info->name};
+  return term.info == other.info ? name + " (" + place_of(data, term) + ")" : name;
+}
+
+std::string separating_experiment(const Case& data, const physics::Term& at, const physics::Term& beside) {
+  if (at.info == beside.info)
+    return "record with one instrument more, between the " + place_of(data, at) + " and the " +
+           place_of(data, beside) + ": it shows the effect of the one and not that of the other";
+  const std::string one{at.info->name}, other{beside.info->name};
   const auto is = [&](const char* a, const char* b) {
     return (one == a && other == b) || (one == b && other == a);
   };
@@ -167,11 +176,10 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin && a.term.info != finding.term.info)
-        return "To tell " + readable(finding.term.info->name) + " from " + readable(a.term.info->name) +
-               ": " +
-               separating_experiment(std::string{finding.term.info->name}, std::string{a.term.info->name}) +
-               ".";
+      if (a.log_odds > -ambiguous_margin)
+        return "To tell " + readable(name_beside(data, finding.term, a.term)) + " from " +
+               readable(name_beside(data, a.term, finding.term)) + ": " +
+               separating_experiment(data, finding.term, a.term) + ".";
   const auto over = [&]() -> std::string {
     if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
       return d.findings.back().term.curve.over;

@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iterator>
+#include <sstream>
 
-#include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 
 namespace invar::report {
 
@@ -124,13 +124,11 @@ void Page::image(const std::vector<unsigned char>& bytes, const std::string& mim
        "\"><figcaption>" + escaped(caption) + "</figcaption></figure>");
 }
 
-void Page::write(const std::filesystem::path& file) const {
+std::string Page::text() const {
   std::vector<Plot> all;
   for (const Part& part : parts_) all.insert(all.end(), part.plots.begin(), part.plots.end());
   const auto drawings = draw(all);
-  std::filesystem::path temporary = file;
-  temporary += ".part";
-  std::ofstream out{temporary, std::ios::binary};
+  std::ostringstream out;
   out << "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
          "content=\"width=device-width\"><title>"
       << escaped(title_) << "</title><style>" << style << "</style></head><body><h1>" << escaped(title_)
@@ -146,14 +144,10 @@ void Page::write(const std::filesystem::path& file) const {
     if (!part.caption.empty()) out << "<figcaption>" << escaped(part.caption) << "</figcaption>";
   }
   out << "</body></html>\n";
-  out.close();
-  if (!out) {
-    std::filesystem::remove(temporary);
-    throw InputError{file.string(), "cannot be written",
-                     "check the folder, its permissions and the space left"};
-  }
-  std::filesystem::rename(temporary, file);
+  return out.str();
 }
+
+void Page::write(const std::filesystem::path& file) const { write_file(file, text()); }
 
 std::string number(double value, int digits) {
   if (std::isnan(value)) return "-";

@@ -37,7 +37,9 @@ class Page {
   /// HTML that the caller made and escaped.
   void html(const std::string& text);
 
-  /// Draws the plots and writes the file through a temporary one. Throws InputError when it cannot be
+  /// Draws the plots.
+  [[nodiscard]] std::string text() const;
+  /// The same as a file, written through a temporary one. Throws InputError when it cannot be
   /// written.
   void write(const std::filesystem::path& file) const;
 

@@ -1,0 +1,168 @@
+// report.json against the contract, key by key, for every verdict.
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/support/mismatch/marks.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace invar::test::mismatch {
+namespace {
+
+using diagnose::Verdict;
+using nlohmann::json;
+
+/// No number may have become null (NaN and infinity are no JSON).
+void expect_no_null(const json& value, const std::string& at) {
+  EXPECT_FALSE(value.is_null()) << at;
+  if (value.is_object() || value.is_array())
+    for (const auto& [key, inner] : value.items()) expect_no_null(inner, at + "/" + key);
+}
+
+bool is_share(const json& value) { return value.is_number() && value >= 0.0 && value <= 1.0; }
+bool is_texts(const json& value) {
+  return value.is_array() &&
+         std::all_of(value.begin(), value.end(), [](const json& v) { return v.is_string(); });
+}
+
+void expect_location(const json& location, const std::string& plant) {
+  EXPECT_TRUE(location.at("site").get<std::string>().starts_with(plant + "."));
+  EXPECT_TRUE(is_texts(location.at("depends_on")));
+  for (const auto& [variable, range] : location.at("where").items()) {
+    ASSERT_EQ(range.size(), 2U) << variable;
+    EXPECT_LE(range[0].get<double>(), range[1].get<double>());
+  }
+  EXPECT_TRUE(is_share(location.at("share")));
+  EXPECT_FALSE(location.at("why").get<std::string>().empty());
+}
+
+void expect_finding(const json& finding, const std::string& plant) {
+  EXPECT_TRUE(finding.at("term").is_string());
+  EXPECT_TRUE(finding.at("site").get<std::string>().starts_with(plant + "."));
+  EXPECT_TRUE(is_share(finding.at("probability")));
+  EXPECT_TRUE(is_share(finding.at("share")));
+  EXPECT_FALSE(finding.at("description").get<std::string>().empty());
+  for (const auto& [name, p] : finding.at("parameters").items()) {
+    EXPECT_TRUE(p.at("value").is_number() && p.at("unit").is_string()) << name;
+    EXPECT_GE(p.at("sigma").get<double>(), 0.0) << name;
+  }
+  double sum = finding.at("probability");
+  for (const auto& a : finding.at("alternatives")) {
+    EXPECT_TRUE(a.at("term").is_string() && is_share(a.at("probability")));
+    sum += a.at("probability").get<double>();
+  }
+  EXPECT_LE(sum, 1.0 + 1e-9);
+}
+
+void expect_contract(const diagnose::Case& data, const diagnose::Diagnosis& d, const std::string& plant) {
+  const auto report = json::parse(diagnose::report_json(data, d));
+  SCOPED_TRACE(report.dump(1));
+  expect_no_null(report, "");
+  EXPECT_EQ(report.at("invar_report"), 1);
+  EXPECT_EQ(report.at("verdict"), diagnose::name_of(d.verdict));
+  EXPECT_EQ(report.contains("partial"), d.is_partial);
+  const auto& mismatch = report.at("mismatch");
+  EXPECT_TRUE(mismatch.at("significant").is_boolean());
+  EXPECT_GE(mismatch.at("residual_over_noise").get<double>(), 0.0);
+  EXPECT_TRUE(is_share(mismatch.at("p_value")));
+  for (const auto& location : report.at("location")) expect_location(location, plant);
+  for (const auto& finding : report.at("findings")) expect_finding(finding, plant);
+  EXPECT_GE(report.at("location").size(), report.at("findings").size());
+  for (const auto& c : report.at("parameter_corrections"))
+    EXPECT_TRUE(c.at("name").is_string() && c.at("from").is_number() && c.at("to").is_number() &&
+                c.at("sigma").is_number());
+  for (const auto* part : {"heldout", "train"}) {
+    EXPECT_EQ(report.at("fit").at(part).size(), data.outputs.size());
+    for (const auto& [signal, row] : report.at("fit").at(part).items()) {
+      EXPECT_TRUE(row.at("unit").is_string()) << signal;
+      for (const auto* number : {"before", "retuned", "after", "noise_floor"})
+        EXPECT_GE(row.at(number).get<double>(), 0.0) << signal << ' ' << number;
+    }
+  }
+  EXPECT_TRUE(report.at("fit").at("split").is_string());
+  for (const auto& a : report.at("ambiguity")) {
+    ASSERT_EQ(a.at("between").size(), 2U);
+    EXPECT_TRUE(is_texts(a.at("between")));
+    EXPECT_NE(a.at("between")[0], a.at("between")[1]);
+    EXPECT_FALSE(a.at("experiment").get<std::string>().empty());
+  }
+  EXPECT_TRUE(report.at("unexplained").at("residual_over_noise").is_number());
+  EXPECT_TRUE(is_texts(report.at("unexplained").at("depends_on")));
+  for (const auto& s : report.at("detectable")) {
+    EXPECT_TRUE(s.at("term").is_string() && s.at("smallest").at("unit").is_string());
+    EXPECT_GT(s.at("smallest").at("value").get<double>(), 0.0);
+  }
+  for (const auto& r : report.at("rejected"))
+    EXPECT_TRUE(r.at("term").is_string() && !r.at("why").get<std::string>().empty());
+  EXPECT_LE(report.at("data").at("used").get<int>(), report.at("data").at("rows").get<int>());
+  for (const auto* cause : {"nan", "outlier"})
+    EXPECT_TRUE(report.at("data").at("dropped").at(cause).is_number_unsigned());
+  EXPECT_EQ(report.at("patched_model"), "patched.yaml");
+
+  const bool claims = !report.at("findings").empty();
+  switch (d.verdict) {
+    case Verdict::no_mismatch:
+      EXPECT_FALSE(claims);
+      if (!d.is_partial) {
+        EXPECT_FALSE(mismatch.at("significant"));
+        EXPECT_GT(mismatch.at("p_value"), 0.0026);  // within three sigma of what the user believed
+      }
+      break;
+    case Verdict::parameters_only:
+      EXPECT_FALSE(claims);
+      EXPECT_FALSE(report.at("parameter_corrections").empty());
+      EXPECT_TRUE(mismatch.at("significant"));
+      break;
+    case Verdict::ambiguous:
+      EXPECT_FALSE(report.at("ambiguity").empty());
+      EXPECT_TRUE(claims);
+      break;
+    case Verdict::unknown_physics:
+      EXPECT_FALSE(report.at("location").empty());
+      for (const auto& finding : report.at("findings")) EXPECT_EQ(finding.at("term"), "unmodelled");
+      break;
+    default:
+      EXPECT_TRUE(claims);
+      EXPECT_TRUE(mismatch.at("significant"));
+  }
+}
+
+TEST(Report, HoldsTheContractForEveryVerdict) {
+  std::set<Verdict> seen;
+  const auto look = [&](const diagnose::Case& data, const diagnose::Diagnosis& d, const std::string& plant) {
+    seen.insert(d.verdict);
+    expect_contract(data, d, plant);
+  };
+  for (const auto& [plant, effect, seed] : {std::tuple{"thermal", "none", 5U},
+                                            {"thermal", "parameter", 5U},
+                                            {"thermal", "sensor_lag", 3U},
+                                            {"error_map", "unknown:dent", 1011U}}) {
+    SCOPED_TRACE(std::string{plant} + " " + effect);
+    auto data = case_of(make(plant, effect, 1.0, seed));
+    auto d = diagnose::search(data, [](double, const std::string&) {});
+    look(data, d, plant);
+    if (d.verdict != Verdict::explained) continue;
+    // The same with a rest, and with a rival that comes as near: of another name, and of its own elsewhere.
+    d.verdict = Verdict::partly_explained;
+    look(data, d, plant);
+    d.verdict = Verdict::ambiguous;
+    auto& finding = d.findings.front();
+    finding.probability = 0.5;
+    auto rival = finding.term;
+    rival.on = "elsewhere";
+    finding.alternatives = {{rival, -0.1}};
+    look(data, d, plant);
+    EXPECT_THAT(diagnose::next_experiment(data, d), ::testing::HasSubstr("elsewhere"));
+  }
+  auto data = case_of(make("thermal", "sensor_lag", 1.0, 3));
+  diagnose::Options stop;
+  stop.stopped = [] { return true; };
+  const auto d = diagnose::search(
+      data, [](double, const std::string&) {}, stop);
+  EXPECT_TRUE(d.is_partial);
+  look(data, d, "thermal");
+  EXPECT_EQ(seen.size(), 6U);
+}
+
+}  // namespace
+}  // namespace invar::test::mismatch
