@@ -163,6 +163,9 @@ class EquationsMachine {
   }
 
  private:
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_states, most_states>;
+  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_states, 1>;
+
   struct Use {
     const EquationsTermKind* kind;
     std::size_t on, with;
@@ -245,9 +248,9 @@ class EquationsMachine {
   }
 
   /// Of the rates of all states here, as far as they do not jump, lane by lane; from steps of `share` of each state.
-  std::array<Eigen::MatrixXd, lanes> jacobian(const State& s, double t, double share) {
+  std::array<Matrix, lanes> jacobian(const State& s, double t, double share) {
     const auto n = static_cast<Eigen::Index>(all_states());
-    std::array<Eigen::MatrixXd, lanes> all;
+    std::array<Matrix, lanes> all;
     for (auto& one : all) one.resize(n, n);
     for (Eigen::Index j = 0; j < n; ++j) {
       State up = s, down = s;
@@ -271,27 +274,27 @@ class EquationsMachine {
     constexpr double gamma = 1.0 - 0.5 * std::numbers::sqrt2;
     const auto n = static_cast<Eigen::Index>(all_states());
     const auto column = [n](const State& state, std::size_t l) {
-      Eigen::VectorXd one(n);
+      Vector one(n);
       for (Eigen::Index i = 0; i < n; ++i) one(i) = state[static_cast<std::size_t>(i)][l];
       return one;
     };
     const auto rates = jacobian(s, t, 1e-6);
-    const Eigen::MatrixXd eye = Eigen::MatrixXd::Identity(n, n);
-    std::vector<Eigen::PartialPivLU<Eigen::MatrixXd>> matrix;
-    std::vector<Eigen::VectorXd> first, second;
+    const Matrix eye = Matrix::Identity(n, n);
+    std::array<Eigen::PartialPivLU<Matrix>, lanes> matrix;
+    std::array<Vector, lanes> first;
     const State here = slope(s, t);
     State next = s;
     for (std::size_t l = 0; l < lanes; ++l) {
-      matrix.push_back((eye - gamma * h * rates[l]).partialPivLu());
-      first.push_back(matrix[l].solve(column(here, l)));
+      matrix[l].compute(eye - gamma * h * rates[l]);
+      first[l] = matrix[l].solve(column(here, l));
       for (Eigen::Index i = 0; i < n; ++i) next[static_cast<std::size_t>(i)][l] += h * first[l](i);
     }
     const State there = slope(next, t + h);
     next = s;
     for (std::size_t l = 0; l < lanes; ++l) {
-      second.push_back(matrix[l].solve(column(there, l) - 2.0 * first[l]));
+      const Vector second = matrix[l].solve(column(there, l) - 2.0 * first[l]);
       for (Eigen::Index i = 0; i < n; ++i)
-        next[static_cast<std::size_t>(i)][l] += h * (1.5 * first[l](i) + 0.5 * second[l](i));
+        next[static_cast<std::size_t>(i)][l] += h * (1.5 * first[l](i) + 0.5 * second(i));
     }
     return next;
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/equations_machine.hpp"
@@ -21,6 +22,18 @@ class OwnEquations final : public Simulation {
       const auto* values = inputs.find(input.signal);
       inputs_.push_back(values == nullptr ? std::vector<double>(time_.size(), 0.0) : bridged(time_, *values));
       is_linear_ = is_linear_ || input.linear;
+    }
+    for (std::size_t k = 0; k < inputs.restarts.size(); ++k) {
+      auto& restart = restarts_.emplace_back();
+      restart.row = inputs.restarts[k];
+      for (const auto& state : structure.equations.states) {
+        const auto name = state.name + ".start" + std::to_string(inputs.first_restart + k);
+        const auto& all = structure.parameters;
+        restart.parameters.push_back(static_cast<std::size_t>(
+            std::find_if(all.begin(), all.end(), [&](const Parameter& one) { return one.name == name; }) -
+            all.begin()));
+        INVAR_EXPECTS(restart.parameters.back() < all.size(), name);
+      }
     }
     for (const auto& output : structure.equations.outputs) {
       const auto* values = inputs.find(output.name);
@@ -120,7 +133,14 @@ class OwnEquations final : public Simulation {
     machine.balance_hidden(s);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
     double fastest = 0.0;
+    auto restart = restarts_.begin();
     for (std::size_t row = 0; row < n; ++row) {
+      if (restart != restarts_.end() && restart->row == row) {
+        for (std::size_t i = 0; i < machine.states(); ++i)
+          for (std::size_t l = 0; l < lanes; ++l)
+            s[i][l] = models[l]->parameters[restart->parameters[i]].value;
+        ++restart;
+      }
       for (std::size_t i = 0; i < inputs_.size(); ++i)
         for (std::size_t l = 0; l < lanes; ++l) machine.set_input(i, l, (*inputs[l])[i][row]);
       machine.show(s, time_[row]);
@@ -141,8 +161,12 @@ class OwnEquations final : public Simulation {
       if (row + 1 == n) break;
       const double h = time_[row + 1] - time_[row];
       if (!(h > 0.0)) continue;
-      const int parts = static_cast<int>(std::clamp(std::ceil(h * fastest / 0.25), 1.0, 60.0));
-      machine.set_stiff(h * fastest > 1.5 * parts);
+      // What is faster than the shortest explicit steps bear is at its balance after an implicit one; the rest needs few.
+      constexpr double most_parts = 60.0, stiff_parts = 15.0;
+      const bool stiff = h * fastest > 1.5 * most_parts;
+      const int parts =
+          static_cast<int>(stiff ? stiff_parts : std::clamp(std::ceil(h * fastest / 0.25), 1.0, most_parts));
+      machine.set_stiff(stiff);
       if (!is_linear_) {
         machine.advance(s, time_[row], h, parts);
         continue;
@@ -169,7 +193,13 @@ class OwnEquations final : public Simulation {
     }
   }
 
+  struct Restart {
+    std::size_t row = 0;
+    std::vector<std::size_t> parameters;  // by state
+  };
+
   std::vector<double> time_;
+  std::vector<Restart> restarts_;
   CompiledEquations compiled_;
   std::vector<std::vector<double>> inputs_;
   std::vector<double> first_;

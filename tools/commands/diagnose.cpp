@@ -170,6 +170,7 @@ int run(const Options& options) {
   Folder folder{options.out};
   for (const bool is_retuned : {true, false}) {
     auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
+    changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
     for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
     if (model.plant == physics::Plant::error_map)

@@ -39,6 +39,12 @@ struct Case {
   std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
   double resolution = 0.0;  // of an encoder, SI, as the user believes; the model itself does not round
   DataCount count;
+  struct Windows {
+    std::size_t count = 0;  // 0: each recording is simulated from its first row to its last
+    double length = 0.0;    // of one, in the unit of time
+    bool grows = false;     // a disturbance of the model grows; false: it stays
+  };
+  Windows windows;
   bool is_time_series = true;     // rows follow one another; false for droplets
   std::function<bool()> stopped;  // asked before each simulation; empty: never
   std::shared_ptr<Remembered> remembered = std::make_shared<Remembered>();

@@ -196,11 +196,10 @@ class Candidates {
     add("hidden_state", state, "", 0.02 / spans_.duration, store_times());
     const auto& span = spans_.of(state);
     add_limits(state, span);
-    for (const double share : {0.97, 0.9, 0.8, 0.7, 0.55}) {
-      add("overflow", state, "", 0.0, {span.low + share * span.width()});
+    for (const double share :
+         {0.97, 0.9, 0.8, 0.7, 0.55})  // what runs over to nowhere is held by an upper limit
       for (const auto& other : equations_.states)
         if (other.name != state) add("overflow", state, other.name, 0.0, {span.low + share * span.width()});
-    }
   }
 
   [[nodiscard]] std::vector<double> store_times() const {

@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "tools/diagnose/report.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -115,6 +116,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     const double to = get(d.best.model, f), sigma = d.best.sigma(static_cast<Eigen::Index>(k));
     if (f.where == Freedom::Where::parameter) {
       const auto& p = data.model.parameters[f.index];
+      if (is_start(p)) continue;
       if (std::abs(to - p.value) > 2.0 * sigma)
         report["parameter_corrections"].push_back(
             {{"name", p.name}, {"from", p.value}, {"to", to}, {"sigma", sigma}, {"unit", p.unit}});
@@ -137,8 +139,10 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"train", fit_json(d.train)},
       {"other_recordings", other_runs},
       {"split",
-       "each third of 18 stretches of each recording was kept from a fit in turn; simulated without "
-       "restart over the whole recording"}};
+       data.windows.count > 0
+           ? "each third of four stretches a window was kept from a fit in turn; " + how_windowed(data)
+           : "each third of 18 stretches of each recording was kept from a fit in turn; simulated without "
+             "restart over the whole recording"}};
   report["unexplained"] = {{"residual_over_noise", d.unexplained}, {"depends_on", d.unexplained_over}};
   report["detectable"] = json::array();
   for (const auto& entry : d.detectable)

@@ -5,6 +5,7 @@
 
 #include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/report.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -234,6 +235,7 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
     const auto& f = d.best.free[k];
     if (f.where != Freedom::Where::parameter) continue;
     const auto& p = data.model.parameters[f.index];
+    if (is_start(p)) continue;
     const double to = get(d.best.model, f), sigma = d.best.sigma(static_cast<Eigen::Index>(k));
     corrections.push_back(
         {p.name,

@@ -5,6 +5,7 @@
 
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/shorten.hpp"
+#include "tools/diagnose/windows.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::diagnose {
@@ -165,7 +166,8 @@ std::string of_a_cell(const DataCount& count) {
 }  // namespace
 
 std::string what_was_looked_at(const Case& data) {
-  const std::string cut = of_a_cell(data.count);
+  std::string cut = of_a_cell(data.count);
+  if (const auto windows = how_windowed(data); !windows.empty()) cut += (cut.empty() ? "" : "; ") + windows;
   if (data.count.shortened == 0) return cut;
   return (cut.empty() ? "" : cut + "; ") + "a long recording: of " + std::to_string(data.count.rows) +
          " rows " + how_shortened(data.model) + " looked at, " + std::to_string(data.count.shortened) +
@@ -223,6 +225,7 @@ std::string moved_parameters(const Diagnosis& d) {
   std::string text;
   for (const auto& f : d.best.free) {
     if (f.where == Freedom::Where::curve || !(f.sigma > 0.0)) continue;
+    if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
     const double to = get(d.best.model, f), sigmas = std::abs(to - f.center) / f.sigma;
     if (!(sigmas > 3.0)) continue;
     const bool own = f.where == Freedom::Where::parameter;

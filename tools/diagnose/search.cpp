@@ -19,6 +19,7 @@
 #include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
 #include "tools/diagnose/wander.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -81,6 +82,7 @@ class Search {
 };
 
 void Search::prepare() {
+  cut_into_windows(data_);
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);

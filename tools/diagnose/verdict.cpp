@@ -10,6 +10,7 @@
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/suspect.hpp"
 #include "tools/diagnose/unsure.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -27,7 +28,9 @@ Fold fold_of(const Case& data, const Weighing& all, std::size_t which) {
   Fold fold{all, all};
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const std::size_t rows = data.recordings[r].inputs.rows();
-    const std::size_t stretch = std::max<std::size_t>(1, rows / stretches);
+    // Within a window of its own states some rows must be left to find these by.
+    const std::size_t count = std::max(stretches, 4 * (data.recordings[r].inputs.restarts.size() + 1));
+    const std::size_t stretch = std::max<std::size_t>(1, rows / count);
     for (std::size_t o = 0; o < data.outputs.size(); ++o)
       for (std::size_t i = 0; i < rows; ++i)
         ((i / stretch) % folds == which ? fold.train : fold.test).present[r][o][i] = false;
@@ -191,6 +194,7 @@ void conclude(const Case& data, Diagnosis& d) {
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];
     if (f.where == Freedom::Where::curve || f.sigma <= 0.0) continue;
+    if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
     d.parameter_excursion =
         std::max(d.parameter_excursion, std::abs(get(d.best.model, f) - f.center) / f.sigma);
   }
@@ -219,6 +223,14 @@ void conclude(const Case& data, Diagnosis& d) {
   double sum = 0.0;
   for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
   d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
+  // An equation that says the right thing leaves noise: many times that is more physics, however much was found.
+  if (data.model.plant == physics::Plant::equations) {
+    if (d.verdict == Verdict::explained && d.unexplained > 5.0) d.verdict = Verdict::partly_explained;
+    if (d.findings.empty() && d.verdict != Verdict::unknown_physics && d.unexplained > 10.0) {
+      d.verdict = Verdict::unknown_physics;
+      d.suspect = most_suspect(data, d);
+    }
+  }
   std::sort(d.rejected.begin(), d.rejected.end(),
             [](const auto& a, const auto& b) { return a.gain > b.gain; });
   std::erase_if(d.rejected, [&](const Rejection& r) {

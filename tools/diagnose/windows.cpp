@@ -1,0 +1,238 @@
+#include "tools/diagnose/windows.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+namespace invar::diagnose {
+
+namespace {
+
+using physics::Model;
+
+/// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
+/// says what it lacks; but each costs a fit as many numbers as there are states.
+constexpr std::size_t fewest_rows = 60, most_starts = 100;
+/// A window is at most as long as a disturbance of its first state takes to grow so much.
+constexpr double most_growth = 30.0;
+
+/// The model with its states as its outputs.
+Model showing_states(const Model& model) {
+  auto shown = model;
+  shown.equations.outputs.clear();
+  std::erase_if(shown.signals, [](const auto& signal) { return signal.is_output; });
+  for (const auto& state : model.equations.states) {
+    shown.equations.outputs.push_back({state.name, state.name, {}});
+    shown.signals.push_back({state.name, state.name, "", true});
+  }
+  return shown;
+}
+
+double reach(const std::vector<double>& values, double begin, double end) {
+  const auto n = static_cast<double>(values.size());
+  double most = 0.0;
+  for (auto i = static_cast<std::size_t>(begin * n); i < static_cast<std::size_t>(end * n); ++i)
+    most = std::isfinite(values[i]) ? std::max(most, std::abs(values[i])) : 1e300;
+  return most;
+}
+
+/// How much farther a small steady push on any state has carried an output by the end of a recording than by its middle. A
+/// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves.
+double goes_on(const Case& data, const Recording& recording) {
+  const auto& model = data.model;
+  physics::Outputs at;
+  recording.simulation->run(model, at);
+  double most = 0.0;
+  for (const auto& state : model.equations.states) {
+    auto pushed = model;
+    const auto* start = model.find(state.name + ".initial");
+    double size = std::max(std::abs(start->value), start->sigma.value_or(0.0));
+    for (const auto& output : at) size = std::max(size, std::min(1e6, reach(output, 0.0, 1.0)));
+    const double duration = recording.inputs.time.back() - recording.inputs.time.front();
+    for (auto& one : pushed.equations.states)
+      if (one.name == state.name) {
+        std::ostringstream by;
+        by.precision(17);
+        by << "(" << one.derivative << ") + " << 1e-6 * std::max(size, 1e-9) / duration;
+        one.derivative = by.str();
+      }
+    physics::Outputs moved;
+    physics::prepare(pushed, recording.inputs)->run(pushed, moved);
+    for (std::size_t o = 0; o < at.size(); ++o) {
+      std::vector<double> change(at[o].size());
+      for (std::size_t i = 0; i < change.size(); ++i) change[i] = moved[o][i] - at[o][i];
+      const double early = reach(change, 0.25, 0.5), late = reach(change, 0.75, 1.0);
+      if (late > 1e-9 * size) most = std::max(most, late / std::max(early, 1e-12 * size));
+    }
+  }
+  return most;
+}
+
+/// Slope and value of what was measured about a row, from the rows around it.
+std::pair<double, double> measured_at(const Recording& recording, std::size_t output, std::size_t row) {
+  const auto& time = recording.inputs.time;
+  const auto& y = recording.measured[output];
+  for (std::size_t about = 4; about < 64; about *= 2) {
+    double n = 0.0, st = 0.0, sy = 0.0, stt = 0.0, sty = 0.0;
+    for (std::size_t i = row - std::min(row, about); i < std::min(y.size(), row + about + 1); ++i) {
+      if (!std::isfinite(y[i])) continue;
+      const double t = time[i] - time[row];
+      n += 1.0, st += t, sy += y[i], stt += t * t, sty += t * y[i];
+    }
+    if (n < 5.0) continue;
+    const double slope = (n * sty - st * sy) / (n * stt - st * st);
+    return {(sy - slope * st) / n, slope};
+  }
+  return {std::nan(""), std::nan("")};
+}
+
+/// What the outputs say of a state at a row: itself, or the rate of one whose rate it is; else what the free run has.
+double guess_of(const Case& data, const Recording& recording, const physics::Outputs& free, std::size_t state,
+                std::size_t row) {
+  const auto& equations = data.model.equations;
+  for (const auto& output : equations.outputs) {
+    const auto o = static_cast<std::size_t>(&output - equations.outputs.data());
+    if (output.expression == equations.states[state].name) {
+      if (const double value = measured_at(recording, o, row).first; std::isfinite(value)) return value;
+    }
+    for (const auto& other : equations.states)
+      if (output.expression == other.name && other.derivative == equations.states[state].name)
+        if (const double slope = measured_at(recording, o, row).second; std::isfinite(slope)) return slope;
+  }
+  const double value = free[state][row];
+  return std::isfinite(value) && std::abs(value) < 1e6
+             ? value
+             : data.model.value(equations.states[state].name + ".initial");
+}
+
+struct Cut {
+  Case data;
+  double growth = 0.0;
+};
+
+/// The case in windows of about so many rows.
+Case in_windows(const Case& whole, std::size_t rows) {
+  Case data = whole;
+  const auto shown = showing_states(whole.model);
+  const auto& states = whole.model.equations.states;
+  std::size_t next = 0;
+  std::vector<double> sizes(states.size(), 0.0);
+  for (auto& recording : data.recordings) {
+    const std::size_t n = recording.inputs.rows(), count = std::max<std::size_t>(1, n / rows);
+    physics::Outputs free;
+    physics::prepare(shown, recording.inputs)->run(shown, free);
+    recording.inputs.first_restart = next;
+    data.windows.count += count;
+    data.windows.length =
+        std::max(data.windows.length,
+                 (recording.inputs.time.back() - recording.inputs.time.front()) / static_cast<double>(count));
+    for (std::size_t k = 1; k < count; ++k, ++next) {
+      const std::size_t row = k * n / count;
+      recording.inputs.restarts.push_back(row);
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        const auto& initial = *whole.model.find(states[i].name + ".initial");
+        const double value = guess_of(whole, recording, free, i, row);
+        sizes[i] =
+            std::max({sizes[i], std::abs(value), initial.sigma.value_or(0.0), std::abs(initial.value), 1e-9});
+        data.model.parameters.push_back(
+            {states[i].name + ".start" + std::to_string(next), initial.unit, value, 1.0, initial.bounds});
+      }
+    }
+  }
+  const std::size_t first = whole.model.parameters.size();
+  for (std::size_t p = first; p < data.model.parameters.size(); ++p)
+    data.model.parameters[p].sigma = sizes[(p - first) % states.size()];
+  for (auto& recording : data.recordings)
+    recording.simulation = physics::prepare(data.model, recording.inputs);
+  return data;
+}
+
+/// The states at the beginning of the windows that bring the model nearest, its numbers as they are believed.
+void estimate_starts(Case& data) {
+  auto fixed = data.model;
+  for (auto& parameter : fixed.parameters)
+    if (!is_start(parameter)) parameter.sigma = 0.0;
+  for (auto& term : fixed.terms) term.sigmas.fill(0.0);
+  for (int again = 0; again < 2; ++again) {
+    const auto plain = weigh(data, simulate(data, data.model), false);
+    data.model.parameters = [&] {
+      auto found = fit(data, plain, data.model, fixed, 8).model.parameters;
+      for (std::size_t p = 0; p < found.size(); ++p) found[p].sigma = data.model.parameters[p].sigma;
+      return found;
+    }();
+  }
+}
+
+/// By how much a disturbance of the states at the beginning of a window has grown at its end, the median of all windows.
+double growth_over_windows(const Case& data) {
+  const auto at = simulate(data, data.model);
+  const auto& states = data.model.equations.states;
+  std::vector<double> all;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    auto moved = data.model;
+    for (auto& p : moved.parameters)
+      if (is_start(p) && p.name.starts_with(states[i].name + ".start")) p.value += 1e-5 * *p.sigma;
+    const auto to = simulate_once(data, moved);
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& restarts = data.recordings[r].inputs.restarts;
+      for (std::size_t k = 0; k < restarts.size(); ++k) {
+        const std::size_t end = k + 1 < restarts.size() ? restarts[k + 1] : data.recordings[r].inputs.rows();
+        const std::size_t early = restarts[k] + (end - restarts[k]) / 5;
+        for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+          double first = 0.0, last = 0.0;
+          for (std::size_t row = restarts[k]; row < end; ++row) {
+            const double change = std::abs(to[r][o][row] - at[r][o][row]);
+            auto& most = row < early ? first : last;
+            most = std::isfinite(change) ? std::max(most, change) : 1e300;
+          }
+          if (first > 0.0) all.push_back(last / first);
+        }
+      }
+    }
+  }
+  return all.empty() ? 0.0 : median(all);
+}
+
+}  // namespace
+
+bool is_start(const physics::Parameter& parameter) {
+  return parameter.name.find(".start") != std::string::npos;
+}
+
+void cut_into_windows(Case& data) {
+  const auto& equations = data.model.equations;
+  if (data.model.plant != physics::Plant::equations || !equations.controlled_input.empty()) return;
+  constexpr double still_going = 1.6;
+  std::size_t rows = 0;
+  bool goes = false;
+  for (const auto& recording : data.recordings) {
+    rows = std::max(rows, recording.inputs.rows());
+    if (recording.inputs.rows() >= 4 * fewest_rows) goes = goes || goes_on(data, recording) > still_going;
+  }
+  if (!goes) return;
+  std::size_t window = std::max(fewest_rows, rows * equations.states.size() / most_starts);
+  auto cut = in_windows(data, window);
+  estimate_starts(cut);
+  double growth = growth_over_windows(cut);
+  while (growth > most_growth && window > fewest_rows / 4 &&
+         2 * cut.windows.count * equations.states.size() <= 2 * most_starts) {
+    window /= 2;
+    cut = in_windows(data, window);
+    estimate_starts(cut);
+    growth = growth_over_windows(cut);
+    cut.windows.grows = true;
+  }
+  data = std::move(cut);
+}
+
+std::string how_windowed(const Case& data) {
+  if (data.windows.count == 0) return "";
+  std::ostringstream text;
+  text.precision(3);
+  text << "judged over " << data.windows.count << " windows of " << data.windows.length
+       << " s, each from states of its own, because the model "
+       << (data.windows.grows ? "runs away from a disturbance" : "integrates");
+  return text.str();
+}
+
+}  // namespace invar::diagnose
