@@ -140,7 +140,7 @@ TEST(Names, AnotherPowerGivesAsMuchAtTheSizesThatTheVariableTakes) {
 
 TEST(Names, ASmallShareBesideOthersIsDoubted) {
   EXPECT_LT(odds_of_another_cause(1000.0, 0.0, 0.0, 1.0), 0.1);
-  EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 4e-4), unlikely_odds);
+  EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 2e-4), unlikely_odds);
   EXPECT_GT(odds_of_another_cause(20.0, 0.0, 0.0, 1.0), odds_of_another_cause(1000.0, 0.0, 0.0, 1.0));
 }
 
