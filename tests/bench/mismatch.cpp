@@ -204,10 +204,14 @@ int main(int argc, char** argv) {
     sums["all"].add(row);
     if (row.machine.missing.empty())
       ++nulls[plant].first, nulls[plant].second += row.marks.false_claims > 0 ? 1 : 0;
-    for (const auto& finding : row.claims)
-      claims.add(finding, row.still_follows, credit(row.machine, std::string{finding.term.info->name}),
+    for (const auto& finding : row.claims) {
+      // A twin that nothing tells from the right name is marked as right; but it is as probable as it is said to be.
+      const std::string name{finding.term.info->name};
+      const double right = ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
+      claims.add(finding, row.still_follows, std::min(right, credit(row.machine, name)),
                  plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),
                  row.claims.size() > 1);
+    }
     seconds.push_back(row.marks.seconds);
   };
   for (const auto& plant : of) {

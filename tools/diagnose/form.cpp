@@ -84,7 +84,7 @@ std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, 
 }
 
 bool is_trifle(const Case& data, const Fit& retuned, const Fit& base, const Fit& further) {
-  constexpr double share = 4e-4;  // of its power: two percent of its size
+  constexpr double share = 1e-4;  // of its power: a percent of its size
   const auto all = squares_left(data, retuned.model), before = squares_left(data, base.model),
              after = squares_left(data, further.model);
   for (std::size_t o = 0; o < all.size(); ++o)

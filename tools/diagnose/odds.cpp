@@ -69,7 +69,7 @@ double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t pl
 }  // namespace
 
 double odds_of_another_cause(double gain, double left, double shape, double share) {
-  constexpr double at_100 = 0.18, slope = 0.52, by_left = 28.0, by_shape = 0.5, form = 0.005, ideal = 0.001;
+  constexpr double at_100 = 0.18, slope = 0.52, by_left = 28.0, by_shape = 0.5, form = 0.005, ideal = 5e-4;
   return at_100 * std::pow(std::max(gain, 1.0) / 100.0, -slope) + by_left * (left + shape) +
          by_shape * std::min(1.0, shape / form) + (share < 1.0 ? ideal / std::max(share, 1e-6) : 0.0);
 }

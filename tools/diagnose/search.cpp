@@ -86,7 +86,6 @@ void Search::prepare() {
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
-  noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
@@ -94,6 +93,8 @@ void Search::prepare() {
     d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
   }
   simulated = simulate(data_, d_.retuned.model);
+  drop_outliers(data_, simulated);  // a wrong parameter hid them
+  noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated);
   // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
   auto coloured = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
