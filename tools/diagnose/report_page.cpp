@@ -37,6 +37,22 @@ std::vector<double> difference(const Case& data, const std::vector<physics::Outp
   return out;
 }
 
+/// Of a sensor the place is the true position.
+std::string recorded_name(const Case& data, const std::string& variable) {
+  return data.model.plant == physics::Plant::sensor && variable == "position" ? "true_position" : variable;
+}
+
+/// What an effect repeats over: the pitch of a finding over position, the period of one over time. 0: it does not repeat.
+double period_over(const physics::Term& term, const std::string& variable) {
+  const auto value = [&](const char* name) {
+    const auto i = term.info->index_of(name);
+    return i < term.info->parameter_count() ? term.values[i] : 0.0;
+  };
+  if (variable == "position" || variable == "true_position") return std::abs(value("pitch"));
+  const double frequency = value("frequency");
+  return variable == "time" && frequency > 0.0 ? 1.0 / frequency : 0.0;
+}
+
 std::vector<double> over(const Case& data, const std::string& variable) {
   std::vector<double> out;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
@@ -151,8 +167,10 @@ void add_other_run(report::Page& page, const Case& data, const OtherRun& run) {
                    line("with what was found", run.after[o], blue)};
     apart.series = {line("refitted", rest(run.retuned), orange),
                     line("with what was found", rest(run.after), blue)};
-    plots.push_back(std::move(both));
-    plots.push_back(std::move(apart));
+    for (auto* plot : {&both, &apart}) {
+      report::in_handy_units(*plot);
+      plots.push_back(std::move(*plot));
+    }
   }
   page.plots(plots);
 }
@@ -181,10 +199,16 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
   }
   const auto unit = unit_shown(data.model.signal(data.outputs[shown])->unit);
   std::vector<Plot> plots;
-  const auto add = [&](const std::string& variable, const std::string& label) {
-    const auto x = over(data, variable);
+  const auto add = [&](const std::string& said, const std::string& said_label) {
+    const auto variable = recorded_name(data, said);
+    auto label = said_label == said ? variable : said_label;
+    auto x = over(data, variable);
     if (plots.size() >= 2 || std::none_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); }))
       return;
+    if (const double period = period_over(finding.term, variable); period > 0.0) {
+      for (double& value : x) value -= period * std::floor(value / period);
+      label += " within one period";
+    }
     Plot plot;
     const auto* signal = data.model.signal(variable);
     plot.title = data.outputs[shown] + " over " + label;
@@ -198,6 +222,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
     plot.series = {averaged("without it", x, difference(data, without, shown), 80),
                    averaged("with it", x, difference(data, after, shown), 80)};
     plot.series[0].colour = orange, plot.series[1].colour = blue;
+    report::in_handy_units(plot);
     if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
   };
   for (const auto& variable : dependence(data, finding)) {
@@ -304,6 +329,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
     plot.series.push_back({"refitted", style, time, difference(data, retuned, o), {}, {}, orange});
     if (!d.findings.empty())
       plot.series.push_back({"with what was found", style, time, difference(data, after, o), {}, {}, blue});
+    report::in_handy_units(plot);
     residuals.push_back(std::move(plot));
   }
   page.heading("The residual of this recording");

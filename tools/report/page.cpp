@@ -69,7 +69,10 @@ figure svg,figure img{max-width:100%;height:auto}figcaption{color:var(--soft);fo
 table.bars{width:100%;max-width:760px;margin:.4rem 0 1.2rem}table.bars caption{text-align:left;font-weight:600;padding-bottom:.2rem}
 .bars th,.bars td{border:0;padding:.12rem .6rem .12rem 0}.bars th{width:13rem;font-weight:400}.bars td:nth-child(2){width:55%}.bars th,.bars td{white-space:nowrap}
 .bars div{height:1rem;border-radius:2px}
-pre{background:#f5f7f9;padding:.8rem;overflow-x:auto;font-size:.86rem})";
+pre{background:#f5f7f9;padding:.8rem;overflow-x:auto;font-size:.86rem}
+@media(max-width:600px){table{display:block;overflow-x:auto}th,td{padding:.25rem .4rem}figure{flex-basis:100%}
+.bars th,.bars td{white-space:normal}.bars th{width:7rem}.bars td:nth-child(2){width:40%}}
+@media print{body{max-width:none;margin:0}h2{break-after:avoid}figure,tr,.callout{break-inside:avoid}.callout,div,svg{print-color-adjust:exact;-webkit-print-color-adjust:exact}})";
 
 }  // namespace
 
@@ -197,6 +200,31 @@ std::string si(double value, const std::string& unit, int digits) {
   if (std::abs(shown) >= 10.0 && std::abs(shown) < 1e5)  // 780, not 7.8e+02
     digits = std::max(digits, static_cast<int>(std::log10(std::abs(shown))) + 1);
   return with_unit(number(shown, digits), prefix.name + unit);
+}
+
+void in_handy_units(Plot& plot) {
+  const auto scale = [](std::string& label, const std::vector<std::vector<double>*>& all) {
+    const auto begin = label.rfind('[');
+    if (begin == std::string::npos || !label.ends_with(']')) return;
+    const auto unit = label.substr(begin + 1, label.size() - begin - 2);
+    if (unit == "s" || unit == "Hz") return;
+    double most = 0.0;
+    for (const auto* values : all)
+      for (const double value : *values)
+        if (std::isfinite(value)) most = std::max(most, std::abs(value));
+    const auto prefix = prefix_of(most, unit);
+    for (auto* values : all)
+      for (double& value : *values) value /= prefix.factor;
+    label.insert(begin + 1, prefix.name);
+  };
+  std::vector<std::vector<double>*> x, y;
+  for (Series& series : plot.series) {
+    x.push_back(&series.x);
+    y.push_back(&series.y);
+    if (series.style == Series::Style::band) y.push_back(&series.u);
+  }
+  scale(plot.x_label, x);
+  scale(plot.y_label, y);
 }
 
 std::string with_sigma(double value, double sigma, const std::string& unit) {

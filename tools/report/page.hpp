@@ -59,6 +59,9 @@ std::string number(double value, int digits = 3);
 /// A value with its unit in the handiest prefix: si(4.1e-6, "m") is "4.1 um". Units that take none ("1", "kg", "1/A2",
 /// "degC") stand as they are.
 std::string si(double value, const std::string& unit, int digits = 3);
+/// Both axes in the handiest prefix of the unit that ends their label: 4e-7 over "error [m]" becomes 400 over "error [nm]".
+/// Seconds and hertz are left as they are: nobody reads kiloseconds.
+void in_handy_units(Plot& plot);
 /// A value with its standard deviation, two digits of which are shown: "19.40 +- 0.78 s".
 std::string with_sigma(double value, double sigma, const std::string& unit);
 

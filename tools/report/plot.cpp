@@ -119,7 +119,7 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
          << quoted(file.string()) << "\nset title " << quoted(plot.title) << "\nset xlabel "
          << quoted(plot.x_label) << " offset 0,0.4\nset ylabel " << quoted(plot.y_label)
          << "\nset grid lc rgb '#dddddd'\nset border 3 lc rgb '#888888'\nset tics nomirror\n"
-         << "set key outside bottom center horizontal samplen 2\nset boxwidth 0.9 relative\n"
+         << "set key outside bottom center horizontal samplen 2 height 0.8\nset boxwidth 0.9 relative\n"
          << (plot.equal_axes ? "set size ratio -1\n" : "set size noratio\n")
          << (plot.log_x ? "set logscale x\n" : "unset logscale x\n")
          << (plot.log_y ? "set logscale y\n" : "unset logscale y\n")

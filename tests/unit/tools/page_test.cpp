@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace invar::report {
 namespace {
 
@@ -22,6 +24,26 @@ TEST(Numbers, ShowTwoDigitsOfTheirSigma) {
   EXPECT_EQ(with_sigma(-7.275e5, 698.6, "1"), "(-7.2750 +- 0.0070)e5");
   EXPECT_EQ(with_sigma(2.4, 0.0, "N"), "2.4 N");
   EXPECT_EQ(with_sigma(3.0, 40.0, "N"), "3 +- 40 N");
+}
+
+TEST(Plots, ShowNumbersOneCanRead) {
+  Plot plot;
+  plot.x_label = "time [s]";
+  plot.y_label = "error [m]";
+  plot.series.resize(2);
+  plot.series[0].x = {0.0, 4000.0};
+  plot.series[0].y = {1e-7, std::nan("")};
+  plot.series[1].y = {-4e-7, 2e-9};
+  in_handy_units(plot);
+  EXPECT_EQ(plot.x_label, "time [s]");
+  EXPECT_EQ(plot.y_label, "error [nm]");
+  EXPECT_DOUBLE_EQ(plot.series[0].x[1], 4000.0);
+  EXPECT_DOUBLE_EQ(plot.series[0].y[0], 100.0);
+  EXPECT_DOUBLE_EQ(plot.series[1].y[0], -400.0);
+  plot.y_label = "exponent";
+  in_handy_units(plot);
+  EXPECT_EQ(plot.y_label, "exponent");
+  EXPECT_DOUBLE_EQ(plot.series[1].y[0], -400.0);
 }
 
 }  // namespace

@@ -1,0 +1,211 @@
+// Terms by name, through a model file, against what the contract's text says of them, written down anew.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "core/model/model_file.hpp"
+#include "core/physics/simulation.hpp"
+
+namespace invar::physics {
+namespace {
+
+using Columns = std::map<std::string, std::vector<double>, std::less<>>;
+
+std::vector<double> simulated(const std::string& text, const std::vector<double>& time,
+                              const Columns& signals, std::size_t output = 0) {
+  const auto yaml = config::Yaml::parse("invar_model: 1\n" + text, "model.yaml");
+  const auto model = model::read(yaml);
+  yaml.finish();
+  Outputs outputs;
+  prepare(model, {time, signals})->run(model, outputs);
+  return outputs.at(output);
+}
+
+// --- droplet: one drop
+
+constexpr double height = 0.012, vx = 0.3, vy = -0.1, ix = 400.0, iy = -250.0, scale = 1e-5, when = 200.0;
+
+struct Spot {
+  double x = 0.0, y = 0.0;
+};
+
+Spot landed(const std::string& terms, double pressure = 9e4) {
+  const std::string text =
+      "plant: droplet\n"
+      "columns: {time: t, target_x: a, target_y: b, height: h, velocity_x: u, velocity_y: v, pressure: p, "
+      "image_x: i, "
+      "image_y: j, landed_x: x, landed_y: y}\n"
+      "parameters: {placement_error_x: {value: 0, unit: m}, placement_error_y: {value: 0, unit: m}, "
+      "slope_x: {value: 0, unit: 1}, slope_y: {value: 0, unit: 1}, speed: {value: 2, unit: m/s}, "
+      "camera_scale: {value: 1e-5, unit: m/px}}\nterms: [" +
+      terms + "]\n";
+  const Columns signals{{"target_x", {0.0}},  {"target_y", {0.0}},  {"height", {height}},
+                        {"velocity_x", {vx}}, {"velocity_y", {vy}}, {"pressure", {pressure}},
+                        {"image_x", {ix}},    {"image_y", {iy}}};
+  return {simulated(text, {when}, signals, 0)[0], simulated(text, {when}, signals, 1)[0]};
+}
+
+void expect_spot(const Spot& spot, double x, double y) {
+  EXPECT_NEAR(spot.x, x, 1e-6 * std::abs(x) + 1e-15);
+  EXPECT_NEAR(spot.y, y, 1e-6 * std::abs(y) + 1e-15);
+}
+
+const std::string carry = "{term: stage_velocity_carry, speed: {value: 4, unit: m/s}}";
+
+TEST(Droplet, LandsWhereTheContractSays) {
+  const double flight = height / 4.0;
+  expect_spot(landed(carry), vx * flight, vy * flight);
+  expect_spot(landed("{term: valve_delay, delay: {value: 300, unit: us}}"), 3e-4 * vx, 3e-4 * vy);
+  const double half = 0.5 * (height / 2.0) * (height / 2.0);
+  expect_spot(landed("{term: crosswind, acceleration_x: {value: 8, unit: m/s2}, acceleration_y: {value: -3, "
+                     "unit: m/s2}}"),
+              8.0 * half, -3.0 * half);
+  // Speed falls with time, and goes with a power of pressure; the flight lasts the longer.
+  const double slow = std::exp(1e-3 * when);
+  expect_spot(landed(carry + ", {term: speed_decay, rate: {value: 1e-3, unit: 1/s}}"), vx * flight * slow,
+              vy * flight * slow);
+  const double less = std::sqrt(1e5 / 9e4);
+  expect_spot(landed(carry + ", {term: pressure_dependence, exponent: {value: 0.5, unit: 1}, "
+                             "reference_pressure: {value: 1e5, unit: Pa}}"),
+              vx * flight * less, vy * flight * less);
+}
+
+TEST(Droplet, ACameraMovesTheSpotByItsScale) {
+  const double stretch = 2e-8 * (ix * ix + iy * iy);
+  expect_spot(landed("{term: lens_distortion, k1: {value: 2e-8, unit: 1/px2}}"), scale * stretch * ix,
+              scale * stretch * iy);
+  expect_spot(landed("{term: camera_rotation, angle: {value: 4, unit: mrad}}"), -scale * 4e-3 * iy,
+              scale * 4e-3 * ix);
+}
+
+// Small steps of Newton's law in still air: Stokes' drag times 1 + 0.15 Re^0.687 on a sphere of water.
+TEST(Droplet, AirBrakesInAllDirectionsAndGravityGoesOn) {
+  constexpr double diameter = 8e-5, dt = 1e-7, rho = 1.19, eta = 1.82e-5;
+  const double mass = 998.0 * std::numbers::pi / 6.0 * std::pow(diameter, 3);
+  double x = 0.0, y = 0.0, z = 0.0, u = vx, v = vy, w = 4.0;
+  while (z < height) {
+    const double speed = std::hypot(u, v, w), re = rho * speed * diameter / eta;
+    const double drag = 3.0 * std::numbers::pi * eta * diameter * (1.0 + 0.15 * std::pow(re, 0.687)) / mass;
+    u -= dt * drag * u, v -= dt * drag * v, w += dt * (9.81 - drag * w);
+    x += dt * u, y += dt * v, z += dt * w;
+  }
+  const auto spot = landed(carry + ", {term: air_drag, diameter: {value: 80, unit: um}}");
+  EXPECT_NEAR(spot.x, x, 1e-3 * x);
+  EXPECT_NEAR(spot.y, y, -1e-3 * y);
+  EXPECT_GT(std::abs(spot.x - vx * height / 4.0), 4e-6);  // without air it lands elsewhere
+}
+
+// --- error map: one point of a travel from 0 to 0.4 m
+
+double map_error(const std::string& term, const std::string& signal = "", double value = 0.0,
+                 double position = 0.3) {
+  const std::string column = signal.empty() ? "" : ", " + signal + ": q";
+  const std::string text = "plant: error_map\ncolumns: {time: t, position: x, error: e" + column +
+                           "}\nbaseline: {positions: [0, 0.4], errors: [0, 0]}\n"
+                           "parameters: {reference_temperature: {value: 20, unit: degC}}\nterms: [" +
+                           term + "]\n";
+  Columns signals{{"position", {0.0, position, 0.4}}};
+  if (!signal.empty()) signals[signal] = {value, value, value};
+  return simulated(text, {0.0, 1.0, 2.0}, signals)[1];
+}
+
+TEST(ErrorMap, IsWhatTheContractSays) {
+  EXPECT_NEAR(map_error("{term: periodic_error, pitch: {value: 20, unit: mm}, amplitude: {value: 300, unit: "
+                        "nm}, phase: {value: 0.7, unit: rad}}",
+                        "", 0.0, 0.123),
+              3e-7 * std::sin(2.0 * std::numbers::pi * 0.123 / 0.02 + 0.7), 1e-15);
+  const std::string play = "{term: backlash, width: {value: 2, unit: um}}";
+  EXPECT_NEAR(map_error(play, "direction", 1.0) - map_error(play, "direction", -1.0), 2e-6, 1e-15);
+  const std::string tilt =
+      "{term: abbe_offset, angle: {value: 5, unit: urad}, angle_change: {value: 2, unit: urad}}";
+  EXPECT_NEAR(map_error(tilt, "offset", 0.03, 0.2), 0.03 * 5e-6, 1e-15);  // at the middle
+  EXPECT_NEAR(map_error(tilt, "offset", 0.03, 0.3), 0.03 * 5.5e-6, 1e-15);
+  EXPECT_NEAR(
+      map_error("{term: thermal_expansion, coefficient: {value: 11, unit: ppm/K}}", "temperature", 23.0),
+      11e-6 * 3.0 * 0.3, 1e-15);
+  // The laser reads longer at higher pressure, and shorter at an angle.
+  EXPECT_NEAR(map_error("{term: refractive_index, coefficient: {value: 2.7e-7, unit: 1/hPa}, "
+                        "reference_pressure: {value: 1000, unit: hPa}}",
+                        "pressure", 1013.0),
+              2.7e-7 * 13.0 * 0.3, 1e-15);
+  EXPECT_NEAR(map_error("{term: cosine_error, angle: {value: 1, unit: mrad}}"), 0.3 * (std::cos(1e-3) - 1.0),
+              1e-12);
+  // Sag is deepest at the middle and nothing at the ends.
+  const std::string sag = "{term: sag, depth: {value: 500, unit: nm}}";
+  EXPECT_NEAR(std::abs(map_error(sag, "", 0.0, 0.2)), 5e-7, 1e-15);
+  EXPECT_NEAR(map_error(sag, "", 0.0, 0.0), 0.0, 1e-15);
+}
+
+// --- axis: how it sets off from rest under a current of 1 A, force over mass
+
+double force(const std::string& term, double current = 1.0) {
+  constexpr double mass = 2.0, step = 1e-4;
+  const std::string text =
+      "plant: axis\ncolumns: {time: t, position: x, current: u}\n"
+      "parameters: {mass: {value: 2, unit: kg}, motor_constant: {value: 10, unit: N/A}, viscous_damping: "
+      "{value: 0, unit: N s/m}}\n"
+      "terms: [" +
+      term + "]\n";
+  std::vector<double> time;
+  for (int i = 0; i <= 20; ++i) time.push_back(step * i);
+  const auto x = simulated(text, time, {{"current", std::vector<double>(time.size(), current)}});
+  const double t = time.back();
+  return mass * 2.0 * x.back() / (t * t);
+}
+
+TEST(Axis, ForcesActOnTheCarriageAsTheContractSays) {
+  constexpr double motor = 10.0;
+  EXPECT_NEAR(force(""), motor, 1e-6);
+  EXPECT_NEAR(force("{term: constant_force, force: {value: 3, unit: N}}"), motor + 3.0, 1e-6);
+  EXPECT_NEAR(
+      force("{term: position_stiffness, stiffness: {value: 500, unit: N/m}, center: {value: 4, unit: mm}}"),
+      motor + 500.0 * 0.004, 0.01);
+  EXPECT_NEAR(force("{term: force_ripple, pitch: {value: 0.5, unit: m}, amplitude: {value: 2, unit: N}, "
+                    "phase: {value: 0.7, unit: rad}}"),
+              motor + 2.0 * std::sin(0.7), 0.01);
+  EXPECT_NEAR(force("{term: motor_constant_ripple, pitch: {value: 0.5, unit: m}, amplitude: {value: 0.1, "
+                    "unit: 1}, phase: {value: 0.7, unit: rad}}"),
+              motor * (1.0 + 0.1 * std::sin(0.7)), 0.01);
+  EXPECT_NEAR(force("{term: magnetic_saturation, coefficient: {value: 0.03, unit: 1/A2}}", -2.0),
+              -2.0 * motor * (1.0 - 0.03 * 4.0), 1e-6);
+  EXPECT_NEAR(force("{term: dead_zone, width: {value: 0.2, unit: A}}"), motor * 0.8, 1e-6);
+  EXPECT_NEAR(force("{term: dead_zone, width: {value: 0.2, unit: A}}", 0.15), 0.0, 1e-6);
+  EXPECT_NEAR(force("{term: additive_disturbance, amplitude: {value: 0.3, unit: A}, frequency: {value: 0.1, "
+                    "unit: Hz}, phase: {value: 0.7, unit: rad}}"),
+              motor * (1.0 + 0.3 * std::sin(0.7)), 0.01);
+  EXPECT_NEAR(force("{term: periodic_disturbance, amplitude: {value: 3, unit: N}, frequency: {value: 0.1, "
+                    "unit: Hz}, phase: {value: 0.7, unit: rad}}"),
+              motor + 3.0 * std::sin(0.7), 0.01);
+  EXPECT_NEAR(force("{term: coulomb_friction, level: {value: 4, unit: N}}"), motor - 4.0, 0.5);
+}
+
+// --- equations: a term on the output, on the input and on the rate
+
+double last(const std::string& term, double input = 0.5) {
+  const std::string text =
+      "plant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: \"u\", initial: {value: 0, unit: m, sigma: 0}}}\n"
+      "outputs: {y: {column: y, expression: \"x\"}}\nparameters: {}\nterms: [" +
+      term + "]\n";
+  std::vector<double> time;
+  for (int i = 0; i <= 400; ++i) time.push_back(0.005 * i);
+  return simulated(text, time, {{"u", std::vector<double>(time.size(), input)}}).back();  // after 2 s
+}
+
+TEST(Equations, TermsActAsTheContractSays) {
+  EXPECT_NEAR(last(""), 1.0, 1e-9);
+  EXPECT_NEAR(last("{term: upper_limit, on: y, limit: {value: 0.6, unit: m}}"), 0.6, 1e-9);
+  EXPECT_NEAR(last("{term: lower_limit, on: y, limit: {value: -0.6, unit: m}}", -0.5), -0.6, 1e-9);
+  EXPECT_NEAR(last("{term: upper_limit, on: u, limit: {value: 0.2, unit: 1}}"), 0.4, 1e-9);
+  EXPECT_NEAR(last("{term: dead_zone, on: u, width: {value: 0.1, unit: 1}}"), 2.0 * (0.5 - 0.1), 1e-9);
+  EXPECT_NEAR(last("{term: delay, on: u, delay: {value: 0.5, unit: s}}", 0.5), 1.0,
+              1e-9);  // it was so before
+  const std::string constant = "{term: constant, on: x, value: {value: 0.25, unit: 1}}";
+  EXPECT_NEAR(last(constant), 1.5, 1e-6);
+  EXPECT_NEAR(last(constant, -0.5), -0.5, 1e-6);
+}
+
+}  // namespace
+}  // namespace invar::physics
