@@ -16,7 +16,7 @@ struct Record {
   std::map<std::string, std::vector<double>, std::less<>> signals;
   /// Rows at which the states of a model in the user's own equations are set anew, the k-th to what the model's parameters
   /// "<state>.start<first_restart + k>" say: an integrating model drifts without that.
-  std::vector<std::size_t> restarts;
+  std::vector<std::size_t> restarts{};
   std::size_t first_restart = 0;
 
   [[nodiscard]] std::size_t rows() const { return time.size(); }
