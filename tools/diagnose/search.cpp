@@ -300,10 +300,7 @@ void Search::finish() {
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
-<<<<<<< HEAD
   auto readings = noise_->put_back();
-  hold_out(data_, d_, options_.refuses);
-=======
   const auto checked = [&] {
     hold_out(data_, d_, options_.refuses);
     return true;
@@ -315,7 +312,6 @@ void Search::finish() {
   }
   d_.is_partial = stopped();
   data_.stopped = {};
->>>>>>> eq
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
     std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;

@@ -188,14 +188,7 @@ void conclude(const Case& data, Diagnosis& d) {
     const auto lost = residual(data, d.weighing, without).squaredNorm() - d.best.residual.squaredNorm();
     const auto all = residual(data, d.weighing, data.model).squaredNorm() - d.best.residual.squaredNorm();
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
-<<<<<<< HEAD
-    const auto rival = fit(data, d.weighing, without, data.model, 5);
-=======
-    double sum = 1.0;
-    for (const auto& a : finding.alternatives) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
-    sum += odds_of_other_site(finding);
     const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
->>>>>>> eq
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
     weigh_name(data, d, place, finding);
   }
