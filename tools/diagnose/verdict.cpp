@@ -134,7 +134,7 @@ void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d) {
     const auto& p = info.parameters[s.start.directions[0].amplitude];
     double size = s.strength.norm();
     // The gain goes with the square of the strength: where it would just reach the margin.
-    const double value = size * std::sqrt((claim_margin + 12.0) / s.gain);
+    const double value = size * std::sqrt((claim_margin_of(d.weighing) + 12.0) / s.gain);
     auto& entry = smallest[std::string{info.name}];
     if (entry.term.empty() || value < entry.value)
       entry = {std::string{info.name}, std::string{p.name}, std::string{p.unit}, value};

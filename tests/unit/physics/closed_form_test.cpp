@@ -18,8 +18,11 @@ std::vector<double> simulated(const std::string& text, const std::vector<double>
   const auto yaml = config::Yaml::parse("invar_model: 1\n" + text, "model.yaml");
   const auto model = model::read(yaml);
   yaml.finish();
+  Record record;
+  record.time = time;
+  record.signals = signals;
   Outputs outputs;
-  prepare(model, {time, signals})->run(model, outputs);
+  prepare(model, record)->run(model, outputs);
   return outputs.at(output);
 }
 
