@@ -298,12 +298,20 @@ void Search::finish() {
     if (d_.has_rest && !noise_->shows(d_.best.model, without_rest.best.model, 0.9)) d_ = without_rest;
     return true;
   });
-  d_.is_partial = stopped();
-  data_.stopped = {};
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
   auto readings = noise_->put_back();
-  hold_out(data_, d_, options_.refuses);
+  const auto checked = [&] {
+    hold_out(data_, d_, options_.refuses);
+    return true;
+  };
+  if (!take(checked)) {  // in few steps, and not to be stopped
+    d_.is_partial = true;
+    data_.stopped = {};
+    (void)checked();
+  }
+  d_.is_partial = stopped();
+  data_.stopped = {};
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
     std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;
@@ -349,8 +357,16 @@ void Search::try_pairs(const Diagnosis& begun) {
 }
 
 Diagnosis Search::run() {
-  prepare();
   data_.stopped = options_.stopped;
+  try {
+    prepare();
+  } catch (const Stopped&) {  // the model as it stands
+    data_.stopped = {};
+    if (!noise_) noise_.emplace(data_);
+    d_.weighing = weigh(data_, simulate(data_, data_.model), false);
+    d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
+    data_.stopped = options_.stopped;
+  }
   const Diagnosis begun = d_;
   const bool in_equations = data_.model.plant == physics::Plant::equations;
   const bool paired = in_equations && take([&] { return add_pair(); });

@@ -61,9 +61,9 @@ Weighing weights_of(const Case& data, const Weighing& coloured, const Fit& whole
 /// The outputs of the model fitted anew without the held-out rows. It begins where the whole recording put it: what is
 /// asked is whether the model holds where it was not fitted, not whether the search finds it again.
 std::vector<physics::Outputs> refitted(const Case& data, const Weighing& weights, std::size_t fold,
-                                       const Fit& whole) {
+                                       const Fit& whole, int iterations) {
   const auto train = fold_of(data, weights, fold).train;
-  return simulate(data, fit(data, train, whole.model, data.model, 6, &whole).model);
+  return simulate(data, fit(data, train, whole.model, data.model, iterations, &whole).model);
 }
 
 }  // namespace
@@ -72,8 +72,9 @@ void hold_out(const Case& data, Diagnosis& d, bool refuses) {
   const std::size_t given = data.model.terms.size();
   const bool any = d.best.model.terms.size() > given;
   const auto nominal = simulate(data, data.model);
-  const auto for_retuned = weights_of(data, d.weighing, d.retuned);
-  const auto for_best = any ? weights_of(data, d.weighing, d.best) : for_retuned;
+  const auto for_retuned = d.is_partial ? d.weighing : weights_of(data, d.weighing, d.retuned);
+  const auto for_best = any && !d.is_partial ? weights_of(data, d.weighing, d.best) : for_retuned;
+  const int iterations = d.is_partial ? 1 : 6;  // who stopped it does not want to wait
   struct Sums {
     Squares before, retuned, after;
   };
@@ -81,8 +82,8 @@ void hold_out(const Case& data, Diagnosis& d, bool refuses) {
   double gain = 0.0;  // of what was not seen, in whitened residuals
   for (std::size_t k = 0; k < folds; ++k) {
     const auto fold = fold_of(data, d.weighing, k);
-    const auto retuned = refitted(data, for_retuned, k, d.retuned);
-    const auto after = any ? refitted(data, for_best, k, d.best) : retuned;
+    const auto retuned = refitted(data, for_retuned, k, d.retuned, iterations);
+    const auto after = any ? refitted(data, for_best, k, d.best, iterations) : retuned;
     for (std::size_t o = 0; o < data.outputs.size(); ++o)
       for (const bool test : {true, false}) {
         auto& sums = (test ? tested : trained)[o];
@@ -187,7 +188,7 @@ void conclude(const Case& data, Diagnosis& d) {
     const auto lost = residual(data, d.weighing, without).squaredNorm() - d.best.residual.squaredNorm();
     const auto all = residual(data, d.weighing, data.model).squaredNorm() - d.best.residual.squaredNorm();
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
-    const auto rival = fit(data, d.weighing, without, data.model, 5);
+    const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
     weigh_name(data, d, place, finding);
   }
@@ -223,9 +224,10 @@ void conclude(const Case& data, Diagnosis& d) {
   double sum = 0.0;
   for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
   d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
-  // An equation that says the right thing leaves noise: many times that is more physics, however much was found.
-  if (data.model.plant == physics::Plant::equations) {
-    if (d.verdict == Verdict::explained && d.unexplained > 5.0) d.verdict = Verdict::partly_explained;
+  // An equation that says the right thing leaves noise. Many times that, and with what was recorded, is more physics, however
+  // much was found.
+  if (data.model.plant == physics::Plant::equations && most_followed > 0.1) {
+    if (d.verdict == Verdict::explained && d.unexplained > 10.0) d.verdict = Verdict::partly_explained;
     if (d.findings.empty() && d.verdict != Verdict::unknown_physics && d.unexplained > 10.0) {
       d.verdict = Verdict::unknown_physics;
       d.suspect = most_suspect(data, d);
