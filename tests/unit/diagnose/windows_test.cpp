@@ -1,0 +1,121 @@
+// Models that integrate or run away, against machines made here by formulas of their own: judged over windows.
+#include "tools/diagnose/windows.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/config/yaml.hpp"
+#include "core/model/model_file.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+physics::Model model_of(const std::string& text) {
+  const auto yaml = config::Yaml::parse(text, "model.yaml");
+  auto model = model::read(yaml);
+  yaml.finish();
+  return model;
+}
+
+struct Recorded {
+  std::vector<double> time, drive, way;
+  [[nodiscard]] Case with(const physics::Model& model) const {
+    recording::Table table;
+    table.add("t", "s", time);
+    table.add("drive", "", drive);
+    table.add("y", "", way);
+    return make_case(model, {table});
+  }
+};
+
+/// A mass that is pushed; the air's drag and what is not even: a wind that nobody records.
+Recorded pushed_mass(double drag, double wind, std::size_t rows) {
+  std::mt19937 random{7};
+  std::normal_distribution<double> normal;
+  Recorded r;
+  double x = 0.0, v = 0.0, u = 0.0, blows = 0.0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (i % 25 == 0) u = std::uniform_real_distribution<double>{-1.0, 1.0}(random)-0.2 * v - 0.05 * x;
+    blows += -0.02 * blows + wind * normal(random);
+    r.time.push_back(0.05 * static_cast<double>(i));
+    r.drive.push_back(u);
+    r.way.push_back(x + 1e-3 * normal(random));
+    for (int part = 0; part < 50; ++part) {  // Heun's rule
+      const double h = 0.001, a = 3.0 * u + blows - drag * v * std::abs(v), w = v + h * a;
+      const double b = 3.0 * u + blows - drag * w * std::abs(w);
+      x += h * (v + 0.5 * h * a);
+      v += 0.5 * h * (a + b);
+    }
+  }
+  return r;
+}
+
+const char* const mass =
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states:\n  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0.01}}\n"
+    "  v: {derivative: 'k*u', initial: {value: 0, unit: m/s, sigma: 0.01}}\n"
+    "outputs: {way: {column: y, expression: x}}\n"
+    "parameters: {k: {value: 3.1, unit: m/s2, sigma: 0.1}}\n";
+
+TEST(Windows, ADriftOfWhatIntegratesIsNoOtherParameter) {
+  auto data = pushed_mass(0.0, 0.01, 1500).with(model_of(mass));
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_GT(data.windows.count, 5U);
+  EXPECT_TRUE(d.findings.empty()) << d.findings[0].term.info->name;
+  EXPECT_NEAR(d.retuned.model.value("k"), 3.0, 0.1);
+  EXPECT_THAT(summary(data, d), ::testing::HasSubstr("because the model integrates"));
+}
+
+TEST(Windows, TheAirsDragIsNamedWhereTheFreeRunDrifts) {
+  auto data = pushed_mass(0.3, 0.0, 1500).with(model_of(mass));
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "quadratic");
+  EXPECT_EQ(d.findings[0].term.on, "v");
+  EXPECT_NEAR(d.findings[0].term.values[0], -0.3, 0.03);
+  EXPECT_LT(d.heldout[0].after, 0.2 * d.heldout[0].retuned);
+}
+
+/// What grows e-fold in half a second, held by a law that the model does not know: its input was recorded alone.
+TEST(Windows, WhatRunsAwayIsFollowedOverShortOnes) {
+  std::mt19937 random{3};
+  std::normal_distribution<double> normal;
+  Recorded r;
+  double x = 0.0, to = 0.0;
+  for (std::size_t i = 0; i < 1200; ++i) {
+    if (i % 40 == 0) to = normal(random);
+    const double y = x + 2e-3 * normal(random), u = 6.0 * (to - y);
+    r.time.push_back(0.02 * static_cast<double>(i));
+    r.drive.push_back(u);
+    r.way.push_back(y);
+    x = (x + u / 2.0) * std::exp(2.0 * 0.02) - u / 2.0;  // x' = 2 x + u
+  }
+  auto data = r.with(model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+      "states: {x: {derivative: 'a*x + u', initial: {value: 0, unit: m, sigma: 0.01}}}\n"
+      "outputs: {way: {column: y, expression: x}}\nparameters: {a: {value: 1.9, unit: 1/s, sigma: 0.1}}\n"));
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_GT(data.windows.count, 5U);
+  EXPECT_TRUE(d.findings.empty()) << d.findings[0].term.info->name;
+  EXPECT_NEAR(d.retuned.model.value("a"), 2.0, 0.02);
+  EXPECT_LT(d.heldout[0].after, 3.5e-3);
+}
+
+/// A tank forgets: it runs from its first row to its last.
+TEST(Windows, WhatForgetsHasNone) {
+  auto data =
+      pushed_mass(0.0, 0.0, 1500)
+          .with(model_of(
+              "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+              "states: {x: {derivative: 'k*u - x', initial: {value: 0, unit: m, sigma: 0.01}}}\n"
+              "outputs: {way: {column: y, expression: x}}\nparameters: {k: {value: 1, unit: m/s}}\n"));
+  cut_into_windows(data);
+  EXPECT_EQ(data.windows.count, 0U);
+  EXPECT_EQ(data.model.parameters.size(), 2U);
+}
+
+}  // namespace
+}  // namespace invar::diagnose
