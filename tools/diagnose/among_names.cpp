@@ -51,12 +51,13 @@ void put_laws_right(const Case& data, Diagnosis& d, Rivals& rivals,
     const std::size_t place = data.model.terms.size() + i;
     const Term claimed = d.best.model.terms[place];
     const auto plain = weigh(data, simulate(data, d.best.model), false);
-    auto other =
-        best_law(data, plain, fit(data, plain, d.best.model, data.model, 0, &d.best), place, without);
-    if (other.model.terms[place].info == claimed.info || !stands(data, other, place)) continue;
+    auto best = fit(data, plain, d.best.model, data.model, 0, &d.best);
+    for (auto& other : fits_of_other_laws(data, plain, best, place, without))
+      if (other.evidence > best.evidence && stands(data, other, place)) best = std::move(other);
+    if (label(best.model.terms[place]) == label(claimed)) continue;
     rivals[i].push_back(claimed);
-    d.weighing = weigh(data, simulate(data, other.model));
-    d.best = fit(data, d.weighing, other.model, data.model, 8, &other);
+    d.weighing = weigh(data, simulate(data, best.model));
+    d.best = fit(data, d.weighing, best.model, data.model, 8, &best);
     d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
   }
 }

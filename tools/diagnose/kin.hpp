@@ -13,8 +13,8 @@ namespace invar::diagnose {
 std::vector<physics::Model> other_laws(const Case& data, const physics::Model& model, std::size_t term,
                                        const std::set<std::string, std::less<>>& without);
 
-/// The best of `start` and its other laws, each followed to its end under `weighing`.
-Fit best_law(const Case& data, const Weighing& weighing, Fit start, std::size_t term,
-             const std::set<std::string, std::less<>>& without);
+/// Fits that begin from the other laws of `start`, the two that come nearest followed to their end under `weighing`.
+std::vector<Fit> fits_of_other_laws(const Case& data, const Weighing& weighing, const Fit& start,
+                                    std::size_t term, const std::set<std::string, std::less<>>& without);
 
 }  // namespace invar::diagnose

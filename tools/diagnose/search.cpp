@@ -93,7 +93,6 @@ void Search::prepare() {
     d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
   }
   simulated = simulate(data_, d_.retuned.model);
-  drop_outliers(data_, simulated);  // a wrong parameter hid them
   noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated);
   // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
@@ -137,8 +136,8 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   if (data_.model.plant == physics::Plant::equations && !fits.empty()) {
     const auto best = std::min_element(fits.begin(), fits.end(), by_evidence);
     const std::size_t place = best->model.terms.size() - 1;
-    for (const auto& other : other_laws(data_, best->model, place, options_.without))
-      fits.push_back(fit(data_, weighing, other, data_.model, 12));
+    for (auto& other : fits_of_other_laws(data_, weighing, *best, place, options_.without))
+      fits.push_back(std::move(other));
   }
   if (options_.refuses)
     std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
