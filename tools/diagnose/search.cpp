@@ -362,6 +362,7 @@ Diagnosis Search::run() {
     prepare();
   } catch (const Stopped&) {  // the model as it stands
     data_.stopped = {};
+    if (!noise_) noise_.emplace(data_);
     d_.weighing = weigh(data_, simulate(data_, data_.model), false);
     d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
     data_.stopped = options_.stopped;
