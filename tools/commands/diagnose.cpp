@@ -211,8 +211,7 @@ void add_diagnose(CLI::App& program) {
       "remainder}\n"
       "where `remainder` is what of the current the controller's law does not account for.\n"
       "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C: the report holds what "
-      "was known by "
-      "then and says so");
+      "was known by then and says so (none where nothing can be said ten seconds later)");
   auto options = std::make_shared<Options>();
   command
       ->add_option_function<std::string>(
