@@ -29,7 +29,7 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
     auto without = fit(data, d.weighing, model, data.model, 10);
     bool possible = true;
     for (std::size_t t = data.model.terms.size(); t < without.model.terms.size(); ++t)
-      possible = possible && stands(data, without, t);
+      possible = possible && (stands(data, without, t) || !stands(data, d.best, t < place ? t : t + 1));
     if (!possible) continue;
     if (advantage(data, d.weighing, d.best, without) > claim_margin_of(d.weighing) &&
         least_ratio(data, d.best, without) < 0.95)

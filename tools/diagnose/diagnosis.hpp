@@ -42,7 +42,7 @@ struct Suspect {
 };
 
 struct Detectable {
-  std::string term, parameter, unit;
+  std::string term, on, parameter, unit;
   double value = 0.0;
 };
 

@@ -347,10 +347,10 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
       smallest.push_back({readable(entry.term), readable(entry.parameter),
                           report::si(entry.value, entry.unit == "*" ? "" : entry.unit)});
     page.table({"effect", "parameter", "smallest"}, smallest);
-    page.paragraph(data.is_time_series ? "To first order, each by itself. One that could pass for a slow "
-                                         "wander of the instrument, or for a parameter "
-                                         "within what was believed, must be several times larger."
-                                       : "To first order, each by itself.");
+    page.paragraph(
+        "To first order, each by itself: more than noise, a wander of the instrument or a parameter within "
+        "what was "
+        "believed could pass for. Twice as much is seen.");
   }
   page.heading("What remains, and what to do next");
   std::string with;

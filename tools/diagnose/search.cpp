@@ -9,6 +9,7 @@
 
 #include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/detectable.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
@@ -319,7 +320,7 @@ void Search::finish() {
     hold_out(data_, d_);
   }
   noise_->put(std::move(readings));
-  smallest_effects(last_screen_, d_);
+  smallest_effects(data_, last_screen_, d_);
   conclude(data_, d_);
 }
 
@@ -352,7 +353,7 @@ void Search::try_pairs(const Diagnosis& begun) {
                        [&](const Finding& f) { return f.term.info->name == r.term; });
   });
   d_.detectable.clear();
-  smallest_effects(screened, d_);
+  smallest_effects(data_, screened, d_);
 }
 
 Diagnosis Search::run() {

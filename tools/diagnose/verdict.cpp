@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/left_over.hpp"
@@ -122,24 +121,6 @@ void hold_out(const Case& data, Diagnosis& d, bool refuses) {
     for (auto* rows : {&d.heldout, &d.train})
       for (auto& row : *rows) row.after = row.retuned;
   }
-}
-
-void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d) {
-  std::map<std::string, Detectable> smallest;
-  for (const auto& s : screened) {
-    const auto& info = *s.start.term.info;
-    if (s.start.directions.empty() || s.start.directions[0].amplitude >= physics::most_parameters ||
-        !(s.gain > 0.0))
-      continue;
-    const auto& p = info.parameters[s.start.directions[0].amplitude];
-    double size = s.strength.norm();
-    // The gain goes with the square of the strength: where it would just reach the margin.
-    const double value = size * std::sqrt((claim_margin_of(d.weighing) + 12.0) / s.gain);
-    auto& entry = smallest[std::string{info.name}];
-    if (entry.term.empty() || value < entry.value)
-      entry = {std::string{info.name}, std::string{p.name}, std::string{p.unit}, value};
-  }
-  for (const auto& [name, entry] : smallest) d.detectable.push_back(entry);
 }
 
 namespace {

@@ -2,14 +2,11 @@
 #pragma once
 
 #include "tools/diagnose/diagnosis.hpp"
-#include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
 
 /// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them.
 void hold_out(const Case& data, Diagnosis& d, bool refuses = true);
-/// What of each screened term would just have been seen.
-void smallest_effects(const std::vector<Screened>& screened, Diagnosis& d);
 /// Probabilities, shares, sigmas and the verdict.
 void conclude(const Case& data, Diagnosis& d);
 

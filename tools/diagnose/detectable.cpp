@@ -1,0 +1,144 @@
+#include "tools/diagnose/detectable.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "tools/diagnose/wander.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+constexpr double price = 12.0;  // of a term's numbers, log
+
+/// What an effect changes in measured - simulated once the model's own numbers have given way to it.
+struct Effect {
+  Eigen::VectorXd raw, whitened;
+};
+
+class Series {
+ public:
+  Series(const Case& data, const Diagnosis& d)
+      : data_{data},
+        d_{d},
+        raw_{differences(data, simulate(data, d.best.model))},
+        left_{residual(data, d.weighing, d.best.model)},
+        own_{whitened(data, d.weighing, d.best.columns)} {
+    Eigen::MatrixXd curvature = own_.transpose() * own_;
+    for (std::size_t k = 0; k < d.best.free.size(); ++k)
+      if (const double sigma = d.best.free[k].sigma; sigma > 0.0) {
+        const auto at = static_cast<Eigen::Index>(k);
+        curvature(at, at) += 1.0 / (sigma * sigma);
+      }
+    curvature_.compute(curvature);
+  }
+
+  [[nodiscard]] Effect effect(const Screened& screened, double share) const {
+    Effect e;
+    e.raw = differences(data_, simulate_once(data_, with(d_.best, {&screened}, share))) - raw_;
+    e.raw = e.raw.array().isFinite().select(e.raw, 0.0).eval();
+    e.whitened = whitened(data_, d_.weighing, e.raw);
+    if (own_.cols() == 0) return e;
+    const Eigen::VectorXd gives_way = curvature_.solve(own_.transpose() * e.whitened);
+    e.raw -= d_.best.columns * gives_way;
+    e.whitened -= own_ * gives_way;
+    return e;
+  }
+
+  /// Would so many times this effect be claimed?
+  [[nodiscard]] bool shows(const Effect& effect, double times) const {
+    Fit one, other;
+    one.residual = left_;
+    other.residual = left_ - times * effect.whitened;
+    one.data_cost = 0.5 * d_.weighing.temper * one.residual.squaredNorm();
+    other.data_cost = 0.5 * d_.weighing.temper * other.residual.squaredNorm();
+    one.evidence = -one.data_cost - price;
+    other.evidence = -other.data_cost;
+    one.model = other.model = d_.best.model;
+    const double margin = claim_margin_of(d_.weighing);
+    if (one.evidence - other.evidence < margin) return false;
+    const auto [ratio, lead] = led(effect, times);
+    const bool coloured = std::any_of(d_.weighing.filters.begin(), d_.weighing.filters.end(),
+                                      [](const Whitening& filter) { return !filter.a.empty(); });
+    if (!coloured && lead - price < margin) return false;
+    return (ratio < 0.995 || lead > claim_margin) &&
+           advantage_over_wander(data_, d_.weighing, one, other) > margin;
+  }
+
+ private:
+  /// Least ratio of the residuals with and without the effect of any output, and its lead in independent rows.
+  [[nodiscard]] std::pair<double, double> led(const Effect& effect, double times) const {
+    double least = 1.0, lead = 0.0;
+    Eigen::Index at = 0;
+    std::vector<std::vector<std::vector<double>>> series(data_.outputs.size());
+    std::vector<double> with(series.size()), without(series.size()), rows(series.size());
+    for (const auto& recording : data_.recordings)
+      for (std::size_t o = 0; o < series.size(); ++o) {
+        auto& one = series[o].emplace_back(recording.inputs.rows());
+        for (double& value : one) {
+          value = raw_(at);
+          if (std::isfinite(value))
+            with[o] += value * value, without[o] += std::pow(value - times * effect.raw(at), 2),
+                rows[o] += 0.5;
+          ++at;
+        }
+      }
+    for (std::size_t o = 0; o < series.size(); ++o)
+      if (with[o] > 0.0 && without[o] > 0.0) {
+        least = std::min(least, std::sqrt(with[o] / without[o]));
+        lead += 0.5 * rows[o] * independent_share(series[o]) * std::log(without[o] / with[o]);
+      }
+    return {least, lead};
+  }
+
+  const Case& data_;
+  const Diagnosis& d_;
+  Eigen::VectorXd raw_, left_;
+  Eigen::MatrixXd own_;
+  Eigen::LDLT<Eigen::MatrixXd> curvature_;
+};
+
+struct Smallest {
+  const Screened* screened = nullptr;
+  Detectable effect;
+};
+
+}  // namespace
+
+void smallest_effects(const Case& data, const std::vector<Screened>& screened, Diagnosis& d) {
+  std::map<std::string, Smallest> smallest;
+  for (const auto& s : screened) {
+    const auto& info = *s.start.term.info;
+    if (s.start.directions.empty() || s.start.directions[0].amplitude >= physics::most_parameters ||
+        !(s.gain > 0.0))
+      continue;
+    const auto& p = info.parameters[s.start.directions[0].amplitude];
+    // The gain goes with the square of the strength: where it would just reach the margin.
+    const double value = s.strength.norm() * std::sqrt((claim_margin_of(d.weighing) + price) / s.gain);
+    auto& entry = smallest[std::string{info.name}];
+    if (entry.screened == nullptr || value < entry.effect.value)
+      entry = {&s,
+               {std::string{info.name}, s.start.term.on, std::string{p.name}, std::string{p.unit}, value}};
+  }
+  const auto add = [&](const Detectable& effect) { d.detectable.push_back(effect); };
+  if (!data.is_time_series || d.best.columns.cols() != static_cast<Eigen::Index>(d.best.free.size())) {
+    for (const auto& [name, entry] : smallest) add(entry.effect);
+    return;
+  }
+  const Series series{data, d};
+  for (const auto& [name, entry] : smallest) {
+    const auto effect = series.effect(*entry.screened, entry.effect.value / entry.screened->strength.norm());
+    constexpr double finer = 1.25, most = 100.0;
+    double times = 1.0;
+    while (times < most && !series.shows(effect, times)) times *= finer;
+    if (times >= most) continue;  // nothing that could be told from a wander
+    auto shown = entry.effect;
+    shown.value *= times;
+    add(shown);
+  }
+}
+
+}  // namespace invar::diagnose
