@@ -340,6 +340,48 @@ std::optional<Range> covered(const Case& data, std::string_view signal) {
   return range;
 }
 
+namespace {
+
+/// Each value less the median of its neighbours to this reach.
+std::vector<double> off_median(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> off(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t a = i < reach ? 0 : i - reach, b = std::min(values.size(), i + reach + 1);
+    off[i] = values[i] - median({values.begin() + static_cast<std::ptrdiff_t>(a),
+                                 values.begin() + static_cast<std::ptrdiff_t>(b)});
+  }
+  return off;
+}
+
+/// Each value less the median of the middles of the three pairs of neighbours about it.
+std::vector<double> off_lines(const std::vector<double>& values) {
+  std::vector<double> off(values.size(), 0.0);
+  for (std::size_t i = 3; i + 3 < values.size(); ++i) {
+    const auto middle = [&](std::size_t by) { return 0.5 * (values[i - by] + values[i + by]); };
+    off[i] = values[i] - median({middle(1), middle(2), middle(3)});
+  }
+  return off;
+}
+
+/// Which are alone far from zero; nothing where most are zero.
+std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off, bool is_time_series) {
+  const double scale = robust_sigma(off);
+  if (!(scale > 0.0)) return std::nullopt;
+  const double limit = (is_time_series ? 6.0 : 5.0) * scale;
+  // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
+  // lone value.
+  const auto beside = [&](std::size_t i, std::size_t j) {
+    return is_time_series && j < off.size() &&
+           off[j] * std::copysign(1.0, off[i]) > std::max(0.5 * limit, 0.2 * std::abs(off[i]));
+  };
+  std::vector<std::size_t> lone;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) lone.push_back(i);
+  return lone;
+}
+
+}  // namespace
+
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     auto& recording = data.recordings[r];
@@ -354,29 +396,17 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
         }
       if (residual.size() < 20) continue;
       // Against the median of its neighbourhood, on the scale of all such differences.
-      std::vector<double> off(residual.size());
-      const std::size_t reach = data.is_time_series ? 3 : 40;
-      for (std::size_t i = 0; i < residual.size(); ++i) {
-        const std::size_t a = i < reach ? 0 : i - reach, b = std::min(residual.size(), i + reach + 1);
-        off[i] = residual[i] - median({residual.begin() + static_cast<std::ptrdiff_t>(a),
-                                       residual.begin() + static_cast<std::ptrdiff_t>(b)});
+      auto lone = far_from(off_median(residual, data.is_time_series ? 3 : 40), data.is_time_series);
+      // Of a residual that runs smoothly, as beside a wrong parameter, most values are the median themselves, and next to
+      // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
+      const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
+      if (data.model.plant == physics::Plant::equations && are_too_many()) {
+        lone = far_from(off_lines(residual), true);
+        if (are_too_many()) continue;
       }
-      const double scale = robust_sigma(off);
-      const double limit = (data.is_time_series ? 6.0 : 5.0) * scale;
-      // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
-      // lone value.
-      const auto beside = [&](std::size_t i, std::size_t j) {
-        return data.is_time_series && j < off.size() &&
-               off[j] * std::copysign(1.0, off[i]) > std::max(0.5 * limit, 0.2 * std::abs(off[i]));
-      };
-      std::vector<std::size_t> lone;
-      for (std::size_t i = 0; i < off.size(); ++i)
-        if (scale > 0.0 && std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1))
-          lone.push_back(rows[i]);
-      // One row in ten is no outlier: readings that mostly stand on steps have a scatter of next to nothing.
-      if (data.model.plant == physics::Plant::equations && 10 * lone.size() > off.size()) continue;
-      for (const std::size_t row : lone) measured[row] = nothing;
-      data.count.outliers += lone.size();
+      if (!lone) continue;
+      for (const std::size_t i : *lone) measured[rows[i]] = nothing;
+      data.count.outliers += lone->size();
     }
   }
 }

@@ -376,5 +376,19 @@ TEST(LongRecordings, AShortOneStaysAsItIs) {
   EXPECT_EQ(stretches[0].forget, 0U);
 }
 
+/// Beside a wrong parameter the residual runs smoothly, and its scatter about its own median is nothing.
+TEST(WrongReadings, AreLeftOutBesideAWrongParameter) {
+  Trouble trouble;
+  trouble.faults = true;
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
+    auto data = case_of(make("equations", "parameter", 1.0, seed, trouble));
+    const auto d = diagnose::search(data, [](double, const std::string&) {});
+    EXPECT_EQ(d.verdict, diagnose::Verdict::parameters_only) << seed << ": " << diagnose::name_of(d.verdict);
+    EXPECT_LT(d.unexplained, 1.2) << seed;
+    EXPECT_GE(data.count.outliers, 1U) << seed;
+    EXPECT_LE(data.count.outliers, 12U) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace invar::test::mismatch
