@@ -5,17 +5,12 @@
 
 #include <cmath>
 
-#include "core/model/model_file.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::diagnose {
 namespace {
 
-physics::Model read(const std::string& text) {
-  const auto yaml = config::Yaml::parse(text, "model.yaml");
-  auto model = model::read(yaml);
-  yaml.finish();
-  return model;
-}
+using test::model_of;
 
 double far(const physics::Model& model, const physics::Model& believed) {
   double sum = 0.0;
@@ -53,7 +48,7 @@ std::string with_sigma(const char* sigma) {
 }
 
 TEST(CommonFactor, OfAllForcesComesBackToWhatWasBelieved) {
-  const auto believed = read(with_sigma("0.2"));
+  const auto believed = model_of(with_sigma("0.2"));
   auto fitted = believed;  // as a fit may leave it: six times everything, and the motor 1 % beside
   fitted.parameters[1].value *= 1.01;
   for (const auto& f : freedoms(fitted, believed))
@@ -73,7 +68,7 @@ TEST(CommonFactor, OfAllForcesComesBackToWhatWasBelieved) {
 }
 
 TEST(CommonFactor, IsNotChosenWhereOneForceIsKnown) {
-  const auto believed = read(with_sigma("0"));
+  const auto believed = model_of(with_sigma("0"));
   auto fitted = believed;
   fitted.parameters[0].value *= 6.0;
   EXPECT_TRUE(with_common_factor(fitted, freedoms(fitted, believed)).empty());
@@ -83,7 +78,7 @@ TEST(CommonFactor, IsNotChosenWhereOneForceIsKnown) {
 }
 
 TEST(CommonFactor, OfHeatFlowsAndCapacitiesChangesNoTemperature) {
-  const auto believed = read(
+  const auto believed = model_of(
       "invar_model: 1\nplant: thermal\ncolumns: {time: t}\n"
       "nodes: {slide: {column: T, capacity: {value: 800, unit: J/K, sigma: 40},"
       " loss: {value: 9, unit: W/K, sigma: 0.5}}}\n"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/model/model_file.hpp"
+#include "tests/support/model_of.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/odds.hpp"
@@ -12,12 +12,7 @@
 namespace invar::diagnose {
 namespace {
 
-physics::Model model_of(const std::string& text) {
-  const auto yaml = config::Yaml::parse(text, "model.yaml");
-  auto model = model::read(yaml);
-  yaml.finish();
-  return model;
-}
+using test::model_of;
 
 /// A carriage behind a dead zone (`width` to either side) in a loop u = kp (r - y), by small steps of Euler's rule.
 struct Shaken {

@@ -6,19 +6,13 @@
 #include <cmath>
 #include <random>
 
-#include "core/config/yaml.hpp"
-#include "core/model/model_file.hpp"
+#include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 
 namespace invar::diagnose {
 namespace {
 
-physics::Model model_of(const std::string& text) {
-  const auto yaml = config::Yaml::parse(text, "model.yaml");
-  auto model = model::read(yaml);
-  yaml.finish();
-  return model;
-}
+using test::model_of;
 
 struct Recorded {
   std::vector<double> time, drive, way;
