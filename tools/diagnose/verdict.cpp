@@ -127,17 +127,12 @@ namespace {
 
 /// How much of the mismatch still follows what was recorded, beside what the best model explains of it: 0 to 1.
 double share_left(const Case& data, const Diagnosis& d, const std::vector<double>& followed) {
-  const auto best = simulate(data, d.best.model), retuned = simulate(data, d.retuned.model);
+  const auto after = squares_left(data, d.best.model), before = squares_left(data, d.retuned.model);
   double left = 0.0, won = 0.0;
-  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    double after = 0.0, before = 0.0;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r)
-      for (std::size_t i = 0; i < best[r][o].size(); ++i)
-        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
-          after += std::pow(y - best[r][o][i], 2), before += std::pow(y - retuned[r][o][i], 2);
-    if (!(after > 0.0)) continue;
+  for (std::size_t o = 0; o < after.size(); ++o) {
+    if (!(after[o] > 0.0)) continue;
     left += followed[o];
-    won += std::max(0.0, before / after - 1.0);
+    won += std::max(0.0, before[o] / after[o] - 1.0);
   }
   return left > 0.0 ? left / (left + won) : 0.0;
 }
