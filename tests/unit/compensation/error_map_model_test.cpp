@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/model/model_file.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::compensation {
 namespace {
@@ -28,15 +29,8 @@ terms:
   - {term: refractive_index, coefficient: {value: 2.7e-7, unit: 1/hPa, sigma: 1e-9}, reference_pressure: {value: 1000, unit: hPa}}
 )";
 
-physics::Model model(const std::string& text) {
-  const auto yaml = config::Yaml::parse(text, "model.yaml");
-  auto read = model::read(yaml);
-  yaml.finish();
-  return read;
-}
-
 TEST(ErrorMapModel, IsTheErrorThatItsFormulaSays) {
-  const auto map = model(diagnosed);
+  const auto map = test::model_of(diagnosed);
   EXPECT_EQ(map.baseline.axis, "y");
   ASSERT_EQ(why_not_corrected(map), "");
   const auto error = thermal_error_of(map);
@@ -58,23 +52,23 @@ TEST(ErrorMapModel, IsTheErrorThatItsFormulaSays) {
 }
 
 TEST(ErrorMapModel, SaysWhatItCannotCorrect) {
-  auto map = model(diagnosed);
+  auto map = test::model_of(diagnosed);
   EXPECT_EQ(why_not_corrected(map.terms.back()),
             "");  // the laser's: left out, the machine errs no less for it
   map.baseline.temperature.reset();
   EXPECT_THAT(why_not_corrected(map), ::testing::HasSubstr("range: {temperature"));
-  auto other =
-      model(std::string{diagnosed} + "  - {term: backlash, width: {value: 1.0e-6, unit: m, sigma: 1e-8}}\n");
+  auto other = test::model_of(std::string{diagnosed} +
+                              "  - {term: backlash, width: {value: 1.0e-6, unit: m, sigma: 1e-8}}\n");
   EXPECT_THAT(std::string{why_not_corrected(other.terms.back())}, ::testing::HasSubstr("direction"));
   EXPECT_NEAR(thermal_error_of(other).value({0.07, 22.0, 0.0, {}}),
-              thermal_error_of(model(diagnosed)).value({0.07, 22.0, 0.0, {}}), 1e-15);
+              thermal_error_of(test::model_of(diagnosed)).value({0.07, 22.0, 0.0, {}}), 1e-15);
 }
 
 TEST(ErrorMapModel, APatchedFileSaysOverWhichTemperaturesItWasFound) {
   const auto yaml = config::Yaml::parse(diagnosed, "model.yaml");
   auto changed = model::read(yaml);
   changed.baseline.temperature = Range{22.5, 24.25};
-  const auto again = model(model::patched(yaml, changed));
+  const auto again = test::model_of(model::patched(yaml, changed));
   ASSERT_TRUE(again.baseline.temperature);
   EXPECT_EQ(again.baseline.temperature->lower, 22.5);
   EXPECT_EQ(again.baseline.temperature->upper, 24.25);

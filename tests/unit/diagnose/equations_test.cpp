@@ -8,6 +8,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/search.hpp"
 
@@ -67,9 +68,7 @@ constexpr Machine motor{
 class Equations : public ::testing::Test {
  protected:
   Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed) {
-    const auto yaml = config::Yaml::parse(machine.yaml, "model.yaml");
-    const auto model = model::read(yaml);
-    yaml.finish();
+    const auto model = test::model_of(machine.yaml);
     auto truth = model;
     truth.terms = hidden;
     std::mt19937 random{seed};
@@ -123,13 +122,11 @@ TEST_F(Equations, ClaimsNothingWhereNothingIsHidden) {
 
 /// Mass under dry friction alone, pushed once: it stops after v^2 / (2 level) and stays.
 TEST(SimulateEquations, DryFrictionStopsAMassWhereTheClosedFormSays) {
-  const auto yaml = config::Yaml::parse(
+  auto model = test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
       "states:\n  x: {derivative: v, initial: {value: 0, unit: m}}\n  v: {derivative: '0*x', initial: "
       "{value: 3, unit: m/s}}\n"
-      "outputs: {way: {column: x, expression: x}}\n",
-      "model.yaml");
-  auto model = model::read(yaml);
+      "outputs: {way: {column: x, expression: x}}\n");
   model.terms = {term("dry_friction", "v", {1.7})};
   for (const double step : {0.01, 0.31}) {
     physics::Record inputs;
@@ -142,11 +139,10 @@ TEST(SimulateEquations, DryFrictionStopsAMassWhereTheClosedFormSays) {
 
 /// Rows of the first output of x' = -2 x from 1, with one term.
 std::vector<double> falling(const physics::Term& added, double step, std::size_t rows) {
-  const auto yaml = config::Yaml::parse(
+  auto model = test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\nstates:\n"
-      "  x: {derivative: '-2*x', initial: {value: 1, unit: m}}\noutputs: {way: {column: x, expression: x}}\n",
-      "model.yaml");
-  auto model = model::read(yaml);
+      "  x: {derivative: '-2*x', initial: {value: 1, unit: m}}\noutputs: {way: {column: x, expression: "
+      "x}}\n");
   model.terms = {added};
   physics::Record inputs;
   for (std::size_t i = 0; i < rows; ++i) inputs.time.push_back(step * static_cast<double>(i));
@@ -183,12 +179,10 @@ TEST(SimulateEquations, AStateIsFeltLateBehindALagAndBehindADeadZoneAsClosedForm
 }
 
 TEST(SimulateEquations, AStoreOnTheWayOfAnInputAndWhatRunsOverFromOneToAnother) {
-  const auto yaml = config::Yaml::parse(
+  auto model = test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: pump, w: drain}\nstates:\n"
       "  x: {derivative: '-x', initial: {value: 0, unit: m, sigma: 0}}\n"
-      "outputs: {one: {column: a, expression: u}, other: {column: b, expression: w}}\n",
-      "model.yaml");
-  auto model = model::read(yaml);
+      "outputs: {one: {column: a, expression: u}, other: {column: b, expression: w}}\n");
   physics::Record inputs;
   for (int i = 0; i < 50; ++i) {
     inputs.time.push_back(0.1 * i);
@@ -224,14 +218,11 @@ TEST(SimulateEquations, ACurveOverAStateIsTheRateThatItDraws) {
 
 /// A thousand times faster than its rows, and across a gap of days: at its balance, not run away.
 TEST(SimulateEquations, WhatIsFarFasterThanTheRowsIsAtItsBalance) {
-  const auto yaml = config::Yaml::parse(
+  const auto model = test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
       "states:\n  x: {derivative: '1000*(u - x)', initial: {value: 0, unit: V}}\n"
       "  z: {derivative: '0.3*(x - z)', initial: {value: 0, unit: V}}\n"
-      "outputs: {fast: {column: a, expression: x}, slow: {column: b, expression: z}}\n",
-      "model.yaml");
-  const auto model = model::read(yaml);
-  yaml.finish();
+      "outputs: {fast: {column: a, expression: x}, slow: {column: b, expression: z}}\n");
   physics::Record inputs;
   for (int i = 0; i < 40; ++i) {
     inputs.time.push_back(i < 20 ? i : 3e5 + i);

@@ -8,6 +8,7 @@
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -16,9 +17,7 @@ class Example : public ::testing::TestWithParam<physics::Plant> {};
 
 TEST_P(Example, IsAModelThatSimulatesAndNamesEveryTerm) {
   const auto text = example_model(GetParam());
-  const auto yaml = config::Yaml::parse(text, "model.yaml");
-  const auto model = model::read(yaml);
-  yaml.finish();
+  const auto model = test::model_of(text);
   EXPECT_EQ(model.plant, GetParam());
   for (const auto* info : physics::terms_of(GetParam()))
     EXPECT_THAT(text, ::testing::HasSubstr("#   " + std::string{info->name} + " (")) << info->name;

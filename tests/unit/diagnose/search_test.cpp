@@ -9,8 +9,8 @@
 #include <fstream>
 #include <random>
 
-#include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/report.hpp"
 
@@ -21,16 +21,13 @@ class DiagnosisTest : public ::testing::Test {
  protected:
   Diagnosis diagnose_thermal(const std::vector<physics::Term>& truth_terms, double loss, unsigned seed,
                              const std::string& temperature = "T") {
-    const auto yaml = config::Yaml::parse(
+    const auto model = test::model_of(
         "invar_model: 1\nplant: thermal\ncolumns: {time: t, speed: v}\n"
         "nodes: {slide: {column: " +
-            temperature +
-            ", capacity: {value: 800, unit: J/K, sigma: 40}, loss: {value: 9, unit: W/K, sigma: 0.5}}}\n"
-            "heaters: {pad: {node: slide, column: P, gain: {value: 1, unit: W/W, sigma: 0.02}}}\n"
-            "ambient: {value: 22, unit: degC, sigma: 0.05}\nnoise: {slide: 0.02}\n",
-        "model.yaml");
-    const auto model = model::read(yaml);
-    yaml.finish();
+        temperature +
+        ", capacity: {value: 800, unit: J/K, sigma: 40}, loss: {value: 9, unit: W/K, sigma: 0.5}}}\n"
+        "heaters: {pad: {node: slide, column: P, gain: {value: 1, unit: W/W, sigma: 0.02}}}\n"
+        "ambient: {value: 22, unit: degC, sigma: 0.05}\nnoise: {slide: 0.02}\n");
     auto truth = model;
     truth.parameters[1].value = loss;
     truth.terms = truth_terms;

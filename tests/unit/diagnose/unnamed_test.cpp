@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "core/model/model_file.hpp"
+#include "tests/support/model_of.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/report.hpp"
@@ -20,15 +20,11 @@ constexpr double step = 0.005;
 constexpr std::size_t rows = 2400;
 
 physics::Model rigid_motor() {
-  const auto yaml = config::Yaml::parse(
+  return test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: volt}\n"
       "states: {w: {derivative: 'k*u - a*w', initial: {value: 0, unit: rad/s, sigma: 1}}}\n"
       "outputs: {speed: {column: speed, expression: w}}\n"
-      "parameters: {k: {value: 12, unit: 1, sigma: 4}, a: {value: 3, unit: 1/s, sigma: 2}}\n",
-      "model.yaml");
-  auto model = model::read(yaml);
-  yaml.finish();
-  return model;
+      "parameters: {k: {value: 12, unit: 1, sigma: 4}, a: {value: 3, unit: 1/s, sigma: 2}}\n");
 }
 
 /// Two inertias on an elastic shaft, the far one measured: what leaves `rigid_motor` ringing at 6 Hz.

@@ -5,8 +5,8 @@
 #include <map>
 #include <numbers>
 
-#include "core/model/model_file.hpp"
 #include "core/physics/simulation.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::physics {
 namespace {
@@ -15,9 +15,7 @@ using Columns = std::map<std::string, std::vector<double>, std::less<>>;
 
 std::vector<double> simulated(const std::string& text, const std::vector<double>& time,
                               const Columns& signals, std::size_t output = 0) {
-  const auto yaml = config::Yaml::parse("invar_model: 1\n" + text, "model.yaml");
-  const auto model = model::read(yaml);
-  yaml.finish();
+  const auto model = test::model_of("invar_model: 1\n" + text);
   Record record;
   record.time = time;
   record.signals = signals;
