@@ -4,24 +4,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <memory>
-#include <thread>
 
-#include "core/base/new_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
 #include "tools/diagnose/example.hpp"
 #include "tools/diagnose/other_run.hpp"
 #include "tools/diagnose/report.hpp"
+#include "tools/diagnose/report_folder.hpp"
 #include "tools/live/interrupt.hpp"
+#include "tools/live/patience.hpp"
 
 namespace invar::tools {
 
@@ -35,81 +31,6 @@ struct Options {
   bool fits_check_start = false;
   bool json = false;
   unsigned seed = 1;
-};
-
-/// The files of a diagnosis: all of them appear, or none.
-class Folder {
- public:
-  /// Throws InputError where it takes no files; so it is said before a long search.
-  explicit Folder(std::filesystem::path folder) : folder_{std::move(folder)} {
-    std::error_code failed;
-    is_new_ = std::filesystem::create_directories(folder_, failed);
-    if (failed)
-      throw InputError{folder_.string(), "cannot be made: " + failed.message(), "choose another --out"};
-    try {
-      for (const auto* name : {"report.json", "report.html", "patched.yaml", "retuned.yaml"}) put(name, "");
-    } catch (...) {
-      forget();
-      throw;
-    }
-    files_.clear();
-  }
-  ~Folder() { forget(); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  void put(const char* name, const std::string& text) {
-    auto& file = files_.emplace_back(std::make_unique<NewFile>(folder_ / name));
-    std::ofstream out{file->path(), std::ios::binary};
-    out << text;
-    out.close();
-    if (!out) file->refuse();
-  }
-  void finish() {
-    is_new_ = false;
-    for (const auto& file : files_) file->finish();
-  }
-
- private:
-  void forget() {
-    files_.clear();
-    std::error_code ignored;
-    if (is_new_) std::filesystem::remove(folder_, ignored);
-  }
-
-  std::filesystem::path folder_;
-  bool is_new_ = false;
-  std::vector<std::unique_ptr<NewFile>> files_;
-};
-
-/// What is known when Ctrl-C comes is put together within a second or so. Where a single simulation takes for ever it is not,
-/// and nobody should have to end the program by hand.
-class Patience {
- public:
-  Patience() = default;
-  ~Patience() {
-    is_over_ = true;
-    watch_.join();
-  }
-  Patience(const Patience&) = delete;
-  Patience& operator=(const Patience&) = delete;
-
- private:
-  void watch() const {
-    constexpr std::chrono::milliseconds look{50};
-    std::chrono::milliseconds left{10'000};
-    while (!is_over_) {
-      std::this_thread::sleep_for(look);
-      if (!interrupted()) continue;
-      left -= look;
-      if (left.count() > 0) continue;
-      std::cerr << "invar: stopped before there was anything to say; no report was written" << std::endl;
-      std::_Exit(130);  // nothing is open: the files are written when the patience is over
-    }
-  }
-
-  std::atomic<bool> is_over_{false};
-  std::thread watch_{[this] { watch(); }};
 };
 
 /// `[######--------------]  31 %  fitting the short list`, on a terminal alone; gone when it goes, also by a fault.
@@ -155,8 +76,9 @@ int run(const Options& options) {
   diagnose::Options how;
   how.stopped = interrupted;
   (void)interrupted();
-  Folder{options.out};
-  auto patience = std::make_unique<Patience>();
+  diagnose::ReportFolder{options.out};
+  auto patience =
+      std::make_unique<Patience>("invar: stopped before there was anything to say; no report was written");
   auto diagnosis = diagnose::search(data, progress, how);
   line.clear();
   diagnose::check_runs(data, diagnosis.best.model, 0.0, options.model);
@@ -167,7 +89,7 @@ int run(const Options& options) {
   const auto json = diagnose::report_json(data, diagnosis);
   const auto page = diagnose::page_text(data, diagnosis, options.model.string());
   patience.reset();
-  Folder folder{options.out};
+  diagnose::ReportFolder folder{options.out};
   for (const bool is_retuned : {true, false}) {
     auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
     changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
