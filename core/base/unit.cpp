@@ -31,8 +31,11 @@ constexpr Named table[] = {
     {"A", 1, 0, 0, 0, 1, 0, 0, 0, 0},
     {"K", 1, 0, 0, 0, 0, 1, 0, 0, 0},
     {"degC", 1, 0, 0, 0, 0, 1, 0, 0, 0},
+    {"\xC2\xB0\x43", 1, 0, 0, 0, 0, 1, 0, 0, 0},  // degree sign and C
+    {"\xE2\x84\x83", 1, 0, 0, 0, 0, 1, 0, 0, 0},  // both in one sign
     {"rad", 1, 0, 0, 0, 0, 0, 1, 0, 0},
     {"deg", pi / 180, 0, 0, 0, 0, 0, 1, 0, 0},
+    {"\xC2\xB0", pi / 180, 0, 0, 0, 0, 0, 1, 0, 0},
     {"arcmin", pi / 10800, 0, 0, 0, 0, 0, 1, 0, 0},
     {"arcsec", pi / 648000, 0, 0, 0, 0, 0, 1, 0, 0},
     {"px", 1, 0, 0, 0, 0, 0, 0, 1, 0},
@@ -45,6 +48,8 @@ constexpr Named table[] = {
     {"V", 1, 2, 1, -3, -1, 0, 0, 0, 0},
     {"ohm", 1, 2, 1, -3, -2, 0, 0, 0, 0},
     {"Ohm", 1, 2, 1, -3, -2, 0, 0, 0, 0},
+    {"\xCE\xA9", 1, 2, 1, -3, -2, 0, 0, 0, 0},      // capital omega
+    {"\xE2\x84\xA6", 1, 2, 1, -3, -2, 0, 0, 0, 0},  // the sign of the unit
     {"F", 1, -2, -1, 4, 2, 0, 0, 0, 0},
     {"H", 1, 2, 1, -2, -2, 0, 0, 0, 0},
     {"Pa", 1, -1, 1, -2, 0, 0, 0, 0, 0},
@@ -59,8 +64,9 @@ struct Prefix {
   std::string_view name;
   double factor;
 };
-constexpr Prefix prefixes[] = {{"n", 1e-9}, {"u", 1e-6}, {"\xC2\xB5", 1e-6}, {"m", 1e-3}, {"c", 1e-2},
-                               {"h", 1e2},  {"k", 1e3},  {"M", 1e6},         {"G", 1e9},  {"p", 1e-12}};
+constexpr Prefix prefixes[] = {{"n", 1e-9}, {"u", 1e-6}, {"\xC2\xB5", 1e-6}, {"\xCE\xBC", 1e-6},
+                               {"m", 1e-3}, {"c", 1e-2}, {"h", 1e2},         {"k", 1e3},
+                               {"M", 1e6},  {"G", 1e9},  {"p", 1e-12}};
 
 std::optional<Unit> exact(std::string_view name) {
   for (const Named& u : table)
@@ -172,7 +178,8 @@ bool Unit::same_quantity(const Unit& other) const {
 std::optional<Unit> parse_unit(std::string_view text) {
   if (text.empty() || text == "-") return Unit{};
   if (text == "K") return Unit{{0, 0, 0, 0, 1, 0, 0, 0}, 1.0, -273.15};
-  if (text == "degF") return Unit{{0, 0, 0, 0, 1, 0, 0, 0}, 5.0 / 9.0, -160.0 / 9.0};
+  if (text == "degF" || text == "\xC2\xB0\x46")
+    return Unit{{0, 0, 0, 0, 1, 0, 0, 0}, 5.0 / 9.0, -160.0 / 9.0};
   return Parser{text}.all();
 }
 

@@ -129,6 +129,7 @@ class Reader {
       : file_{file.string()}, model_{model}, recording_{recording::Recording::open(file)} {}
 
   std::vector<recording::Table> run() {
+    if (recording_.channels().empty()) refuse("holds no topic", "record with `invar record`");
     find_topics();
     read_samples();
     const Topic& clock = *clock_;
@@ -157,7 +158,17 @@ class Reader {
   }
 
  private:
+  /// What is wrong with the file itself comes first.
   [[noreturn]] void refuse(const std::string& what, const std::string& mend) const {
+    if (recording_.bytes() == 0) throw InputError{file_, "is empty", "record again"};
+    if (damaged_chunks_ > 0)
+      throw InputError{file_,
+                       "is damaged, " + std::to_string(damaged_chunks_) +
+                           " of its chunks cannot be read; of the rest: " + what,
+                       "copy the file again"};
+    if (!recording_.complete() && !recording_.damage().empty())
+      throw InputError{file_, recording_.damage().front() + "; there: " + what,
+                       "copy the file again, or record again"};
     throw InputError{file_, what, mend};
   }
 
@@ -280,6 +291,7 @@ class Reader {
         samples.values[k].push_back(sum);
       }
     }
+    damaged_chunks_ = stream.damaged_chunks();
     for (auto& [name, topic] : topics_) {
       if (topic.samples.size() == 0)
         refuse("`" + name + "` holds no sample", "record it while the cell runs");
@@ -387,6 +399,7 @@ class Reader {
   std::map<std::string, Topic> topics_;
   const Topic* clock_ = nullptr;
   bool has_enabled_ = false;
+  std::size_t damaged_chunks_ = 0;
   double period_ = 0.0;
 };
 

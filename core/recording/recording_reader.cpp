@@ -24,13 +24,13 @@ void map_file(const std::filesystem::path& file, RecordingContents& contents) {
     return InputError{file.string(), std::string{"cannot be read: "} + std::strerror(error),
                       "name a recording (.mcap)"};
   };
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe is not waited for
   if (descriptor < 0) throw refuse(errno);
   struct stat about {};
   int error = ::fstat(descriptor, &about) != 0 ? errno
               : S_ISREG(about.st_mode)         ? 0
               : S_ISDIR(about.st_mode)         ? EISDIR
-                                               : EINVAL;
+                                               : ESPIPE;
   const auto size = static_cast<std::size_t>(error == 0 ? about.st_size : 0);
   void* begin = nullptr;
   if (error == 0 && size > 0) {

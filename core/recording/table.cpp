@@ -1,5 +1,8 @@
 #include "core/recording/table.hpp"
 
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -25,7 +28,11 @@ class Lines {
  public:
   explicit Lines(const std::filesystem::path& file) : file_{file.string()} {
     if (std::filesystem::is_directory(file)) throw InputError{file_, "is a folder", "name a CSV file"};
-    stream_.reset(gzopen(file.c_str(), "rb"));  // reads plain files too
+    std::error_code unknown;
+    const bool is_pipe = std::filesystem::is_fifo(file, unknown);
+    const int opened = open(file.c_str(), O_RDONLY | O_CLOEXEC | (is_pipe ? O_NONBLOCK : 0));
+    if (opened >= 0 && is_pipe) wait_for_writer(opened);
+    if (opened >= 0) stream_.reset(gzdopen(opened, "rb"));  // reads plain files too
     if (!stream_) throw InputError{file_, "cannot be read", "check the path and its permissions"};
     (void)gzbuffer(stream_.get(), 1U << 17U);
     more();
@@ -51,6 +58,18 @@ class Lines {
   }
 
  private:
+  /// A pipe may bring a table, but one into which nobody writes would be waited for without end.
+  void wait_for_writer(int opened) const {
+    constexpr int patience = 5'000;  // ms
+    pollfd pipe{opened, POLLIN, 0};
+    if (poll(&pipe, 1, patience) > 0) {
+      (void)fcntl(opened, F_SETFL, O_RDONLY);  // from here on as any file
+      return;
+    }
+    close(opened);
+    throw InputError{file_, "is a pipe into which nobody has written for five seconds", "name a CSV file"};
+  }
+
   void more() {
     text_.erase(0, std::exchange(at_, 0));
     const std::size_t kept = text_.size();
@@ -153,6 +172,9 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
     };
     split(line, cells);
     if (table.columns.empty()) {
+      if (trimmed(line).find('\r') != std::string_view::npos)
+        refuse(where(), "the lines end in a carriage return alone",
+               "end them in a line feed, as by `tr '\\r' '\\n'`");
       if (cells.size() == 1 && line.find_first_of(";\t") != std::string_view::npos)
         refuse(where(), "the cells are parted by semicolons or tabs",
                "part them by commas, and write decimal points");

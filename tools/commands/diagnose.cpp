@@ -12,6 +12,7 @@
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
+#include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/example.hpp"
 #include "tools/diagnose/other_run.hpp"
 #include "tools/diagnose/report.hpp"
@@ -67,6 +68,7 @@ int run(const Options& options) {
   progress(0.0, "reading");
   auto data = diagnose::load_case(model, options.recordings);
   diagnose::check_runs(data, model, 0.5, options.model);  // the fit may mend a model that runs away late
+  diagnose::check_clock(data);
   std::vector<diagnose::OtherRun> checks;  // read before the search: what is unusable is said at once
   for (std::size_t i = 0; i < options.checks.size(); ++i)
     checks.push_back(diagnose::read_other_run(

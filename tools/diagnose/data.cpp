@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/model/recording_file.hpp"
+#include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
 
@@ -279,6 +280,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
+  check_ticks(model, record.time, table.file);
   const std::size_t ordered = record.rows();
   std::size_t looked_at = 0;
   auto parts = without_pauses(model, std::move(record));

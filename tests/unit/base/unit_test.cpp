@@ -29,6 +29,17 @@ TEST(Unit, TemperaturesCarryTheirOffset) {
   EXPECT_DOUBLE_EQ(convert("W/K", "W/degC", 3.0), 3.0);
 }
 
+TEST(Unit, ReadsTheSignsThatPeopleWrite) {
+  EXPECT_NEAR(convert("\u00B0C", "K", 0.0), 273.15, 1e-12);
+  EXPECT_NEAR(convert("\u2103", "K", 0.0), 273.15, 1e-12);
+  EXPECT_NEAR(convert("\u00B0F", "degC", 212.0), 100.0, 1e-12);
+  EXPECT_DOUBLE_EQ(convert("W/\u00B0C", "W/K", 3.0), 3.0);
+  EXPECT_NEAR(convert("\u00B0", "rad", 180.0), std::numbers::pi, 1e-15);
+  EXPECT_DOUBLE_EQ(convert("k\u03A9", "ohm", 2.0), 2e3);
+  EXPECT_DOUBLE_EQ(convert("\u2126", "V/A", 2.0), 2.0);
+  for (const char* micro : {"\u00B5m", "\u03BCm"}) EXPECT_DOUBLE_EQ(convert(micro, "m", 1.0), 1e-6);
+}
+
 TEST(Unit, ReadsProductsPowersAndQuotients) {
   EXPECT_DOUBLE_EQ(convert("N s2/m2", "kg/m", 1.0), 1.0);
   EXPECT_DOUBLE_EQ(convert("W s/(K m)", "N/K", 1.0), 1.0);

@@ -2,6 +2,7 @@
 #include "core/model/recording_file.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <fstream>
@@ -18,6 +19,8 @@
 namespace invar::model {
 namespace {
 
+using ::testing::AllOf;
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 
 const std::filesystem::path machines = std::filesystem::path{INVAR_SOURCE_DIR} / "deployment" / "machines";
@@ -198,9 +201,36 @@ TEST_F(RecordedAxis, WhatCannotBeUsedIsSaidInOneLine) {
   EXPECT_EQ(refusal(file, model(named("stage_z.state.position", "'stage_z.state[axis=2].position'"))),
             "nothing is refused");
   EXPECT_THAT(refusal(folder / "none.mcap", model()), HasSubstr("none.mcap: cannot be read"));
+  std::ofstream{folder / "empty.mcap"};
+  EXPECT_EQ(refusal(folder / "empty.mcap", model()),
+            (folder / "empty.mcap").string() + ": is empty; record again");
+  ASSERT_EQ(mkfifo((folder / "pipe.mcap").c_str(), 0600), 0);
+  EXPECT_THAT(refusal(folder / "pipe.mcap", model()), HasSubstr("pipe.mcap: cannot be read"));
+  // Cut off: what is there is read, and where that is too little the cut is what is wrong.
+  const auto size = std::filesystem::file_size(file);
+  for (const std::uintmax_t keep : {std::uintmax_t{100}, std::uintmax_t{2000}, size / 2, size - 5}) {
+    std::filesystem::copy_file(file, folder / "cut.mcap", std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::resize_file(folder / "cut.mcap", keep);
+    const auto said = refusal(folder / "cut.mcap", model());
+    if (keep >= size / 2)
+      EXPECT_EQ(said, "nothing is refused");
+    else
+      EXPECT_THAT(said, AllOf(HasSubstr("cut.mcap: the file ends at byte " + std::to_string(keep)),
+                              HasSubstr("; copy the file again, or record again")));
+  }
+  for (const auto& whole : {folder / "cut.mcap", file}) {
+    std::filesystem::copy_file(whole, folder / "damaged.mcap",
+                               std::filesystem::copy_options::overwrite_existing);
+    std::fstream damaged{folder / "damaged.mcap", std::ios::in | std::ios::out | std::ios::binary};
+    for (std::uintmax_t at = 20000; at + 5000 < size; at += 5000)
+      damaged.seekp(static_cast<std::streamoff>(at)).put('x');
+    damaged.close();
+    EXPECT_THAT(refusal(folder / "damaged.mcap", model()),
+                ContainsRegex("damaged.mcap: .*is damaged.*; copy the file again"));
+  }
   EXPECT_THAT(refusal(record([](std::size_t i) { return i % 10 != 0; }), model()),
-              ::testing::ContainsRegex("lacks 1[12][0-9][0-9] of 1[12][0-9][0-9][0-9] cycles of "
-                                       "`cell/trial/stage_z/state`; record on the PC of the loop"));
+              ContainsRegex("lacks 1[12][0-9][0-9] of 1[12][0-9][0-9][0-9] cycles of "
+                            "`cell/trial/stage_z/state`; record on the PC of the loop"));
   EXPECT_THAT(refusal(record([](std::size_t i) { return i % 20 == 0; }), model()),
               HasSubstr("holds only each 20th cycle of its loop; leave `state` out of `publish`"));
   auto slower = model();

@@ -3,10 +3,12 @@
 #include "tests/support/temporary_folder.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <fstream>
+#include <thread>
 
 namespace invar::recording {
 namespace {
@@ -97,7 +99,19 @@ TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m];y [m]\n1,5;2,5\n")), HasSubstr("parted by semicolons"));
   EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
   EXPECT_THAT(fault_of(make("")), HasSubstr("is empty"));
+  EXPECT_THAT(fault_of(make("x [m],y [m]\r1,2\r3,4\r")),
+              HasSubstr("in.csv:1: the lines end in a carriage return"));
+  EXPECT_EQ(fault_of(make("x [m],y [m]\r\n1,2\r\n")), "accepted");
   EXPECT_THAT(fault_of(folder / "none.csv"), HasSubstr("cannot be read"));
+}
+
+TEST_F(TableTest, ReadsAPipeAndDoesNotWaitForOneIntoWhichNobodyWrites) {
+  const auto pipe = folder / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer{[&] { std::ofstream{pipe} << "x [m]\n1\n2\n"; }};
+  EXPECT_EQ(Table::read(pipe).rows(), 2U);
+  writer.join();
+  EXPECT_THAT(fault_of(pipe), HasSubstr("pipe: is a pipe into which nobody has written"));
 }
 
 TEST_F(TableTest, SaysWhichColumnIsMissingOrMeasuresSomethingElse) {
