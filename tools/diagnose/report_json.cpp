@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/windows.hpp"
 
@@ -50,23 +51,13 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   report["location"] = json::array();
   report["findings"] = json::array();
   report["ambiguity"] = json::array();
-  for (const auto& finding : d.findings) {
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    const auto& finding = d.findings[i];
     const auto& term = finding.term;
     const auto depends = dependence(data, finding);
     json where = json::object();
-    if (!term.curve.knots.empty()) {
-      // Where the curve is more than a third of its peak.
-      double top = 0.0, low = 0.0, high = 0.0;
-      for (double v : term.curve.values) top = std::max(top, std::abs(v));
-      bool first = true;
-      for (std::size_t k = 0; k < term.curve.knots.size(); ++k)
-        if (std::abs(term.curve.values[k]) > top / 3.0) {
-          if (first) low = term.curve.knots[k];
-          high = term.curve.knots[k];
-          first = false;
-        }
-      where[term.curve.over] = {low, high};
-    }
+    for (const auto& region : regions_of(data, d, i))
+      where[region.variable] = {region.within.lower, region.within.upper};
     report["location"].push_back(
         {{"site", site_of(data, term)},
          {"depends_on", depends},
@@ -75,9 +66,9 @@ std::string report_json(const Case& data, const Diagnosis& d) {
          {"why", "without " + std::string{term.info->name} + " there, " + text(100.0 * finding.share) +
                      " % of the excess residual comes back"}});
     json parameters = json::object();
-    for (std::size_t i = 0; i < term.info->parameter_count(); ++i)
-      parameters[std::string{term.info->parameters[i].name}] = {
-          {"value", term.values[i]}, {"unit", unit_of(data, term, i)}, {"sigma", finding.sigmas[i]}};
+    for (std::size_t k = 0; k < term.info->parameter_count(); ++k)
+      parameters[std::string{term.info->parameters[k].name}] = {
+          {"value", term.values[k]}, {"unit", unit_of(data, term, k)}, {"sigma", finding.sigmas[k]}};
     json alternatives = json::array();
     for (const auto& a : finding.alternatives) {
       const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
@@ -102,6 +93,9 @@ std::string report_json(const Case& data, const Diagnosis& d) {
           {"over", term.curve.over}, {"knots", term.curve.knots}, {"values", term.curve.values}};
     report["findings"].push_back(entry);
   }
+  if (d.is_partial && d.findings.empty() && d.verdict == Verdict::ambiguous)
+    report["ambiguity"].push_back({{"between", {"nothing is missing", "physics that was not tried"}},
+                                   {"experiment", "none: let the diagnosis run to its end"}});
   if (d.suspect)
     report["location"].push_back(
         {{"site", d.suspect->site},

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/windows.hpp"
 
@@ -131,7 +132,11 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   }
   const std::string rest = report::number(d.unexplained, 3) + " times the noise";
   Names rows;
-  if (missing.empty() && d.verdict != Verdict::unknown_physics)
+  if (d.is_partial)
+    rows.push_back({"what is missing", missing.empty()
+                                           ? "not known: it was stopped before all was tried"
+                                           : "so far the above: it was stopped before all was tried"});
+  else if (missing.empty() && d.verdict != Verdict::unknown_physics)
     rows.push_back({"what is missing", "nothing that this recording shows"});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
   rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
@@ -180,11 +185,13 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  const std::vector<physics::Outputs>& after) {
   const auto& finding = d.findings[which];
   const auto& info = *finding.term.info;
+  const auto part = region_words(regions_of(data, d, which));
   page.paragraph(title_of(finding) + " (" + place_of(data, finding.term) + "; in the model file " +
                  std::string{(finding.stand_in != nullptr ? finding.stand_in : &info)->name} + " at " +
                  site_of(data, finding.term) + "): " + std::string{info.description} + " " +
                  std::string{info.source} + ". Of the mismatch, " + report::number(100.0 * finding.share, 3) +
-                 " % comes back when it alone is taken out.");
+                 " % comes back when it alone is taken out." +
+                 (part.empty() ? "" : " It shows most at " + part + "."));
   auto model = d.best.model;
   model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
   const auto without = simulate(data, model);

@@ -249,11 +249,11 @@ std::string moved_parameters(const Diagnosis& d) {
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   if (d.is_partial) {
     if (d.findings.empty())
-      return "Stopped before all was tried; nothing was found until then, which does not say that nothing is "
-             "missing.";
+      return "Not finished, nothing can be said. Stopped before all was tried; nothing was found until then, "
+             "which does not say that nothing is missing.";
     auto whole = d;
     whole.is_partial = false;
-    return "Stopped before all was tried, and rivals may not have been weighed; so far: " +
+    return "Not finished. Stopped before all was tried, and rivals may not have been weighed; so far: " +
            verdict_sentence(data, whole);
   }
   std::string names;

@@ -389,6 +389,9 @@ Diagnosis Search::run() {
     }
   }
   (void)noise_->put_back();
+  // Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
+  if (d_.is_partial && (d_.verdict == Verdict::no_mismatch || d_.verdict == Verdict::parameters_only))
+    d_.verdict = Verdict::ambiguous;
   progress_(1.0, "done");
   return d_;
 }

@@ -11,6 +11,8 @@ namespace {
 
 using diagnose::Verdict;
 using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 /// No number may have become null (NaN and infinity are no JSON).
 void expect_no_null(const json& value, const std::string& at) {
@@ -103,19 +105,19 @@ void expect_contract(const diagnose::Case& data, const diagnose::Diagnosis& d, c
   switch (d.verdict) {
     case Verdict::no_mismatch:
       EXPECT_FALSE(claims);
-      if (!d.is_partial) {
-        EXPECT_FALSE(mismatch.at("significant"));
-        EXPECT_GT(mismatch.at("p_value"), 0.0026);  // within three sigma of what the user believed
-      }
+      EXPECT_FALSE(d.is_partial) << "half a search says that nothing is missing";
+      EXPECT_FALSE(mismatch.at("significant"));
+      EXPECT_GT(mismatch.at("p_value"), 0.0026);  // within three sigma of what the user believed
       break;
     case Verdict::parameters_only:
       EXPECT_FALSE(claims);
+      EXPECT_FALSE(d.is_partial);
       EXPECT_FALSE(report.at("parameter_corrections").empty());
       EXPECT_TRUE(mismatch.at("significant"));
       break;
     case Verdict::ambiguous:
       EXPECT_FALSE(report.at("ambiguity").empty());
-      EXPECT_TRUE(claims);
+      EXPECT_TRUE(claims || d.is_partial);
       break;
     case Verdict::unknown_physics:
       EXPECT_FALSE(report.at("location").empty());
@@ -152,16 +154,41 @@ TEST(Report, HoldsTheContractForEveryVerdict) {
     rival.on = "elsewhere";
     finding.alternatives = {{rival, -0.1}};
     look(data, d, plant);
-    EXPECT_THAT(diagnose::next_experiment(data, d), ::testing::HasSubstr("elsewhere"));
+    EXPECT_THAT(diagnose::next_experiment(data, d), HasSubstr("elsewhere"));
   }
-  auto data = case_of(make("thermal", "sensor_lag", 1.0, 3));
-  diagnose::Options stop;
-  stop.stopped = [] { return true; };
-  const auto d = diagnose::search(
-      data, [](double, const std::string&) {}, stop);
-  EXPECT_TRUE(d.is_partial);
-  look(data, d, "thermal");
   EXPECT_EQ(seen.size(), 6U);
+}
+
+TEST(Report, OfASearchThatWasStoppedSaysFirstThatNothingCanBeSaid) {
+  for (const char* effect : {"none", "parameter", "sensor_lag"}) {
+    auto data = case_of(make("thermal", effect, 1.0, 3));
+    diagnose::Options stop;
+    stop.stopped = [] { return true; };
+    const auto d = diagnose::search(
+        data, [](double, const std::string&) {}, stop);
+    EXPECT_TRUE(d.is_partial);
+    EXPECT_TRUE(d.findings.empty());
+    expect_contract(data, d, "thermal");
+    EXPECT_THAT(diagnose::summary(data, d), StartsWith("Not finished, nothing can be said."));
+    const auto page = diagnose::page_text(data, d, "model.yaml");
+    EXPECT_NE(page.find("Not finished, nothing can be said."), std::string::npos);
+    EXPECT_EQ(page.find("nothing that this recording shows"), std::string::npos);
+  }
+}
+
+// A force that grows with the time is a third of its most after a third of it, and in a loop the current tells.
+TEST(Report, SaysInWhichRegionAnEffectShows) {
+  const auto machine = make("axis", "slow_drift", 1.0, 6001);
+  auto data = case_of(machine);
+  const auto d = diagnose::search(data, [](double, const std::string&) {});
+  const auto report = json::parse(diagnose::report_json(data, d));
+  SCOPED_TRACE(report.at("location").dump(1));
+  ASSERT_EQ(report.at("findings")[0].at("term"), "slow_drift");
+  const auto where = report.at("location")[0].at("where").at("time");
+  const double end = data.recordings[0].inputs.time.back();
+  EXPECT_NEAR(where[0].get<double>(), end / 3.0, end / 30.0);
+  EXPECT_NEAR(where[1].get<double>(), end, end / 30.0);
+  EXPECT_TRUE(diagnose::page_text(data, d, "model.yaml").find("It shows most at time ") != std::string::npos);
 }
 
 }  // namespace
