@@ -54,32 +54,6 @@ std::string name_beside(const Case& data, const physics::Term& term, const physi
   return term.info == other.info ? name + " (" + place_of(data, term) + ")" : name;
 }
 
-std::string separating_experiment(const Case& data, const physics::Term& at, const physics::Term& beside) {
-  if (at.info == beside.info)
-    return "record with one instrument more, between the " + place_of(data, at) + " and the " +
-           place_of(data, beside) + ": it shows the effect of the one and not that of the other";
-  const std::string one{at.info->name}, other{beside.info->name};
-  const auto is = [&](const char* a, const char* b) {
-    return (one == a && other == b) || (one == b && other == a);
-  };
-  if (is("coulomb_friction", "constant_force") || is("stribeck_friction", "constant_force") ||
-      is("presliding_friction", "constant_force"))
-    return "move in both directions: friction turns its sign with the motion, a constant force does not";
-  if (is("transport_delay", "measurement_delay"))
-    return "record the position with a second, direct instrument: a late encoder trails it, a late motor "
-           "does not";
-  if (is("transport_delay", "amplifier_lag") || is("measurement_delay", "amplifier_lag"))
-    return "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
-  if (is("stage_velocity_carry", "valve_delay"))
-    return "print at two clearly different heights: carry grows with the height, a valve delay does not";
-  if (is("force_ripple", "motor_constant_ripple"))
-    return "cross the same places at high and at low current: the ripple of the motor constant goes with the "
-           "current";
-  if (is("periodic_disturbance", "additive_disturbance"))
-    return "record with the motor switched off and the carriage free: a force shakes it still";
-  return "a recording in which " + one + " and " + other + " act at different times, places or speeds";
-}
-
 std::string readable(std::string_view name) {
   std::string text{name};
   std::replace(text.begin(), text.end(), '_', ' ');
@@ -172,50 +146,6 @@ std::string what_was_looked_at(const Case& data) {
   return (cut.empty() ? "" : cut + "; ") + "a long recording: of " + std::to_string(data.count.rows) +
          " rows " + how_shortened(data.model) + " looked at, " + std::to_string(data.count.shortened) +
          " are not run through";
-}
-
-std::string next_experiment(const Case& data, const Diagnosis& d) {
-  if (d.is_partial) return "Let the diagnosis run to its end.";
-  for (const auto& finding : d.findings)
-    for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin)
-        return "To tell " + readable(name_beside(data, finding.term, a.term)) + " from " +
-               readable(name_beside(data, a.term, finding.term)) + ": " +
-               separating_experiment(data, finding.term, a.term) + ".";
-  const auto over = [&]() -> std::string {
-    if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
-      return d.findings.back().term.curve.over;
-    return d.unexplained_over.empty() ? "" : d.unexplained_over.front();
-  }();
-  switch (d.verdict) {
-    case Verdict::unknown_physics:
-    case Verdict::partly_explained:
-      if (over == "time" || over == "t")
-        return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
-               "back.";
-      if (over == "history")
-        return "Record again with one input alone in steps, each held until all is at rest, and then in "
-               "quick changes: "
-               "what has no name yet goes with what was before, and this shows for how long.";
-      return "Record again with " + (over.empty() ? "one input" : over) +
-             " varied on its own and all else held: what has no name yet goes with it, or with something "
-             "that "
-             "moved beside it.";
-    case Verdict::no_mismatch:
-      return "None is needed. An effect smaller than those listed as detectable would take a longer or a "
-             "livelier recording.";
-    case Verdict::parameters_only:
-      return "Measure the parameter that moved on its own, or take over patched.yaml.";
-    default:
-      return (d.other_runs.empty()
-                  ? std::string{"Simulate patched.yaml on a recording that was not used here (--check)"}
-                  : std::string{"None is needed: see what patched.yaml makes of the other recording"}) +
-             (data.model.plant == physics::Plant::axis
-                  ? "; then give it to the running stage (invar job apply)."
-              : data.model.plant == physics::Plant::error_map
-                  ? "; then give it to the running compensation (invar job apply)."
-                  : ".");
-  }
 }
 
 namespace {

@@ -1,0 +1,135 @@
+// What to record next, so that it tells what this recording does not.
+#include <algorithm>
+#include <array>
+
+#include "tools/diagnose/report.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+/// Two names, in either order, and what tells them apart.
+struct Pair {
+  std::string_view one, other;
+  const char* experiment;
+};
+
+constexpr const char* both_ways =
+    "move in both directions: friction turns its sign with the motion, a constant force does not";
+constexpr const char* second_instrument =
+    "record the position with a second, direct instrument and diagnose with its column, `current` as an "
+    "input and "
+    "no controller: a late motor is found again, a late encoder is not";
+constexpr const char* quick =
+    "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
+constexpr const char* creep =
+    "move to and fro by some micrometres, and then by millimetres: before it slides a bristle springs, which "
+    "shows in the small motion alone";
+
+constexpr std::array pairs{
+    Pair{"coulomb_friction", "constant_force", both_ways},
+    Pair{"stribeck_friction", "constant_force", both_ways},
+    Pair{"presliding_friction", "constant_force", both_ways},
+    Pair{"coulomb_friction", "presliding_friction", creep},
+    Pair{"stribeck_friction", "presliding_friction", creep},
+    Pair{"transport_delay", "measurement_delay", second_instrument},
+    Pair{"transport_delay", "amplifier_lag", quick},
+    Pair{"measurement_delay", "amplifier_lag", quick},
+    Pair{"stage_velocity_carry", "valve_delay",
+         "print at two clearly different heights: carry grows with the height, a valve delay does not"},
+    Pair{"force_ripple", "motor_constant_ripple",
+         "cross the same places at high and at low current: the ripple of the motor constant goes with the "
+         "current"},
+    Pair{"periodic_disturbance", "additive_disturbance",
+         "record with the motor switched off and the carriage free: a force shakes it still"},
+    Pair{"delay", "lag",
+         "change the input quickly, up to the rate of the rows: a delay keeps the shape, a lag rounds it"}};
+
+/// How to find out whether an effect goes with this variable.
+std::string varied(const std::string& variable) {
+  if (variable == "time" || variable == "t")
+    return "record the same motion twice, the second time after a pause";
+  if (variable == "history" || variable == "frequency")
+    return "record with long steps, each held until all is at rest, and then with quick changes";
+  if (variable == "direction") return "cross the same places in both directions";
+  if (variable == "image") return "print the same target in the middle and in the corners of the image";
+  return "record with " + variable + " varied on its own and all else held";
+}
+
+/// The first of `one` that is not among `other`, what can be commanded before what cannot.
+std::string only_in(const std::vector<std::string>& one, const std::vector<std::string>& other) {
+  std::string first;
+  for (const auto& variable : one)
+    if (std::find(other.begin(), other.end(), variable) == other.end() && variable != "acceleration" &&
+        (first.empty() || first == "history" || first == "frequency"))
+      first = variable;
+  return first;
+}
+
+}  // namespace
+
+std::string separating_experiment(const Case& data, const physics::Term& at, const physics::Term& beside) {
+  if (at.info == beside.info)
+    return "record with one instrument more, between the " + place_of(data, at) + " and the " +
+           place_of(data, beside) + ": it shows the effect of the one and not that of the other";
+  const auto one = at.info->name, other = beside.info->name;
+  for (const auto& pair : pairs)
+    if ((pair.one == one && pair.other == other) || (pair.one == other && pair.other == one))
+      return pair.experiment;
+  const auto of_one = dependence(data, at), of_other = dependence(data, beside);
+  for (const bool turned : {false, true}) {
+    const auto variable = turned ? only_in(of_other, of_one) : only_in(of_one, of_other);
+    if (variable.empty()) continue;
+    return varied(variable) + ": " + readable(turned ? other : one) + " goes with it, " +
+           readable(turned ? one : other) + " does not";
+  }
+  const auto shared = of_one.empty() ? std::string{"the excitation"} : of_one.front();
+  return "record with " + shared + " at a third and at three times of its size: " + readable(one) + " and " +
+         readable(other) + " grow with it in different ways";
+}
+
+std::string next_experiment(const Case& data, const Diagnosis& d) {
+  if (d.is_partial) return "Let the diagnosis run to its end.";
+  for (const auto& finding : d.findings)
+    for (const auto& a : finding.alternatives)
+      if (a.log_odds > -ambiguous_margin)
+        return "To tell " + readable(name_beside(data, finding.term, a.term)) + " from " +
+               readable(name_beside(data, a.term, finding.term)) + ": " +
+               separating_experiment(data, finding.term, a.term) + ".";
+  const auto over = [&]() -> std::string {
+    if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
+      return d.findings.back().term.curve.over;
+    return d.unexplained_over.empty() ? "" : d.unexplained_over.front();
+  }();
+  switch (d.verdict) {
+    case Verdict::unknown_physics:
+    case Verdict::partly_explained:
+      if (over == "time" || over == "t")
+        return "Record the same motion again: what has no name yet goes with time, so see whether it comes "
+               "back.";
+      if (over == "history")
+        return "Record again with one input alone in steps, each held until all is at rest, and then in "
+               "quick changes: "
+               "what has no name yet goes with what was before, and this shows for how long.";
+      return "Record again with " + (over.empty() ? "one input" : over) +
+             " varied on its own and all else held: what has no name yet goes with it, or with something "
+             "that "
+             "moved beside it.";
+    case Verdict::no_mismatch:
+      return "None is needed. An effect smaller than those listed as detectable would take a longer or a "
+             "livelier recording.";
+    case Verdict::parameters_only:
+      return "Measure the parameter that moved on its own, or take over patched.yaml.";
+    default:
+      return (d.other_runs.empty()
+                  ? std::string{"Simulate patched.yaml on a recording that was not used here (--check)"}
+                  : std::string{"None is needed: see what patched.yaml makes of the other recording"}) +
+             (data.model.plant == physics::Plant::axis
+                  ? "; then give it to the running stage (invar job apply)."
+              : data.model.plant == physics::Plant::error_map
+                  ? "; then give it to the running compensation (invar job apply)."
+                  : ".");
+  }
+}
+
+}  // namespace invar::diagnose
