@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The cell finds out what its model leaves out. Three ways: as jobs in simulated time, on a running cell with `invar record` and
 # `invar job apply`, and with nothing hidden, where nothing may be claimed or applied.
-# mismatch.sh INVAR SOURCE_DIR jobs|live|clock|nothing|refusals     live: simulated time at the pace of the wall clock, slower where
+# mismatch.sh INVAR SOURCE_DIR jobs|live|clock|nothing|watch|refusals     live: simulated time at the pace of the wall clock, slower where
 # the host is busy, so that no cycle is lost; clock: by the wall clock, by hand
 set -euo pipefail
 invar=$1 source=$2 part=$3
@@ -73,6 +73,31 @@ case $part in
     "$invar" run $cell --job prove | tee summary
     grep -q "nothing was given to the stage" summary || fail "something was applied"
     [[ ! -e out/mismatch/motion_after.csv ]] || fail "there is a motion after nothing"
+    ;;
+  watch)
+    # The watch beside the stage says nothing while the axis is what its model says, and where it parts when it does; what it
+    # says is on the cell's bus and in the recording.
+    sed -i "s|topics: \[stage_x/state\]|topics: [stage_x/state, process/notices]|; s/type: model_watch/&\n        time: 1/" $cell
+    hide "{term: coulomb_friction, level: {value: 3, unit: N}}"
+    mv $truth deployment/machines/linear-axis-worn.yaml
+    cp "$source/$truth" $truth
+    hide ""
+    notices() { # what the watch said in a run of the job `excite`: one line a notice, time [s] first
+      rm -rf out tables
+      "$invar" run $cell --job excite >run.log || { cat run.log; fail "the cell does not run"; }
+      "$invar" recording info out/mismatch/recording.mcap | grep -q process/notices || return 0
+      "$invar" export out/mismatch/recording.mcap --topic process.notices --out tables >/dev/null
+      { grep watch_x tables/* || true; }
+    }
+    notices >said
+    [[ ! -s said ]] || { cat said; fail "the watch says that an axis parts from its model that does not"; }
+    sed -i 's|x: {model: machines/linear-axis-true.yaml}|x: {model: machines/linear-axis-true.yaml, changed: machines/linear-axis-worn.yaml, change_at: 6}|' $cell
+    grep -q change_at $cell || fail "the cell file has no line of the world's model to change"
+    notices >said
+    cat said
+    [[ $(wc -l <said) == 1 ]] || fail "one notice was to come, behind the change at 6 s"
+    awk -F, '{ exit !($1 > 6 && $1 < 10) }' said || fail "it did not come within seconds"
+    grep -q "SEVERITY_WARNING,0,watch_x,\"axis and model part: .*axis\.force, goes with direction" said || fail "it does not say where"
     ;;
   live | clock)
     time=--real-time
