@@ -8,8 +8,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 
 namespace invar::diagnose {
@@ -18,12 +18,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::UnorderedElementsAre;
 
-physics::Model read(const std::string& text) {
-  const auto yaml = config::Yaml::parse("invar_model: 1\n" + text, "model.yaml");
-  auto model = model::read(yaml);
-  yaml.finish();
-  return model;
-}
+physics::Model read(const std::string& text) { return test::model_of("invar_model: 1\n" + text); }
 
 const std::string axis_numbers =
     "parameters: {mass: {value: 4, unit: kg, sigma: 0.06}, motor_constant: {value: 20, unit: N/A, sigma: "
