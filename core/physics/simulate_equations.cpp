@@ -139,6 +139,7 @@ class OwnEquations final : public Simulation {
         for (std::size_t i = 0; i < machine.states(); ++i)
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
+        if (row == 0) machine.balance_hidden(s);
         ++restart;
       }
       for (std::size_t i = 0; i < inputs_.size(); ++i)
