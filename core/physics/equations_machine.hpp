@@ -113,7 +113,6 @@ class EquationsMachine {
 
   void advance(State& s, double t, double h, int parts) {
     h /= parts;
-    shortest_lag_ = h / 2.5;
     for (int part = 0; part < parts; ++part, t += h) {
       for (auto& late : delays_) late.past.emplace_back(t, s[late.use.on]);
       if (frictions_.empty())
@@ -141,19 +140,34 @@ class EquationsMachine {
     return slot(compiled_.law);
   }
 
-  /// The largest rate of change of anything of any lane [1/s]: the spectral radius of the Jacobian here. A jump (the sign of
-  /// a speed that is zero) has none: it would only make steps short.
-  double fastest(const State& s, double t) {
+  /// How fast anything of any lane changes.
+  struct Rates {
+    double radius = 0.0;  // [1/s]: the spectral radius of the Jacobian
+    /// [1/s], with what dies away counted half: what swings carries its error on, what is damped forgets it.
+    double swing = 0.0;
+  };
+  /// Of all states, or of the user's own alone, here. A jump (the sign of a speed that is zero) has no rate of change: it
+  /// would only make steps short.
+  Rates fastest(const State& s, double t, bool own) {
     auto fine = jacobian(s, t, 1e-6);
     const auto coarse = jacobian(s, t, 1e-4);
-    double most = 0.0;
+    const auto n = static_cast<Eigen::Index>(own ? states_ : all_states());
+    Rates most;
     for (std::size_t l = 0; l < lanes; ++l) {
       for (Eigen::Index k = 0; k < fine[l].size(); ++k)
         if (std::abs(fine[l](k)) > 30.0 * std::abs(coarse[l](k))) fine[l](k) = coarse[l](k);
-      if (fine[l].allFinite()) most = std::max(most, fine[l].eigenvalues().cwiseAbs().maxCoeff());
+      if (!fine[l].allFinite()) continue;
+      for (const auto& rate : fine[l].topLeftCorner(n, n).eigenvalues()) {
+        most.radius = std::max(most.radius, std::abs(rate));
+        most.swing = std::max(most.swing,
+                              std::hypot(rate.real() < 0.0 ? 0.5 * rate.real() : rate.real(), rate.imag()));
+      }
     }
     return most;
   }
+  [[nodiscard]] bool has_added_states() const { return !hidden_.empty() || !lags_.empty(); }
+  /// [s] Stores and lags that are faster are blended out: they would only make steps short.
+  void set_shortest(double time_constant) { shortest_ = time_constant; }
   /// Steps are longer than an explicit rule bears.
   void set_stiff(bool stiff) { stiff_ = stiff; }
 
@@ -188,9 +202,7 @@ class EquationsMachine {
   [[nodiscard]] double* slot(std::size_t s) { return slots_.data() + s * lanes; }
   [[nodiscard]] std::size_t first_lag() const { return states_ + hidden_.size(); }
   /// Never so short that a step could not follow; what is shorter is blended out.
-  [[nodiscard]] double time_constant(const Use& lag, std::size_t l) const {
-    return std::max(lag.p[l][0], shortest_lag_);
-  }
+  [[nodiscard]] double time_constant(double wanted) const { return std::max(wanted, shortest_); }
 
   /// The rates as they would be without friction and limits: those jump, and what jumps has no rate of change.
   State free_slope(const State& s, double t) {
@@ -206,14 +218,14 @@ class EquationsMachine {
     for (std::size_t h = 0; h < hidden_.size(); ++h) {
       const auto& term = hidden_[h];
       for (std::size_t l = 0; l < lanes; ++l) {
-        const double difference = s[states_ + h][l] - s[term.on][l];
-        d[term.on][l] += term.p[l][0] * difference;
-        d[states_ + h][l] = -difference / term.p[l][1];
+        const double difference = s[states_ + h][l] - s[term.on][l], time = time_constant(term.p[l][1]);
+        d[term.on][l] += term.p[l][0] * term.p[l][1] / time * difference;  // holds as much
+        d[states_ + h][l] = -difference / time;
       }
     }
     for (std::size_t k = 0; k < lags_.size(); ++k)
       for (std::size_t l = 0; l < lanes; ++l)
-        d[first_lag() + k][l] = (s[lags_[k].on][l] - s[first_lag() + k][l]) / time_constant(lags_[k], l);
+        d[first_lag() + k][l] = (s[lags_[k].on][l] - s[first_lag() + k][l]) / time_constant(lags_[k].p[l][0]);
     return d;
   }
 
@@ -227,7 +239,7 @@ class EquationsMachine {
     for (std::size_t k = 0; k < lags_.size(); ++k)
       for (std::size_t l = 0; l < lanes; ++l)
         slot(lags_[k].on)[l] -=
-            lags_[k].p[l][0] / time_constant(lags_[k], l) * (s[lags_[k].on][l] - s[first_lag() + k][l]);
+            lags_[k].p[l][0] / time_constant(lags_[k].p[l][0]) * (s[lags_[k].on][l] - s[first_lag() + k][l]);
     for (const auto& late : delays_)
       for (std::size_t l = 0; l < lanes; ++l) {
         const double by = late.use.p[l][0], when = t - by;
@@ -417,7 +429,7 @@ class EquationsMachine {
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
-  double shortest_lag_ = 0.0;
+  double shortest_ = 0.0;
   bool stiff_ = false;
 };
 

@@ -132,13 +132,14 @@ class OwnEquations final : public Simulation {
     }
     machine.balance_hidden(s);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
-    double fastest = 0.0;
+    typename EquationsMachine<lanes>::Rates own, fastest;
     auto restart = restarts_.begin();
     for (std::size_t row = 0; row < n; ++row) {
       if (restart != restarts_.end() && restart->row == row) {
         for (std::size_t i = 0; i < machine.states(); ++i)
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
+        if (row == 0) machine.balance_hidden(s);
         ++restart;
       }
       for (std::size_t i = 0; i < inputs_.size(); ++i)
@@ -150,8 +151,17 @@ class OwnEquations final : public Simulation {
           machine.set_input(machine.controlled() - machine.states(), l, commanded[l]);
       }
       if (row % std::max<std::size_t>(1, n / 32) == 0) {
-        const double now = machine.fastest(s, time_[row]);
-        fastest = std::max(now, 0.5 * fastest);  // where it was fast, it may soon be again
+        const auto renew = [&](auto& rates, bool of_own) {  // where it was fast, it may soon be again
+          const auto now = machine.fastest(s, time_[row], of_own);
+          rates.radius = std::max(now.radius, 0.5 * rates.radius);
+          rates.swing = std::max(now.swing, 0.5 * rates.swing);
+        };
+        renew(own, true);
+        if (machine.has_added_states()) {
+          const double usual = (time_.back() - time_.front()) / static_cast<double>(n);
+          machine.set_shortest(usual / parts_for(usual * own.swing) / 2.5);
+        }
+        renew(fastest, false);
       }
       machine.show(s, time_[row]);
       machine.work_out_outputs();
@@ -162,10 +172,9 @@ class OwnEquations final : public Simulation {
       const double h = time_[row + 1] - time_[row];
       if (!(h > 0.0)) continue;
       // What is faster than the shortest explicit steps bear is at its balance after an implicit one; the rest needs few.
-      constexpr double most_parts = 60.0, stiff_parts = 15.0;
-      const bool stiff = h * fastest > 1.5 * most_parts;
-      const int parts =
-          static_cast<int>(stiff ? stiff_parts : std::clamp(std::ceil(h * fastest / 0.25), 1.0, most_parts));
+      constexpr double stiff_parts = 15.0;
+      const bool stiff = h * fastest.radius > 1.5 * most_parts;
+      const int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
       machine.set_stiff(stiff);
       if (!is_linear_) {
         machine.advance(s, time_[row], h, parts);
@@ -192,6 +201,10 @@ class OwnEquations final : public Simulation {
       }
     }
   }
+
+  static constexpr double most_parts = 60.0;
+  /// Steps of the classical Runge-Kutta rule over a time in which the fastest turns so far [rad].
+  static double parts_for(double turn) { return std::clamp(std::ceil(turn / 0.25), 1.0, most_parts); }
 
   struct Restart {
     std::size_t row = 0;

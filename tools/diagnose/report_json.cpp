@@ -135,6 +135,8 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"split",
        data.windows.count > 0
            ? "each third of four stretches a window was kept from a fit in turn; " + how_windowed(data)
+       : data.windows.anew > 0
+           ? "each third of 18 stretches of each recording was kept from a fit in turn; " + how_windowed(data)
            : "each third of 18 stretches of each recording was kept from a fit in turn; simulated without "
              "restart over the whole recording"}};
   report["unexplained"] = {{"residual_over_noise", d.unexplained}, {"depends_on", d.unexplained_over}};

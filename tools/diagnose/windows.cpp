@@ -4,6 +4,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "tools/diagnose/anew.hpp"
+
 namespace invar::diagnose {
 
 namespace {
@@ -105,45 +107,62 @@ double guess_of(const Case& data, const Recording& recording, const physics::Out
              : data.model.value(equations.states[state].name + ".initial");
 }
 
-struct Cut {
-  Case data;
-  double growth = 0.0;
-};
+using Rows = std::vector<std::vector<std::size_t>>;  // by recording
 
-/// The case in windows of about so many rows.
-Case in_windows(const Case& whole, std::size_t rows) {
+/// The case with states of their own from these rows on. Where the model forgets, its run says how wide they go.
+Case with_starts(const Case& whole, const Rows& rows, bool forgets) {
   Case data = whole;
   const auto shown = showing_states(whole.model);
   const auto& states = whole.model.equations.states;
   std::size_t next = 0;
   std::vector<double> sizes(states.size(), 0.0);
-  for (auto& recording : data.recordings) {
-    const std::size_t n = recording.inputs.rows(), count = std::max<std::size_t>(1, n / rows);
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    auto& recording = data.recordings[r];
     physics::Outputs free;
     physics::prepare(shown, recording.inputs)->run(shown, free);
     recording.inputs.first_restart = next;
-    data.windows.count += count;
-    data.windows.length =
-        std::max(data.windows.length,
-                 (recording.inputs.time.back() - recording.inputs.time.front()) / static_cast<double>(count));
-    for (std::size_t k = 1; k < count; ++k, ++next) {
-      const std::size_t row = k * n / count;
-      recording.inputs.restarts.push_back(row);
+    recording.inputs.restarts = rows[r];
+    for (std::size_t k = 0; k < rows[r].size(); ++k, ++next)
       for (std::size_t i = 0; i < states.size(); ++i) {
         const auto& initial = *whole.model.find(states[i].name + ".initial");
-        const double value = guess_of(whole, recording, free, i, row);
+        const double value = guess_of(whole, recording, free, i, rows[r][k]);
         sizes[i] =
             std::max({sizes[i], std::abs(value), initial.sigma.value_or(0.0), std::abs(initial.value), 1e-9});
+        if (const double far = reach(free[i], 0.0, 1.0); forgets && far < 1e6)
+          sizes[i] = std::max(sizes[i], far);
         data.model.parameters.push_back(
             {states[i].name + ".start" + std::to_string(next), initial.unit, value, 1.0, initial.bounds});
       }
-    }
   }
   const std::size_t first = whole.model.parameters.size();
   for (std::size_t p = first; p < data.model.parameters.size(); ++p)
     data.model.parameters[p].sigma = sizes[(p - first) % states.size()];
   for (auto& recording : data.recordings)
     recording.simulation = physics::prepare(data.model, recording.inputs);
+  return data;
+}
+
+/// The case in windows of about so many rows, and from these rows on; a window that would begin near one of them is none.
+Case in_windows(const Case& whole, std::size_t rows, const Rows& anew) {
+  Rows all = anew;
+  Case::Windows windows = whole.windows;
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    const auto& inputs = whole.recordings[r].inputs;
+    const std::size_t n = inputs.rows(), count = std::max<std::size_t>(1, n / rows);
+    windows.count += count;
+    windows.length =
+        std::max(windows.length, (inputs.time.back() - inputs.time.front()) / static_cast<double>(count));
+    for (std::size_t k = 1; k < count; ++k) {
+      const std::size_t row = k * n / count;
+      if (std::none_of(anew[r].begin(), anew[r].end(), [&](std::size_t other) {
+            return 2 * std::max(row, other) < 2 * std::min(row, other) + rows;
+          }))
+        all[r].push_back(row);
+    }
+    std::sort(all[r].begin(), all[r].end());
+  }
+  auto data = with_starts(whole, all, false);
+  data.windows = windows;
   return data;
 }
 
@@ -201,23 +220,31 @@ bool is_start(const physics::Parameter& parameter) {
 
 void cut_into_windows(Case& data) {
   const auto& equations = data.model.equations;
-  if (data.model.plant != physics::Plant::equations || !equations.controlled_input.empty()) return;
+  if (data.model.plant != physics::Plant::equations) return;
   constexpr double still_going = 1.6;
+  const auto anew = begun_anew(data, most_starts / std::max<std::size_t>(1, equations.states.size()));
+  for (const auto& of : anew) data.windows.anew += of.size();
   std::size_t rows = 0;
   bool goes = false;
   for (const auto& recording : data.recordings) {
     rows = std::max(rows, recording.inputs.rows());
-    if (recording.inputs.rows() >= 4 * fewest_rows) goes = goes || goes_on(data, recording) > still_going;
+    if (recording.inputs.rows() >= 4 * fewest_rows && equations.controlled_input.empty())
+      goes = goes || goes_on(data, recording) > still_going;
   }
-  if (!goes) return;
+  if (!goes) {
+    if (data.windows.anew == 0) return;
+    data = with_starts(data, anew, true);
+    estimate_starts(data);
+    return;
+  }
   std::size_t window = std::max(fewest_rows, rows * equations.states.size() / most_starts);
-  auto cut = in_windows(data, window);
+  auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
   double growth = growth_over_windows(cut);
   while (growth > most_growth && window > fewest_rows / 4 &&
          2 * cut.windows.count * equations.states.size() <= 2 * most_starts) {
     window /= 2;
-    cut = in_windows(data, window);
+    cut = in_windows(data, window, anew);
     estimate_starts(cut);
     growth = growth_over_windows(cut);
     cut.windows.grows = true;
@@ -226,12 +253,20 @@ void cut_into_windows(Case& data) {
 }
 
 std::string how_windowed(const Case& data) {
-  if (data.windows.count == 0) return "";
+  const auto& windows = data.windows;
   std::ostringstream text;
   text.precision(3);
-  text << "judged over " << data.windows.count << " windows of " << data.windows.length
-       << " s, each from states of its own, because the model "
-       << (data.windows.grows ? "runs away from a disturbance" : "integrates");
+  if (windows.count > 0)
+    text << "judged over " << windows.count << " windows of " << windows.length
+         << " s, each from states of its own, because the model "
+         << (windows.grows ? "runs away from a disturbance" : "integrates");
+  if (windows.anew > 0)
+    text << (text.str().empty() ? "" : "; ") << "begun at states of their own: " << windows.anew
+         << (windows.anew == 1 ? " stretch" : " stretches")
+         << " behind gaps in an input or in further recordings";
+  if (windows.forgetting > 0)
+    text << (text.str().empty() ? "" : "; ") << "not compared: " << windows.forgetting
+         << " rows in and behind gaps in an input";
   return text.str();
 }
 

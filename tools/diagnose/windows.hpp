@@ -8,13 +8,15 @@ namespace invar::diagnose {
 /// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
 /// on a state goes on to grow to the end of the recording. Each window begins at states of its own, parameters
 /// "<state>.start<k>" that every fit estimates beside the others, under a prior as wide as the state itself goes. A closed
-/// loop, a model that forgets and a recording too short for windows stay as they are.
+/// loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
+/// (anew.hpp).
 void cut_into_windows(Case& data);
 
 /// Is it a state at the beginning of a window?
 bool is_start(const physics::Parameter& parameter);
 
-/// "over 12 windows of 5 s, each from states of its own, because the model integrates"; empty where there are none.
+/// "judged over 12 windows of 5 s, each from states of its own, because the model integrates", and what begins anew behind
+/// gaps; empty where there is nothing of it.
 std::string how_windowed(const Case& data);
 
 }  // namespace invar::diagnose

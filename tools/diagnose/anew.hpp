@@ -1,0 +1,20 @@
+// Anew: where the states of a model in the user's own equations are not what a run from the first row makes of them.
+#pragma once
+
+#include <vector>
+
+#include "tools/diagnose/data.hpp"
+
+namespace invar::diagnose {
+
+/// Rows by recording from which on the states are unknown: behind a gap in which the inputs may have done what they do beside
+/// it, where the model would show that for long; and the first row of a further recording, unless its initial states are
+/// known exactly and its first rows do not contradict. Rows behind a gap that the model soon forgets, and rows
+/// without an input, are marked as nothing to compare with instead and counted in `data.windows.forgetting`. At most so many
+/// rows.
+std::vector<std::vector<std::size_t>> begun_anew(Case& data, std::size_t most);
+
+/// Do the first rows of a recording contradict a state that an output shows, as the model begins?
+bool starts_elsewhere(const Case& data, const Recording& recording);
+
+}  // namespace invar::diagnose
