@@ -206,7 +206,8 @@ Machine make(const std::string& plant, const std::string& effect, double size, u
                     : plant == "droplet"   ? make_droplet(wish, draw)
                     : plant == "sensor"    ? make_sensor(wish, draw)
                                            : make_equations(wish, draw);
-  machine.plant = plant, machine.effect = effect, machine.size = size;
+  machine.plant = plant, machine.effect = effect;
+  if (!(machine.size > 0.0)) machine.size = size;
   machine.parameter_is_off = wish.has("parameter");
   if (machine.verdicts.empty()) {
     if (machine.missing.empty())

@@ -58,7 +58,7 @@ struct TrueTerm {
 
 struct Machine {
   std::string plant, effect;  // "axis", "coulomb_friction+dead_zone"
-  double size = 0.0;          // of the effect, 1: usual
+  double size = 0.0;          // of the effect, 1: usual; an axis may have got less, so that its current stays within its limit
   std::string yaml;           // model.yaml: what its user believes
   std::vector<recording::Table> recordings;
   std::vector<recording::Table> quiet;               // the same without noise and faults
