@@ -199,7 +199,7 @@ Machine make_axis(const Wish& wish, Draw& draw) {
   const auto size = [&](const char* name) { return wish.of(name); };
   m.dry = size("coulomb_friction") * push;
   if (wish.has("stribeck_friction")) {
-    m.dry = wish.size * push, m.sticking = draw.between(0.5, 1.2) * m.dry;
+    m.dry = size("stribeck_friction") * push, m.sticking = draw.between(0.5, 1.2) * m.dry;
     m.creep = draw.log_between(0.004, 0.02);
   }
   m.bristle_force = size("presliding_friction") * push;
