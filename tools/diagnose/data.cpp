@@ -400,7 +400,8 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
       // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
-      if (data.is_time_series && are_too_many()) {
+      const auto plant = data.model.plant;
+      if (are_too_many() && (plant == physics::Plant::equations || (lone && plant == physics::Plant::axis))) {
         lone = far_from(off_lines(residual), true);
         if (are_too_many()) continue;
       }
