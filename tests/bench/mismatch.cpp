@@ -19,6 +19,7 @@ namespace {
 struct Row {
   Machine machine;
   double win = 0.0;
+  std::vector<double> beside;  // of each effect beside the others
   Marks marks;
   std::string verdict, findings, rejected;
   std::vector<diagnose::Finding> claims;
@@ -58,11 +59,12 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
       row.machine.verdicts = {{"unknown_physics", 1.0}, {"ambiguous", 1.0}, {"partly_explained", 1.0}};
     }
   row.win = row.machine.missing.empty() ? 0.0 : to_be_won(row.machine);
+  if (row.machine.missing.size() > 1) row.beside = to_be_won_beside(row.machine, seed, trouble);
   const std::clock_t begin = std::clock();  // of all threads: what it costs, however busy the host
   auto data = case_of(row.machine);
   const auto d = diagnose::search(
       data, [](double, const std::string&) {}, options);
-  row.marks = mark(row.machine, data, d, row.win);
+  row.marks = mark(row.machine, data, d, row.win, row.beside);
   row.marks.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   row.verdict = diagnose::name_of(d.verdict);
   row.still_follows = d.still_follows;
@@ -190,14 +192,18 @@ int main(int argc, char** argv) {
       return;
     }
     const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out, keep);
+    std::string beside;
+    for (const double won : row.beside)
+      beside += (beside.empty() ? " (" : ", ") + std::to_string(std::lround(std::min(won, 1e9)));
+    if (!beside.empty()) beside += ")";
     std::printf(
-        "%-9s %-34s seed %5u size %.2f%s%s win %9.1f  v %.1f l %.1f n %.1f false %d fit %5.2f %6.2f s  %s: "
+        "%-9s %-34s seed %5u size %.2f%s%s win %9.1f%s  v %.1f l %.1f n %.1f false %d fit %5.2f %6.2f s  %s: "
         "%s\n",
         plant.c_str(), effect.c_str(), number, row.machine.size,
         colours[static_cast<std::size_t>(trouble.colour)],
-        trouble.faults ? " faults" : (trouble.quantised ? " steps" : ""), row.win, row.marks.verdict,
-        row.marks.located, row.marks.named, row.marks.false_claims, row.marks.fit, row.marks.seconds,
-        row.verdict.c_str(), row.findings.c_str());
+        trouble.faults ? " faults" : (trouble.quantised ? " steps" : ""), row.win, beside.c_str(),
+        row.marks.verdict, row.marks.located, row.marks.named, row.marks.false_claims, row.marks.fit,
+        row.marks.seconds, row.verdict.c_str(), row.findings.c_str());
     if (why) std::printf("%s%s", row.rejected.c_str(), row.machine.yaml.c_str());
     std::fflush(stdout);
     sums[plant].add(row);

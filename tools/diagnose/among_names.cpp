@@ -31,9 +31,8 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
     for (std::size_t t = data.model.terms.size(); t < without.model.terms.size(); ++t)
       possible = possible && (stands(data, without, t) || !stands(data, d.best, t < place ? t : t + 1));
     if (!possible) continue;
-    if (advantage(data, d.weighing, d.best, without) > claim_margin_of(d.weighing) &&
-        least_ratio(data, d.best, without) < 0.95)
-      continue;
+    const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing);
+    if (gain > margin && (least_ratio(data, d.best, without) < 0.95 || gain > plainly * margin)) continue;
     d.reject(std::string{removed.info->name}, "the others explain it without",
              d.best.evidence - without.evidence);
     d.best = std::move(without);

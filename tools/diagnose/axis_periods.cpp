@@ -245,8 +245,17 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     std::vector<double> pitches;
     // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
     const double finest = std::max(least, span / 6000.0);
-    for (double k : peaks(power, 4, static_cast<std::size_t>(4.0 * span / finest), 4))
-      pitches.push_back(4.0 * span / k);
+    const auto last = std::min(bins - 1, static_cast<std::size_t>(4.0 * span / finest));
+    for (double k : peaks(power, 4, last, 4)) pitches.push_back(4.0 * span / k);
+    // A carriage that is pushed at a few places alone smears a wave over its neighbours: the highest of all stays.
+    if (last > 4) {
+      const auto highest =
+          std::max_element(power.begin() + 4, power.begin() + static_cast<std::ptrdiff_t>(last));
+      const double pitch = 4.0 * span / static_cast<double>(highest - power.begin());
+      if (std::none_of(pitches.begin(), pitches.end(),
+                       [&](double p) { return std::abs(span / p - span / pitch) < 0.5; }))
+        pitches.push_back(pitch);
+    }
     return pitches;
   };
   if (span > 1e-5) {

@@ -399,10 +399,11 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       if (residual.size() < 20) continue;
       // Against the median of its neighbourhood, on the scale of all such differences.
       auto lone = far_from(off_median(residual, data.is_time_series ? 3 : 40), data.is_time_series);
-      // Of a residual that runs smoothly, as beside a wrong parameter, most values are the median themselves, and next to
+      // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
       // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
-      if (data.model.plant == physics::Plant::equations && are_too_many()) {
+      const auto plant = data.model.plant;
+      if (are_too_many() && (plant == physics::Plant::equations || (lone && plant == physics::Plant::axis))) {
         lone = far_from(off_lines(residual), true);
         if (are_too_many()) continue;
       }

@@ -93,6 +93,8 @@ inline constexpr double claim_margin = 10.0;
 inline double claim_margin_of(const Weighing& weighing) {
   return claim_margin + 0.001 * weighing.temper * static_cast<double>(weighing.rows);
 }
+/// A further claim that hardly moves the size of the residual needs so many times the margin.
+inline constexpr double plainly = 3.0;
 /// Alternatives nearer than this cannot be told apart.
 inline constexpr double ambiguous_margin = 3.0;
 

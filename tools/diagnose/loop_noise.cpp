@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/physics/library.hpp"
@@ -119,6 +120,21 @@ bool LoopNoise::shows(const physics::Model& with, const physics::Model& without,
   for (std::size_t o = 0; o < shaken.size(); ++o)
     if (shaken[o] < ratio * ratio * farther[o] || quiet[o] < plain * plain * farther[o]) return true;
   return false;
+}
+
+double LoopNoise::gain(const physics::Model& with, const physics::Model& without,
+                       const Weighing& weighing) const {
+  const auto position = fed_back(data_);
+  if (!position) return std::numeric_limits<double>::infinity();
+  const auto off = softened(data_, recorded_, with, *position);
+  auto shaken = simulate(data_, with);
+  for (std::size_t r = 0; r < off.size(); ++r)
+    for (std::size_t o = 0; o < off[r].size(); ++o)
+      for (std::size_t i = 0; i < off[r][o].size();
+           ++i)  // against what was recorded, whatever is taken off now
+        shaken[r][o][i] += off[r][o][i] + data_.recordings[r].measured[o][i] - recorded_[r][o][i];
+  return 0.5 * weighing.temper *
+         (residual(data_, weighing, without).squaredNorm() - residual(data_, weighing, shaken).squaredNorm());
 }
 
 }  // namespace invar::diagnose

@@ -22,6 +22,9 @@ class LoopNoise {
   /// Does `with` lie nearer than `without`, by this ratio of the residual of any output, when it is shaken too? Play that is
   /// finer than the noise shows in a run without noise alone.
   [[nodiscard]] bool shows(const physics::Model& with, const physics::Model& without, double ratio) const;
+  /// By how much log likelihood does it then, under this weighing? Infinite where no loop feeds noise back.
+  [[nodiscard]] double gain(const physics::Model& with, const physics::Model& without,
+                            const Weighing& weighing) const;
 
  private:
   Case& data_;

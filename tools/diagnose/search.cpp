@@ -190,11 +190,12 @@ bool Search::add_named(double round) {
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double gain = std::min(advantage(data_, own, with_term, without),
                                    advantage_over_wander(data_, own, with_term, without));
-      // A further claim must be one that an engineer would see in the residual. A first one need not, where the noise is
-      // loud at other frequencies, if it pays when counted in independent rows.
+      // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
+      // not, where the noise is loud at other frequencies, if it pays when counted in independent rows.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
-      const bool shows = least_ratio(data_, with_term, without) < ratio ||
-                         (rivals_.empty() && lead(data_, with_term, without) > claim_margin);
+      const bool shows =
+          least_ratio(data_, with_term, without) < ratio ||
+          (rivals_.empty() ? lead(data_, with_term, without) > claim_margin : gain > plainly * margin());
       if (shows && (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)))
         settled_fits[k] = {own, std::move(with_term), std::move(without), gain};
     });
@@ -214,7 +215,8 @@ bool Search::add_named(double round) {
                   f.evidence - base.evidence);
       continue;
     }
-    if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95)) {
+    if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95) &&
+        noise_->gain(own_fit.model, own_base.model, own_weighing) < plainly * margin()) {
       d_.reject(std::string{own_fit.model.terms.back().info->name},
                 "in the noise of this loop its effect would not show", best_gain);
       continue;

@@ -136,7 +136,8 @@ Trace run(const Truth& m, const std::vector<double>& reference, const std::vecto
       double bend = bristle;
       if (m.bristle_force > 0.0) {
         const double most = m.bristle_force / m.bristle_stiffness;
-        bend += (x1 - x) * (1.0 - bristle / most * (x1 > x ? 1.0 : -1.0));
+        const double limit = std::copysign(most, x1 - x);  // Dahl's law, solved over the step
+        bend = limit + (bristle - limit) * std::exp(-std::abs(x1 - x) / most);
       }
       const double f1 = pull(x1, vp, t + h, swing1, swing_p, bend);
       const double a1 = sticks ? 0.0 : (f1 - direction * dry(m, std::abs(vp))) / carriage;
@@ -146,7 +147,12 @@ Trace run(const Truth& m, const std::vector<double>& reference, const std::vecto
         swing_speed += 0.5 * h * (s0 + s1);
         swing = swing1;
       }
-      if (direction != 0.0 && v1 * direction < 0.0) v1 = 0.0;
+      if (direction != 0.0 &&
+          v1 * direction < 0.0) {  // it turns within the step: stays, or goes on the other way
+        const double before_turn = std::abs(v) / (std::abs(v) + std::abs(v1));
+        const double against = std::abs(f1) - dry(m, 0.0);
+        v1 = against > 0.0 ? std::copysign(against / carriage * h * (1.0 - before_turn), f1) : 0.0;
+      }
       x = x1, v = v1, bristle = bend;
       if (m.play > 0.0) shown = std::clamp(shown, x - 0.5 * m.play, x + 0.5 * m.play);
       if (m.late_reading > 0.0) {
@@ -193,7 +199,7 @@ Machine make_axis(const Wish& wish, Draw& draw) {
   const auto size = [&](const char* name) { return wish.of(name); };
   m.dry = size("coulomb_friction") * push;
   if (wish.has("stribeck_friction")) {
-    m.dry = wish.size * push, m.sticking = draw.between(0.5, 1.2) * m.dry;
+    m.dry = size("stribeck_friction") * push, m.sticking = draw.between(0.5, 1.2) * m.dry;
     m.creep = draw.log_between(0.004, 0.02);
   }
   m.bristle_force = size("presliding_friction") * push;
@@ -240,6 +246,7 @@ Machine make_axis(const Wish& wish, Draw& draw) {
       damping = std::max(0.2 * damping, damping + by * damping_sigma);
   }
   Machine machine;
+  machine.size = wish.size;
   machine.yaml =
       "invar_model: 1\nplant: axis\ncolumns: {time: col_time, reference: col_reference, position: "
       "col_position, "

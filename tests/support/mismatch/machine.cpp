@@ -199,14 +199,15 @@ Machine make(const std::string& plant, const std::string& effect, double size, u
   for (std::string part; std::getline(parts, part, '+');)
     if (part != "none") wish.effects.push_back(part);
   wish.size = size;
-  wish.colour = trouble.colour, wish.rows = trouble.rows;
+  wish.colour = trouble.colour, wish.rows = trouble.rows, wish.muted = trouble.muted;
   Machine machine = plant == "axis"        ? make_axis(wish, draw)
                     : plant == "thermal"   ? make_thermal(wish, draw)
                     : plant == "error_map" ? make_error_map(wish, draw)
                     : plant == "droplet"   ? make_droplet(wish, draw)
                     : plant == "sensor"    ? make_sensor(wish, draw)
                                            : make_equations(wish, draw);
-  machine.plant = plant, machine.effect = effect, machine.size = size;
+  machine.plant = plant, machine.effect = effect;
+  if (!(machine.size > 0.0)) machine.size = size;
   machine.parameter_is_off = wish.has("parameter");
   if (machine.verdicts.empty()) {
     if (machine.missing.empty())

@@ -58,8 +58,9 @@ struct TrueTerm {
 
 struct Machine {
   std::string plant, effect;  // "axis", "coulomb_friction+dead_zone"
-  double size = 0.0;          // of the effect, 1: usual
-  std::string yaml;           // model.yaml: what its user believes
+  double size =
+      0.0;  // of the effect, 1: usual; an axis may have got less, so that its current stays within its limit
+  std::string yaml;  // model.yaml: what its user believes
   std::vector<recording::Table> recordings;
   std::vector<recording::Table> quiet;               // the same without noise and faults
   std::map<std::string, std::vector<double>> noise;  // of the first recording, by column
@@ -76,6 +77,7 @@ struct Trouble {
   bool quantised = false;  // written in steps about as large as the noise
   bool faults = false;     // gaps, empty cells, outliers, repeated and swapped rows
   bool renamed = false;    // columns called c1, c2, ...
+  std::string muted;       // an effect of which the machine has nothing; all else is as with it
 };
 
 /// The effects that the machines of a plant can have: "none", "parameter", each term, "unknown:..." for what no term

@@ -1,6 +1,8 @@
 #include "tests/support/mismatch/marks.hpp"
 
 #include <cmath>
+#include <limits>
+#include <sstream>
 
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
@@ -19,8 +21,9 @@ diagnose::Case case_of(const Machine& machine) {
   return diagnose::make_case(model_of(machine), machine.recordings);
 }
 
-double to_be_won(const Machine& machine) {
-  auto quiet = diagnose::make_case(model_of(machine), machine.quiet);
+namespace {
+
+double to_be_won(const Machine& machine, diagnose::Case quiet) {
   auto weighing = diagnose::weigh(quiet, diagnose::simulate(quiet, quiet.model), false);
   for (std::size_t o = 0; o < quiet.outputs.size(); ++o) {
     const auto& column = quiet.model.signal(quiet.outputs[o])->column;
@@ -29,6 +32,37 @@ double to_be_won(const Machine& machine) {
   auto best = diagnose::fit(quiet, weighing, quiet.model, quiet.model, 10);
   best = diagnose::fit(quiet, weighing, best.model, quiet.model, 10);
   return best.cost;
+}
+
+}  // namespace
+
+double to_be_won(const Machine& machine) {
+  return to_be_won(machine, diagnose::make_case(model_of(machine), machine.quiet));
+}
+
+std::vector<double> to_be_won_beside(const Machine& machine, unsigned seed, const Trouble& trouble) {
+  std::vector<double> won;
+  std::istringstream parts{machine.effect};
+  for (std::string part; std::getline(parts, part, '+');) {
+    if (part == "parameter" || part == "none") continue;
+    auto as_is = trouble;
+    as_is.muted = part;
+    const auto without = make(machine.plant, machine.effect, machine.size, seed, as_is);
+    auto quiet = diagnose::make_case(model_of(machine), machine.quiet);
+    // What the user's model gives, and on top of it what the effect changes.
+    const auto other = diagnose::make_case(model_of(machine), without.quiet);
+    const auto nominal = diagnose::simulate(quiet, quiet.model);
+    bool same = without.yaml == machine.yaml && other.recordings.size() == quiet.recordings.size();
+    for (std::size_t r = 0; same && r < nominal.size(); ++r)
+      for (std::size_t o = 0; o < nominal[r].size(); ++o) {
+        auto& measured = quiet.recordings[r].measured[o];
+        const auto& before = other.recordings[r].measured[o];
+        same = same && before.size() == measured.size();
+        for (std::size_t i = 0; same && i < measured.size(); ++i) measured[i] += nominal[r][o][i] - before[i];
+      }
+    won.push_back(same ? to_be_won(machine, std::move(quiet)) : std::numeric_limits<double>::infinity());
+  }
+  return won;
 }
 
 double credit(const Machine& machine, const std::string& term) {
@@ -74,7 +108,8 @@ double fit_on_test(const Machine& machine, const physics::Model& believed, const
   return n > 0.0 ? sum / n : 1.0;
 }
 
-Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win) {
+Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win,
+           const std::vector<double>& beside) {
   Marks marks;
   const auto verdict = diagnose::name_of(d.verdict);
   if (const auto at = machine.verdicts.find(verdict); at != machine.verdicts.end())
@@ -82,7 +117,8 @@ Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::D
   const bool modest = verdict == "no_mismatch" || verdict == "parameters_only";
   if (machine.missing.empty() && modest && win < plain) marks.verdict = 1.0;
   if (!machine.missing.empty() && win < plain && modest) marks.verdict = 1.0;
-  for (const auto& missing : machine.missing) {
+  for (std::size_t m = 0; m < machine.missing.size(); ++m) {
+    const auto& missing = machine.missing[m];
     double named = 0.0, located = 0.0;
     for (const auto& finding : d.findings) {
       const auto site = diagnose::site_of(data, finding.term);
@@ -97,7 +133,7 @@ Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::D
           });
       located = std::max(located, meets ? 1.0 : 0.5);
     }
-    if (win < plain && modest) named = located = 1.0;
+    if ((win < plain && modest) || (m < beside.size() && beside[m] < plain)) named = located = 1.0;
     marks.named += named / static_cast<double>(machine.missing.size());
     marks.located += located / static_cast<double>(machine.missing.size());
   }

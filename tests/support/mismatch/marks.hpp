@@ -9,6 +9,9 @@ namespace invar::test::mismatch {
 /// How far the best nominal model stays from the quiet truth, as half the sum of squares in units of the noise: the log
 /// likelihood that there is to win. Below `hidden` nobody could claim anything; above `plain` one must.
 double to_be_won(const Machine& machine);
+/// The same of each missing effect beside the others, as `missing` has them. Infinite where the effect cannot be taken out
+/// alone.
+std::vector<double> to_be_won_beside(const Machine& machine, unsigned seed, const Trouble& trouble);
 inline constexpr double hidden = 12.0, plain = 120.0;
 
 struct Marks {
@@ -21,8 +24,9 @@ struct Marks {
 
 physics::Model model_of(const Machine& machine);
 diagnose::Case case_of(const Machine& machine);
-/// `win` is to_be_won.
-Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win);
+/// `win` is to_be_won, `beside` to_be_won_beside where there are several effects: one below `plain` need not be found.
+Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win,
+           const std::vector<double>& beside = {});
 /// The share of what a perfect model would gain on the test run over the believed one.
 double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched);
 /// The same of outputs on `machine.test_inputs` that are no model's.

@@ -13,6 +13,7 @@ struct Wish {
   double size = 1.0;
   Colour colour = Colour::white;
   std::size_t rows = 0;  // 0: drawn
+  std::string muted;     // of this effect nothing, all else as with it
 
   [[nodiscard]] bool has(const std::string& name) const {
     return std::find(effects.begin(), effects.end(), name) != effects.end();
@@ -23,7 +24,7 @@ struct Wish {
            : colour == Colour::resonance ? draw.between(0.2, 2.0)
                                          : 0.0;
   }
-  [[nodiscard]] double of(const std::string& name) const { return has(name) ? size : 0.0; }
+  [[nodiscard]] double of(const std::string& name) const { return has(name) && name != muted ? size : 0.0; }
 };
 
 Machine make_axis(const Wish& wish, Draw& draw);

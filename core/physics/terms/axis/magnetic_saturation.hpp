@@ -16,7 +16,7 @@ struct MagneticSaturation {
       .depends_on = {"current"},
       .parameters = {{{"coefficient",
                        "1/A2",
-                       {0.0, 1.0},
+                       {0.0, 100.0},
                        Role::amplitude,
                        {1e-3},
                        "relative loss per current squared"}}},
