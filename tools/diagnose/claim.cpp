@@ -6,6 +6,8 @@
 #include <complex>
 #include <numbers>
 
+#include "tools/diagnose/sensitivities.hpp"
+
 namespace invar::diagnose {
 
 using physics::Role;

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <utility>
 
+#include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/wander.hpp"
 
 namespace invar::diagnose {
@@ -60,7 +60,7 @@ class Series {
     one.model = other.model = d_.best.model;
     const double margin = claim_margin_of(d_.weighing);
     if (one.evidence - other.evidence < margin) return false;
-    const auto [ratio, lead] = led(effect, times);
+    const auto [ratio, lead, independent] = led(effect, times);
     const bool coloured = std::any_of(d_.weighing.filters.begin(), d_.weighing.filters.end(),
                                       [](const Whitening& filter) { return !filter.a.empty(); });
     if (!coloured && lead - price < margin) return false;
@@ -69,29 +69,17 @@ class Series {
   }
 
  private:
-  /// Least ratio of the residuals with and without the effect of any output, and its lead in independent rows.
-  [[nodiscard]] std::pair<double, double> led(const Effect& effect, double times) const {
-    double least = 1.0, lead = 0.0;
+  /// The residual with the effect that nobody modelled over the one without.
+  [[nodiscard]] Lead led(const Effect& effect, double times) const {
+    Left with(data_.outputs.size()), without(data_.outputs.size());
     Eigen::Index at = 0;
-    std::vector<std::vector<std::vector<double>>> series(data_.outputs.size());
-    std::vector<double> with(series.size()), without(series.size()), rows(series.size());
     for (const auto& recording : data_.recordings)
-      for (std::size_t o = 0; o < series.size(); ++o) {
-        auto& one = series[o].emplace_back(recording.inputs.rows());
-        for (double& value : one) {
-          value = raw_(at);
-          if (std::isfinite(value))
-            with[o] += value * value, without[o] += std::pow(value - times * effect.raw(at), 2),
-                rows[o] += 0.5;
-          ++at;
-        }
+      for (std::size_t o = 0; o < with.size(); ++o) {
+        auto &e = with[o].emplace_back(), &f = without[o].emplace_back();
+        for (std::size_t i = 0; i < recording.inputs.rows(); ++i, ++at)
+          e.push_back(raw_(at)), f.push_back(raw_(at) - times * effect.raw(at));
       }
-    for (std::size_t o = 0; o < series.size(); ++o)
-      if (with[o] > 0.0 && without[o] > 0.0) {
-        least = std::min(least, std::sqrt(with[o] / without[o]));
-        lead += 0.5 * rows[o] * independent_share(series[o]) * std::log(without[o] / with[o]);
-      }
-    return {least, lead};
+    return lead_of(data_, with, without);
   }
 
   const Case& data_;

@@ -20,14 +20,35 @@ void Diagnosis::reject(const std::string& term, const std::string& why, double g
   rejected.push_back({term, why, gain});
 }
 
-std::vector<double> squares_left(const Case& data, const physics::Model& model) {
-  const auto simulated = simulate(data, model);
-  std::vector<double> sums(data.outputs.size(), 0.0);
+double Squares::rms() const { return count > 0.0 ? std::sqrt(sum / count) : 0.0; }
+
+namespace {
+
+template <class Counts>
+std::vector<Squares> squares_of(const Case& data, const std::vector<physics::Outputs>& simulated,
+                                Counts counts) {
+  std::vector<Squares> all(data.outputs.size());
   for (std::size_t r = 0; r < data.recordings.size(); ++r)
-    for (std::size_t o = 0; o < sums.size(); ++o)
+    for (std::size_t o = 0; o < all.size(); ++o)
       for (std::size_t i = 0; i < simulated[r][o].size(); ++i)
-        if (const double y = data.recordings[r].measured[o][i]; std::isfinite(y))
-          sums[o] += std::pow(y - simulated[r][o][i], 2);
+        if (counts(r, o, i))
+          all[o] += {std::pow(data.recordings[r].measured[o][i] - simulated[r][o][i], 2), 1.0};
+  return all;
+}
+
+}  // namespace
+
+std::vector<Squares> squares_left(const Case& data, const std::vector<physics::Outputs>& simulated,
+                                  const Weighing& on) {
+  return squares_of(data, simulated, [&](auto r, auto o, auto i) { return on.present[r][o][i]; });
+}
+
+std::vector<double> squares_left(const Case& data, const physics::Model& model) {
+  std::vector<double> sums;
+  for (const auto& one : squares_of(data, simulate(data, model), [&](auto r, auto o, auto i) {
+         return std::isfinite(data.recordings[r].measured[o][i]);
+       }))
+    sums.push_back(one.sum);
   return sums;
 }
 

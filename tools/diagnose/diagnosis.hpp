@@ -98,6 +98,15 @@ inline constexpr double plainly = 3.0;
 /// Alternatives nearer than this cannot be told apart.
 inline constexpr double ambiguous_margin = 3.0;
 
+/// Of measured - simulated of one output.
+struct Squares {
+  double sum = 0.0, count = 0.0;
+  void operator+=(const Squares& more) { sum += more.sum, count += more.count; }
+  [[nodiscard]] double rms() const;
+};
+/// By output, of the rows that belong to a weighing.
+std::vector<Squares> squares_left(const Case& data, const std::vector<physics::Outputs>& simulated,
+                                  const Weighing& on);
 /// Sum of squares of measured - simulated by output.
 std::vector<double> squares_left(const Case& data, const physics::Model& model);
 /// The smallest ratio of residual RMS of any output, a over b.

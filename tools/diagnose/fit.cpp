@@ -3,10 +3,9 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "tools/diagnose/common_factor.hpp"
-#include "tools/diagnose/windows.hpp"
+#include "tools/diagnose/sensitivities.hpp"
 
 namespace invar::diagnose {
 
@@ -126,196 +125,6 @@ void for_neighbours(const std::vector<Freedom>& free, F f) {
 
 }  // namespace
 
-std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
-  Remembered::Simulations recordings;
-  for (const auto& recording : data.recordings) recordings.push_back(recording.simulation);
-  if (auto known = data.remembered->find(model, recordings)) return std::move(*known);
-  auto all = simulate_once(data, model);
-  data.remembered->keep(model, recordings, all);
-  return all;
-}
-
-std::vector<physics::Outputs> simulate_once(const Case& data, const Model& model) {
-  if (data.stopped && data.stopped()) throw Stopped{};
-  std::vector<physics::Outputs> all(data.recordings.size());
-  for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
-  return all;
-}
-
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
-  Weighing weighing;
-  weighing.present.resize(data.recordings.size());
-  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    std::vector<std::vector<double>> series;
-    std::size_t used = 0;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      const auto& measured = data.recordings[r].measured[o];
-      std::vector<double> one(measured.size());
-      std::vector<bool> present(measured.size());
-      for (std::size_t i = 0; i < one.size(); ++i) {
-        one[i] = measured[i] - simulated[r][o][i];
-        present[i] = std::isfinite(one[i]);
-        used += present[i] ? 1U : 0U;
-      }
-      series.push_back(std::move(one));
-      weighing.present[r].push_back(std::move(present));
-      weighing.rows += static_cast<Eigen::Index>(measured.size());
-    }
-    const std::size_t most = coloured && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
-    auto filter = fit_whitening(series, most);
-    // Hardly any values: nothing but the user's word says how good they are.
-    if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o]};
-    weighing.filters.push_back(filter);
-  }
-  // In a loop the command repeats the noise of the reading.
-  weighing.temper = data.model.controller && data.outputs.size() > 1 ? 0.5 : 1.0;
-  return weighing;
-}
-
-Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated) {
-  Eigen::Index rows = 0;
-  for (const auto& recording : data.recordings)
-    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
-  Eigen::VectorXd out(rows);
-  Eigen::Index at = 0;
-  for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
-    for (std::size_t o = 0; o < data.outputs.size(); ++o)
-      for (std::size_t i = 0; i < data.recordings[rec].inputs.rows(); ++i)
-        out(at++) = data.recordings[rec].measured[o][i] - simulated[rec][o][i];
-  return out;
-}
-
-namespace {
-
-void whiten_all(const Case& data, const Weighing& weighing, const double* in, double* out) {
-  std::vector<double> r;
-  for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
-    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-      const std::size_t rows = data.recordings[rec].inputs.rows();
-      r.assign(in, in + rows);
-      // What is present but not finite ran away.
-      for (std::size_t i = 0; i < rows; ++i)
-        if (!std::isfinite(r[i])) r[i] = 1e3 * weighing.filters[o].sigma;
-      whiten(weighing.filters[o], r, weighing.present[rec][o], out);
-      in += rows;
-      out += rows;
-    }
-}
-
-}  // namespace
-
-Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
-                         const std::vector<physics::Outputs>& simulated) {
-  const Eigen::VectorXd raw = differences(data, simulated);
-  Eigen::VectorXd out(raw.size());
-  whiten_all(data, weighing, raw.data(), out.data());
-  return out.cwiseMax(-1e6).cwiseMin(1e6);
-}
-
-Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const Model& model) {
-  return residual(data, weighing, simulate(data, model));
-}
-
-Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& models) {
-  Eigen::Index rows = 0;
-  for (const auto& recording : data.recordings)
-    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
-  Eigen::MatrixXd columns(rows, static_cast<Eigen::Index>(models.size()));
-  const std::size_t together = data.model.plant == physics::Plant::equations ? 8 : 1;
-  in_parallel((models.size() + together - 1) / together, [&](std::size_t group) {
-    if (data.stopped && data.stopped()) throw Stopped{};
-    const std::size_t begin = group * together, end = std::min(models.size(), begin + together);
-    std::vector<const Model*> some;
-    for (std::size_t k = begin; k < end; ++k) some.push_back(&models[k]);
-    std::vector<std::vector<physics::Outputs>> all(some.size(),
-                                                   std::vector<physics::Outputs>(data.recordings.size()));
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      std::vector<physics::Outputs> outputs;
-      data.recordings[r].simulation->run_all(some, outputs);
-      for (std::size_t k = 0; k < some.size(); ++k) all[k][r] = std::move(outputs[k]);
-    }
-    for (std::size_t k = begin; k < end; ++k)
-      columns.col(static_cast<Eigen::Index>(k)) = differences(data, all[k - begin]);
-  });
-  return columns;
-}
-
-namespace {
-
-/// Rows [first, last) of the residual column of one output that a window's states move: those of its recording from its
-/// restart to the next.
-struct Stretch {
-  Eigen::Index first = 0, last = 0;
-};
-
-/// The rows of all outputs that the start `name` moves.
-std::vector<Stretch> moved_by(const Case& data, const std::string& name) {
-  const std::size_t which = std::stoul(name.substr(name.find(".start") + 6));
-  std::vector<Stretch> rows;
-  Eigen::Index at = 0;
-  for (const auto& recording : data.recordings) {
-    const auto& restarts = recording.inputs.restarts;
-    const std::size_t first = recording.inputs.first_restart, n = recording.inputs.rows();
-    for (std::size_t o = 0; o < data.outputs.size(); ++o, at += static_cast<Eigen::Index>(n))
-      if (which >= first && which - first < restarts.size()) {
-        const std::size_t k = which - first, end = k + 1 < restarts.size() ? restarts[k + 1] : n;
-        rows.push_back({at + static_cast<Eigen::Index>(restarts[k]), at + static_cast<Eigen::Index>(end)});
-      }
-  }
-  return rows;
-}
-
-}  // namespace
-
-Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
-  const Eigen::VectorXd at = differences(data, simulate(data, model));
-  std::vector<Model> changed;
-  std::vector<std::size_t> run_of(free.size());
-  Eigen::VectorXd steps(static_cast<Eigen::Index>(free.size()));
-  std::map<std::string, std::size_t> run_of_state;  // one run moves a state in all windows: they do not meet
-  const auto is_window = [&](const Freedom& f) {
-    return f.where == Freedom::Where::parameter && is_start(model.parameters[f.index]);
-  };
-  for (std::size_t j = 0; j < free.size(); ++j) {
-    const double value = get(model, free[j]);
-    // Equations that swing for long answer in phase: there a larger step would not be small.
-    double step = (model.plant == physics::Plant::equations ? 1e-4 : 1e-2) * free[j].scale;
-    if (value + step > free[j].bounds.upper) step = -step;
-    steps(static_cast<Eigen::Index>(j)) = step;
-    run_of[j] = changed.size();
-    if (is_window(free[j])) {
-      const auto& name = model.parameters[free[j].index].name;
-      run_of[j] = run_of_state.try_emplace(name.substr(0, name.find(".start")), changed.size()).first->second;
-    }
-    if (run_of[j] == changed.size()) changed.push_back(model);
-    set(changed[run_of[j]], free[j], value + step);
-  }
-  const Eigen::MatrixXd runs = differences_of(data, changed);
-  Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(free.size()));
-  for (std::size_t j = 0; j < free.size(); ++j) {
-    const auto to = static_cast<Eigen::Index>(j), from = static_cast<Eigen::Index>(run_of[j]);
-    const auto slope = [](double v) { return std::isfinite(v) ? v : 0.0; };
-    if (!is_window(free[j])) {
-      columns.col(to) = ((runs.col(from) - at) / steps(to)).unaryExpr(slope);
-      continue;
-    }
-    columns.col(to).setZero();
-    for (const auto& [first, last] : moved_by(data, model.parameters[free[j].index].name))
-      columns.col(to).segment(first, last - first) =
-          ((runs.col(from) - at).segment(first, last - first) / steps(to)).unaryExpr(slope);
-  }
-  return columns;
-}
-
-Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns) {
-  Eigen::MatrixXd out(columns.rows(), columns.cols());
-  in_parallel(static_cast<std::size_t>(columns.cols()), [&](std::size_t j) {
-    const auto k = static_cast<Eigen::Index>(j);
-    whiten_all(data, weighing, columns.col(k).data(), out.col(k).data());
-  });
-  return out;
-}
-
 namespace {
 
 bool same_term(const Model& a, const Model& b, std::size_t term) {
@@ -410,24 +219,26 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
     });
     return sum;
   };
-  const auto filtered = [&](const Eigen::VectorXd& r) {
-    Eigen::VectorXd out(r.size());
-    whiten_all(data, weighing, r.data(), out.data());
-    return Eigen::VectorXd{out.cwiseMax(-1e6).cwiseMin(1e6)};
-  };
   Eigen::VectorXd raw = differences(data, simulate(data, best.model));
-  best.residual = filtered(raw);
+  best.residual = filtered(data, weighing, raw);
   best.data_cost = 0.5 * weighing.temper * best.residual.squaredNorm();
   best.cost = best.data_cost + priors(best.model);
   best.columns = nearly(data, best.model, best.free, near);
   bool fresh = near == nullptr, verified = fresh;
-  const bool cheap =
-      data.model.plant == physics::Plant::equations;  // to simulate: always fresh sensitivities
+  // To simulate: always fresh sensitivities.
+  constexpr Eigen::Index cheap_values = 60000, many = 40;
+  const bool cheap = data.model.plant == physics::Plant::equations && n * raw.size() <= cheap_values;
   Eigen::MatrixXd j = whitened(data, weighing, best.columns);
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   const auto derive = [&] {
-    hessian = weighing.temper * (j.transpose() * j);
+    if (n > many) {  // half of it: the products are most of what windows cost
+      hessian.setZero(n, n);
+      hessian.selfadjointView<Eigen::Lower>().rankUpdate(j.transpose(), weighing.temper);
+      hessian = Eigen::MatrixXd{hessian.selfadjointView<Eigen::Lower>()};
+    } else {
+      hessian = weighing.temper * (j.transpose() * j);
+    }
     gradient = weighing.temper * (j.transpose() * best.residual);
     for (Eigen::Index k = 0; k < n; ++k) {
       const auto& f = best.free[static_cast<std::size_t>(k)];
@@ -475,7 +286,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       scale(k) = f.scale;
     }
     const Eigen::VectorXd raw_tried = differences(data, simulate(data, tried));
-    Eigen::VectorXd r = filtered(raw_tried);
+    Eigen::VectorXd r = filtered(data, weighing, raw_tried);
     const double data_cost = 0.5 * weighing.temper * r.squaredNorm();
     const double cost = data_cost + priors(tried);
     if (cost < best.cost) {

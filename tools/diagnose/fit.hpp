@@ -49,11 +49,8 @@ std::vector<physics::Outputs> simulate_once(const Case& data, const physics::Mod
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const physics::Model& model);
 Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
                          const std::vector<physics::Outputs>& simulated);
-/// measured - simulated of each model, a column each. Runs on all processors.
-Eigen::MatrixXd differences_of(const Case& data, const std::vector<physics::Model>& models);
-/// Columns: change of measured - simulated by each freedom, row by row as they stand. Runs on all processors.
-Eigen::MatrixXd sensitivities(const Case& data, const physics::Model& model,
-                              const std::vector<Freedom>& free);
+/// measured - simulated through the filters of the weighing.
+Eigen::VectorXd filtered(const Case& data, const Weighing& weighing, const Eigen::VectorXd& differences);
 /// Each column through the filters of the weighing.
 Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns);
 /// measured - simulated of all recordings and outputs below one another; NaN where nothing was measured.

@@ -9,32 +9,41 @@
 
 namespace invar::diagnose {
 
-double lead(const Case& data, const Fit& one, const Fit& other) {
-  const auto with_one = simulate(data, one.model), with_other = simulate(data, other.model);
-  double sum = 0.0, independent = 0.0;
-  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    std::vector<std::vector<double>> left[2];
-    double squares[2] = {0.0, 0.0}, rows = 0.0;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      const auto& y = data.recordings[r].measured[o];
-      for (int side = 0; side < 2; ++side) {
-        const auto& simulated = (side == 0 ? with_one : with_other)[r][o];
-        auto& e = left[side].emplace_back(y.size());
-        for (std::size_t i = 0; i < y.size(); ++i) {
-          e[i] = y[i] - simulated[i];
-          if (std::isfinite(y[i])) squares[side] += e[i] * e[i], rows += 0.5;
+Lead lead_of(const Case& data, const Left& one, const Left& other) {
+  Lead all;
+  for (std::size_t o = 0; o < one.size(); ++o) {
+    double with = 0.0, without = 0.0, rows = 0.0;
+    for (std::size_t r = 0; r < one[o].size(); ++r)
+      for (std::size_t i = 0; i < one[o][r].size(); ++i)
+        if (const double e = one[o][r][i], f = other[o][r][i]; std::isfinite(e) || std::isfinite(f)) {
+          if (std::isfinite(e)) with += e * e, rows += 0.5;
+          if (std::isfinite(f)) without += f * f, rows += 0.5;
         }
-      }
-    }
-    if (!(squares[0] > 0.0) || !(squares[1] > 0.0)) continue;
+    if (!(with > 0.0) || !(without > 0.0)) continue;
     // The smaller residual is nearer to the noise, and so is its colour.
-    const auto& nearer = left[squares[0] < squares[1] ? 0 : 1];
-    const double worth = rows * (data.is_time_series ? independent_share(nearer) : 1.0);
-    sum += 0.5 * worth * std::log(squares[1] / squares[0]);
-    independent += worth;
+    const double worth =
+        rows * (data.is_time_series ? independent_share(with < without ? one[o] : other[o]) : 1.0);
+    all.ratio = std::min(all.ratio, std::sqrt(with / without));
+    all.gain += 0.5 * worth * std::log(without / with);
+    all.independent += worth;
   }
-  return sum - 0.5 * (static_cast<double>(one.free.size()) - static_cast<double>(other.free.size())) *
-                   std::log(std::max(10.0, independent));
+  return all;
+}
+
+double lead(const Case& data, const Fit& one, const Fit& other) {
+  const auto left_by = [&](const Fit& fit) {
+    const auto simulated = simulate(data, fit.model);
+    Left left(data.outputs.size());
+    for (std::size_t o = 0; o < left.size(); ++o)
+      for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+        auto& e = left[o].emplace_back(data.recordings[r].measured[o]);
+        for (std::size_t i = 0; i < e.size(); ++i) e[i] -= simulated[r][o][i];
+      }
+    return left;
+  };
+  const auto all = lead_of(data, left_by(one), left_by(other));
+  return all.gain - 0.5 * (static_cast<double>(one.free.size()) - static_cast<double>(other.free.size())) *
+                        std::log(std::max(10.0, all.independent));
 }
 
 double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other) {

@@ -8,6 +8,16 @@
 
 namespace invar::diagnose {
 
+/// measured - simulated by output and recording; NaN where nothing was measured.
+using Left = std::vector<std::vector<std::vector<double>>>;
+
+struct Lead {
+  double ratio = 1.0;        // the least of the residuals of any output, one over the other
+  double gain = 0.0;         // log likelihood, counted in independent rows of the residual that is smaller
+  double independent = 0.0;  // so many rows
+};
+Lead lead_of(const Case& data, const Left& one, const Left& other);
+
 /// log likelihood of `one` over `other` counted in independent rows of the residual that `one` leaves, less the price
 /// of the numbers that it has more: says which is right whatever the colour of the noise.
 double lead(const Case& data, const Fit& one, const Fit& other);

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/diagnose/excerpt.hpp"
+#include "tools/diagnose/sensitivities.hpp"
+
 namespace invar::diagnose {
 
 namespace {
@@ -98,10 +101,15 @@ double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const
   return std::max(0.0, -0.5 * strength.dot(g));
 }
 
-}  // namespace
+std::size_t directions_of(const std::vector<Start>& starts) {
+  std::size_t sum = 0;
+  for (const auto& start : starts) sum += start.directions.size();
+  return sum;
+}
 
-std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
-                             const std::vector<Start>& starts, std::size_t keep) {
+/// On all rows.
+std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, const Fit& base,
+                                    const std::vector<Start>& starts, std::size_t keep) {
   const auto n = nuisance(data, weighing, base);
   const Eigen::VectorXd at = differences(data, simulate(data, base.model));
   std::vector<Screened> all(starts.size());
@@ -149,6 +157,41 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   return all;
 }
 
+}  // namespace
+
+std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,
+                             const std::vector<Start>& starts, std::size_t keep) {
+  const auto some = excerpt(data, weighing, base, directions_of(starts));
+  if (!some) return screen_on_all(data, weighing, base, starts, keep);
+  auto ranked = screen_on_all(some->data, some->weighing, some->base, starts, 0);
+  // The best of them, two of a kind at most, on all rows.
+  constexpr std::size_t enough = 40;  // directions
+  std::vector<Start> best;
+  std::vector<Screened> others;
+  for (auto& s : ranked) {
+    const auto is_kin = [&](const Start& start) {
+      const auto &a = start.term, &b = s.start.term;
+      return a.info == b.info && a.on == b.on && a.with == b.with && a.curve.over == b.curve.over;
+    };
+    const bool is_good = !s.impossible && std::count_if(best.begin(), best.end(), is_kin) < 2 &&
+                         (directions_of(best) < enough || best.size() < 2 * keep);
+    if (is_good)
+      best.push_back(s.start);
+    else
+      others.push_back(std::move(s));
+  }
+  auto all = screen_on_all(data, weighing, base, best, keep);
+  const double least = all.empty() ? 0.0 : all.back().merit;
+  for (auto& s : others) {  // what they would gain, if they go on as in the excerpt
+    s.merit += s.gain / some->share - s.gain;
+    s.gain /= some->share;
+    if (!s.impossible) s.merit = std::min(s.merit, least);
+    all.push_back(std::move(s));
+  }
+  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.merit > b.merit; });
+  return all;
+}
+
 namespace {
 
 /// A strength that its bounds forbid, or a limit that would hardly be there.
@@ -170,6 +213,12 @@ double price(const Start& start, double observations) {
 
 std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighing, const Fit& base,
                                        const std::vector<Start>& starts, std::size_t most) {
+  if (const auto some = excerpt(data, weighing, base, directions_of(starts))) {
+    auto pairs = screen_pairs(some->data, some->weighing, some->base, starts, most);
+    for (auto& pair : pairs)
+      pair.shift.setZero(static_cast<Eigen::Index>(base.free.size()));  // of the excerpt's
+    return pairs;
+  }
   // Of each term the two starts that gain most alone. In the user's equations, which have many places, what repeats is left
   // to the search one by one: it shows alone, at its own place in the spectrum.
   const bool may_repeat = data.model.plant != physics::Plant::equations;

@@ -37,19 +37,6 @@ Fold fold_of(const Case& data, const Weighing& all, std::size_t which) {
   return fold;
 }
 
-/// Squares of measured - simulated, and how many.
-struct Squares {
-  double sum = 0.0, count = 0.0;
-  void add(const Case& data, const std::vector<physics::Outputs>& simulated, std::size_t o,
-           const Weighing& on) {
-    for (std::size_t r = 0; r < data.recordings.size(); ++r)
-      for (std::size_t i = 0; i < data.recordings[r].inputs.rows(); ++i)
-        if (on.present[r][o][i])
-          sum += std::pow(data.recordings[r].measured[o][i] - simulated[r][o][i], 2), count += 1.0;
-  }
-  [[nodiscard]] double rms() const { return count > 0.0 ? std::sqrt(sum / count) : 0.0; }
-};
-
 /// The weights under which this model is the best of its kind: coloured ones may follow the colour of what is still
 /// missing and lead away from it; then every row counts alike.
 Weighing weights_of(const Case& data, const Weighing& coloured, const Fit& whole) {
@@ -83,14 +70,14 @@ void hold_out(const Case& data, Diagnosis& d, bool refuses) {
     const auto fold = fold_of(data, d.weighing, k);
     const auto retuned = refitted(data, for_retuned, k, d.retuned, iterations);
     const auto after = any ? refitted(data, for_best, k, d.best, iterations) : retuned;
-    for (std::size_t o = 0; o < data.outputs.size(); ++o)
-      for (const bool test : {true, false}) {
-        auto& sums = (test ? tested : trained)[o];
-        const auto& on = test ? fold.test : fold.train;
-        sums.before.add(data, nominal, o, on);
-        sums.retuned.add(data, retuned, o, on);
-        sums.after.add(data, after, o, on);
-      }
+    for (const bool test : {true, false}) {
+      const auto& on = test ? fold.test : fold.train;
+      auto& sums = test ? tested : trained;
+      const auto before = squares_left(data, nominal, on), without = squares_left(data, retuned, on),
+                 with = squares_left(data, after, on);
+      for (std::size_t o = 0; o < sums.size(); ++o)
+        sums[o].before += before[o], sums[o].retuned += without[o], sums[o].after += with[o];
+    }
     if (any)
       gain +=
           0.5 * d.weighing.temper *

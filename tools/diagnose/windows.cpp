@@ -8,18 +8,7 @@
 
 namespace invar::diagnose {
 
-namespace {
-
-using physics::Model;
-
-/// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
-/// says what it lacks; but each costs a fit as many numbers as there are states.
-constexpr std::size_t fewest_rows = 60, most_starts = 100;
-/// A window is at most as long as a disturbance of its first state takes to grow so much.
-constexpr double most_growth = 30.0;
-
-/// The model with its states as its outputs.
-Model showing_states(const Model& model) {
+physics::Model showing_states(const physics::Model& model) {
   auto shown = model;
   shown.equations.outputs.clear();
   std::erase_if(shown.signals, [](const auto& signal) { return signal.is_output; });
@@ -29,6 +18,16 @@ Model showing_states(const Model& model) {
   }
   return shown;
 }
+
+namespace {
+
+using physics::Model;
+
+/// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
+/// says what it lacks; but each costs a fit as many numbers as there are states.
+constexpr std::size_t fewest_rows = 60, most_starts = 100;
+/// A window is at most as long as a disturbance of its first state takes to grow so much.
+constexpr double most_growth = 30.0;
 
 double reach(const std::vector<double>& values, double begin, double end) {
   const auto n = static_cast<double>(values.size());

@@ -12,6 +12,9 @@ namespace invar::diagnose {
 /// (anew.hpp).
 void cut_into_windows(Case& data);
 
+/// The model with its states as its outputs.
+physics::Model showing_states(const physics::Model& model);
+
 /// Is it a state at the beginning of a window?
 bool is_start(const physics::Parameter& parameter);
 
