@@ -90,12 +90,15 @@ std::string separating_experiment(const Case& data, const physics::Term& at, con
 
 std::string next_experiment(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
+  std::string apart;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
       if (a.log_odds > -ambiguous_margin)
-        return "To tell " + readable(name_beside(data, finding.term, a.term)) + " from " +
-               readable(name_beside(data, a.term, finding.term)) + ": " +
-               separating_experiment(data, finding.term, a.term) + ".";
+        apart += (apart.empty() ? "To tell " : " To tell ") +
+                 readable(name_beside(data, finding.term, a.term)) + " from " +
+                 readable(name_beside(data, a.term, finding.term)) + ": " +
+                 separating_experiment(data, finding.term, a.term) + ".";
+  if (!apart.empty()) return apart;
   const auto over = [&]() -> std::string {
     if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
       return d.findings.back().term.curve.over;

@@ -15,13 +15,6 @@ namespace {
 constexpr std::size_t cells = 40, fewest = 3;  // fewest: rows in a cell that counts
 constexpr double third = 1.0 / 3.0;
 
-std::string unit_of_variable(const Case& data, const std::string& variable) {
-  if (variable == "time") return "s";
-  if (variable == "velocity") return "m/s";
-  const auto* signal = data.model.signal(variable);
-  return signal != nullptr ? signal->unit : "";
-}
-
 /// By recording and row, the square of what the finding does to the outputs, each in its noise.
 std::vector<std::vector<double>> power_of_effect(const Case& data, const Diagnosis& d, std::size_t finding) {
   auto model = d.best.model;
@@ -108,14 +101,14 @@ std::vector<Region> regions_of(const Case& data, const Diagnosis& d, std::size_t
   return regions;
 }
 
-std::string region_words(const std::vector<Region>& regions) {
+std::string where_of(const Case& data, const Diagnosis& d, std::size_t finding) {
   std::string text;
-  for (const auto& region : regions)
+  for (const auto& region : regions_of(data, d, finding))
     if (region.is_part)
-      text += (text.empty() ? "" : ", ") + region.variable + " " +
+      text += (text.empty() ? ", most at " : ", ") + region.variable + " " +
               report::si(region.within.lower, region.unit) + " to " +
               report::si(region.within.upper, region.unit);
-  return text;
+  return place_of(data, d.findings[finding].term) + text;
 }
 
 }  // namespace invar::diagnose

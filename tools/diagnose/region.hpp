@@ -21,7 +21,7 @@ struct Region {
 /// peak. Heat and equations add up what acts on them, and show it long after: there of curves alone.
 std::vector<Region> regions_of(const Case& data, const Diagnosis& d, std::size_t finding);
 
-/// "position 94 mm to 110 mm": the regions that are a part of what was recorded; empty where none is.
-std::string region_words(const std::vector<Region>& regions);
+/// "force on the carriage, at position 94 mm to 110 mm": its place, and the regions that are a part of what was recorded.
+std::string where_of(const Case& data, const Diagnosis& d, std::size_t finding);
 
 }  // namespace invar::diagnose

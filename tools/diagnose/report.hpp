@@ -44,5 +44,8 @@ std::string separating_experiment(const Case& data, const physics::Term& one, co
 std::string name_beside(const Case& data, const physics::Term& term, const physics::Term& other);
 /// The unit of a term's parameter, by the place it acts on where the library leaves it open.
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter);
+/// The units, SI, of what an effect without a name adds at its place, and of what it goes with; empty where not known.
+std::string unit_of_curve(const Case& data, const physics::Term& term);
+std::string unit_of_variable(const Case& data, const std::string& variable);
 
 }  // namespace invar::diagnose

@@ -101,7 +101,7 @@ Series averaged(const std::string& label, const std::vector<double>& x, const st
 }
 
 /// The four numbers of one output beside one another.
-void add_bars(report::Page& page, const FitRow& row) {
+void add_bars(report::Page& page, const FitRow& row, bool any_found) {
   const auto bar = [&](const char* label, double value, const char* colour) {
     std::string text = report::si(value, row.unit);
     if (row.noise_floor > 0.0 && value != row.noise_floor)
@@ -109,8 +109,8 @@ void add_bars(report::Page& page, const FitRow& row) {
     return report::Page::Bar{label, value, text, colour};
   };
   std::vector<report::Page::Bar> bars{bar("model as it is", row.before, grey),
-                                      bar("its parameters refitted", row.retuned, orange),
-                                      bar("with what was found", row.after, blue)};
+                                      bar("its parameters refitted", row.retuned, orange)};
+  if (any_found) bars.push_back(bar("with what was found", row.after, blue));
   if (row.noise_floor > 0.0) bars.push_back(bar("noise", row.noise_floor, green));
   page.bars(row.signal, bars);
 }
@@ -118,9 +118,11 @@ void add_bars(report::Page& page, const FitRow& row) {
 /// What somebody must know who reads no further.
 void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   Names missing;
-  for (const auto& finding : d.findings)
-    missing.push_back({title_of(finding), place_of(data, finding.term),
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    const auto& finding = d.findings[i];
+    missing.push_back({title_of(finding), where_of(data, d, i),
                        report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, finding)});
+  }
   if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
   std::string fit;
   for (const auto& row : d.heldout) {
@@ -144,10 +146,10 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   page.table({"in short", ""}, rows);
 }
 
-void add_other_run(report::Page& page, const Case& data, const OtherRun& run) {
+void add_other_run(report::Page& page, const Case& data, const Diagnosis& d, const OtherRun& run) {
   page.heading("Another recording, not used here: " + run.name);
   page.paragraph("All three models run freely from the recording's first row to its last.");
-  for (const auto& row : run.fit) add_bars(page, row);
+  for (const auto& row : run.fit) add_bars(page, row, !d.findings.empty());
   std::vector<Plot> plots;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     if (std::none_of(run.fit.begin(), run.fit.end(),
@@ -185,13 +187,11 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  const std::vector<physics::Outputs>& after) {
   const auto& finding = d.findings[which];
   const auto& info = *finding.term.info;
-  const auto part = region_words(regions_of(data, d, which));
-  page.paragraph(title_of(finding) + " (" + place_of(data, finding.term) + "; in the model file " +
+  page.paragraph(title_of(finding) + " (" + where_of(data, d, which) + "; in the model file " +
                  std::string{(finding.stand_in != nullptr ? finding.stand_in : &info)->name} + " at " +
-                 site_of(data, finding.term) + "): " + std::string{info.description} + " " +
-                 std::string{info.source} + ". Of the mismatch, " + report::number(100.0 * finding.share, 3) +
-                 " % comes back when it alone is taken out." +
-                 (part.empty() ? "" : " It shows most at " + part + "."));
+                 site_of(data, finding.term) + "): " + std::string{info.description} + " [" +
+                 std::string{info.source} + "] Of the mismatch, " + report::number(100.0 * finding.share, 3) +
+                 " % comes back when it alone is taken out.");
   auto model = d.best.model;
   model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
   const auto without = simulate(data, model);
@@ -217,14 +217,10 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
       label += " within one period";
     }
     Plot plot;
-    const auto* signal = data.model.signal(variable);
-    plot.title = data.outputs[shown] + " over " + label;
+    plot.title = "what is left of " + data.outputs[shown] + ", over " + label;
     if (!plots.empty() && plots.back().title == plot.title)
       return;  // direction and speed are both seen over velocity
-    plot.x_label = label + (signal != nullptr        ? in_brackets(signal->unit)
-                            : variable == "time"     ? " [s]"
-                            : variable == "velocity" ? " [m/s]"
-                                                     : "");
+    plot.x_label = label + in_brackets(unit_of_variable(data, variable));
     plot.y_label = "mean of measured - simulated" + in_brackets(unit);
     plot.series = {averaged("without it", x, difference(data, without, shown), 80),
                    averaged("with it", x, difference(data, after, shown), 80)};
@@ -245,10 +241,11 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
   if (!finding.term.curve.knots.empty()) {
     Plot plot;
     plot.title = "the effect without a name";
-    plot.x_label = finding.term.curve.over;
-    plot.y_label = "fitted curve";
+    plot.x_label = finding.term.curve.over + in_brackets(unit_of_variable(data, finding.term.curve.over));
+    plot.y_label = "fitted curve" + in_brackets(unit_of_curve(data, finding.term));
     plot.series.push_back(
         {"", Series::Style::line, finding.term.curve.knots, finding.term.curve.values, {}, {}, blue});
+    report::in_handy_units(plot);
     plots.push_back(std::move(plot));
   }
   if (!plots.empty()) page.plots(plots, "Averaged over cells of the variable with which it goes.");
@@ -278,7 +275,9 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
   }
   if (corrections.empty()) return;
   page.heading("The model's own parameters");
-  page.table({"parameter", "believed", "fitted beside what was found", "moved by"}, corrections);
+  page.table(
+      {"parameter", "believed", d.findings.empty() ? "fitted" : "fitted beside what was found", "moved by"},
+      corrections);
 }
 
 void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
@@ -315,12 +314,12 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
 
   page.heading("Error on data that no fit saw");
   for (const auto& row : d.heldout)
-    if (!is_bare(row)) add_bars(page, row);
+    if (!is_bare(row)) add_bars(page, row, !d.findings.empty());
   page.paragraph(
       "RMS of measured - simulated on each third of the recording in turn, which its fit did not see. "
       "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added. `Noise` "
       "is what the model file says, or the part of the residual that is not related from row to row.");
-  for (const auto& run : d.other_runs) add_other_run(page, data, run);
+  for (const auto& run : d.other_runs) add_other_run(page, data, d, run);
 
   const auto retuned = simulate(data, d.retuned.model), after = simulate(data, d.best.model);
   const auto time = over(data, "time");

@@ -1,6 +1,7 @@
 // The few lines for the terminal.
 #include <algorithm>
 
+#include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/report/page.hpp"
 
@@ -44,9 +45,11 @@ std::string summary(const Case& data, const Diagnosis& d) {
   std::string out = verdict_sentence(data, d) + "\n";
   std::vector<std::vector<std::string>> rows;
   if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
-  for (const auto& finding : d.findings)
-    rows.push_back({title_of(finding), place_of(data, finding.term),
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    const auto& finding = d.findings[i];
+    rows.push_back({title_of(finding), where_of(data, d, i),
                     report::number(100.0 * finding.probability) + " %", sizes_of(data, finding)});
+  }
   out += aligned(rows);
   rows.clear();
   add_fit(rows, "error held out", d.heldout);

@@ -49,6 +49,30 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
 }
 
+std::string unit_of_curve(const Case& data, const physics::Term& term) {
+  using physics::Plant;
+  switch (data.model.plant) {
+    case Plant::axis:
+      return term.info->site == "force" ? "N" : term.info->site == "measurement" ? "m" : "1";
+    case Plant::thermal:
+      return term.info->site == "loss" ? "W/K" : "W";
+    case Plant::error_map:
+    case Plant::droplet:
+      return "m";
+    default: {
+      const auto* signal = data.model.signal(term.on);
+      return data.model.plant == Plant::sensor && signal != nullptr ? signal->unit : "";
+    }
+  }
+}
+
+std::string unit_of_variable(const Case& data, const std::string& variable) {
+  if (variable == "time") return "s";
+  if (variable == "velocity") return "m/s";
+  const auto* signal = data.model.signal(variable);
+  return signal != nullptr ? signal->unit : "";
+}
+
 std::string name_beside(const Case& data, const physics::Term& term, const physics::Term& other) {
   const std::string name{term.info->name};
   return term.info == other.info ? name + " (" + place_of(data, term) + ")" : name;
@@ -61,8 +85,16 @@ std::string readable(std::string_view name) {
 }
 
 std::string title_of(const Finding& finding) {
-  return finding.term.info->name == "unmodelled" ? "an effect without a name"
-                                                 : readable(finding.term.info->name);
+  const auto& term = finding.term;
+  if (term.info->name == "unmodelled") return "an effect without a name";
+  auto title = readable(term.info->name);
+  if (term.info->plant != physics::Plant::equations) return title;
+  // A law's name alone says nothing of a machine.
+  const auto& over = term.with.empty() ? term.on : term.with;
+  if (term.info->name == "coupling") return title + " to " + over;
+  for (const auto* law : {"linear", "quadratic", "cubic", "periodic"})
+    if (term.info->name == law) title += " in " + over;
+  return title;
 }
 
 std::string place_of(const Case& data, const physics::Term& term) {
@@ -116,7 +148,7 @@ std::string sizes_of(const Case& data, const Finding& finding) {
     double top = 0.0;
     for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
     text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over + ", up to " +
-            report::number(top);
+            report::si(top, unit_of_curve(data, finding.term));
   }
   return text;
 }
@@ -226,9 +258,9 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
         return "Unknown physics: something is missing, most likely at the " + places +
                ", that no known term describes.";
       }
-      return "Unknown physics: something acts at the " + place_of(data, d.findings.front().term) + " (" +
-             site_of(data, d.findings.front().term) + ") that depends on " +
-             d.findings.front().term.curve.over + " and that no known term describes.";
+      return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
+             " (" + site_of(data, d.findings.front().term) + ") that goes with " +
+             d.findings.front().term.curve.over + ", and no known term describes it.";
   }
   return "";
 }
