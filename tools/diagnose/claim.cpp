@@ -326,6 +326,8 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term))
     return false;
   if (is_lag(fit, term)) return false;
+  if (info.name == "overflow" && values[1] < 0.05)
+    return false;  // what runs over to nowhere is an upper limit
   // Friction that is smaller at rest than at speed is none.
   if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
 

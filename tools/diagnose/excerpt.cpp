@@ -86,4 +86,13 @@ std::optional<Excerpt> excerpt(const Case& whole, const Weighing& weighing, cons
   return some;
 }
 
+Fit on_all(const Case& whole, const Weighing& weighing, const Fit& base, const Fit& of_excerpt) {
+  auto model = of_excerpt.model;
+  model.parameters.resize(
+      base.model.parameters.size());  // without the states at the beginning of its stretches
+  for (std::size_t i = 0; i < model.parameters.size(); ++i)
+    if (model.parameters[i].name.ends_with(".initial")) model.parameters[i] = base.model.parameters[i];
+  return fit(whole, weighing, model, whole.model, 2, &base);
+}
+
 }  // namespace invar::diagnose

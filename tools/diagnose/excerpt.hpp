@@ -19,4 +19,7 @@ struct Excerpt {
 std::optional<Excerpt> excerpt(const Case& whole, const Weighing& weighing, const Fit& base,
                                std::size_t runs);
 
+/// A fit to the excerpt taken to all rows: `base` is the one that the excerpt was made of.
+Fit on_all(const Case& whole, const Weighing& weighing, const Fit& base, const Fit& of_excerpt);
+
 }  // namespace invar::diagnose

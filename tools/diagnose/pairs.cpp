@@ -5,6 +5,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/diagnosis.hpp"
+#include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/other_cause.hpp"
 
 namespace invar::diagnose {
@@ -84,7 +85,11 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
   const auto pairs =
       screen_pairs(data, plain, under, named_starts(data, plain, under, without), own ? 10 : 6);
   std::vector<Fit> rough(pairs.size());
-  in_parallel(pairs.size(), [&](std::size_t i) { rough[i] = begin(data, plain, under, pairs[i]); });
+  const auto some = excerpt(data, plain, under, 80 * rough.size());
+  in_parallel(pairs.size(), [&](std::size_t i) {
+    rough[i] = some ? on_all(data, plain, under, begin(some->data, some->weighing, some->base, pairs[i]))
+                    : begin(data, plain, under, pairs[i]);
+  });
   std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
   // What swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
   const bool quick = own && data.recordings.size() * data.recordings.front().inputs.rows() < 8000;

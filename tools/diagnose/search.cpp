@@ -10,6 +10,7 @@
 #include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/detectable.hpp"
+#include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
@@ -122,8 +123,12 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   progress_(share + 0.04, "fitting the short list");
   // A few steps each; those that lag far behind the leader are not driven further.
   std::vector<Fit> fits(shortlist.size());
-  in_parallel(fits.size(),
-              [&](std::size_t i) { fits[i] = fit_with(data_, weighing, base, *shortlist[i], 3); });
+  const auto some = excerpt(data_, weighing, base, 40 * fits.size());
+  in_parallel(fits.size(), [&](std::size_t i) {
+    fits[i] = some ? on_all(data_, weighing, base,
+                            fit_with(some->data, some->weighing, some->base, *shortlist[i], 3))
+                   : fit_with(data_, weighing, base, *shortlist[i], 3);
+  });
   double leader = -1e300;
   for (const auto& f : fits) leader = std::max(leader, f.evidence);
   for (auto& f : fits) {
