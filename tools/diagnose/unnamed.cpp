@@ -65,10 +65,11 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     const double gain =
         std::min(curved.evidence - without.evidence, advantage_over_wander(data, own, curved, without));
     // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
-    // independent rows.
-    if ((s.start.term.curve.over == "time" || s.start.term.curve.over == "t") &&
-        least_ratio(data, rough, under_plain) > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)
-      continue;
+    // independent rows, and one that hardly takes any is what that noise does.
+    if (const auto& over = s.start.term.curve.over; over == "time" || over == "t") {
+      const double left = least_ratio(data, rough, under_plain);
+      if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
+    }
     // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
     if (gain > claim_margin && rough.evidence > best.plain)
       best = {std::move(curved), own, gain, rough.evidence};
