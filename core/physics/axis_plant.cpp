@@ -101,6 +101,17 @@ void AxisPlant::rest_at(double position, double time) noexcept {
   positions_past_.push(time, position, 0.0);
 }
 
+void AxisPlant::go_on_from(double position, double velocity) noexcept {
+  played_ += position - position_;
+  bristle_from_ = position_ = position;
+  velocity_ = velocity;
+  if (!(age_ > 0.0)) return;
+  positions_past_.clear();
+  const double shown = play_ != nullptr ? played_ : position_;
+  positions_past_.push(time_ - age_, shown - age_ * velocity, velocity);
+  positions_past_.push(time_, shown, velocity);
+}
+
 double AxisPlant::variable(int code, const AxisPoint& at) const noexcept {
   switch (code) {
     case Variable::velocity:

@@ -45,6 +45,9 @@ class AxisPlant {
   void rest_at(double position, double time = 0.0) noexcept;
   /// Another speed to start from, after rest_at. Real-time.
   void set_velocity(double velocity) noexcept { velocity_ = velocity; }
+  /// Goes on from another position and speed, as if it had come there at that speed; currents on their way, bristles, play
+  /// and what swings stay as they are. Real-time.
+  void go_on_from(double position, double velocity) noexcept;
   /// The temperature that terms may depend on [degC]. Real-time.
   void set_temperature(double temperature) noexcept { temperature_ = temperature; }
   /// A further force on the carriage from outside, held until changed [N]. Real-time.

@@ -30,6 +30,13 @@ std::vector<std::string> Model::outputs() const {
   return names;
 }
 
+std::vector<std::string> states_of(const Model& model) {
+  if (model.plant == Plant::axis && !model.controller) return {"position", "velocity"};
+  std::vector<std::string> names;
+  for (const auto& state : model.equations.states) names.push_back(state.name);
+  return names;
+}
+
 AxisPlant make_axis(const Model& model, double longest_step) {
   INVAR_EXPECTS(model.plant == Plant::axis);
   std::vector<AxisTerm> terms;

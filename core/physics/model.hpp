@@ -99,6 +99,10 @@ struct Model {
   [[nodiscard]] std::vector<std::string> outputs() const;
 };
 
+/// What a run of the model may begin anew with: the states of own equations; position [m] and velocity [m/s] of an axis
+/// without controller. Empty for all others.
+std::vector<std::string> states_of(const Model& model);
+
 /// A plant object of the model's present numbers. Preconditions: the model is of that plant.
 AxisPlant make_axis(const Model& model, double longest_step = 1e-3);
 ThermalPlant make_thermal(const Model& model);

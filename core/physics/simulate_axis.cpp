@@ -109,10 +109,11 @@ class ClosedLoop final : public Simulation {
 
 class OpenLoop final : public Simulation {
  public:
-  OpenLoop(const Model& /*structure*/, const Record& inputs)
+  OpenLoop(const Model& structure, const Record& inputs)
       : time_{inputs.time},
         current_{bridged(inputs.time, inputs.signals.at("current"))},
-        start_position_{first_or(inputs, "position", 0.0)} {
+        start_position_{first_or(inputs, "position", 0.0)},
+        restarts_{restarts_of(structure, inputs)} {
     if (const auto* values = inputs.find("temperature")) temperature_ = bridged(inputs.time, *values);
     for (std::size_t i = 1; i < time_.size(); ++i) longest_ = std::max(longest_, time_[i] - time_[i - 1]);
   }
@@ -122,7 +123,13 @@ class OpenLoop final : public Simulation {
     plant.rest_at(start_position_, time_.front());
     outputs.resize(1);
     outputs[0].resize(time_.size());
+    auto restart = restarts_.begin();
     for (std::size_t row = 0; row < time_.size(); ++row) {
+      if (restart != restarts_.end() && restart->row == row) {
+        plant.go_on_from(model.parameters[restart->parameters[0]].value,
+                         model.parameters[restart->parameters[1]].value);
+        ++restart;
+      }
       outputs[0][row] = plant.reading();
       if (row + 1 == time_.size()) break;
       if (!temperature_.empty()) plant.set_temperature(temperature_[row]);
@@ -133,6 +140,7 @@ class OpenLoop final : public Simulation {
  private:
   std::vector<double> time_, current_, temperature_;
   double start_position_ = 0.0, longest_ = 0.0;
+  std::vector<Restart> restarts_;
 };
 
 }  // namespace

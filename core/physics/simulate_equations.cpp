@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/equations_machine.hpp"
@@ -23,18 +22,7 @@ class OwnEquations final : public Simulation {
       inputs_.push_back(values == nullptr ? std::vector<double>(time_.size(), 0.0) : bridged(time_, *values));
       is_linear_ = is_linear_ || input.linear;
     }
-    for (std::size_t k = 0; k < inputs.restarts.size(); ++k) {
-      auto& restart = restarts_.emplace_back();
-      restart.row = inputs.restarts[k];
-      for (const auto& state : structure.equations.states) {
-        const auto name = state.name + ".start" + std::to_string(inputs.first_restart + k);
-        const auto& all = structure.parameters;
-        restart.parameters.push_back(static_cast<std::size_t>(
-            std::find_if(all.begin(), all.end(), [&](const Parameter& one) { return one.name == name; }) -
-            all.begin()));
-        INVAR_EXPECTS(restart.parameters.back() < all.size(), name);
-      }
-    }
+    restarts_ = restarts_of(structure, inputs);
     for (const auto& output : structure.equations.outputs) {
       const auto* values = inputs.find(output.name);
       first_.push_back(values == nullptr || values->empty() ? std::nan("") : values->front());
@@ -205,11 +193,6 @@ class OwnEquations final : public Simulation {
   static constexpr double most_parts = 60.0;
   /// Steps of the classical Runge-Kutta rule over a time in which the fastest turns so far [rad].
   static double parts_for(double turn) { return std::clamp(std::ceil(turn / 0.25), 1.0, most_parts); }
-
-  struct Restart {
-    std::size_t row = 0;
-    std::vector<std::size_t> parameters;  // by state
-  };
 
   std::vector<double> time_;
   std::vector<Restart> restarts_;

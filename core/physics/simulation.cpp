@@ -1,6 +1,8 @@
 #include "core/physics/simulation.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "core/base/contract.hpp"
 #include "core/physics/simulate_plants.hpp"
@@ -31,6 +33,23 @@ std::vector<double> bridged(const std::vector<double>& time, const std::vector<d
   }
   for (std::size_t j = last == n ? 0 : last + 1; j < n; ++j) out[j] = last == n ? 0.0 : values[last];
   return out;
+}
+
+std::vector<Restart> restarts_of(const Model& structure, const Record& inputs) {
+  std::vector<Restart> restarts;
+  const auto states = states_of(structure);
+  const auto& all = structure.parameters;
+  for (std::size_t k = 0; k < inputs.restarts.size(); ++k) {
+    auto& restart = restarts.emplace_back();
+    restart.row = inputs.restarts[k];
+    for (const auto& state : states) {
+      const auto name = state + ".start" + std::to_string(inputs.first_restart + k);
+      const auto at = std::find_if(all.begin(), all.end(), [&](const auto& one) { return one.name == name; });
+      INVAR_EXPECTS(at != all.end(), name);
+      restart.parameters.push_back(static_cast<std::size_t>(at - all.begin()));
+    }
+  }
+  return restarts;
 }
 
 std::unique_ptr<Simulation> prepare(const Model& structure, const Record& inputs) {

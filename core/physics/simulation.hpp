@@ -14,7 +14,7 @@ namespace invar::physics {
 struct Record {
   std::vector<double> time;
   std::map<std::string, std::vector<double>, std::less<>> signals;
-  /// Rows at which the states of a model in the user's own equations are set anew, the k-th to what the model's parameters
+  /// Rows at which the states of a model (`states_of`) are set anew, the k-th to what the model's parameters
   /// "<state>.start<first_restart + k>" say: an integrating model drifts without that.
   std::vector<std::size_t> restarts{};
   std::size_t first_restart = 0;

@@ -155,12 +155,20 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
 
 /// Adds the term that explains most, if one stands under the filters that its own residual asks for.
 bool Search::add_named(double round) {
-  for (const bool coloured : {true, false}) {
+  enum class From { coloured, plain, believed };
+  for (const auto from : {From::coloured, From::plain, From::believed}) {
+    const bool coloured = from == From::coloured;
+    // In a window of its own friction looks like a motor without force: from there no name is found.
+    if (from == From::believed && (data_.model.plant != physics::Plant::axis || data_.windows.count == 0 ||
+                                   d_.best.model.terms.size() > given()))
+      break;
     // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
     // every row counts alike. Either way a claim is judged under the filters of its own residual.
     const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
     const Fit base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
-    auto fits = shortlisted(weighing, base, 0.1 + 0.2 * round + (coloured ? 0.0 : 0.1));
+    auto fits = shortlisted(weighing,
+                            from == From::believed ? fit(data_, weighing, data_.model, data_.model, 0) : base,
+                            0.1 + 0.2 * round + (coloured ? 0.0 : 0.1));
     std::vector<std::size_t> leaders;
     std::set<std::string> tried;
     for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {

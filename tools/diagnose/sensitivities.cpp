@@ -73,7 +73,8 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
   for (std::size_t j = 0; j < free.size(); ++j) {
     const double value = get(model, free[j]);
     // Equations that swing for long answer in phase: there a larger step would not be small.
-    double step = (model.plant == physics::Plant::equations ? 1e-4 : 1e-2) * free[j].scale;
+    double step =
+        (model.plant == physics::Plant::equations || is_window(free[j]) ? 1e-4 : 1e-2) * free[j].scale;
     if (value + step > free[j].bounds.upper) step = -step;
     steps(static_cast<Eigen::Index>(j)) = step;
     run_of[j] = changed.size();

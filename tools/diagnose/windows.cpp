@@ -87,10 +87,21 @@ std::pair<double, double> measured_at(const Recording& recording, std::size_t ou
   return {std::nan(""), std::nan("")};
 }
 
+/// What the model says of a state at the beginning of a recording.
+physics::Parameter initial_of(const Model& model, const std::string& state) {
+  const auto* given = model.find(state + ".initial");
+  return given != nullptr ? *given : physics::Parameter{state + ".initial", "", 0.0, {}, {}};
+}
+
 /// What the outputs say of a state at a row: itself, or the rate of one whose rate it is; else what the free run has.
 double guess_of(const Case& data, const Recording& recording, const physics::Outputs& free, std::size_t state,
                 std::size_t row) {
   const auto& equations = data.model.equations;
+  if (equations.states.empty()) {  // an axis: position, velocity
+    const auto [position, velocity] = measured_at(recording, 0, row);
+    const double value = state == 0 ? position : velocity;
+    return std::isfinite(value) ? value : 0.0;
+  }
   for (const auto& output : equations.outputs) {
     const auto o = static_cast<std::size_t>(&output - equations.outputs.data());
     if (output.expression == equations.states[state].name) {
@@ -111,26 +122,28 @@ using Rows = std::vector<std::vector<std::size_t>>;  // by recording
 /// The case with states of their own from these rows on. Where the model forgets, its run says how wide they go.
 Case with_starts(const Case& whole, const Rows& rows, bool forgets) {
   Case data = whole;
-  const auto shown = showing_states(whole.model);
-  const auto& states = whole.model.equations.states;
+  const auto states = physics::states_of(whole.model);
   std::size_t next = 0;
   std::vector<double> sizes(states.size(), 0.0);
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     auto& recording = data.recordings[r];
-    physics::Outputs free;
-    physics::prepare(shown, recording.inputs)->run(shown, free);
+    physics::Outputs free(states.size());
+    if (!whole.model.equations.states.empty()) {
+      const auto shown = showing_states(whole.model);
+      physics::prepare(shown, recording.inputs)->run(shown, free);
+    }
     recording.inputs.first_restart = next;
     recording.inputs.restarts = rows[r];
     for (std::size_t k = 0; k < rows[r].size(); ++k, ++next)
       for (std::size_t i = 0; i < states.size(); ++i) {
-        const auto& initial = *whole.model.find(states[i].name + ".initial");
+        const auto initial = initial_of(whole.model, states[i]);
         const double value = guess_of(whole, recording, free, i, rows[r][k]);
         sizes[i] =
             std::max({sizes[i], std::abs(value), initial.sigma.value_or(0.0), std::abs(initial.value), 1e-9});
         if (const double far = reach(free[i], 0.0, 1.0); forgets && far < 1e6)
           sizes[i] = std::max(sizes[i], far);
         data.model.parameters.push_back(
-            {states[i].name + ".start" + std::to_string(next), initial.unit, value, 1.0, initial.bounds});
+            {states[i] + ".start" + std::to_string(next), initial.unit, value, 1.0, initial.bounds});
       }
   }
   const std::size_t first = whole.model.parameters.size();
@@ -184,12 +197,11 @@ void estimate_starts(Case& data) {
 /// By how much a disturbance of the states at the beginning of a window has grown at its end, the median of all windows.
 double growth_over_windows(const Case& data) {
   const auto at = simulate(data, data.model);
-  const auto& states = data.model.equations.states;
   std::vector<double> all;
-  for (std::size_t i = 0; i < states.size(); ++i) {
+  for (const auto& state : physics::states_of(data.model)) {
     auto moved = data.model;
     for (auto& p : moved.parameters)
-      if (is_start(p) && p.name.starts_with(states[i].name + ".start")) p.value += 1e-5 * *p.sigma;
+      if (is_start(p) && p.name.starts_with(state + ".start")) p.value += 1e-5 * *p.sigma;
     const auto to = simulate_once(data, moved);
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto& restarts = data.recordings[r].inputs.restarts;
@@ -218,17 +230,21 @@ bool is_start(const physics::Parameter& parameter) {
 }
 
 void cut_into_windows(Case& data) {
-  const auto& equations = data.model.equations;
-  if (data.model.plant != physics::Plant::equations) return;
+  const auto states = physics::states_of(data.model).size();
+  const bool is_axis = data.model.plant == physics::Plant::axis;
+  if (data.model.plant != physics::Plant::equations && !(is_axis && states > 0)) return;
   constexpr double still_going = 1.6;
-  const auto anew = begun_anew(data, most_starts / std::max<std::size_t>(1, equations.states.size()));
-  for (const auto& of : anew) data.windows.anew += of.size();
+  // Nobody says that an axis is at rest where the recording of its current begins.
+  const auto anew = is_axis ? Rows(data.recordings.size(), {0})
+                            : begun_anew(data, most_starts / std::max<std::size_t>(1, states));
   std::size_t rows = 0;
   bool goes = false;
-  for (const auto& recording : data.recordings) {
-    rows = std::max(rows, recording.inputs.rows());
-    if (recording.inputs.rows() >= 4 * fewest_rows && equations.controlled_input.empty())
-      goes = goes || goes_on(data, recording) > still_going;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto& recording = data.recordings[r];
+    data.windows.anew += is_axis ? 0 : anew[r].size();
+    rows = is_axis ? rows + recording.inputs.rows() : std::max(rows, recording.inputs.rows());
+    if (recording.inputs.rows() >= 4 * fewest_rows && data.model.equations.controlled_input.empty())
+      goes = goes || is_axis || goes_on(data, recording) > still_going;
   }
   if (!goes) {
     if (data.windows.anew == 0) return;
@@ -236,12 +252,12 @@ void cut_into_windows(Case& data) {
     estimate_starts(data);
     return;
   }
-  std::size_t window = std::max(fewest_rows, rows * equations.states.size() / most_starts);
+  std::size_t window = std::max(fewest_rows, rows * states / most_starts);
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
   double growth = growth_over_windows(cut);
   while (growth > most_growth && window > fewest_rows / 4 &&
-         2 * cut.windows.count * equations.states.size() <= 2 * most_starts) {
+         2 * cut.windows.count * states <= 2 * most_starts) {
     window /= 2;
     cut = in_windows(data, window, anew);
     estimate_starts(cut);
