@@ -182,6 +182,11 @@ std::string what_was_looked_at(const Case& data) {
 
 namespace {
 
+/// "2.4", "770": a ratio as one says it.
+std::string times(double ratio) {
+  return ratio >= 10.0 && ratio < 1e6 ? std::to_string(std::lround(ratio)) : report::number(ratio, 2);
+}
+
 /// Those that left what the user believed by more than so many of his sigmas.
 std::string moved_parameters(const Diagnosis& d, double least = 3.0) {
   std::string text;
@@ -201,7 +206,7 @@ std::string moved_parameters(const Diagnosis& d, double least = 3.0) {
       unit = info.parameters[f.index].unit;
     }
     text += (text.empty() ? "" : ", ") + name + " is " + report::si(to, unit, 4) + ", not " +
-            report::si(f.center, unit, 4) + " (" + report::number(sigmas, 2) + " sigma of what was believed)";
+            report::si(f.center, unit, 4) + " (" + times(sigmas) + " sigma of what was believed)";
   }
   return text;
 }
@@ -215,7 +220,7 @@ std::string beside_the_verdict(const Diagnosis& d) {
   std::string text;
   if (!moved.empty()) text = (d.findings.size() == 1 ? "with it " : "with them ") + moved;
   if (d.unexplained >= much)
-    text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + report::number(d.unexplained, 2) +
+    text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
   return text.empty() ? text : "Mind: " + text + ".";
 }
