@@ -91,7 +91,8 @@ std::string name_of(Verdict verdict);
 /// log evidence by which a term must win before it is claimed; more where many rows would make a trifle significant.
 inline constexpr double claim_margin = 10.0;
 inline double claim_margin_of(const Weighing& weighing) {
-  return claim_margin + 0.001 * weighing.temper * static_cast<double>(weighing.rows);
+  return claim_margin + weighing.left_of_inputs +
+         0.001 * weighing.temper * static_cast<double>(weighing.rows);
 }
 /// A further claim that hardly moves the size of the residual needs so many times the margin.
 inline constexpr double plainly = 3.0;

@@ -35,6 +35,7 @@ struct Weighing {
   std::vector<Whitening> filters;                       // by output
   std::vector<std::vector<std::vector<bool>>> present;  // by recording, output, row
   Eigen::Index rows = 0;
+  double left_of_inputs = 0.0;  // log likelihood, see Case
   double temper =
       1.0;  // what one nat of log likelihood counts: outputs of one loop tell the same thing twice
 };

@@ -174,6 +174,11 @@ std::string of_a_cell(const DataCount& count) {
 std::string what_was_looked_at(const Case& data) {
   std::string cut = of_a_cell(data.count);
   if (const auto windows = how_windowed(data); !windows.empty()) cut += (cut.empty() ? "" : "; ") + windows;
+  if (data.quiet_rows > 0)
+    cut +=
+        (cut.empty() ? "" : "; ") +
+        std::string{"the inputs as recorded carry noise that the machine did not feel: their median over "} +
+        std::to_string(data.quiet_rows) + " rows stands in their place";
   if (data.count.shortened == 0) return cut;
   return (cut.empty() ? "" : cut + "; ") + "a long recording: of " + std::to_string(data.count.rows) +
          " rows " + how_shortened(data.model) + " looked at, " + std::to_string(data.count.shortened) +

@@ -16,6 +16,7 @@
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
+#include "tools/diagnose/quiet_inputs.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/unsure.hpp"
@@ -406,7 +407,14 @@ Diagnosis Search::run() {
 
 Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
                  const Options& options) {
-  return Search{data, progress, options}.run();
+  const Case as_read = data;
+  auto d = Search{data, progress, options}.run();
+  if (!options.refuses) return d;
+  if (auto quiet = with_quiet_inputs(as_read, data, d)) {
+    data = std::move(*quiet);
+    d = Search{data, progress, options}.run();
+  }
+  return d;
 }
 
 }  // namespace invar::diagnose

@@ -26,6 +26,7 @@ std::vector<physics::Outputs> simulate_once(const Case& data, const Model& model
 
 Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
   Weighing weighing;
+  weighing.left_of_inputs = data.left_of_inputs;
   weighing.present.resize(data.recordings.size());
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     std::vector<std::vector<double>> series;
