@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <map>
 #include <string>
 #include <string_view>
 
+#include "core/base/unit.hpp"
 #include "core/physics/expression.hpp"
 
 namespace invar::model {
@@ -33,16 +35,21 @@ class Names {
       node.fault("`" + name + "` means something else in an expression", "give it another name");
     else if (const auto [at, is_new] = seen_.emplace(name, what); !is_new)
       node.fault("`" + name + "` is " + at->second + " already", "give one of the two another name");
+    else
+      return;
+    are_good_ = false;
   }
+  [[nodiscard]] bool are_good() const { return are_good_; }
   [[nodiscard]] const std::map<std::string, std::string>& all() const { return seen_; }
 
  private:
   std::map<std::string, std::string> seen_;
+  bool are_good_ = true;
 };
 
 /// One expression: nothing is set in it, and it ends once.
-void check(const Node& node) {
-  if (!node.exists()) return;
+bool is_one_value(const Node& node) {
+  if (!node.exists()) return false;
   const auto text = node.as_text();
   int depth = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
@@ -53,8 +60,24 @@ void check(const Node& node) {
     if ((c == '=' && !compares) || c == ';' || c == '"' || (c == ',' && depth == 0)) {
       node.fault("`" + text + "`: `" + std::string{c} + "` has no place in it",
                  "write one expression that gives the value");
-      return;
+      return false;
     }
+  }
+  return true;
+}
+
+/// Reads a formula as the simulation will, to say at its line what it is that cannot be read.
+void check_formula(const Node& node, const physics::Model& model) {
+  if (!node.exists()) return;
+  std::vector<std::string> variables{"t"}, constants;
+  for (const auto& state : model.equations.states) variables.push_back(state.name);
+  for (const auto& input : model.equations.inputs) variables.push_back(input.symbol);
+  for (const auto& parameter : model.parameters)
+    if (parameter.name.find('.') == std::string::npos) constants.push_back(parameter.name);
+  try {
+    (void)physics::Expressions{variables, constants}.add(physics::Expressions::rates, node.as_text(), "");
+  } catch (const InputError& error) {
+    node.fault(error.faults().front().what, error.faults().front().mend);
   }
 }
 
@@ -68,28 +91,47 @@ bool mentions(const std::string& expression, const std::string& name) {
   return false;
 }
 
+/// Nothing converts between the states: one whose rate is another as it stands is in that one's unit, times a second.
+void check_rate(const Node& node, const physics::Model& model) {
+  auto rate = node.text("derivative", "");
+  std::erase(rate, ' ');
+  const auto *of_state = model.find(node.key() + ".initial"), *of_rate = model.find(rate + ".initial");
+  if (of_state == nullptr || of_rate == nullptr || of_state->unit == "1" || of_rate->unit == "1") return;
+  const auto needed = parse_unit("(" + of_state->unit + ")/s"), there = parse_unit(of_rate->unit);
+  if (!needed || !there || !needed->same_quantity(*there)) return;
+  if (std::abs(needed->factor / there->factor - 1.0) < 1e-9) return;
+  node["initial"].fault(
+      "is in " + of_state->unit + ", and its rate `" + rate + "` in " + of_rate->unit +
+          ", between which nothing converts",
+      "give `" + rate + "` in " + of_state->unit + "/s, or `" + node.key() + "` to suit it");
+}
+
 }  // namespace
 
 void check_own_expressions(const Node& root, const physics::Model& model) {
   Names names;
+  std::vector<Node> formulas;
   for (const auto& node : root["states"].children()) {
     names.take(node, "a state");
-    check(node["derivative"]);
+    formulas.push_back(node["derivative"]);
+    check_rate(node, model);
   }
   for (const auto& node : root["inputs"].children()) names.take(node, "an input");
   for (const auto& node : root["parameters"].children()) names.take(node, "a parameter");
   for (const auto& node : root["outputs"].children()) {
-    check(node["expression"]);
+    formulas.push_back(node["expression"]);
     if (const auto at = names.all().find(node.key()); at != names.all().end() && at->second == "an input")
       node.fault("`" + node.key() + "` is an input already", "give the output another name");
   }
+  if (root.has("controller")) formulas.push_back(root["controller"]["expression"]);
+  for (const auto& node : formulas)
+    if (is_one_value(node) && names.are_good()) check_formula(node, model);
   if (model.equations.states.empty())
     root["states"].fault("names no state", "add one, with derivative and initial");
   if (model.equations.outputs.empty())
     root["outputs"].fault("names no output", "add one, with column and expression");
   if (!root.has("controller")) return;
   const auto controller = root["controller"];
-  check(controller["expression"]);
   const auto& output = model.equations.controlled_input;
   const auto at = names.all().find(output);
   if (at == names.all().end() || at->second != "an input")

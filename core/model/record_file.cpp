@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <numbers>
+#include <optional>
 
 #include "core/base/unit.hpp"
 
@@ -23,11 +25,54 @@ bool speaks_in(const physics::Model& model, const std::string& unit) {
   });
 }
 
+/// A state that is an output as it stands, and the unit of its numbers; nothing of both where it is none or says no unit.
+struct OwnState {
+  std::string name, unit;
+};
+OwnState state_of(const physics::Signal& signal, const physics::Model& model) {
+  for (const auto& output : model.equations.outputs) {
+    if (output.name != signal.name) continue;
+    auto name = output.expression;
+    std::erase(name, ' ');
+    const auto* initial = model.find(name + ".initial");
+    if (initial != nullptr && initial->unit != "1") return {name, initial->unit};
+  }
+  return {};
+}
+
+/// Throws where a column says that it measures something else than the state that it is compared with.
+void check_own_unit(const recording::Column& column, const OwnState& state, const std::string& where) {
+  if (state.unit.empty() || column.unit == state.unit) return;
+  const auto of_column = parse_unit(column.unit), of_state = parse_unit(state.unit);
+  const bool is_label = !of_state && of_column;  // the model's unit is a name of the user's own
+  if (is_label || column.unit == "1" || column.unit == "-") return;
+  if (of_column && of_column->same_quantity(*of_state)) return;
+  throw InputError{where + ": column `" + column.name + "`",
+                   "is in `" + column.unit + "`, the model's `" + state.name + "` in `" + state.unit + "`",
+                   of_column ? "name the right column, or mend one of the two units"
+                             : "write a unit that is known, or the model's own, into the header"};
+}
+
+/// The factor of turns a minute where the model's numbers are angles; nothing where they are not.
+std::optional<double> of_turns(const OwnState& state, const physics::Model& model) {
+  constexpr double per_rpm = 2.0 * std::numbers::pi / 60.0;
+  constexpr std::size_t radian = 5;
+  if (const auto unit = parse_unit(state.unit); unit && !state.unit.empty())
+    return unit->dimension[radian] == 1.0 ? std::optional{per_rpm / unit->factor} : std::nullopt;
+  if (speaks_in(model, "rad") && !speaks_in(model, "Hz")) return per_rpm;
+  return std::nullopt;
+}
+
 /// A model in the user's own expressions takes a column in SI, but as it stands where his numbers are in that unit too,
-/// where it is absolute (K), or where the unit is a name of his own.
-ColumnUnit unit_of_expression(const recording::Column& column, const physics::Model& model) {
+/// where it is absolute (K), or where the unit is a name of his own; turns a minute in rad/s where his numbers are angles.
+ColumnUnit unit_of_expression(const recording::Column& column, const physics::Signal& signal,
+                              const physics::Model& model, const std::string& where) {
+  const auto state = state_of(signal, model);
+  check_own_unit(column, state, where);
   const auto unit = parse_unit(column.unit);
   if (!unit || column.unit == "K" || speaks_in(model, column.unit)) return {column.unit, 1.0, 0.0};
+  if (column.unit == "rpm")
+    if (const auto factor = of_turns(state, model)) return {column.unit, *factor, 0.0};
   return {column.unit, unit->factor, unit->offset};
 }
 
@@ -35,7 +80,7 @@ ColumnUnit unit_of(const recording::Column& column, const physics::Signal& signa
                    const physics::Model& model, const std::string& where) {
   const auto& si = signal.unit;
   if (column.unit.empty()) return {si, 1.0, 0.0};
-  if (si.empty()) return unit_of_expression(column, model);
+  if (si.empty()) return unit_of_expression(column, signal, model, where);
   const auto to = conversion(column.unit, si);
   if (!to)
     throw InputError{where + ": column `" + column.name + "`",

@@ -198,8 +198,11 @@ std::size_t Expressions::add(Section section, const std::string& formula, const 
   } catch (const mu::ParserError& error) {
     std::string what = error.GetMsg();
     if (what.ends_with('.')) what.pop_back();
+    std::string functions;
+    for (const auto word : expression_words())
+      if (word != "pi") functions += (functions.empty() ? "" : " ") + std::string{word};
     throw InputError{where, "`" + formula + "`: " + what,
-                     "use states, inputs, parameters, t, pi and the functions of the contract"};
+                     "use states, inputs, parameters, t, pi, + - * / ^ and the functions " + functions};
   }
 }
 

@@ -129,6 +129,14 @@ std::optional<double> number(std::string_view cell) {
   return std::nullopt;
 }
 
+/// A cell as a message shows it: a line of some hundred digits says no more than its beginning.
+std::string shortened(std::string_view cell) {
+  std::size_t most = 20;
+  if (cell.size() <= most) return std::string{cell};
+  while (most > 0 && (static_cast<unsigned char>(cell[most]) & 0xC0U) == 0x80U) --most;  // inside a letter
+  return std::string{cell.substr(0, most)} + "...";
+}
+
 /// True for the bracket of `samples[3]`, false for that of `ratio [1]`: an index follows its name at once.
 bool is_index(std::string_view cell, std::size_t open) {
   const std::string_view inside = cell.substr(open + 1, cell.size() - open - 2);
@@ -202,7 +210,7 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
         continue;
       }
       if (!value)
-        refuse(where() + ": column `" + column.name + "`", "`" + std::string{cells[i]} + "` is not a number",
+        refuse(where() + ": column `" + column.name + "`", "`" + shortened(cells[i]) + "` is not a number",
                "write a number, or leave the cell empty");
       column.values.push_back(*value);
     }

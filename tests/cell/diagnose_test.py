@@ -113,6 +113,7 @@ class Diagnose(unittest.TestCase):
         (self.folder / "empty.csv").write_text("t [s],heat [V/s],warmth [V]\n" + "".join(f"{i},1,\n" for i in range(60)))
         for words, said in ((["--check", "nowhere.csv"], "nowhere.csv"),
                             (["--check", "other.csv", "--check-outputs", "short.csv"], "short.csv: has 2 rows, other.csv has 60"),
+                            (["--check", "./run.csv"], "--check: ./run.csv is a --recording too"),
                             (["--check", "back.csv"], "back.csv:4: time goes back"),
                             (["--check", "empty.csv"], "empty.csv: has fewer than 8 values of each output"),
                             (["--check-outputs", "outputs.csv"], "--check-outputs: are 1, but --check are 0")):

@@ -54,12 +54,25 @@ class ProgressLine {
   bool is_seen_ = isatty(STDERR_FILENO) == 1;
 };
 
+/// What a fit has seen proves nothing of it.
+void check_are_others(const Options& options) {
+  for (const auto& check : options.checks)
+    for (const auto& recording : options.recordings) {
+      std::error_code unknown;  // a file that is not there is said when it is read
+      if (std::filesystem::equivalent(check, recording, unknown))
+        throw InputError{
+            "--check", check.string() + " is a --recording too, and a fit proves nothing on what it has seen",
+            "name a recording that is in no --recording"};
+    }
+}
+
 int run(const Options& options) {
   if (!options.check_outputs.empty() && options.check_outputs.size() != options.checks.size())
     throw InputError{"--check-outputs",
                      "are " + std::to_string(options.check_outputs.size()) + ", but --check are " +
                          std::to_string(options.checks.size()),
                      "give one file of outputs for each --check, in the same order"};
+  check_are_others(options);
   const auto yaml = config::Yaml::load(options.model);
   const auto model = model::read(yaml);
   yaml.finish();

@@ -12,6 +12,9 @@ constexpr const char* axis = R"(
 columns: {time: t, reference: setpoint, position: encoder, current: current}   # signal: column of the recording
 controller: {kind: pid, rate: 1000.0, kp: 4.0e3, ki: 2.0e4, kd: 60.0, velocity_filter_hz: 200.0, limit: 8.0}
 # or {kind: cascade, rate: 1000.0, kp: 160.0, kv: 240.0, limit: 10.0}; without a controller `current` is an input
+# pid: u = clamp(kp e + ki sum(e) / rate + kd d, +-limit), e = reference - position; the sum holds e[k], which is not added where u clamps;
+#   kd acts on the error: d[k] = d[k-1] + a ((e[k] - e[k-1]) rate - d[k-1]), a = 1 - exp(-2 pi velocity_filter_hz / rate), 1 without a filter
+# cascade: u = clamp(kv (kp e - v), +-limit), v as d but of the measured position. Sum and filter begin at 0, e[-1] = e[0]; no limit: no clamp
 parameters:
   mass: {value: 3.2, unit: kg, sigma: 0.06}
   motor_constant: {value: 20.0, unit: N/A, sigma: 0.2}
@@ -67,7 +70,8 @@ parameters:
   a1: {value: 2.5, unit: 1}                   # no sigma: a start value, nothing is known beyond it
   a2: {value: 2.5, unit: 1}
 # + - * / ^ and sin cos tan exp log sqrt abs sign min max tanh, pi, t (the time in s). A column with a unit is taken in SI, or in
-# the unit as it stands where the numbers here are in it too. `controller: {output: u, expression: ...}` closes a loop.
+# the unit as it stands where the numbers here are in it too. rpm is rad/s where they are angles.
+# `controller: {output: u, expression: ...}` closes a loop.
 )";
 
 const char* body(Plant plant) {

@@ -38,6 +38,9 @@ std::string what_was_looked_at(const Case& data);
 std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
+/// What the verdict alone would hide, in a line: parameters that went far from what was believed, and much that remains;
+/// empty where there is neither.
+std::string beside_the_verdict(const Diagnosis& diagnosis);
 /// The motion or recording that would tell two terms apart.
 std::string separating_experiment(const Case& data, const physics::Term& one, const physics::Term& other);
 /// A term's name, with its place where `other` is of the same name elsewhere.

@@ -310,6 +310,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   const bool clear =
       (d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only) && !d.is_partial;
   page.callout(verdict_sentence(data, d), fine ? "good" : (clear ? "plain" : "warn"));
+  if (const auto beside = beside_the_verdict(d); !beside.empty()) page.callout(beside, "warn");
   in_short(page, data, d);
 
   page.heading("Error on data that no fit saw");

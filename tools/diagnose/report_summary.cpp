@@ -43,6 +43,7 @@ void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& tit
 
 std::string summary(const Case& data, const Diagnosis& d) {
   std::string out = verdict_sentence(data, d) + "\n";
+  if (const auto beside = beside_the_verdict(d); !beside.empty()) out += beside + "\n";
   std::vector<std::vector<std::string>> rows;
   if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
   for (std::size_t i = 0; i < d.findings.size(); ++i) {

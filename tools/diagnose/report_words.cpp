@@ -187,14 +187,19 @@ std::string what_was_looked_at(const Case& data) {
 
 namespace {
 
-/// Those that left what the user believed.
-std::string moved_parameters(const Diagnosis& d) {
+/// "2.4", "770": a ratio as one says it.
+std::string times(double ratio) {
+  return ratio >= 10.0 && ratio < 1e6 ? std::to_string(std::lround(ratio)) : report::number(ratio, 2);
+}
+
+/// Those that left what the user believed by more than so many of his sigmas.
+std::string moved_parameters(const Diagnosis& d, double least = 3.0) {
   std::string text;
   for (const auto& f : d.best.free) {
     if (f.where == Freedom::Where::curve || !(f.sigma > 0.0)) continue;
     if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
     const double to = get(d.best.model, f), sigmas = std::abs(to - f.center) / f.sigma;
-    if (!(sigmas > 3.0)) continue;
+    if (!(sigmas > least)) continue;
     const bool own = f.where == Freedom::Where::parameter;
     std::string name, unit;
     if (own) {
@@ -206,12 +211,24 @@ std::string moved_parameters(const Diagnosis& d) {
       unit = info.parameters[f.index].unit;
     }
     text += (text.empty() ? "" : ", ") + name + " is " + report::si(to, unit, 4) + ", not " +
-            report::si(f.center, unit, 4) + " (" + report::number(sigmas, 2) + " sigma of what was believed)";
+            report::si(f.center, unit, 4) + " (" + times(sigmas) + " sigma of what was believed)";
   }
   return text;
 }
 
 }  // namespace
+
+std::string beside_the_verdict(const Diagnosis& d) {
+  constexpr double far = 10.0;  // sigmas of what was believed: the rest of the model has become another
+  constexpr double much = 3.0;  // times the noise
+  const auto moved = d.findings.empty() ? std::string{} : moved_parameters(d, far);
+  std::string text;
+  if (!moved.empty()) text = (d.findings.size() == 1 ? "with it " : "with them ") + moved;
+  if (d.unexplained >= much)
+    text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
+            " times the noise";
+  return text.empty() ? text : "Mind: " + text + ".";
+}
 
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   if (d.is_partial) {

@@ -192,6 +192,14 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   return all;
 }
 
+std::string why_impossible(const Start& start) {
+  const auto& d = start.directions.front();
+  if (d.amplitude >= none) return "fits best with the opposite of what it does, which nothing has";
+  std::string name{start.term.info->parameters[d.amplitude].name};
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return "fits best with a negative " + name + ", which nothing has";
+}
+
 namespace {
 
 /// A strength that its bounds forbid, or a limit that would hardly be there.

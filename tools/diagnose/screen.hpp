@@ -1,6 +1,8 @@
 // Screening: what each start would gain to first order, alone and in pairs, the nominal parameters free beside it.
 #pragma once
 
+#include <string>
+
 #include "tools/diagnose/candidates.hpp"
 
 namespace invar::diagnose {
@@ -13,6 +15,9 @@ struct Screened {
   double merit = 0.0;        // gain less the price of its numbers
   bool impossible = false;   // needs a sign that its bounds forbid
 };
+
+/// Why no machine has what a start would need: "fits best with a negative time constant, which nothing has".
+std::string why_impossible(const Start& start);
 
 /// Best first by merit. `keep` bounds how many carry their columns.
 std::vector<Screened> screen(const Case& data, const Weighing& weighing, const Fit& base,

@@ -113,8 +113,7 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
   std::map<std::string, int> seen;
   for (const auto& s : screened) {
     if (s.impossible) {
-      if (s.merit > 3.0)
-        d_.reject(std::string{s.start.term.info->name}, "would need an impossible sign", s.merit);
+      if (s.merit > 3.0) d_.reject(std::string{s.start.term.info->name}, why_impossible(s.start), s.merit);
       continue;
     }
     // What first order cannot tell apart goes on together.
@@ -225,8 +224,8 @@ bool Search::add_named(double round) {
       }
     if (best_gain < margin()) {
       for (const auto& f : fits)
-        d_.reject(std::string{f.model.terms.back().info->name}, "its gain does not pay for its numbers",
-                  f.evidence - base.evidence);
+        d_.reject(std::string{f.model.terms.back().info->name},
+                  "what it explains is no more than chance would", f.evidence - base.evidence);
       continue;
     }
     if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95) &&

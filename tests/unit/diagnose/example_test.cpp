@@ -36,6 +36,14 @@ TEST_P(Example, IsAModelThatSimulatesAndNamesEveryTerm) {
     for (const double v : output) ASSERT_TRUE(std::isfinite(v));
 }
 
+TEST(ExampleOfAnAxis, SaysWhatItsControllerComputes) {
+  const auto text = example_model(physics::Plant::axis);
+  for (const auto* said : {"u = clamp(kp e + ki sum(e) / rate + kd d, +-limit)", "kd acts on the error",
+                           "a = 1 - exp(-2 pi velocity_filter_hz / rate)",
+                           "u = clamp(kv (kp e - v), +-limit)", "not added where u clamps"})
+    EXPECT_THAT(text, ::testing::HasSubstr(said));
+}
+
 INSTANTIATE_TEST_SUITE_P(EveryPlant, Example,
                          ::testing::Values(physics::Plant::axis, physics::Plant::thermal,
                                            physics::Plant::error_map, physics::Plant::droplet,

@@ -1,6 +1,7 @@
 // report.json against the contract, key by key, for every verdict.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/mismatch/marks.hpp"
@@ -174,6 +175,29 @@ TEST(Report, OfASearchThatWasStoppedSaysFirstThatNothingCanBeSaid) {
     EXPECT_NE(page.find("Not finished, nothing can be said."), std::string::npos);
     EXPECT_EQ(page.find("nothing that this recording shows"), std::string::npos);
   }
+}
+
+// What is named explains little where the model's own numbers had to leave what is known, or much remains.
+TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
+  auto data = case_of(make("thermal", "sensor_lag", 1.0, 3));
+  auto d = diagnose::search(data, [](double, const std::string&) {});
+  ASSERT_FALSE(d.findings.empty());
+  EXPECT_EQ(diagnose::beside_the_verdict(d), "");
+  EXPECT_EQ(diagnose::page_text(data, d, "model.yaml").find("Mind: "), std::string::npos);
+  d.unexplained = 96.0;
+  EXPECT_EQ(diagnose::beside_the_verdict(d), "Mind: what remains is 96 times the noise.");
+  const auto own = std::find_if(d.best.free.begin(), d.best.free.end(), [](const auto& f) {
+    return f.where == diagnose::Freedom::Where::parameter && f.sigma > 0.0;
+  });
+  ASSERT_NE(own, d.best.free.end());
+  auto& parameter = d.best.model.parameters[own->index];
+  parameter.value = own->center + 770.0 * own->sigma;
+  const auto said = diagnose::beside_the_verdict(d);
+  EXPECT_THAT(said, StartsWith("Mind: with it " + parameter.name + " is "));
+  EXPECT_THAT(said, HasSubstr("(770 sigma of what was believed); what remains is 96 times the noise."));
+  EXPECT_THAT(diagnose::summary(data, d), HasSubstr(".\n" + said + "\n"));
+  const auto page = diagnose::page_text(data, d, "model.yaml");
+  EXPECT_LT(page.find(said), page.find("<table"));
 }
 
 // A force that grows with the time is a third of its most after a third of it, and in a loop the current tells.

@@ -1,6 +1,8 @@
 // Units of models in the user's own expressions: a column is taken as his numbers are written.
 #include <gmock/gmock.h>
 
+#include <numbers>
+
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
 
@@ -50,6 +52,43 @@ TEST(OwnUnits, ANameOfTheUsersOwnIsALabel) {
   EXPECT_EQ(read_own("counts", "counts/V").find("k")->unit, "counts/V");
 }
 
+std::string refusal(const std::string& column_unit, const std::string& state_unit) {
+  try {
+    (void)first(column_unit, read_own(state_unit, "\"1\""));
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(OwnUnits, AColumnOfAnotherQuantityThanItsStateIsRefused) {
+  using ::testing::HasSubstr;
+  EXPECT_THAT(refusal("K", "cm"), HasSubstr("column `out`: is in `K`, the model's `x` in `cm`"));
+  EXPECT_THAT(refusal("furlong", "cm"), HasSubstr("column `out`: is in `furlong`, the model's `x` in `cm`"));
+  EXPECT_THAT(refusal("V", "m/s"), HasSubstr("is in `V`"));
+  // What says nothing, says the same, or is a name of the user's own stands.
+  for (const auto& [column, state] : {std::pair{"cm", "cm"},
+                                      {"mm", "m"},
+                                      {"furlong", "furlong"},
+                                      {"furlong", "\"1\""},
+                                      {"V", "volts"},
+                                      {"1", "V"},
+                                      {"", "V"},
+                                      {"deg", "rad"},
+                                      {"K", "degC"}})
+    EXPECT_EQ(refusal(column, state), "none") << column << " for " << state;
+}
+
+TEST(OwnUnits, TurnsAMinuteAreRadiansASecondWhereTheModelSpeaksOfAngles) {
+  constexpr double per_rpm = 2.0 * std::numbers::pi / 60.0;
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("rad/s", "\"1\"")), 40.0 * per_rpm);
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("deg/s", "\"1\"")), 40.0 * 6.0);
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("\"1\"", "rad/(V s)")), 40.0 * per_rpm);
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("Hz", "rad")), 40.0 / 60.0);
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("\"1\"", "\"1\"")), 40.0 / 60.0);
+  EXPECT_DOUBLE_EQ(first("rpm", read_own("rpm", "rad")), 40.0);
+}
+
 std::string fault_of(const std::string& derivative, const std::string& parameters,
                      const std::string& rest = "") {
   try {
@@ -68,6 +107,35 @@ std::string fault_of(const std::string& derivative, const std::string& parameter
   return "none";
 }
 
+std::string fault_of_mass(const std::string& place, const std::string& speed) {
+  try {
+    const auto yaml = config::Yaml::parse(
+        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\nstates:\n"
+        "  x: {derivative: v, initial: {value: 1, unit: " +
+            place + "}}\n  v: {derivative: u - x, initial: {value: 1, unit: " + speed +
+            "}}\noutputs: {y: {column: out, expression: x}}\n",
+        "model.yaml");
+    (void)read(yaml);
+    yaml.finish();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(OwnUnits, AStateAndTheStateThatIsItsRateAreInOneUnit) {
+  EXPECT_THAT(fault_of_mass("mm", "m/s"),
+              ::testing::StartsWith("model.yaml:6: states.x.initial: is in mm, and its rate `v` in m/s"));
+  for (const auto& [place, speed] : {std::pair{"mm", "mm/s"},
+                                     {"m", "m/s"},
+                                     {"rad", "1/s"},
+                                     {"rad", "rad/s"},
+                                     {"counts", "m/s"},
+                                     {"\"1\"", "m/s"},
+                                     {"mm", "\"1\""}})
+    EXPECT_EQ(fault_of_mass(place, speed), "none") << place << ", " << speed;
+}
+
 TEST(OwnExpressions, ANameStandsForOneThing) {
   using ::testing::HasSubstr;
   EXPECT_EQ(fault_of("k*(u - x) + max(0, x >= 2)", "k: {value: 1}"), "none");
@@ -76,6 +144,23 @@ TEST(OwnExpressions, ANameStandsForOneThing) {
   EXPECT_THAT(fault_of("u - x", "pi: {value: 1}"), HasSubstr("`pi` means something else"));
   EXPECT_THAT(fault_of("u - x", "sin: {value: 1}"), HasSubstr("`sin` means something else"));
   EXPECT_THAT(fault_of("u - x", "a-b: {value: 1}"), HasSubstr("`a-b` is no name"));
+}
+
+TEST(OwnExpressions, AFormulaThatCannotBeReadIsSaidAtItsLineWithWhatThereIs) {
+  using ::testing::AllOf;
+  using ::testing::HasSubstr;
+  using ::testing::StartsWith;
+  EXPECT_THAT(fault_of("(u - x", ""),
+              AllOf(StartsWith("model.yaml:5: states.x.derivative: "), HasSubstr("arenthesis")));
+  EXPECT_THAT(fault_of("u - sqrt(xx)", ""),
+              AllOf(StartsWith("model.yaml:5: states.x.derivative: "), HasSubstr("\"xx\"")));
+  EXPECT_THAT(
+      fault_of("cosinus(x)", ""),
+      HasSubstr("sin cos tan asin acos atan sinh cosh tanh exp log ln log2 log10 sqrt abs sign min max"));
+  EXPECT_THAT(fault_of("u - x", "", "controller: {output: u, expression: 2*y}\n"),
+              StartsWith("model.yaml:8: controller.expression: "));
+  // A name that is none is said, and not once more at each formula.
+  EXPECT_THAT(fault_of("u - x", "a-b: {value: 1}"), Not(HasSubstr("derivative")));
 }
 
 TEST(OwnExpressions, AnExpressionGivesOneValueAndALoopDoesNotFollowItself) {

@@ -95,6 +95,8 @@ TEST_F(TableTest, SaysOfAPackedFileThatItIsCutOffRatherThanWhatItsLastLineLacks)
 TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m],y [m]\n1,2\n3\n")), HasSubstr("in.csv:3: this row has 1 cells"));
   EXPECT_THAT(fault_of(make("x [m]\n1\nabc\n")), HasSubstr("in.csv:3: column `x`: `abc` is not a number"));
+  EXPECT_THAT(fault_of(make("x [m]\n1\n" + std::string(400, '9') + "\n")),
+              HasSubstr("`" + std::string(20, '9') + "...` is not a number"));
   EXPECT_THAT(fault_of(make("x,x\n1,2\n")), HasSubstr("stands twice"));
   EXPECT_THAT(fault_of(make("x [m];y [m]\n1,5;2,5\n")), HasSubstr("parted by semicolons"));
   EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
