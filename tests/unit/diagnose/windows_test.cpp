@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -109,6 +110,58 @@ TEST(Windows, WhatForgetsHasNone) {
   cut_into_windows(data);
   EXPECT_EQ(data.windows.count, 0U);
   EXPECT_EQ(data.model.parameters.size(), 2U);
+}
+
+/// An axis that a loop the model does not know leads to and fro: exact between rows, for the force is constant there but for
+/// the friction, which turns or holds where the speed passes zero.
+Case led_axis(double friction) {
+  std::mt19937 random{11};
+  std::normal_distribution<double> normal;
+  constexpr double moved = 3.2, motor = 20.0, h = 1e-3;
+  recording::Table table;
+  std::vector<double> time, current, position;
+  double x = 0.0, v = 0.0;
+  for (int i = 0; i < 4000; ++i) {
+    const double t = h * i;
+    const double to = 0.03 * std::sin(4.0 * t) + 0.01 * std::sin(11.0 * t),
+                 reading = x + 1e-6 * normal(random);
+    const double u = std::clamp(1500.0 * (to - reading) - 40.0 * v, -8.0, 8.0);
+    time.push_back(t), current.push_back(u), position.push_back(reading);
+    for (double left = h; left > 0.0;) {
+      const double push = motor * u;
+      if (v == 0.0 && std::abs(push) <= friction) break;  // holds
+      const double a = (push - std::copysign(friction, v != 0.0 ? v : push)) / moved;
+      const double stop = v * a < 0.0 ? -v / a : 2.0 * left, part = std::min(left, stop);
+      x += part * (v + 0.5 * a * part);
+      v = stop <= left ? 0.0 : v + a * part;
+      left -= part;
+    }
+  }
+  table.add("t", "s", time);
+  table.add("i", "A", current);
+  table.add("y", "m", position);
+  return make_case(model_of("invar_model: 1\nplant: axis\ncolumns: {time: t, position: y, current: i}\n"
+                            "parameters:\n  mass: {value: 3.2, unit: kg, sigma: 0.06}\n"
+                            "  motor_constant: {value: 20.1, unit: N/A, sigma: 0.2}\n"
+                            "  viscous_damping: {value: 0, unit: N s/m, sigma: 0}\n"),
+                   {table});
+}
+
+TEST(Windows, AnAxisWithoutControllerIsJudgedOverThem) {
+  auto data = led_axis(3.0);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_GT(data.windows.count, 20U);
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction") << summary(data, d);
+  EXPECT_NEAR(d.findings[0].term.values[0], 3.0, 0.15);
+  EXPECT_THAT(summary(data, d), ::testing::HasSubstr("each from states of its own"));
+}
+
+TEST(Windows, AnAxisThatTheModelKnowsLacksNothing) {
+  auto data = led_axis(0.0);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
+  EXPECT_LT(d.heldout[0].after, 1.3e-6);
 }
 
 }  // namespace
