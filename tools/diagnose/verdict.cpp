@@ -187,8 +187,8 @@ void conclude(const Case& data, Diagnosis& d) {
   double sum = 0.0;
   for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
   d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
-  // An equation, or a window of an axis, that says the right thing leaves noise. Many times that, and with what was recorded, is more physics, however
-  // much was found.
+  // An equation, or a window of an axis, that says the right thing leaves noise. Many times that, and with what was
+  // recorded, is more physics, however much was found.
   if ((data.model.plant == physics::Plant::equations || data.windows.count > 0) && most_followed > 0.1) {
     if (d.verdict == Verdict::explained && d.unexplained > 10.0) d.verdict = Verdict::partly_explained;
     if (d.findings.empty() && d.verdict != Verdict::unknown_physics && d.unexplained > 10.0) {
