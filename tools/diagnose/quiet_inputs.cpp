@@ -63,8 +63,7 @@ std::optional<Case> with_quiet_inputs(const Case& as_read, const Case& judged, c
   const bool is_open = model.plant == physics::Plant::axis ? !model.controller
                                                            : model.plant == physics::Plant::equations &&
                                                                  model.equations.controlled_input.empty();
-  const bool claims = !d.findings.empty() || d.verdict == Verdict::unknown_physics;
-  if (!is_open || !claims || d.is_partial) return std::nullopt;
+  if (!is_open || d.findings.empty() || d.is_partial) return std::nullopt;
   const double margin = claim_margin_of(d.weighing);
   std::optional<Case> quiet;
   std::size_t reach = 0;
@@ -76,7 +75,7 @@ std::optional<Case> with_quiet_inputs(const Case& as_read, const Case& judged, c
     cost = now, reach = tried;
     quiet = std::move(other);
   }
-  if (!quiet || (!d.findings.empty() && all_stand(judged, *quiet, d))) return std::nullopt;
+  if (!quiet || all_stand(judged, *quiet, d)) return std::nullopt;
   auto again = quietened(as_read, reach);
   // A median over n rows leaves pi / (2 n) of the power of white noise.
   const double left = 0.5 * std::numbers::pi / static_cast<double>(again.quiet_rows);

@@ -196,6 +196,12 @@ void conclude(const Case& data, Diagnosis& d) {
       d.suspect = most_suspect(data, d);
     }
   }
+  // Where every window of an axis begins anew, numbers that are off leave noise.
+  if (d.verdict == Verdict::parameters_only && data.model.plant == physics::Plant::axis &&
+      data.windows.count > 0 && d.unexplained > 3.0) {
+    d.verdict = Verdict::unknown_physics;
+    d.suspect = most_suspect(data, d);
+  }
   std::sort(d.rejected.begin(), d.rejected.end(),
             [](const auto& a, const auto& b) { return a.gain > b.gain; });
   std::erase_if(d.rejected, [&](const Rejection& r) {
