@@ -12,10 +12,9 @@ std::vector<double> running_median(const std::vector<double>& values, std::size_
   std::vector<double> quiet(values.size());
   for (std::size_t i = 0; i < values.size(); ++i) {
     const std::size_t by = std::min({reach, i, values.size() - 1 - i});  // one-sided, it would lead or trail
-    std::vector<double> about;
-    for (std::size_t k = i - by; k <= i + by; ++k)
-      if (std::isfinite(values[k])) about.push_back(values[k]);
-    quiet[i] = std::isfinite(values[i]) ? median(std::move(about)) : values[i];
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(i);
+    const auto to = static_cast<std::ptrdiff_t>(by);
+    quiet[i] = std::isfinite(values[i]) ? median({at - to, at + to + 1}) : values[i];
   }
   return quiet;
 }
@@ -60,9 +59,7 @@ bool all_stand(const Case& judged, const Case& quiet, const Diagnosis& d) {
 std::optional<Case> with_quiet_inputs(const Case& as_read, const Case& judged, const Diagnosis& d) {
   // A set point is known, and so is what a loop does with it.
   const auto& model = judged.model;
-  const bool is_open = model.plant == physics::Plant::axis ? !model.controller
-                                                           : model.plant == physics::Plant::equations &&
-                                                                 model.equations.controlled_input.empty();
+  const bool is_open = !physics::states_of(model).empty() && model.equations.controlled_input.empty();
   if (!is_open || d.findings.empty() || d.is_partial) return std::nullopt;
   const double margin = claim_margin_of(d.weighing);
   std::optional<Case> quiet;
