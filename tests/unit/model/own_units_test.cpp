@@ -5,6 +5,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::model {
 namespace {
@@ -89,38 +90,31 @@ TEST(OwnUnits, TurnsAMinuteAreRadiansASecondWhereTheModelSpeaksOfAngles) {
   EXPECT_DOUBLE_EQ(first("rpm", read_own("rpm", "rad")), 40.0);
 }
 
-std::string fault_of(const std::string& derivative, const std::string& parameters,
-                     const std::string& rest = "") {
+std::string fault_of_model(const std::string& text) {
   try {
-    const auto yaml = config::Yaml::parse(
-        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
-        "states: {x: {derivative: '" +
-            derivative +
-            "', initial: {value: 1, unit: V}}}\noutputs: {y: {column: out, expression: x}}\nparameters: {" +
-            parameters + "}\n" + rest,
-        "model.yaml");
-    (void)read(yaml);
-    yaml.finish();
+    (void)test::model_of(text);
   } catch (const InputError& error) {
     return error.what();
   }
   return "none";
 }
 
+std::string fault_of(const std::string& derivative, const std::string& parameters,
+                     const std::string& rest = "") {
+  return fault_of_model(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\n"
+      "states: {x: {derivative: '" +
+      derivative +
+      "', initial: {value: 1, unit: V}}}\noutputs: {y: {column: out, expression: x}}\nparameters: {" +
+      parameters + "}\n" + rest);
+}
+
 std::string fault_of_mass(const std::string& place, const std::string& speed) {
-  try {
-    const auto yaml = config::Yaml::parse(
-        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\nstates:\n"
-        "  x: {derivative: v, initial: {value: 1, unit: " +
-            place + "}}\n  v: {derivative: u - x, initial: {value: 1, unit: " + speed +
-            "}}\noutputs: {y: {column: out, expression: x}}\n",
-        "model.yaml");
-    (void)read(yaml);
-    yaml.finish();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "none";
+  return fault_of_model(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: in}\nstates:\n"
+      "  x: {derivative: v, initial: {value: 1, unit: " +
+      place + "}}\n  v: {derivative: u - x, initial: {value: 1, unit: " + speed +
+      "}}\noutputs: {y: {column: out, expression: x}}\n");
 }
 
 TEST(OwnUnits, AStateAndTheStateThatIsItsRateAreInOneUnit) {
