@@ -37,6 +37,11 @@ std::vector<std::string> states_of(const Model& model) {
   return names;
 }
 
+Model without_term(Model model, std::size_t place) {
+  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+  return model;
+}
+
 AxisPlant make_axis(const Model& model, double longest_step) {
   INVAR_EXPECTS(model.plant == Plant::axis);
   std::vector<AxisTerm> terms;

@@ -103,6 +103,9 @@ struct Model {
 /// without controller. Empty for all others.
 std::vector<std::string> states_of(const Model& model);
 
+/// The model less its term at `place`. Precondition: it has that many.
+Model without_term(Model model, std::size_t place);
+
 /// A plant object of the model's present numbers. Preconditions: the model is of that plant.
 AxisPlant make_axis(const Model& model, double longest_step = 1e-3);
 ThermalPlant make_thermal(const Model& model);

@@ -17,9 +17,8 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
   };
   for (std::size_t i = 0; i < rivals.size() && rivals.size() > 1; ++i) {
     const std::size_t place = data.model.terms.size() + i;
-    Model model = d.best.model;
-    const Term removed = model.terms[place];
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    const Term removed = d.best.model.terms[place];
+    Model model = physics::without_term(d.best.model, place);
     // What one friction law gives up another may take over.
     for (std::size_t t = data.model.terms.size(); t < model.terms.size(); ++t)
       if (is_friction(removed) && is_friction(model.terms[t])) {

@@ -112,9 +112,7 @@ bool is_its_own(const Case& data, const physics::Model& model, std::size_t term)
   constexpr double turns = 5.0;  // of the wave in a block: a tenth of its frequency is one band
   const double frequency = wave_of(model, model.terms[term]);
   if (!(frequency > 0.0)) return false;
-  auto free = model;
-  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  const auto without = simulate(data, free);
+  const auto without = simulate(data, physics::without_term(model, term));
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     double blocks = 0.0, own = 0.0;
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
@@ -166,9 +164,7 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
   if (angles_of(data, model, model.terms[term], 0).empty()) return true;
   const auto onset = info.index_of("onset");
   const double from = onset < physics::most_parameters ? model.terms[term].values[onset] : -1e300;
-  auto free = model;
-  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  const auto without = simulate(data, free);
+  const auto without = simulate(data, physics::without_term(model, term));
   double least = 1.0;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     std::vector<std::complex<double>> blocks;
@@ -239,9 +235,7 @@ double step_of(std::vector<double> values) {
 /// against the steps of the instrument itself.
 bool is_rounding(const Case& data, const physics::Model& model, std::size_t term) {
   if (angles_of(data, model, model.terms[term], 0).empty()) return false;
-  auto free = model;
-  free.terms.erase(free.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  const auto with = simulate(data, model), without = simulate(data, free);
+  const auto with = simulate(data, model), without = simulate(data, physics::without_term(model, term));
   const auto to_steps = [](double value, double step) {
     return step > 0.0 ? step * std::round(value / step) : value;
   };

@@ -85,9 +85,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
   if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
     return std::nullopt;
   const auto starts = unmodelled_starts(data, named);
-  auto without_term = named.model;
-  without_term.terms.erase(without_term.terms.begin() + static_cast<std::ptrdiff_t>(term));
-  const Fit base = fit(data, plain, without_term, data.model, 6);
+  const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, 6);
   const auto instead = screen(data, plain, base, starts, 4);
   std::optional<OtherCause> found;
   for (const auto& s : instead) {

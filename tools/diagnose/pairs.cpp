@@ -105,8 +105,7 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
     // Neither alone: an engineer must see what the other adds.
     bool needed = true;
     for (const std::size_t dropped : {first, first + 1}) {
-      auto alone = best.fit.model;
-      alone.terms.erase(alone.terms.begin() + static_cast<std::ptrdiff_t>(dropped));
+      const auto alone = physics::without_term(best.fit.model, dropped);
       const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
       needed = needed && least_ratio(data, best.fit, single.fit) < 0.8;
     }

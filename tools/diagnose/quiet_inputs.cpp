@@ -38,8 +38,7 @@ std::vector<double> gains(const Case& data, const Diagnosis& d) {
   const auto best = fit(data, d.weighing, d.best.model, data.model, 5);
   std::vector<double> all;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
-    auto without = best.model;
-    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + i));
+    const auto without = physics::without_term(best.model, data.model.terms.size() + i);
     all.push_back(best.evidence - fit(data, d.weighing, without, data.model, 5).evidence);
   }
   return all;

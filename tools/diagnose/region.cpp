@@ -17,10 +17,8 @@ constexpr double third = 1.0 / 3.0;
 
 /// By recording and row, the square of what the finding does to the outputs, each in its noise.
 std::vector<std::vector<double>> power_of_effect(const Case& data, const Diagnosis& d, std::size_t finding) {
-  auto model = d.best.model;
-  const auto with = simulate(data, model);
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + finding));
-  const auto without = simulate(data, model);
+  const auto with = simulate(data, d.best.model);
+  const auto without = simulate(data, physics::without_term(d.best.model, data.model.terms.size() + finding));
   std::vector<std::vector<double>> power;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     auto& squares = power.emplace_back(data.recordings[r].inputs.rows(), 0.0);

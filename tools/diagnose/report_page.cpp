@@ -192,9 +192,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  site_of(data, finding.term) + "): " + std::string{info.description} + " [" +
                  std::string{info.source} + "] Of the mismatch, " + report::number(100.0 * finding.share, 3) +
                  " % comes back when it alone is taken out.");
-  auto model = d.best.model;
-  model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + which));
-  const auto without = simulate(data, model);
+  const auto without = simulate(data, physics::without_term(d.best.model, data.model.terms.size() + which));
   // The output that it moves most, seen from its noise.
   std::size_t shown = 0;
   double most = -1.0;

@@ -101,8 +101,7 @@ OtherShape other_shape(const Case& data, const Beside& beside, std::size_t term)
   if (const auto late = second_times(data, named, term); late.cols() > 0)
     weigh_up(squares_taken(plain, data, named, late), late.cols());
   if (found.lead < claim_margin) return found;
-  auto without = named.model;
-  without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(term));
+  const auto without = physics::without_term(named.model, term);
   const double all = fit(data, plain, without, data.model, 6).residual.squaredNorm() - squares + taken;
   found.share = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
   return found;

@@ -22,8 +22,7 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
         std::string{d.best.model.terms[data.model.terms.size() + i].info->name},
         "a free course over " + other->fit.model.terms.back().curve.over + " does far better in its place",
         other->lead);
-    auto model = d.best.model;
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size() + i));
+    const auto model = physics::without_term(d.best.model, data.model.terms.size() + i);
     d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));
     d.weighing = weigh(data, simulate(data, other->fit.model));
     d.best = fit(data, d.weighing, model, data.model, 8);
@@ -43,7 +42,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
       kept.insert(kept.begin(), finding);
       continue;
     }
-    model.terms.erase(model.terms.begin() + static_cast<std::ptrdiff_t>(given + i));
+    model = physics::without_term(std::move(model), given + i);
     if (!is_curve && (!nearest || finding.gain > nearest->gain)) nearest = finding;
   }
   if (!nearest) return false;

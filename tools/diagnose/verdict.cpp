@@ -146,8 +146,7 @@ void conclude(const Case& data, Diagnosis& d) {
         finding.sigmas[f.index] = d.best.sigma(static_cast<Eigen::Index>(k));
     }
     // What is lost without it.
-    physics::Model without = d.best.model;
-    without.terms.erase(without.terms.begin() + static_cast<std::ptrdiff_t>(place));
+    const auto without = physics::without_term(d.best.model, place);
     const auto lost = residual(data, d.weighing, without).squaredNorm() - d.best.residual.squaredNorm();
     const auto all = residual(data, d.weighing, data.model).squaredNorm() - d.best.residual.squaredNorm();
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
