@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tools/diagnose/fit.hpp"
+#include "tools/diagnose/control_law.hpp"
 
 namespace invar::diagnose {
 
@@ -78,6 +78,7 @@ struct Diagnosis {
   std::vector<std::string> unexplained_over;
   std::optional<Suspect> suspect;  // of unknown physics that has no curve either
   double still_follows = 0.0;      // share of the mismatch that is left and follows what was recorded
+  std::optional<LawOff> off_law;   // of an axis in closed loop
   bool is_unnamed = false;         // the finding is a curve alone
   bool is_partial = false;         // stopped before all was tried
   bool has_rest = false;           // the last finding is a curve beside named ones

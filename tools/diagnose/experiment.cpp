@@ -90,6 +90,10 @@ std::string separating_experiment(const Case& data, const physics::Term& at, con
 
 std::string next_experiment(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
+  if (d.off_law && d.off_law->is_another_law())
+    return "Compare the controller block of the model's file with the drive: gains and their units, the "
+           "filter, the rate, "
+           "what is differentiated; invar diagnose --example axis says the law that is meant.";
   std::string apart;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)

@@ -103,7 +103,10 @@ std::string report_json(const Case& data, const Diagnosis& d) {
          {"where", json::object()},
          {"share", d.still_follows},
          {"why",
-          "what is left over follows what was recorded, most of all by way of the " + d.suspect->place}});
+          d.off_law && d.off_law->is_another_law()
+              ? "the recorded current is not what the controller makes of the recorded reference and position"
+              : "what is left over follows what was recorded, most of all by way of the " +
+                    d.suspect->place}});
   report["parameter_corrections"] = json::array();
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];

@@ -265,6 +265,12 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
     }
     case Verdict::unknown_physics:
+      if (d.off_law && d.off_law->is_another_law())
+        return "Unknown physics: the recorded current is not what the model's controller makes of the "
+               "recorded "
+               "reference and position. What goes with the motion differs by " +
+               report::si(d.off_law->off, "A") + " RMS, and the current moves by " +
+               report::si(d.off_law->all, "A") + ". Nothing behind the loop is judged.";
       if (d.findings.empty())
         return "Unknown physics: what the model leaves over follows what was recorded and its past, and "
                "neither a known "

@@ -52,6 +52,8 @@ class Search {
   void finish();
   /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
   void try_pairs(const Diagnosis& begun);
+  /// What is said where the machine's controller is another than the model's: nothing of what lies behind it.
+  void stop_at_the_law();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
@@ -371,6 +373,18 @@ void Search::try_pairs(const Diagnosis& begun) {
   smallest_effects(data_, screened, d_);
 }
 
+void Search::stop_at_the_law() {
+  hold_out(data_, d_);
+  d_.best =
+      fit(data_, d_.weighing, data_.model, data_.model, 0);  // numbers that a wrong loop asks for are none
+  for (auto* rows : {&d_.heldout, &d_.train})
+    for (auto& row : *rows) row.after = row.before;
+  conclude(data_, d_);
+  d_.verdict = Verdict::unknown_physics;
+  d_.suspect = Suspect{"axis.controller", "controller", {"reference", "position"}};
+  progress_(1.0, "done");
+}
+
 Diagnosis Search::run() {
   data_.stopped = options_.stopped;
   try {
@@ -381,6 +395,13 @@ Diagnosis Search::run() {
     d_.weighing = weigh(data_, simulate(data_, data_.model), false);
     d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
     data_.stopped = options_.stopped;
+  }
+  if (options_.refuses && take([&] {
+        d_.off_law = off_the_law(data_);
+        return d_.off_law && d_.off_law->is_another_law();
+      })) {
+    stop_at_the_law();
+    return d_;
   }
   const Diagnosis begun = d_;
   const bool in_equations = data_.model.plant == physics::Plant::equations;

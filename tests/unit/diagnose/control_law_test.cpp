@@ -1,0 +1,97 @@
+// The machine's controller against the model's, on a loop that is stepped here by the closed form of a mass with drag.
+#include "tools/diagnose/control_law.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "tests/support/model_of.hpp"
+#include "tools/diagnose/report.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+constexpr double rate = 1000.0, mass = 5.0, motor = 40.0, drag = 12.0;
+
+struct Law {
+  double kp = 8000.0, ki = 2e5, kd = 60.0, filter = 200.0;
+  bool of_error = true;  // its derivative is taken of the error; false: of the reading
+};
+
+/// Two sines and pauses. `seen`: noise that the controller sees; `read`: more of it in what is recorded alone.
+recording::Table loop(const Law& law, double seen, double read, double coulomb, unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  const double share = -std::expm1(-2.0 * std::numbers::pi * law.filter / rate), h = 1.0 / rate;
+  const double fades = std::exp(-drag / mass * h), moves = mass / drag * (1.0 - fades);
+  std::vector<double> time, reference, position, current;
+  double x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0;
+  for (int k = 0; k < 9000; ++k) {
+    const double t = h * k,
+                 gate = std::fmod(t, 3.0) < 2.0 ? std::sin(std::numbers::pi * std::fmod(t, 3.0) / 2.0) : 0.0;
+    const double r = gate * gate * (0.02 * std::sin(5.0 * t) + 0.004 * std::sin(31.0 * t));
+    const double y = x + seen * normal(random), e = r - y, tracked = law.of_error ? e : -y;
+    if (k == 0) last = tracked;
+    slope += share * ((tracked - last) * rate - slope), last = tracked;
+    sum += e;
+    const double u = law.kp * e + law.ki * sum / rate + law.kd * slope;
+    time.push_back(t), reference.push_back(r), position.push_back(y + read * normal(random)),
+        current.push_back(u);
+    const double force = motor * u - coulomb * std::tanh(v / 2e-4), settled = force / drag;
+    x += settled * h + (v - settled) * moves, v = settled + (v - settled) * fades;
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("r", "m", reference);
+  table.add("y", "m", position);
+  table.add("u", "A", current);
+  return table;
+}
+
+Case case_of(const recording::Table& table) {
+  return make_case(
+      test::model_of(
+          "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u}\n"
+          "controller: {kind: pid, rate: 1000, kp: 8000, ki: 2.0e5, kd: 60, velocity_filter_hz: 200}\n"
+          "parameters: {mass: {value: 5.05, unit: kg, sigma: 0.1}, motor_constant: {value: 40, unit: N/A, "
+          "sigma: 0.2}, viscous_damping: {value: 12.5, unit: N s/m, sigma: 2}}\nterms: []\n"),
+      {table});
+}
+
+double off(const recording::Table& table) {
+  const auto data = case_of(table);
+  const auto found = off_the_law(data);
+  return found ? found->off / found->all : -1.0;
+}
+
+TEST(ControlLaw, TheSameLawIsNoOtherWhateverIsNoisyOrMissing) {
+  for (const double coulomb : {0.0, 6.0})
+    for (const double read : {0.0, 3e-7}) {
+      const double share = off(loop({}, 1e-7, read, coulomb, 4));
+      EXPECT_GE(share, 0.0);
+      EXPECT_LT(share, 0.01) << coulomb << " N, " << read << " m";
+    }
+}
+
+TEST(ControlLaw, AnotherGainOrAnotherDerivativeIsSeen) {
+  EXPECT_GT(off(loop({.kp = 8800.0}, 1e-7, 0.0, 0.0, 4)), 0.05);
+  EXPECT_GT(off(loop({.ki = 1.7e5}, 1e-7, 3e-7, 0.0, 4)), 0.05);
+  EXPECT_GT(off(loop({.of_error = false}, 1e-7, 0.0, 6.0, 4)), 0.05);
+}
+
+TEST(ControlLaw, NothingBehindALoopOfAnotherLawIsNamed) {
+  auto data = case_of(loop({.kp = 8800.0}, 1e-7, 0.0, 0.0, 4));
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  EXPECT_TRUE(d.findings.empty());
+  ASSERT_TRUE(d.suspect);
+  EXPECT_EQ(d.suspect->site, "axis.controller");
+  EXPECT_NE(summary(data, d).find("controller block"), std::string::npos) << summary(data, d);
+  EXPECT_EQ(d.best.model.value("mass"), 5.05);
+}
+
+}  // namespace
+}  // namespace invar::diagnose
