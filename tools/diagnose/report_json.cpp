@@ -136,8 +136,9 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"train", fit_json(d.train)},
       {"other_recordings", other_runs},
       {"split",
-       data.windows.count > 0
-           ? "each third of four stretches a window was kept from a fit in turn; " + how_windowed(data)
+       data.windows.count > 0 ? "each of the last three quarters of a window was kept from a fit in turn, "
+                                "never its beginning; " +
+                                    how_windowed(data)
        : data.windows.anew > 0
            ? "each third of 18 stretches of each recording was kept from a fit in turn; " + how_windowed(data)
            : "each third of 18 stretches of each recording was kept from a fit in turn; simulated without "

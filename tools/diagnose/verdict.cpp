@@ -26,13 +26,25 @@ struct Fold {
 Fold fold_of(const Case& data, const Weighing& all, std::size_t which) {
   Fold fold{all, all};
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-    const std::size_t rows = data.recordings[r].inputs.rows();
+    const auto& inputs = data.recordings[r].inputs;
     // Within a window of its own states some rows must be left to find these by.
-    const std::size_t count = std::max(stretches, 4 * (data.recordings[r].inputs.restarts.size() + 1));
-    const std::size_t stretch = std::max<std::size_t>(1, rows / count);
-    for (std::size_t o = 0; o < data.outputs.size(); ++o)
-      for (std::size_t i = 0; i < rows; ++i)
-        ((i / stretch) % folds == which ? fold.train : fold.test).present[r][o][i] = false;
+    const std::size_t count = std::max(stretches, 4 * (inputs.restarts.size() + 1));
+    const std::size_t least = std::max<std::size_t>(1, inputs.rows() / count);
+    auto restart = inputs.restarts.begin();
+    std::size_t begin = 0, stretch = least, first = 0;
+    for (std::size_t i = 0; i < inputs.rows(); ++i) {
+      if (restart != inputs.restarts.end() && *restart == i) {
+        begin = i;
+        const auto end = ++restart == inputs.restarts.end() ? inputs.rows() : *restart;
+        stretch = std::max<std::size_t>(1, std::min(least, (end - begin) / 4));
+        // What fades within a few rows is not to be known from later ones, so its beginning is not asked for.
+        first = 1;
+      }
+      const std::size_t at = (i - begin) / stretch;
+      const bool tested = at >= first && (at - first) % folds == which;
+      for (std::size_t o = 0; o < data.outputs.size(); ++o)
+        (tested ? fold.train : fold.test).present[r][o][i] = false;
+    }
   }
   return fold;
 }
