@@ -291,6 +291,18 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
       const auto one = transform(response, size);
       for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += std::norm(one[k]);
     }
+    // A slow wave is hardly narrower than its neighbourhood, and where a loop holds against it no peak stands out: the
+    // frequency of the greatest likelihood stays as well.
+    const double cycle =
+        static_cast<double>(size) / static_cast<double>(rows);  // bins of one in the recording
+    double likeliest = 0.0, place = 0.0;
+    for (auto k = static_cast<std::size_t>(2.0 * cycle); k < power.size(); ++k)
+      if (answer[k] > 0.0 && power[k] > likeliest * answer[k])
+        likeliest = power[k] / answer[k], place = static_cast<double>(k);
+    if (place > 0.0 &&
+        std::none_of(lines.begin(), lines.begin() + std::min<std::ptrdiff_t>(3, std::ssize(lines)),
+                     [&](double line) { return std::abs(line - place) < 0.5 * cycle; }))
+      periods.force_frequency.push_back(place * hertz);
     const double begin = data.recordings[r].inputs.time.front();
     for (const auto& square : squares(spectrum, answer, levels(power, 8, power.size() - 1), lines)) {
       const double turns = square.place * hertz * begin;

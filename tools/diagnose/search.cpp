@@ -32,6 +32,17 @@ using physics::Model;
 using physics::Role;
 using physics::Term;
 
+/// Has no number of a term that stands in both moved by more than a fiftieth?
+bool settled(const Model& before, const Model& now) {
+  for (std::size_t t = 0; t < now.terms.size(); ++t)
+    for (std::size_t i = 0; i < now.terms[t].info->parameter_count(); ++i)
+      if (now.terms[t].info->parameters[i].role == Role::amplitude &&
+          std::abs(now.terms[t].values[i] - before.terms[t].values[i]) >
+              0.02 * std::abs(before.terms[t].values[i]))
+        return false;
+  return true;
+}
+
 class Search {
  public:
   Search(Case& data, const std::function<void(double, const std::string&)>& progress, const Options& options)
@@ -56,6 +67,8 @@ class Search {
   void stop_at_the_law();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
+  /// Holds the model out: on the readings that it was fitted to, and told of those recorded.
+  void check(bool refuses);
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
   /// or the step says so.
   template <class Step>
@@ -271,10 +284,27 @@ bool Search::add_named(double round) {
 
 void Search::quieten() {
   if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
-  noise_->take_off(d_.best.model);
-  d_.weighing = weigh(data_, simulate(data_, d_.best.model));
-  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
+  // What noise makes of a bend goes with its size, which a fit to readings that still hold it takes too small.
+  for (int again = 0; again < 5; ++again) {
+    const auto was = d_.best.model;
+    noise_->take_off(was);
+    d_.weighing = weigh(data_, simulate(data_, was));
+    d_.best = fit(data_, d_.weighing, was, data_.model, 4, &d_.best);
+    if (settled(was, d_.best.model)) break;
+  }
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
+}
+
+void Search::check(bool refuses) {
+  const Case fitted_to = data_;
+  auto readings = noise_->put_back();
+  try {
+    hold_out(fitted_to, data_, d_, refuses);
+  } catch (const Stopped&) {
+    noise_->put(std::move(readings));
+    throw;
+  }
+  noise_->put(std::move(readings));
 }
 
 bool Search::add_pair(const Fit* rival) {
@@ -317,11 +347,7 @@ void Search::finish() {
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
   progress_(0.88, "checking on held-out stretches");
-  auto readings = noise_->put_back();
-  const auto checked = [&] {
-    hold_out(data_, d_, options_.refuses);
-    return true;
-  };
+  const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped
     d_.is_partial = true;
     data_.stopped = {};
@@ -334,9 +360,8 @@ void Search::finish() {
     std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;
     d_.heldout.clear();
     d_.train.clear();
-    hold_out(data_, d_);
+    check(true);
   }
-  noise_->put(std::move(readings));
   smallest_effects(data_, last_screen_, d_);
   conclude(data_, d_);
 }
@@ -415,9 +440,7 @@ Diagnosis Search::run() {
       d_.heldout.clear();
       d_.train.clear();
       d_.parameter_excursion = 0.0;
-      auto readings = noise_->put_back();
-      hold_out(data_, d_);
-      noise_->put(std::move(readings));
+      check(true);
       if (d_.findings.empty())
         d_ = stated;  // the curve does not hold
       else

@@ -66,7 +66,7 @@ std::vector<physics::Outputs> refitted(const Case& data, const Weighing& weights
 
 }  // namespace
 
-void hold_out(const Case& data, Diagnosis& d, bool refuses) {
+void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses) {
   const std::size_t given = data.model.terms.size();
   const bool any = d.best.model.terms.size() > given;
   const auto nominal = simulate(data, data.model);
@@ -85,8 +85,8 @@ void hold_out(const Case& data, Diagnosis& d, bool refuses) {
     for (const bool test : {true, false}) {
       const auto& on = test ? fold.test : fold.train;
       auto& sums = test ? tested : trained;
-      const auto before = squares_left(data, nominal, on), without = squares_left(data, retuned, on),
-                 with = squares_left(data, after, on);
+      const auto before = squares_left(recorded, nominal, on), without = squares_left(recorded, retuned, on),
+                 with = squares_left(recorded, after, on);
       for (std::size_t o = 0; o < sums.size(); ++o)
         sums[o].before += before[o], sums[o].retuned += without[o], sums[o].after += with[o];
     }

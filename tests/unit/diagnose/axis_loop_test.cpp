@@ -1,0 +1,104 @@
+// Axes in closed loop whose missing force is small beside the noise that goes round in the loop, simulated here.
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "tests/support/model_of.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+constexpr double mass = 20.0, motor = 23.0, damping = 19.0, period = 1e-3;
+
+struct Axis {
+  std::function<double(double time)> push = [](double) { return 0.0; };  // [N]
+  double friction = 0.0;                                                 // Coulomb's [N]
+  double noise = 2.3e-8;                                                 // of the encoder [m]
+};
+
+/// Moves and rests under the contract's PID; forty steps of Heun's rule a cycle, stuck where friction holds.
+Case recorded(const Axis& axis, double rest, unsigned seed) {
+  constexpr double kp = 26000.0, ki = 470000.0, kd = 210.0, filter = 380.0;
+  std::mt19937 random{seed};
+  std::normal_distribution<double> noise{0.0, axis.noise};
+  std::uniform_real_distribution<double> places{-0.02, 0.02};
+  const double share = 1.0 - std::exp(-2.0 * std::numbers::pi * filter * period);
+  std::vector<double> time, reference, position, current;
+  double x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
+  for (int k = 0; k < 11000; ++k) {
+    const double now = k * period;
+    if (now > begun + 0.3 + rest) begun = now, from = to, to = places(random);
+    const double s = std::min(1.0, (now - begun) / 0.3);
+    const double r = from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    const double y = x + noise(random), e = r - y;
+    if (k == 0) last = e;
+    slope += share * ((e - last) / period - slope);
+    last = e;
+    sum += e;
+    const double u = kp * e + ki * sum * period + kd * slope;
+    time.push_back(now), reference.push_back(r), position.push_back(y), current.push_back(u);
+    constexpr int parts = 40;
+    const double h = period / parts;
+    for (int part = 0; part < parts; ++part) {
+      const double given = motor * u + axis.push(now + part * h);
+      if (v == 0.0 && std::abs(given) <= axis.friction) continue;
+      const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
+      const auto slows = [&](double speed) { return (given - damping * speed - way * axis.friction) / mass; };
+      const double a = slows(v), b = slows(v + h * a), next = v + 0.5 * h * (a + b);
+      x += h * (v + 0.5 * h * a);
+      v = axis.friction > 0.0 && next * way < 0.0 ? 0.0 : next;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("r", "m", reference);
+  table.add("y", "m", position);
+  table.add("u", "A", current);
+  return make_case(
+      test::model_of(
+          "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u}\n"
+          "controller: {kind: pid, rate: 1000, kp: 26000, ki: 470000, kd: 210, velocity_filter_hz: 380, "
+          "limit: 50}\nparameters:\n  mass: {value: 20.1, unit: kg, sigma: 0.25}\n  motor_constant: {value: "
+          "23, unit: N/A, sigma: 0.1}\n  viscous_damping: {value: 18, unit: N s/m, sigma: 2.5}\n"),
+      {table});
+}
+
+Diagnosis searched(Case data) {
+  return search(data, [](double, const std::string&) {});
+}
+
+TEST(AxisLoop, ASlowWaveThatTheLoopHoldsAgainstIsFound) {
+  Axis axis;
+  axis.push = [](double t) { return 0.12 * std::sin(2.0 * std::numbers::pi * 0.7 * t + 1.0); };
+  const auto d = searched(recorded(axis, 0.25, 5));
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  ASSERT_TRUE(term.info->name == "periodic_disturbance" || term.info->name == "additive_disturbance");
+  EXPECT_NEAR(term.values[term.info->index_of("frequency")], 0.7, 0.004);
+}
+
+TEST(AxisLoop, FrictionThatTheNoiseShakesLooseIsFoundAndMeasured) {
+  Axis axis;
+  axis.friction = 0.15;
+  axis.noise = 4.0e-8;
+  const auto d = searched(recorded(axis, 1.8, 3));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
+}
+
+TEST(AxisLoop, NoiseAloneIsNoPhysics) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    const auto d = searched(recorded({}, 1.0, seed));
+    EXPECT_TRUE(d.findings.empty()) << "seed " << seed;
+    EXPECT_EQ(d.verdict, Verdict::no_mismatch) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace invar::diagnose
