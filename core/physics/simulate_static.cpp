@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/physics/approach.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulate_plants.hpp"
 #include "core/physics/spline.hpp"
@@ -36,7 +37,8 @@ class ErrorMap final : public Simulation {
       : variables_{inputs},
         time_{inputs.time},
         position_{taken(inputs, "position")},
-        direction_{taken(inputs, "direction")},
+        direction_{inputs.find("direction") != nullptr ? taken(inputs, "direction")
+                                                       : directions_of_approach(position_)},
         pressure_{taken(inputs, "pressure", 1013.25)},
         offset_{taken(inputs, "offset")},
         has_temperature_{inputs.find("temperature") != nullptr},
