@@ -281,18 +281,24 @@ bool turns_with_direction(const Case& data, const physics::Model& model, std::si
   const auto& play = model.terms[term];
   if (play.info->plant != physics::Plant::error_map || play.info->name != "backlash") return true;
   const auto without = simulate(data, physics::without_term(model, term));
-  std::array<double, 2> sum{}, rows{};
+  std::array<double, 2> sum{}, square{}, rows{};
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto direction = variable_values(data, r, "direction");
     for (std::size_t i = 0; i < direction.size(); ++i)
       if (const double e = data.recordings[r].measured[0][i] - without[r][0][i];
           std::isfinite(e) && direction[i] != 0.0) {
         const std::size_t side = direction[i] > 0.0 ? 1 : 0;
-        sum[side] += e, rows[side] += 1.0;
+        sum[side] += e, square[side] += e * e, rows[side] += 1.0;
       }
   }
-  if (rows[0] == 0.0 || rows[1] == 0.0) return false;
-  return (sum[1] / rows[1] - sum[0] / rows[0]) / play.values[0] > 0.5;
+  if (rows[0] < 2.0 || rows[1] < 2.0) return false;
+  double difference = 0.0, variance = 0.0;
+  for (const std::size_t side : {0U, 1U}) {
+    const double mean = sum[side] / rows[side];
+    difference += side == 1 ? mean : -mean;
+    variance += (square[side] / rows[side] - mean * mean) / (rows[side] - 1.0);
+  }
+  return difference / play.values[0] > 0.5 && std::abs(difference) > 3.0 * std::sqrt(variance);
 }
 
 /// A store through which the whole of a signal goes is a lag: what makes it a store, the part that passes it by, is zero.
