@@ -171,6 +171,10 @@ class Sensors final : public Simulation {
       if (b > i && time_[b] - time_[i] > 3.0 * usual && a < i) b = i;
       if (time_[b] > time_[a]) velocity_[i] = (position_[b] - position_[a]) / (time_[b] - time_[a]);
     }
+    acceleration_.assign(n, 0.0);
+    for (std::size_t i = 1; i + 1 < n; ++i)
+      if (time_[i + 1] - time_[i - 1] < 4.0 * usual)
+        acceleration_[i] = (velocity_[i + 1] - velocity_[i - 1]) / (time_[i + 1] - time_[i - 1]);
   }
 
   void run(const Model& model, Outputs& outputs) const override {
@@ -197,8 +201,10 @@ class Sensors final : public Simulation {
           if (kind->reading != nullptr) out[i] += kind->reading(at, term.values.data());
           if (!term.curve.knots.empty()) {
             const auto* over = variables_.find(term.curve.over);
-            out[i] += term.curve(
-                over != nullptr ? (*over)[i] : (term.curve.over == "velocity" ? velocity[i] : position[i]));
+            const auto derived = term.curve.over == "velocity"       ? velocity[i]
+                                 : term.curve.over == "acceleration" ? acceleration_[i]
+                                                                     : position[i];
+            out[i] += term.curve(over != nullptr ? (*over)[i] : derived);
           }
         }
         if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);
@@ -236,7 +242,7 @@ class Sensors final : public Simulation {
 
   Variables variables_;
   std::vector<std::string> outputs_;
-  std::vector<double> time_, position_, velocity_;
+  std::vector<double> time_, position_, velocity_, acceleration_;
 };
 
 }  // namespace
