@@ -9,7 +9,7 @@ namespace invar::physics {
 struct MapPoint {
   double time = 0.0;
   double position = 0.0;
-  double direction = 0.0;  // of approach, +1 or -1; 0 where it is not recorded
+  double direction = 0.0;  // of approach, +1 or -1; 0 where it is not known
   double warmth = 0.0;     // temperature above the reference temperature
   double pressure = 0.0;
   double offset = 0.0;             // lateral, from the scale

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/physics/approach.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulate_plants.hpp"
 #include "core/physics/spline.hpp"
@@ -36,7 +37,8 @@ class ErrorMap final : public Simulation {
       : variables_{inputs},
         time_{inputs.time},
         position_{taken(inputs, "position")},
-        direction_{taken(inputs, "direction")},
+        direction_{inputs.find("direction") != nullptr ? taken(inputs, "direction")
+                                                       : directions_of_approach(position_)},
         pressure_{taken(inputs, "pressure", 1013.25)},
         offset_{taken(inputs, "offset")},
         has_temperature_{inputs.find("temperature") != nullptr},
@@ -169,6 +171,10 @@ class Sensors final : public Simulation {
       if (b > i && time_[b] - time_[i] > 3.0 * usual && a < i) b = i;
       if (time_[b] > time_[a]) velocity_[i] = (position_[b] - position_[a]) / (time_[b] - time_[a]);
     }
+    acceleration_.assign(n, 0.0);
+    for (std::size_t i = 1; i + 1 < n; ++i)
+      if (time_[i + 1] - time_[i - 1] < 4.0 * usual)
+        acceleration_[i] = (velocity_[i + 1] - velocity_[i - 1]) / (time_[i + 1] - time_[i - 1]);
   }
 
   void run(const Model& model, Outputs& outputs) const override {
@@ -195,8 +201,10 @@ class Sensors final : public Simulation {
           if (kind->reading != nullptr) out[i] += kind->reading(at, term.values.data());
           if (!term.curve.knots.empty()) {
             const auto* over = variables_.find(term.curve.over);
-            out[i] += term.curve(
-                over != nullptr ? (*over)[i] : (term.curve.over == "velocity" ? velocity[i] : position[i]));
+            const auto derived = term.curve.over == "velocity"       ? velocity[i]
+                                 : term.curve.over == "acceleration" ? acceleration_[i]
+                                                                     : position[i];
+            out[i] += term.curve(over != nullptr ? (*over)[i] : derived);
           }
         }
         if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);
@@ -234,7 +242,7 @@ class Sensors final : public Simulation {
 
   Variables variables_;
   std::vector<std::string> outputs_;
-  std::vector<double> time_, position_, velocity_;
+  std::vector<double> time_, position_, velocity_, acceleration_;
 };
 
 }  // namespace

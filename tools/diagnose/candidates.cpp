@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <set>
 
 #include "core/physics/library.hpp"
+#include "tools/diagnose/jump.hpp"
 
 namespace invar::diagnose {
 
@@ -165,15 +167,18 @@ std::vector<double> variable_values(const Case& data, std::size_t recording, con
     return std::vector<double>{};
   };
   if (data.model.plant == Plant::thermal && name == "temperature") return measured(data.outputs.front());
-  if (name == "velocity") {
-    auto position =
+  if (name == "velocity" || name == "acceleration") {
+    auto values =
         data.model.plant == Plant::sensor ? physics::bridged(r.inputs.time, *r.inputs.find("true_position"))
         : r.inputs.find("reference") != nullptr ? physics::bridged(r.inputs.time, *r.inputs.find("reference"))
                                                 : measured("position");
-    std::vector<double> velocity(position.size(), 0.0);
-    for (std::size_t i = 1; i + 1 < position.size(); ++i)
-      velocity[i] = (position[i + 1] - position[i - 1]) / (r.inputs.time[i + 1] - r.inputs.time[i - 1]);
-    return velocity;
+    for (int order = 0; order < (name == "velocity" ? 1 : 2); ++order) {
+      std::vector<double> rate(values.size(), 0.0);
+      for (std::size_t i = 1; i + 1 < values.size(); ++i)
+        rate[i] = (values[i + 1] - values[i - 1]) / (r.inputs.time[i + 1] - r.inputs.time[i - 1]);
+      values = std::move(rate);
+    }
+    return values;
   }
   return measured(name);
 }
@@ -301,8 +306,10 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"loss", "speed", 5},       {"source", "power", 6}, {"source", "motor_current", 5}};
       break;
     case Plant::error_map:
-      choices = {{"kinematic", "position", 12},  {"kinematic", "time", 14},  {"thermal", "temperature", 6},
-                 {"measurement", "pressure", 5}, {"kinematic", "offset", 5}, {"thermal", "time", 10}};
+      choices = {{"kinematic", "position", 12},  {"kinematic", "time", 14},
+                 {"thermal", "temperature", 6},  {"kinematic", "temperature", 6},
+                 {"measurement", "pressure", 5}, {"kinematic", "pressure", 5},
+                 {"kinematic", "offset", 5},     {"thermal", "time", 10}};
       break;
     case Plant::droplet:
       choices = {{"flight", "time", 6},      {"flight", "height", 6},   {"camera", "image_x", 6},
@@ -311,8 +318,10 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"valve", "on_time", 5}};
       break;
     case Plant::sensor:
-      choices = {
-          {"measurement", "velocity", 10}, {"measurement", "time", 10}, {"measurement", "true_position", 14}};
+      choices = {{"measurement", "velocity", 10},
+                 {"measurement", "acceleration", 6},
+                 {"measurement", "time", 10},
+                 {"measurement", "true_position", 14}};
       break;
     default:
       break;
@@ -345,6 +354,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       starts.push_back(std::move(start));
     }
   }
+  auto jumps = jump_starts(data, fitted);
+  std::move(jumps.begin(), jumps.end(), std::back_inserter(starts));
   return starts;
 }
 

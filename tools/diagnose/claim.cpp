@@ -6,6 +6,7 @@
 #include <complex>
 #include <numbers>
 
+#include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/sensitivities.hpp"
 
 namespace invar::diagnose {
@@ -274,6 +275,32 @@ bool is_rounding(const Case& data, const physics::Model& model, std::size_t term
   return false;
 }
 
+/// Does the error of a map turn with the direction of approach, as play says? A constant error does not, however much a
+/// play explains of it where nearly all points were approached from one side.
+bool turns_with_direction(const Case& data, const physics::Model& model, std::size_t term) {
+  const auto& play = model.terms[term];
+  if (play.info->plant != physics::Plant::error_map || play.info->name != "backlash") return true;
+  const auto without = simulate(data, physics::without_term(model, term));
+  std::array<double, 2> sum{}, square{}, rows{};
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto direction = variable_values(data, r, "direction");
+    for (std::size_t i = 0; i < direction.size(); ++i)
+      if (const double e = data.recordings[r].measured[0][i] - without[r][0][i];
+          std::isfinite(e) && direction[i] != 0.0) {
+        const std::size_t side = direction[i] > 0.0 ? 1 : 0;
+        sum[side] += e, square[side] += e * e, rows[side] += 1.0;
+      }
+  }
+  if (rows[0] < 2.0 || rows[1] < 2.0) return false;
+  double difference = 0.0, variance = 0.0;
+  for (const std::size_t side : {0U, 1U}) {
+    const double mean = sum[side] / rows[side];
+    difference += side == 1 ? mean : -mean;
+    variance += (square[side] / rows[side] - mean * mean) / (rows[side] - 1.0);
+  }
+  return difference / play.values[0] > 0.5 && std::abs(difference) > 3.0 * std::sqrt(variance);
+}
+
 /// A store through which the whole of a signal goes is a lag: what makes it a store, the part that passes it by, is zero.
 bool is_lag(const Fit& fit, std::size_t term) {
   const auto& store = fit.model.terms[term];
@@ -317,7 +344,8 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
        is_known_better(data, fit, term) || !acts(data, fit.model, fit.model.terms[term])))
     return false;
   if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term) ||
-      is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term))
+      is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term) ||
+      !turns_with_direction(data, fit.model, term))
     return false;
   if (is_lag(fit, term)) return false;
   if (info.name == "overflow" && values[1] < 0.05)

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/model/recording_file.hpp"
+#include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
@@ -272,6 +273,9 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   check_filled(model, record, table.file);
   const std::size_t before = data.count.out_of_order, rows = record.rows();
   put_in_order(record, data.count);
+  if (model.plant == physics::Plant::error_map && record.find("direction") == nullptr)
+    record.signals["direction"] =
+        physics::directions_of_approach(physics::bridged(record.time, record.signals.at("position")));
   // Points of a map and drops may stand in any order.
   const bool is_course = model.plant != physics::Plant::error_map && model.plant != physics::Plant::droplet;
   if (is_course && 2 * (data.count.out_of_order - before) > rows)

@@ -108,9 +108,21 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     (named ? d.has_rest : d.is_unnamed) = true;
   }
   if (!d.is_unnamed && !d.has_rest) return;
-  Finding finding;
-  finding.term = d.best.model.terms.back();
-  d.findings.push_back(finding);
+  const auto find_last = [&d] { d.findings.emplace_back().term = d.best.model.terms.back(); };
+  find_last();
+  // What moves a drop moves it in two directions, and an instrument may stand beside another.
+  for (std::size_t more = 1; more < data.outputs.size() && !d.best.model.terms.back().on.empty(); ++more) {
+    auto next = best_curve(data, d.best, courses_beside(data, d.best, &d.best));
+    if (next.gain < margin || least_ratio(data, next.fit, d.best) > (named ? 0.9 : 0.985)) break;
+    const auto& terms = next.fit.model.terms;
+    if (std::any_of(
+            terms.begin() + static_cast<std::ptrdiff_t>(given), terms.end() - 1,
+            [&](const auto& term) { return !term.curve.knots.empty() && term.on == terms.back().on; }))
+      break;
+    d.best = std::move(next.fit);
+    d.weighing = std::move(next.weighing);
+    find_last();
+  }
   d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
 }
 

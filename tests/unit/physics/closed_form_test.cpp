@@ -5,6 +5,7 @@
 #include <map>
 #include <numbers>
 
+#include "core/physics/approach.hpp"
 #include "core/physics/simulation.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -110,6 +111,13 @@ double map_error(const std::string& term, const std::string& signal = "", double
   Columns signals{{"position", {0.0, position, 0.4}}};
   if (!signal.empty()) signals[signal] = {value, value, value};
   return simulated(text, {0.0, 1.0, 2.0}, signals)[1];
+}
+
+TEST(ErrorMap, DirectionsFollowFromThePositions) {
+  // Up, jitter, the end read twice, down, stood on three times, up again.
+  EXPECT_THAT(directions_of_approach({0.0, 0.1, 0.09999, 0.2, 0.2, 0.1, 0.0, 0.0, 0.0, 0.1}),
+              ::testing::ElementsAre(0, 1, 1, 1, -1, -1, -1, -1, -1, 1));
+  EXPECT_THAT(directions_of_approach({}), ::testing::IsEmpty());
 }
 
 TEST(ErrorMap, IsWhatTheContractSays) {

@@ -19,12 +19,18 @@ struct Backlash {
                        {-1e-2, 1e-2},
                        Role::amplitude,
                        {5e-7},
-                       "the whole gap: error from + less error from -"}}},
+                       "the whole gap: error from + less error from -"},
+                      {"middle",
+                       "m",
+                       {-1e-2, 1e-2},
+                       Role::amplitude,
+                       {5e-7},
+                       "mean of both sides: half the width where the baseline was taken from one side"}}},
       .description =
           "Play or elastic wind-up in the drive: a point reached from below differs from the same point "
           "reached from above.",
-      .source = "ISO 230-2, reversal value: width / 2 times the direction"};
-  static double error(const MapPoint& at, const double* p) { return 0.5 * p[0] * at.direction; }
+      .source = "ISO 230-2, reversal value: middle + width / 2 times the direction"};
+  static double error(const MapPoint& at, const double* p) { return 0.5 * p[0] * at.direction + p[1]; }
   static constexpr ErrorMapTermKind kind{.info = &info, .error = error};
 };
 
