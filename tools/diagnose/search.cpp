@@ -399,7 +399,7 @@ void Search::try_pairs(const Diagnosis& begun) {
 }
 
 void Search::stop_at_the_law() {
-  hold_out(data_, d_);
+  check(options_.refuses);
   d_.best =
       fit(data_, d_.weighing, data_.model, data_.model, 0);  // numbers that a wrong loop asks for are none
   for (auto* rows : {&d_.heldout, &d_.train})
