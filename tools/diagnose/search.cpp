@@ -67,6 +67,9 @@ class Search {
   void stop_at_the_law();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew.
   void quieten();
+  /// The same until the strengths stay: what noise makes of a bend goes with its size, which a fit to readings that still
+  /// hold it takes too small.
+  void settle();
   /// Holds the model out: on the readings that it was fitted to, and told of those recorded.
   void check(bool refuses);
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
@@ -284,15 +287,19 @@ bool Search::add_named(double round) {
 
 void Search::quieten() {
   if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
-  // What noise makes of a bend goes with its size, which a fit to readings that still hold it takes too small.
-  for (int again = 0; again < 5; ++again) {
-    const auto was = d_.best.model;
-    noise_->take_off(was);
-    d_.weighing = weigh(data_, simulate(data_, was));
-    d_.best = fit(data_, d_.weighing, was, data_.model, 4, &d_.best);
-    if (settled(was, d_.best.model)) break;
-  }
+  noise_->take_off(d_.best.model);
+  d_.weighing = weigh(data_, simulate(data_, d_.best.model));
+  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
+}
+
+void Search::settle() {
+  if (d_.best.model.terms.size() == given()) return;
+  for (int again = 0; again < 4; ++again) {
+    const auto was = d_.best.model;
+    quieten();
+    if (settled(was, d_.best.model)) return;
+  }
 }
 
 void Search::check(bool refuses) {
@@ -346,6 +353,7 @@ void Search::finish() {
     return true;
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
+  if (!curved) take([&] { return settle(), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped
