@@ -19,12 +19,15 @@ constexpr std::size_t fewest_rows = 60;
 /// Twice the log likelihood that what happened in a gap may cost in all before it matters.
 constexpr double matters = 4.0;
 
-/// The rows at which all inputs were recorded.
+/// The rows at which everything that drives the model was recorded.
 std::vector<std::size_t> known_rows(const physics::Model& model, const physics::Record& inputs) {
+  std::vector<std::string> drives;
+  for (const auto& input : model.equations.inputs) drives.push_back(input.signal);
+  if (model.plant == physics::Plant::axis) drives = {"current"};
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < inputs.rows(); ++i)
-    if (std::all_of(model.equations.inputs.begin(), model.equations.inputs.end(), [&](const auto& input) {
-          const auto* values = inputs.find(input.signal);
+    if (std::all_of(drives.begin(), drives.end(), [&](const auto& signal) {
+          const auto* values = inputs.find(signal);
           return values == nullptr || std::isfinite((*values)[i]);
         }))
       rows.push_back(i);
@@ -114,6 +117,14 @@ std::vector<double> left_of(const Case& data, const Recording& recording, const 
   return squares;
 }
 
+/// Takes rows out of what is compared.
+void leave_out(Case& data, Recording& recording, std::size_t from, std::size_t to) {
+  for (auto& measured : recording.measured)
+    std::fill(measured.begin() + static_cast<std::ptrdiff_t>(from),
+              measured.begin() + static_cast<std::ptrdiff_t>(to), std::nan(""));
+  data.windows.forgetting += to - from;
+}
+
 /// The rows behind gaps from which on a recording begins anew; what is soon forgotten is taken out of what is compared.
 std::vector<std::size_t> behind_gaps(Case& data, Recording& recording, std::size_t most) {
   const std::size_t n = recording.inputs.rows();
@@ -124,16 +135,10 @@ std::vector<std::size_t> behind_gaps(Case& data, Recording& recording, std::size
   physics::Outputs as_held;
   recording.simulation->run(data.model, as_held);
   const std::size_t soon = std::max(fewest_rows, n / 50);
-  const auto leave_out = [&](std::size_t from, std::size_t to) {
-    for (auto& measured : recording.measured)
-      std::fill(measured.begin() + static_cast<std::ptrdiff_t>(from),
-                measured.begin() + static_cast<std::ptrdiff_t>(to), std::nan(""));
-    data.windows.forgetting += to - from;
-  };
   bool is_lost = false;  // since a gap before
   for (std::size_t k = 0; k < gaps.size(); ++k) {
     const std::size_t row = gaps[k].behind, next = k + 1 < gaps.size() ? gaps[k + 1].before + 1 : n;
-    leave_out(gaps[k].before + 1, row);
+    leave_out(data, recording, gaps[k].before + 1, row);
     const auto left = left_of(data, recording, as_held, noise, gaps[k]);
     if (!is_lost && left[row] < matters) continue;
     std::size_t until = row;
@@ -144,7 +149,7 @@ std::vector<std::size_t> behind_gaps(Case& data, Recording& recording, std::size
       if (rows.size() < most) rows.push_back(row);
       continue;
     }
-    leave_out(row, is_lost ? next : until);
+    leave_out(data, recording, row, is_lost ? next : until);
   }
   return rows;
 }
@@ -162,6 +167,21 @@ bool starts_elsewhere(const Case& data, const Recording& recording) {
       if (std::abs(first - data.model.value(state.name + ".initial")) > 6.0 * noise[o]) return true;
     }
   return false;
+}
+
+std::vector<std::vector<std::size_t>> axis_begun_anew(Case& data) {
+  std::vector<std::vector<std::size_t>> all;
+  for (auto& recording : data.recordings) {
+    auto& rows = all.emplace_back(1, 0);
+    for (const auto& gap : gaps_of(data.model, recording.inputs)) {
+      const bool is_short = gap.before + 1 < rows.back() + fewest_rows;  // too few rows to find states by
+      leave_out(data, recording, is_short ? rows.back() : gap.before + 1, gap.behind);
+      if (is_short && rows.size() > 1) rows.pop_back();
+      rows.push_back(gap.behind);
+    }
+    data.windows.anew += rows.size() - 1;
+  }
+  return all;
 }
 
 std::vector<std::vector<std::size_t>> begun_anew(Case& data, std::size_t most) {

@@ -1,4 +1,4 @@
-// Anew: where the states of a model in the user's own equations are not what a run from the first row makes of them.
+// Anew: where the states of a model are not what a run from the first row makes of them.
 #pragma once
 
 #include <vector>
@@ -13,6 +13,10 @@ namespace invar::diagnose {
 /// without an input, are marked as nothing to compare with instead and counted in `data.windows.forgetting`. At most so many
 /// rows.
 std::vector<std::vector<std::size_t>> begun_anew(Case& data, std::size_t most);
+
+/// The same of an axis whose current was recorded: its first row, for nobody says that it is at rest there, and the rows
+/// behind gaps of the current.
+std::vector<std::vector<std::size_t>> axis_begun_anew(Case& data);
 
 /// Do the first rows of a recording contradict a state that an output shows, as the model begins?
 bool starts_elsewhere(const Case& data, const Recording& recording);

@@ -234,9 +234,8 @@ void cut_into_windows(Case& data) {
   const bool is_axis = data.model.plant == physics::Plant::axis;
   if (data.model.plant != physics::Plant::equations && !(is_axis && states > 0)) return;
   constexpr double still_going = 1.6;
-  // Nobody says that an axis is at rest where the recording of its current begins.
-  const auto anew = is_axis ? Rows(data.recordings.size(), {0})
-                            : begun_anew(data, most_starts / std::max<std::size_t>(1, states));
+  const auto anew =
+      is_axis ? axis_begun_anew(data) : begun_anew(data, most_starts / std::max<std::size_t>(1, states));
   std::size_t rows = 0;
   bool goes = false;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {

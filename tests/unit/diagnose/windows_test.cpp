@@ -114,7 +114,8 @@ TEST(Windows, WhatForgetsHasNone) {
 
 /// An axis that a loop the model does not know leads to and fro: exact between rows, for the force is constant there but for
 /// the friction, which turns or holds where the speed passes zero.
-Case led_axis(double friction) {
+/// Of the rows from `lost` on, fifty were not recorded; 0: all were.
+Case led_axis(double friction, int lost = 0) {
   std::mt19937 random{11};
   std::normal_distribution<double> normal;
   constexpr double moved = 3.2, motor = 20.0, h = 1e-3;
@@ -126,7 +127,8 @@ Case led_axis(double friction) {
     const double to = 0.03 * std::sin(4.0 * t) + 0.01 * std::sin(11.0 * t),
                  reading = x + 1e-6 * normal(random);
     const double u = std::clamp(1500.0 * (to - reading) - 40.0 * v, -8.0, 8.0);
-    time.push_back(t), current.push_back(u), position.push_back(reading);
+    if (lost == 0 || i < lost || i >= lost + 50)
+      time.push_back(t), current.push_back(u), position.push_back(reading);
     for (double left = h; left > 0.0;) {
       const double push = motor * u;
       if (v == 0.0 && std::abs(push) <= friction) break;  // holds
@@ -160,6 +162,14 @@ TEST(Windows, AnAxisWithoutControllerIsJudgedOverThem) {
 TEST(Windows, AnAxisThatTheModelKnowsLacksNothing) {
   auto data = led_axis(0.0);
   const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
+  EXPECT_LT(d.heldout[0].after, 1.3e-6);
+}
+
+TEST(Windows, WhatTheCurrentDidInAGapIsNotKnown) {
+  auto data = led_axis(0.0, 2110);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(data.windows.anew, 1U);
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
 }
