@@ -41,6 +41,25 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
       }
     return others;
   }
+  // Friction of three numbers may hold the one that is right where a fit from nothing would not begin: at nearly one speed
+  // damping has taken all of it, and more.
+  if (found.info->plant == physics::Plant::axis && !without.contains("coulomb_friction") &&
+      (name == "stribeck_friction" || name == "presliding_friction")) {
+    double level = found.values[0];
+    if (name == "stribeck_friction") {
+      double rms = 0.0, rows = 0.0;
+      for (std::size_t r = 0; r < data.recordings.size(); ++r)
+        for (const double v : variable_values(data, r, "velocity")) rms += v * v, rows += 1.0;
+      const double speeds = std::sqrt(rms / std::max(1.0, rows)) / found.values[2];
+      level += (found.values[1] - level) * std::exp(-speeds * speeds);
+    }
+    auto& put = others.emplace_back(model).terms[term];
+    put = {};
+    put.info = physics::find_term(physics::Plant::axis, "coulomb_friction");
+    put.values[0] = level;
+    put.given[0] = true;
+    return others;
+  }
   const int power = found.info->plant == physics::Plant::equations ? power_of(name) : 0;
   if (power == 0) return others;
   // First harmonic of sign(s) |s|^p under s = sin: what a swing feels of each power.

@@ -7,9 +7,8 @@ namespace invar::diagnose {
 
 /// The model with found term `term` put as another law of the same variable: another power, with the strength that gives as
 /// much at the sizes that the variable takes; of what comes late, a lag or a delay of the same
-/// time, there and of each input. A machine that swings for long answers in
-/// phase: from strength zero no such fit arrives. Empty for anything else and outside the user's own equations; without the
-/// names in `without`.
+/// time, there and of each input. A machine that swings for long answers in phase: from strength zero no such fit arrives.
+/// Of an axis's friction that sticks or bends, Coulomb's. Empty for anything else; without the names in `without`.
 std::vector<physics::Model> other_laws(const Case& data, const physics::Model& model, std::size_t term,
                                        const std::set<std::string, std::less<>>& without);
 

@@ -19,6 +19,7 @@ struct Axis {
   std::function<double(double time)> push = [](double) { return 0.0; };  // [N]
   double friction = 0.0;                                                 // Coulomb's [N]
   double noise = 2.3e-8;                                                 // of the encoder [m]
+  double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
 
 /// Moves and rests under the contract's PID; forty steps of Heun's rule a cycle, stuck where friction holds.
@@ -34,7 +35,8 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     const double now = k * period;
     if (now > begun + 0.3 + rest) begun = now, from = to, to = places(random);
     const double s = std::min(1.0, (now - begun) / 0.3);
-    const double r = from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    const double r = axis.steady > 0.0 ? axis.steady * now
+                                       : from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
     const double y = x + noise(random), e = r - y;
     if (k == 0) last = e;
     slope += share * ((e - last) / period - slope);
@@ -90,6 +92,17 @@ TEST(AxisLoop, FrictionThatTheNoiseShakesLooseIsFoundAndMeasured) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
   EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
+}
+
+TEST(AxisLoop, FrictionAtOneSpeedIsNotMoreThanCoulombs) {
+  Axis axis;
+  axis.friction = 4.0;
+  axis.noise = 1.0e-7;
+  axis.steady = 0.004;
+  const auto d = searched(recorded(axis, 0.0, 4));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.05 * axis.friction);
 }
 
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
