@@ -32,6 +32,15 @@ using physics::Model;
 using physics::Role;
 using physics::Term;
 
+/// By how many of the user's sigmas his numbers moved at most.
+double excursion_of(const Fit& fit) {
+  double most = 0.0;
+  for (const auto& f : fit.free)
+    if (f.where == Freedom::Where::parameter && f.sigma > 0.0)
+      most = std::max(most, std::abs(get(fit.model, f) - f.center) / f.sigma);
+  return most;
+}
+
 class Search {
  public:
   Search(Case& data, const std::function<void(double, const std::string&)>& progress, const Options& options)
@@ -160,9 +169,10 @@ bool Search::add_named(double round) {
   for (const auto from : {From::coloured, From::plain, From::believed}) {
     const bool coloured = from == From::coloured;
     // In a window of its own friction looks like a motor without force: from there no name is found.
-    if (from == From::believed && (data_.model.plant != physics::Plant::axis || data_.windows.count == 0 ||
-                                   d_.best.model.terms.size() > given()))
-      break;
+    // Where what is missing led the user's numbers far astray, it may look from there like its own opposite.
+    const bool is_axis = data_.model.plant == physics::Plant::axis && data_.windows.count > 0;
+    const bool is_astray = data_.model.plant == physics::Plant::error_map && excursion_of(d_.best) > 5.0;
+    if (from == From::believed && (!(is_axis || is_astray) || d_.best.model.terms.size() > given())) break;
     // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
     // every row counts alike. Either way a claim is judged under the filters of its own residual.
     const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
