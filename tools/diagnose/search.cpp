@@ -13,6 +13,7 @@
 #include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
+#include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
@@ -213,8 +214,12 @@ bool Search::add_named(double round) {
       if (least_ratio(data_, settled, with_term) < 0.9)
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
-      const double gain = std::min(advantage(data_, own, with_term, without),
-                                   advantage_over_wander(data_, own, with_term, without));
+      const double evidence = advantage(data_, own, with_term, without);
+      double gain = std::min(evidence, advantage_over_wander(data_, own, with_term, without));
+      if (const double counted = std::min(evidence, lead(data_, with_term, without));
+          options_.refuses && gain < 2.0 * margin() && counted > 2.0 * margin() &&
+          goes_with_recording(data_, with_term, without))
+        gain = counted;
       // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
       // not, where the noise is loud at other frequencies, if it pays when counted in independent rows.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;

@@ -48,14 +48,6 @@ void sharpen(const Case& data, Curved& found) {
   weighing = own;
 }
 
-/// Noise that wanders does not know what was recorded: does the curve take most of what goes with that, beyond what a
-/// residual turned round against the recording would?
-bool goes_with_recording(const std::vector<double>& before, const std::vector<double>& after) {
-  for (std::size_t o = 0; o < before.size(); ++o)
-    if (before[o] > 0.1 && after[o] < 0.5 * before[o]) return true;
-  return false;
-}
-
 }  // namespace
 
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
@@ -63,7 +55,6 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   const auto& [plain, under_plain, screened] = looked;
   const double margin = claim_margin_of(plain);
   int tried = 0;
-  std::vector<double> followed;
   for (const auto& s : screened) {
     if (tried++ >= 3 || s.merit < claim_margin) break;
     const Fit near = with_columns(data, under_plain, s);
@@ -79,8 +70,7 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     const auto& over = s.start.term.curve.over;
     if (const double counted = lead(data, rough, under_plain);
         gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && over != "time" && over != "t") {
-      if (followed.empty()) followed = followed_share(data, under_plain);
-      if (goes_with_recording(followed, followed_share(data, rough))) gain = std::min(evidence, counted);
+      if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
     }
     // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
     // independent rows, and one that hardly takes any is what that noise does.

@@ -158,6 +158,35 @@ TEST(ErrorMaps, ACarriageMaySwingToEitherSideAlongTheWay) {
   EXPECT_EQ(d.findings[0].term.info->name, "abbe_offset");
 }
 
+physics::Model tachometer() {
+  return test::model_of(
+      "invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, velocity_sensor: v}\n"
+      "parameters: {resolution: {value: 1e-7, unit: m, sigma: 0}, gain: {value: 1, sigma: 0.01}}\nterms: "
+      "[]\n");
+}
+
+TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
+  std::mt19937 random{20};
+  std::normal_distribution<double> reading{0.0, 1e-4};
+  std::uniform_real_distribution<double> chance{0.0, 1.0};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 12000; ++k) {
+    const double t = 1e-3 * k;
+    time.push_back(t), position.push_back(0.05 * std::sin(2.0 * t));
+    const double spike = chance(random) < 0.02 ? (chance(random) < 0.5 ? -1.0 : 1.0) * 5e-3 : 0.0;
+    velocity.push_back(0.1 * std::cos(2.0 * t) + 4e-5 + spike + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(tachometer(), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "bias");
+  EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
+}
+
 TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   std::mt19937 random{19};
   std::normal_distribution<double> reading{0.0, 4e-4};
@@ -173,12 +202,7 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   table.add("t", "s", time);
   table.add("x", "m", position);
   table.add("v", "m/s", velocity);
-  auto data = make_case(
-      test::model_of("invar_model: 1\nplant: sensor\n"
-                     "columns: {time: t, true_position: x, velocity_sensor: v}\n"
-                     "parameters: {resolution: {value: 1e-7, unit: m, sigma: 0}, gain: {value: 1, sigma: "
-                     "0.01}}\nterms: []\n"),
-      {table});
+  auto data = make_case(tachometer(), {table});
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
