@@ -225,6 +225,18 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
           continue;
         }
       }
+      if (info->name == "heating_rate_lag") {
+        // What is late by a minute and what is late by hours lies too far apart for one beginning.
+        double lasts = 0.0;
+        for (const auto& r : data.recordings)
+          lasts = std::max(lasts, r.inputs.time.back() - r.inputs.time.front());
+        for (const double share : {0.01, 0.03, 0.1, 0.3}) {
+          term.values[0] = info->parameters[0].bounds.clamp(share * lasts);
+          term.given[0] = true;
+          add_starts(starts, term);
+        }
+        continue;
+      }
       if (info->name == "ambient_drift") {
         double until = 0.0;
         for (const auto& r : data.recordings) until = std::max(until, r.inputs.time.back());
@@ -318,7 +330,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"valve", "on_time", 5}};
       break;
     case Plant::sensor:
-      choices = {{"measurement", "velocity", 10},
+      choices = {{"measurement", "velocity", 12},
                  {"measurement", "acceleration", 6},
                  {"measurement", "time", 10},
                  {"measurement", "true_position", 14}};
@@ -340,6 +352,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
     std::vector<std::string> on{""};
     if (data.model.plant == Plant::thermal) on = data.model.thermal.nodes;
     if (data.model.plant == Plant::droplet || data.model.plant == Plant::sensor) on = data.outputs;
+    const bool beside_rest = data.model.plant == Plant::sensor && std::string_view{choice.over} == "velocity";
     for (const auto& place : on) {
       Start start;
       start.term.info = physics::unmodelled(data.model.plant, choice.site);
@@ -347,7 +360,11 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       start.term.curve.over = choice.over;
       for (std::size_t k = 0; k < choice.knots; ++k) {
         const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
-        start.term.curve.knots.push_back(low + share * (high - low));
+        // Where an instrument changes with its velocity it does so beside rest.
+        const double away = 2.0 * share - 1.0;
+        start.term.curve.knots.push_back(beside_rest && low < 0.0 && high > 0.0
+                                             ? (away < 0.0 ? low : high) * away * away
+                                             : low + share * (high - low));
         start.term.curve.values.push_back(0.0);
         start.directions.push_back({none, k, false});
       }

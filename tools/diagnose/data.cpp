@@ -383,6 +383,16 @@ std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off,
   std::vector<std::size_t> lone;
   for (std::size_t i = 0; i < off.size(); ++i)
     if (std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) lone.push_back(i);
+  // Where many are alone, some fall beside another by chance; no more of them than that.
+  std::vector<std::size_t> pairs;
+  for (std::size_t i = 1; i + 2 < off.size(); ++i)
+    if (std::abs(off[i]) > limit && std::abs(off[i + 1]) > limit && beside(i, i + 1) && !beside(i, i - 1) &&
+        !beside(i + 1, i + 2))
+      pairs.push_back(i);
+  const auto alone = static_cast<double>(lone.size());
+  const double expected = 0.5 * alone * alone / static_cast<double>(off.size());
+  if (expected > 0.5 && static_cast<double>(pairs.size()) < expected + 1.0 + 4.0 * std::sqrt(expected))
+    for (const std::size_t i : pairs) lone.push_back(i), lone.push_back(i + 1);
   return lone;
 }
 

@@ -242,6 +242,16 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
   return shares;
 }
 
+bool goes_with_recording(const Case& data, const Fit& with, const Fit& without) {
+  if (data.model.controller) return false;
+  const auto before = followed_share(data, without);
+  if (!(*std::max_element(before.begin(), before.end()) > 0.1)) return false;
+  const auto after = followed_share(data, with);
+  for (std::size_t o = 0; o < before.size(); ++o)
+    if (before[o] > 0.1 && after[o] < 0.5 * before[o]) return true;
+  return false;
+}
+
 bool is_louder_in_motion(const Case& data, const Fit& fit) {
   constexpr double least = 5.0;  // coarse steps of a reading make it half as loud again at most
   const auto simulated = simulate(data, fit.model);

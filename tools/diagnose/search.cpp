@@ -13,6 +13,7 @@
 #include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
+#include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
@@ -41,6 +42,15 @@ bool settled(const Model& before, const Model& now) {
               0.02 * std::abs(before.terms[t].values[i]))
         return false;
   return true;
+}
+
+/// By how many of the user's sigmas his numbers moved at most.
+double excursion_of(const Fit& fit) {
+  double most = 0.0;
+  for (const auto& f : fit.free)
+    if (f.where == Freedom::Where::parameter && f.sigma > 0.0)
+      most = std::max(most, std::abs(get(fit.model, f) - f.center) / f.sigma);
+  return most;
 }
 
 class Search {
@@ -176,9 +186,10 @@ bool Search::add_named(double round) {
   for (const auto from : {From::coloured, From::plain, From::believed}) {
     const bool coloured = from == From::coloured;
     // In a window of its own friction looks like a motor without force: from there no name is found.
-    if (from == From::believed && (data_.model.plant != physics::Plant::axis || data_.windows.count == 0 ||
-                                   d_.best.model.terms.size() > given()))
-      break;
+    // Where what is missing led the user's numbers far astray, it may look from there like its own opposite.
+    const bool is_axis = data_.model.plant == physics::Plant::axis && data_.windows.count > 0;
+    const bool is_astray = data_.model.plant == physics::Plant::error_map && excursion_of(d_.best) > 5.0;
+    if (from == From::believed && (!(is_axis || is_astray) || d_.best.model.terms.size() > given())) break;
     // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
     // every row counts alike. Either way a claim is judged under the filters of its own residual.
     const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
@@ -219,8 +230,12 @@ bool Search::add_named(double round) {
       if (least_ratio(data_, settled, with_term) < 0.9)
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
-      const double gain = std::min(advantage(data_, own, with_term, without),
-                                   advantage_over_wander(data_, own, with_term, without));
+      const double evidence = advantage(data_, own, with_term, without);
+      double gain = std::min(evidence, advantage_over_wander(data_, own, with_term, without));
+      if (const double counted = std::min(evidence, lead(data_, with_term, without));
+          options_.refuses && gain < 2.0 * margin() && counted > 2.0 * margin() &&
+          goes_with_recording(data_, with_term, without))
+        gain = counted;
       // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
       // not, where the noise is loud at other frequencies, if it pays when counted in independent rows.
       const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;

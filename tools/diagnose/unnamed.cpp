@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/left_over.hpp"
+#include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/wander.hpp"
 
@@ -51,6 +53,7 @@ void sharpen(const Case& data, Curved& found) {
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   Curved best;
   const auto& [plain, under_plain, screened] = looked;
+  const double margin = claim_margin_of(plain);
   int tried = 0;
   for (const auto& s : screened) {
     if (tried++ >= 3 || s.merit < claim_margin) break;
@@ -62,17 +65,22 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
     if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
     const auto without = fit(data, own, base.model, data.model, 4, &base);
-    const double gain =
-        std::min(curved.evidence - without.evidence, advantage_over_wander(data, own, curved, without));
+    const double evidence = curved.evidence - without.evidence;
+    double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
+    const auto& over = s.start.term.curve.over;
+    if (const double counted = lead(data, rough, under_plain);
+        gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && over != "time" && over != "t") {
+      if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
+    }
     // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
     // independent rows, and one that hardly takes any is what that noise does.
-    if (const auto& over = s.start.term.curve.over; over == "time" || over == "t") {
+    if (over == "time" || over == "t") {
       const double left = least_ratio(data, rough, under_plain);
       if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
     }
     // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
-    if (gain > claim_margin && rough.evidence > best.plain)
-      best = {std::move(curved), own, gain, rough.evidence};
+    if (gain > claim_margin && (best.gain < claim_margin || lead(data, curved, best.fit) > 0.0))
+      best = {std::move(curved), own, gain};
   }
   if (best.gain > claim_margin) sharpen(data, best);
   return best;

@@ -8,8 +8,7 @@ namespace invar::diagnose {
 struct Curved {
   Fit fit;
   Weighing weighing;
-  double gain = -1e300;   // over what it was added to, under its own filters
-  double plain = -1e300;  // evidence with every row alike: comparable between curves
+  double gain = -1e300;  // over what it was added to, under its own filters
 };
 
 /// The curve that explains most beside `base`, of what was looked at.

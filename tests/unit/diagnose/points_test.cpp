@@ -1,4 +1,4 @@
-// Error maps and drops whose truth is written out here, point by point.
+// Error maps, drops and instruments whose truth is written out here, point by point.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -106,6 +106,107 @@ TEST(ErrorMaps, AnErrorThatGoesWithTheTemperatureAndNotWithThePlaceIsLocatedTher
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "temperature");
   EXPECT_EQ(d.best.model.terms.back().info->site, "kinematic");  // not in proportion to the position
+}
+
+/// A carriage that is swept there and back for an hour, 1 s a row; the air warms at once by 2 K now and then.
+template <class Error>
+Case swept(const std::string& more_columns, const std::string& expansion, Error error, unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> reading{0.0, noise};
+  std::vector<std::vector<double>> columns(5);
+  double scale = 0.0;  // [K], what follows the air
+  for (int k = 0; k < 3600; ++k) {
+    const double at = std::fmod(k / 400.0, 2.0), x = travel * (at < 1.0 ? at : 2.0 - at) - 0.1;
+    const double air = (k / 600) % 2 == 0 ? 0.0 : 2.0, offset = 0.03 * ((k / 400) % 3);
+    const double values[] = {1.0 * k, x, 20.0 + air, offset, error(x, air, scale, offset) + reading(random)};
+    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(values[c]);
+    scale += (air - scale) * (1.0 - std::exp(-1.0 / 45.0));
+  }
+  recording::Table table;
+  const char* names[] = {"t", "x", "T", "o", "e"};
+  const char* units[] = {"s", "m", "degC", "m", "m"};
+  for (std::size_t c = 0; c < columns.size(); ++c) table.add(names[c], units[c], columns[c]);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: error_map\ncolumns: {time: t, position: x, error: e" +
+                     more_columns +
+                     "}\nbaseline: {positions: [-0.1, -0.05, 0, 0.05, 0.1], errors: [0, 0, 0, 0, 0]}\n"
+                     "parameters: {reference_temperature: {value: 20, unit: degC, sigma: 0.05}" +
+                     expansion + "}\nterms: []\n"),
+      {table});
+}
+
+TEST(ErrorMaps, AScaleThatFollowsByLessThanAMinuteIsNoOtherExpansion) {
+  auto data = swept(
+      ", temperature: T", ", expansion: {value: 1.7e-5, unit: 1/K, sigma: 3.5e-7}",
+      [](double x, double, double scale, double) { return 1.7e-5 * scale * x; }, 17);
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "heating_rate_lag");
+  EXPECT_NEAR(d.findings[0].term.values[0], 45.0, 7.0);
+  EXPECT_EQ(d.verdict, Verdict::explained);
+}
+
+TEST(ErrorMaps, ACarriageMaySwingToEitherSideAlongTheWay) {
+  auto data = swept(
+      ", offset: o", "",
+      [](double x, double, double, double offset) {
+        return offset * 2e-5 * std::sin(2.0 * M_PI * x / travel);
+      },
+      18);
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "abbe_offset");
+}
+
+physics::Model tachometer() {
+  return test::model_of(
+      "invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, velocity_sensor: v}\n"
+      "parameters: {resolution: {value: 1e-7, unit: m, sigma: 0}, gain: {value: 1, sigma: 0.01}}\nterms: "
+      "[]\n");
+}
+
+TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
+  std::mt19937 random{20};
+  std::normal_distribution<double> reading{0.0, 1e-4};
+  std::uniform_real_distribution<double> chance{0.0, 1.0};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 12000; ++k) {
+    const double t = 1e-3 * k;
+    time.push_back(t), position.push_back(0.05 * std::sin(2.0 * t));
+    const double spike = chance(random) < 0.02 ? (chance(random) < 0.5 ? -1.0 : 1.0) * 5e-3 : 0.0;
+    velocity.push_back(0.1 * std::cos(2.0 * t) + 4e-5 + spike + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(tachometer(), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "bias");
+  EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
+}
+
+TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
+  std::mt19937 random{19};
+  std::normal_distribution<double> reading{0.0, 4e-4};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 6000; ++k) {
+    const double t = 1e-3 * k;
+    const double v = 0.12 * std::cos(2.3 * t) + 0.05 * std::cos(5.1 * t + 1.0);
+    time.push_back(t);
+    position.push_back(0.12 / 2.3 * std::sin(2.3 * t) + 0.05 / 5.1 * std::sin(5.1 * t + 1.0));
+    velocity.push_back(v - 8e-4 * std::tanh(v / 0.004) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(tachometer(), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.best.model.terms.back().curve.over, "velocity");
 }
 
 TEST(Drops, WhatMovesThemInTwoDirectionsIsDrawnInBoth) {

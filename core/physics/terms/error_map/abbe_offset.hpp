@@ -22,13 +22,21 @@ struct AbbeOffset {
              Role::amplitude,
              {5e-6},
              "from one end of the travel to the other"},
-            {"angle_bow", "rad", {-0.1, 0.1}, Role::amplitude, {5e-6}, "middle against the ends"}}},
+            {"angle_bow", "rad", {-0.1, 0.1}, Role::amplitude, {5e-6}, "middle against the ends"},
+            {"angle_twist",
+             "rad",
+             {-0.1, 0.1},
+             Role::amplitude,
+             {5e-6},
+             "one way in the first half, the other in the second"}}},
       .description =
           "The carriage pitches or yaws; beside the scale that moves the point by offset times angle.",
-      .source = "Abbe 1890; ISO 230-1: error = offset angle(position), the angle a parabola along the way"};
+      .source = "Abbe 1890; ISO 230-1: error = offset angle(position), the angle a cubic along the way"};
   static double error(const MapPoint& at, const double* p) {
     const double s = (at.position - at.first) / (at.last - at.first);
-    return at.offset * (p[0] + p[1] * (s - 0.5) + p[2] * (4.0 * s * (1.0 - s) - 1.0));
+    const double u = 2.0 * s - 1.0;
+    return at.offset * (p[0] + p[1] * (s - 0.5) + p[2] * (4.0 * s * (1.0 - s) - 1.0) +
+                        p[3] * 0.5 * u * (5.0 * u * u - 3.0));
   }
   static constexpr ErrorMapTermKind kind{.info = &info, .error = error};
 };
