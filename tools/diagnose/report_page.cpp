@@ -182,6 +182,27 @@ void add_other_run(report::Page& page, const Case& data, const Diagnosis& d, con
   page.plots(plots);
 }
 
+/// The error of a map over the position, by the side from which the points were approached.
+Plot from_both_sides(const Case& data, const std::vector<double>& without, const std::vector<double>& with) {
+  const auto position = over(data, "position"), direction = over(data, "direction");
+  const auto from = [&](double side) {
+    auto x = position;
+    for (std::size_t i = 0; i < x.size(); ++i)
+      if (!(side * direction[i] > 0.0)) x[i] = std::nan("");
+    return x;
+  };
+  Plot plot;
+  plot.title = "what is left of error, by the side of approach";
+  plot.x_label = "position [m]";
+  plot.y_label = "mean of measured - simulated [m]";
+  plot.series = {averaged("without it, from below", from(1.0), without, 40),
+                 averaged("without it, from above", from(-1.0), without, 40),
+                 averaged("with it", position, with, 40)};
+  plot.series[0].colour = orange, plot.series[1].colour = green, plot.series[2].colour = blue;
+  report::in_handy_units(plot);
+  return plot;
+}
+
 /// A finding's own section: what it is, and what would be missing without it alone.
 void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::size_t which,
                  const std::vector<physics::Outputs>& after) {
@@ -226,8 +247,17 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
     report::in_handy_units(plot);
     if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
   };
+  // What moves a drop along x goes with what it did along x; a turned camera takes the one for the other.
+  const bool along_x = data.outputs[shown] == "landed_x", across = info.name == "camera_rotation";
   for (const auto& variable : dependence(data, finding)) {
-    if (variable == "direction" || variable == "speed")
+    if (data.model.plant == physics::Plant::error_map && variable == "direction")
+      plots.push_back(
+          from_both_sides(data, difference(data, without, shown), difference(data, after, shown)));
+    else if (data.model.plant == physics::Plant::droplet && variable == "velocity")
+      add(along_x ? "velocity_x" : "velocity_y", along_x ? "velocity_x" : "velocity_y");
+    else if (variable == "image")
+      add(along_x != across ? "image_x" : "image_y", along_x != across ? "image_x" : "image_y");
+    else if (variable == "direction" || variable == "speed")
       add("velocity", "velocity");
     else if (data.model.plant == physics::Plant::thermal && variable == "temperature" &&
              !finding.term.on.empty())
@@ -268,7 +298,8 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
         {p.name,
          f.sigma > 0.0 ? report::with_sigma(p.value, f.sigma, p.unit) : report::si(p.value, p.unit, 4),
          report::with_sigma(to, sigma, p.unit),
-         f.sigma > 0.0 ? report::number(std::abs(to - f.center) / f.sigma, 2) + " sigma of what was believed"
+         f.sigma > 0.0 ? report::number(std::round(1e3 * std::abs(to - f.center) / f.sigma) / 1e3, 2) +
+                             " sigma of what was believed"
                        : "nothing was believed beyond a start value"});
   }
   if (corrections.empty()) return;
@@ -290,7 +321,8 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
                             report::number(a.log_odds)});
   for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, report::number(r.gain)});
   if (considered.empty()) {
-    page.paragraph("No other term of the library came near: none had a gain worth a fit.");
+    page.paragraph(d.is_partial ? "It was stopped before anything else was weighed."
+                                : "No other term of the library came near: none had a gain worth a fit.");
     return;
   }
   page.table({"effect", "why not", "log evidence"}, considered);

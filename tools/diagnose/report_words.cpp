@@ -30,7 +30,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
   if (!term.curve.over.empty()) {
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
-    if (term.curve.over.rfind("velocity", 0) == 0) names.emplace_back("velocity");
+    if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty())
     names.push_back(term.with.empty() ? term.on : term.with);

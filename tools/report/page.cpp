@@ -229,7 +229,7 @@ void in_handy_units(Plot& plot) {
 
 std::string with_sigma(double value, double sigma, const std::string& unit) {
   if (!(sigma > 0.0) || !std::isfinite(sigma) || !std::isfinite(value)) return si(value, unit, 4);
-  const auto prefix = prefix_of(value, unit);
+  const auto prefix = prefix_of(std::max(std::abs(value), sigma), unit);
   double v = value / prefix.factor, s = sigma / prefix.factor;
   const double size = std::max(std::abs(v), s);
   std::string before, behind;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/support/model_of.hpp"
+#include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
 
 namespace invar::diagnose {
@@ -48,6 +49,7 @@ TEST(ErrorMaps, PlayIsFoundThoughNobodyRecordedTheDirection) {
   EXPECT_EQ(d.findings[0].term.info->name, "backlash");
   EXPECT_NEAR(d.findings[0].term.values[0], 8e-7, 1e-7);
   EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_THAT(page_text(data, d, "calibration"), ::testing::HasSubstr("by the side of approach"));
 }
 
 TEST(ErrorMaps, PlayBesideABaselineThatWasTakenFromOneSideLeavesNothingElse) {

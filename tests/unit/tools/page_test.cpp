@@ -24,6 +24,7 @@ TEST(Numbers, ShowTwoDigitsOfTheirSigma) {
   EXPECT_EQ(with_sigma(-7.275e5, 698.6, "1"), "(-7.2750 +- 0.0070)e5");
   EXPECT_EQ(with_sigma(2.4, 0.0, "N"), "2.4 N");
   EXPECT_EQ(with_sigma(3.0, 40.0, "N"), "3 +- 40 N");
+  EXPECT_EQ(with_sigma(5.5e-8, 1.0e-5, "m"), "0 +- 10 um");
 }
 
 TEST(Plots, ShowNumbersOneCanRead) {
