@@ -267,7 +267,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         if (name == "position_stiffness") shapes = {0.0};
         // What rings, rings at one pitch: from far off it would seem to push the other way.
         if (name == "flexible_mode")
-          for (double f = 20.0; f < 350.0; f *= 1.4) shapes.push_back(f);
+          for (double f = 20.0; f < 350.0; f *= 1.2) shapes.push_back(f);
         if (may_repeat && name != "flexible_mode" && shapes.empty()) continue;
       }
       if (info->name == "stage_velocity_carry") {

@@ -148,6 +148,16 @@ std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, 
         s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
       }
       const double numbers = static_cast<double>(s.start.directions.size() + shapes);
+      // More than all there is of something is none of it: the gain of what may be.
+      if (s.start.term.curve.knots.empty() && s.start.directions.size() == 1 &&
+          s.start.directions[0].amplitude < none) {
+        const double upper = info.parameters[s.start.directions[0].amplitude].bounds.upper,
+                     full = s.strength(0);
+        if (full > upper) {
+          s.gain *= upper * (2.0 * full - upper) / (full * full);
+          s.strength(0) = upper;
+        }
+      }
       s.merit = s.gain - 0.5 * numbers * std::log(observations);
       if (keep == 0 || s.merit < 0.0) s.columns.resize(0, 0);
     });
@@ -328,6 +338,13 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
           p.bounds.lower >= 0.0
               ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
               : p.bounds.clamp(value);
+      // A loop of so many times the force over the same way is also so many times as stiff.
+      if (info.name == "presliding_friction" && d == 0) {
+        const auto stiffness = info.index_of("stiffness");
+        const double times = term.values[direction.amplitude] / s->start.term.values[direction.amplitude];
+        term.values[stiffness] =
+            info.parameters[stiffness].bounds.clamp(times * s->start.term.values[stiffness]);
+      }
     }
     model.terms.push_back(term);
   }

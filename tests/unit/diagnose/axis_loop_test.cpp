@@ -19,6 +19,8 @@ struct Axis {
   std::function<double(double time)> push = [](double) { return 0.0; };  // [N]
   double friction = 0.0;                                                 // Coulomb's [N]
   double noise = 2.3e-8;                                                 // of the encoder [m]
+  double bristles = 0.0, stiffness = 1e4;                                // Dahl's friction [N], [N/m]
+  double reach = 0.02;                                                   // of the moves [m]
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
 
@@ -27,10 +29,10 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
   constexpr double kp = 26000.0, ki = 470000.0, kd = 210.0, filter = 380.0;
   std::mt19937 random{seed};
   std::normal_distribution<double> noise{0.0, axis.noise};
-  std::uniform_real_distribution<double> places{-0.02, 0.02};
+  std::uniform_real_distribution<double> places{-axis.reach, axis.reach};
   const double share = 1.0 - std::exp(-2.0 * std::numbers::pi * filter * period);
   std::vector<double> time, reference, position, current;
-  double x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
+  double bend = 0.0, x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
   for (int k = 0; k < 11000; ++k) {
     const double now = k * period;
     if (now > begun + 0.3 + rest) begun = now, from = to, to = places(random);
@@ -47,7 +49,11 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     constexpr int parts = 40;
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
-      const double given = motor * u + axis.push(now + part * h);
+      double given = motor * u + axis.push(now + part * h);
+      if (axis.bristles > 0.0) {
+        bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
+        given -= axis.stiffness * bend;
+      }
       if (v == 0.0 && std::abs(given) <= axis.friction) continue;
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
       const auto slows = [&](double speed) { return (given - damping * speed - way * axis.friction) / mass; };
@@ -103,6 +109,18 @@ TEST(AxisLoop, FrictionAtOneSpeedIsNotMoreThanCoulombs) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
   EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.05 * axis.friction);
+}
+
+TEST(AxisLoop, BristlesOfAWeakSealBendAsFarAsThoseOfAStrongOne) {
+  Axis axis;
+  axis.bristles = 0.03;
+  axis.stiffness = 1000.0;
+  axis.reach = 2e-4;
+  const auto d = searched(recorded(axis, 0.2, 6));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "presliding_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.bristles, 0.1 * axis.bristles);
+  EXPECT_NEAR(d.findings[0].term.values[1], axis.stiffness, 0.2 * axis.stiffness);
 }
 
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
