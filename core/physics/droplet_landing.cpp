@@ -42,8 +42,14 @@ Landing landing(const Droplet& d, double slope_x, double slope_y) {
   State s{along_x, along_y, 0.0, carried_x + speed * slope_x, carried_y + speed * slope_y, speed};
   const double h = std::min(d.height / speed / 8.0, 0.25 / drag_rate(speed, d.diameter));
   for (int i = 0; i < 2000; ++i) {
-    const State a = slope(s), b = slope(moved(s, a, 0.5 * h)), c = slope(moved(s, b, 0.5 * h)),
-                e = slope(moved(s, c, h));
+    const State a = slope(s);
+    if (std::abs(a.w) < 1e-3 * gravity) {  // falls steadily from here on, however far it is
+      const double rate = (gravity - a.w) / s.w, t = (d.height - s.z) / s.w,
+                   fades = -std::expm1(-rate * t) / rate;
+      return {s.x + d.pull_x / rate * (t - fades) + s.u * fades,
+              s.y + d.pull_y / rate * (t - fades) + s.v * fades};
+    }
+    const State b = slope(moved(s, a, 0.5 * h)), c = slope(moved(s, b, 0.5 * h)), e = slope(moved(s, c, h));
     const State next = moved(moved(moved(moved(s, a, h / 6.0), b, h / 3.0), c, h / 3.0), e, h / 6.0);
     if (next.z >= d.height) {
       // The rest of the way with the speed at hand, to second order.

@@ -1,5 +1,6 @@
 // Which pitch or frequency would explain most of an axis's residual: the residual is carried back through the
 // closed loop to the force (or the reading) that would have caused it, and that is looked at along position and time.
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -190,6 +191,43 @@ std::vector<Square> squares(const Spectrum& spectrum, const std::vector<double>&
 
 }  // namespace
 
+namespace {
+
+/// The waves along the way, up to a hundred, by least squares: where a carriage stood says no more of a wave than where it
+/// passed, though it left many rows there. Sums and counts of the residual in bins over the span.
+std::vector<double> long_pitches(const std::vector<double>& sums, const std::vector<double>& counts,
+                                 double span) {
+  constexpr std::size_t cells = 1024;
+  constexpr double step = 0.1;  // waves over the span
+  std::array<double, cells> sum{}, count{};
+  for (std::size_t i = 0; i < sums.size(); ++i)
+    sum[i * cells / sums.size()] += sums[i], count[i * cells / sums.size()] += counts[i];
+  std::vector<double> gain(1001, 0.0), pitches;
+  for (std::size_t k = 8; k < gain.size(); ++k) {
+    Eigen::Matrix3d normal = 1e-12 * Eigen::Matrix3d::Identity();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    double level = 0.0, rows = 0.0;
+    for (std::size_t i = 0; i < cells; ++i) {
+      if (count[i] == 0.0) continue;
+      const double angle = 2.0 * std::numbers::pi * step * static_cast<double>(k) *
+                           (static_cast<double>(i) + 0.5) / static_cast<double>(cells);
+      const Eigen::Vector3d wave{1.0, std::cos(angle), std::sin(angle)};
+      normal += count[i] * wave * wave.transpose(), right += sum[i] * wave;
+      level += sum[i], rows += count[i];
+    }
+    if (rows > 0.0) gain[k] = right.dot(normal.ldlt().solve(right)) - level * level / rows;
+  }
+  std::vector<std::pair<double, double>> tops;
+  for (std::size_t k = 9; k + 1 < gain.size(); ++k)
+    if (gain[k] > gain[k - 1] && gain[k] >= gain[k + 1]) tops.emplace_back(gain[k], static_cast<double>(k));
+  std::sort(tops.rbegin(), tops.rend());
+  for (std::size_t i = 0; i < std::min<std::size_t>(4, tops.size()); ++i)
+    pitches.push_back(span / (step * tops[i].second));
+  return pitches;
+}
+
+}  // namespace
+
 std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
   std::vector<std::vector<double>> positions;
   double low = 1e300, high = -1e300;
@@ -200,20 +238,24 @@ std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
   const double span = high - low;
   if (!(span > 1e-6)) return {};
   constexpr std::size_t bins = 1U << 16U, padded = 4 * bins;
-  std::vector<double> grid(bins, 0.0);
+  std::vector<double> grid(bins, 0.0), count(bins, 0.0);
   Eigen::Index at = 0;
   for (std::size_t r = 0; r < positions.size(); ++r)
     for (const auto& output : data.outputs) {
       for (std::size_t i = 0; i < positions[r].size(); ++i, ++at)
-        if (output == "encoder")
-          grid[static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1))] += fitted.residual(at);
+        if (output == "encoder") {
+          const auto bin = static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1));
+          grid[bin] += fitted.residual(at), count[bin] += 1.0;
+        }
     }
+  const auto slow = long_pitches(grid, count, span);
   const auto spectrum = transform(std::move(grid), padded);
   std::vector<double> power(bins), pitches;
   for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
   for (double k :
        peaks(power, 4, std::min<std::size_t>(bins - 2, static_cast<std::size_t>(4.0 * span / 1e-5)), 6))
     pitches.push_back(4.0 * span / k);
+  pitches.insert(pitches.end(), slow.begin(), slow.end());
   return pitches;
 }
 

@@ -391,7 +391,7 @@ std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off,
       pairs.push_back(i);
   const auto alone = static_cast<double>(lone.size());
   const double expected = 0.5 * alone * alone / static_cast<double>(off.size());
-  if (expected > 0.5 && static_cast<double>(pairs.size()) < expected + 1.0 + 4.0 * std::sqrt(expected))
+  if (expected > 0.02 && static_cast<double>(pairs.size()) < expected + 1.0 + 4.0 * std::sqrt(expected))
     for (const std::size_t i : pairs) lone.push_back(i), lone.push_back(i + 1);
   return lone;
 }

@@ -189,6 +189,35 @@ TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
   EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
 }
 
+TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
+  std::mt19937 random{21};
+  std::normal_distribution<double> reading{0.0, 2e-8};
+  std::vector<double> time, position, shown;
+  std::uniform_real_distribution<double> moves{0.25, 0.7}, rests{0.0, 0.3};
+  double begin = 0.0, lasts = 0.4, rest = 0.1;
+  bool up = true;
+  for (int k = 0; k < 3000; ++k) {
+    const double t = 2e-3 * k;
+    if (t > begin + lasts + rest) begin = t, lasts = moves(random), rest = rests(random), up = !up;
+    const double q = std::min(1.0, (t - begin) / lasts), way = q * q * q * (10.0 - 15.0 * q + 6.0 * q * q);
+    const double x = -0.0088 + 0.0136 * (up ? way : 1.0 - way);
+    time.push_back(2e-3 * k), position.push_back(x);
+    shown.push_back(x + 4e-8 * std::sin(2.0 * M_PI * x / 0.0037 + 1.0) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shown);
+  auto data = make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "periodic_error");
+  EXPECT_NEAR(d.findings[0].term.values[1], 0.0037, 1e-4);
+}
+
 TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   std::mt19937 random{19};
   std::normal_distribution<double> reading{0.0, 4e-4};
