@@ -1,6 +1,7 @@
 #include "core/model/record_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <cmath>
 #include <numbers>
@@ -11,6 +12,9 @@
 namespace invar::model {
 
 namespace {
+
+/// What SI counts in, and with it every unit that is none of its own.
+constexpr std::array own_units{"m", "kg", "s", "A", "K", "rad"};
 
 /// Does one of the model's numbers stand in this unit, alone (`cm`) or in another (`cm/s`)?
 bool speaks_in(const physics::Model& model, const std::string& unit) {
@@ -23,6 +27,32 @@ bool speaks_in(const physics::Model& model, const std::string& unit) {
     }
     return false;
   });
+}
+
+/// Do they stand in the parts of this unit (`mg/s` beside `mg/l`), and in none of those that SI would put in their place?
+bool speaks_in_parts(const physics::Model& model, const std::string& unit) {
+  bool any = false;
+  for (std::size_t at = 0; at < unit.size();) {
+    const auto is_name = [&](std::size_t i) {
+      return std::isalpha(static_cast<unsigned char>(unit[i])) != 0;
+    };
+    if (!is_name(at)) {
+      ++at;
+      continue;
+    }
+    auto end = at;
+    while (end < unit.size() && is_name(end)) ++end;
+    const auto part = unit.substr(at, end - at);
+    at = end;
+    const auto size = parse_unit(part);
+    if (!size || std::abs(size->factor - 1.0) < 1e-12) continue;
+    const bool speaks_si = std::any_of(own_units.begin(), own_units.end(), [&](const char* si) {
+      return parse_unit(si)->dimension == size->dimension && speaks_in(model, si);
+    });
+    if (speaks_si || !speaks_in(model, part)) return false;
+    any = true;
+  }
+  return any;
 }
 
 /// A state that is an output as it stands, and the unit of its numbers; nothing of both where it is none or says no unit.
@@ -70,7 +100,8 @@ ColumnUnit unit_of_expression(const recording::Column& column, const physics::Si
   const auto state = state_of(signal, model);
   check_own_unit(column, state, where);
   const auto unit = parse_unit(column.unit);
-  if (!unit || column.unit == "K" || speaks_in(model, column.unit)) return {column.unit, 1.0, 0.0};
+  if (!unit || column.unit == "K" || speaks_in(model, column.unit) || speaks_in_parts(model, column.unit))
+    return {column.unit, 1.0, 0.0};
   if (column.unit == "rpm")
     if (const auto factor = of_turns(state, model)) return {column.unit, *factor, 0.0};
   return {column.unit, unit->factor, unit->offset};

@@ -48,6 +48,21 @@ TEST(OwnUnits, AColumnStandsInTheUnitOfTheModelsNumbersOrElseInSi) {
   EXPECT_DOUBLE_EQ(first("m", read_own("mm", "\"1\"")), 40.0);  // `mm` is another unit than `m`
 }
 
+TEST(OwnUnits, AColumnInPartsOfWhichTheModelsNumbersAreStandsAsTheyDo) {
+  const auto input = [](const std::string& column_unit, const std::string& state_unit) {
+    recording::Table table;
+    table.add("t", "s", {0.0, 1.0});
+    table.add("in", column_unit, {5.0, 5.0});
+    table.add("out", "", {40.0, 41.0});
+    return to_record(table, read_own(state_unit, "\"1\""), true).record.signals.at("u").front();
+  };
+  EXPECT_EQ(input("mg/s", "mg/l"), 5.0);  // a dose beside a concentration: both in mg
+  EXPECT_EQ(input("mm/s", "1/mm"), 5.0);
+  EXPECT_DOUBLE_EQ(input("mg/s", "kg/l"), 5e-6);
+  EXPECT_DOUBLE_EQ(input("mg/s", "V"), 5e-6);
+  EXPECT_DOUBLE_EQ(input("mm/min", "1/mm"), 5e-3 / 60.0);  // of one part nothing says how he counts
+}
+
 TEST(OwnUnits, ANameOfTheUsersOwnIsALabel) {
   EXPECT_EQ(first("counts", read_own("counts", "counts/V")), 40.0);
   EXPECT_EQ(read_own("counts", "counts/V").find("k")->unit, "counts/V");
