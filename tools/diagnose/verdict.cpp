@@ -23,16 +23,31 @@ struct Fold {
   Weighing train, test;
 };
 
+/// The first rows of each window: they alone say where a state begins that is soon forgotten. A fit without them would have
+/// it anywhere, and they would be judged by that.
+std::vector<bool> rows_of_starts(const Case& data, const Recording& recording) {
+  std::vector<bool> is(recording.inputs.rows(), false);
+  const auto& restarts = recording.inputs.restarts;
+  const std::size_t needed = 3 * physics::states_of(data.model).size();
+  for (std::size_t k = 0; k < restarts.size(); ++k) {
+    const std::size_t end = k + 1 < restarts.size() ? restarts[k + 1] : is.size();
+    const std::size_t count = std::min(needed, (end - restarts[k]) / 5);
+    std::fill_n(is.begin() + static_cast<std::ptrdiff_t>(restarts[k]), count, true);
+  }
+  return is;
+}
+
 Fold fold_of(const Case& data, const Weighing& all, std::size_t which) {
   Fold fold{all, all};
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto never = rows_of_starts(data, data.recordings[r]);
     const std::size_t rows = data.recordings[r].inputs.rows();
     // Within a window of its own states some rows must be left to find these by.
     const std::size_t count = std::max(stretches, 4 * (data.recordings[r].inputs.restarts.size() + 1));
     const std::size_t stretch = std::max<std::size_t>(1, rows / count);
     for (std::size_t o = 0; o < data.outputs.size(); ++o)
       for (std::size_t i = 0; i < rows; ++i)
-        ((i / stretch) % folds == which ? fold.train : fold.test).present[r][o][i] = false;
+        ((i / stretch) % folds == which && !never[i] ? fold.train : fold.test).present[r][o][i] = false;
   }
   return fold;
 }
