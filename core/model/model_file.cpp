@@ -8,6 +8,7 @@
 
 #include "core/base/unit.hpp"
 #include "core/model/own_expressions.hpp"
+#include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/static_plants.hpp"
 
@@ -241,7 +242,8 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   for (const auto& state : model.equations.states) places.push_back(state.name);
   const bool on_state = std::find(places.begin(), places.end(), term.on) != places.end();
   for (const auto& input : model.equations.inputs) places.push_back(input.symbol);
-  for (const auto& output : model.equations.outputs) places.push_back(output.name);
+  for (const auto& output : model.equations.outputs)
+    places.push_back(physics::place_of_output(model.equations, output.name));
   const std::string name{term.info->name};
   if (std::find(places.begin(), places.end(), term.on) == places.end()) {
     const auto meant = config::nearest(term.on, places);

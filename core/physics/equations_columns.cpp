@@ -7,31 +7,83 @@
 
 namespace invar::physics {
 
-namespace {
+Bending::Bending(const Term& term, bool held)
+    : kind_{equations_kind(*term.info)->memory},
+      first_{term.values[0]},
+      second_{term.values[1]},
+      held_{held} {}
 
-/// Of each value a share arrives by way of a first-order store, in balance at the start. What is held from row to row
-/// counts with the mean over its row's step, as a machine feels it; what is smooth goes straight from row to row.
-void follow(const std::vector<double>& time, std::vector<double>& values, double time_constant, double share,
-            bool held) {
-  double z = values.front(), last = values.front();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const double now = values[i];
-    const std::size_t end = held ? std::min(i + 1, values.size() - 1) : i;
-    const double h = end > 0 ? time[end] - time[end - 1] : 0.0, kept = std::exp(-h / time_constant);
-    double felt = z;
-    if (held) {
-      felt = h > 0.0 ? now + (z - now) * (1.0 - kept) * time_constant / h : z;
-      z = now + (z - now) * kept;
-    } else if (h > 0.0) {
-      const double behind = (now - last) / h * time_constant;
-      felt = z = now - behind + (z - last + behind) * kept;
-    }
-    last = now;
-    values[i] = now + share * (felt - now);
+double Bending::through_store(double step, double value, double time_constant, double share) {
+  if (!begun_) store_ = last_ = value;
+  const double kept = std::exp(-step / time_constant);
+  double felt = store_;
+  if (held_) {
+    felt = step > 0.0 ? value + (store_ - value) * (1.0 - kept) * time_constant / step : store_;
+    store_ = value + (store_ - value) * kept;
+  } else if (begun_ && step > 0.0) {
+    const double behind = (value - last_) / step * time_constant;
+    felt = store_ = value - behind + (store_ - last_ + behind) * kept;
   }
+  last_ = value;
+  return value + share * (felt - value);
 }
 
-}  // namespace
+double Bending::late(double now, double value) {
+  times_.push_back(now);
+  values_.push_back(value);
+  const double when = now - first_;
+  while (place_ + 1 < times_.size() && times_[place_ + 1] <= when) ++place_;
+  const std::size_t next = std::min(place_ + 1, times_.size() - 1);
+  const double h = times_[next] - times_[place_];
+  const double share = h > 0.0 ? std::clamp((when - times_[place_]) / h, 0.0, 1.0) : 0.0;
+  return values_[place_] + share * (values_[next] - values_[place_]);
+}
+
+double Bending::operator()(double now, double step, double value) {
+  double bent = value;
+  switch (kind_) {
+    case EquationsMemory::upper_limit:
+      bent = std::min(value, first_);
+      break;
+    case EquationsMemory::lower_limit:
+      bent = std::max(value, first_);
+      break;
+    case EquationsMemory::dead_zone:
+      bent = value - std::clamp(value, -first_, first_);
+      break;
+    case EquationsMemory::lag:
+      if (first_ > 0.0) bent = through_store(step, value, first_, 1.0);
+      break;
+    case EquationsMemory::hidden_state:
+      bent = through_store(step, value, second_, first_);
+      break;
+    case EquationsMemory::delay:
+      if (first_ > 0.0) bent = late(now, value);
+      break;
+    default:
+      break;
+  }
+  begun_ = true;
+  return bent;
+}
+
+std::vector<Bending> bendings(const Model& model, const std::string& on, bool held) {
+  std::vector<Bending> all;
+  for (const auto& term : model.terms)
+    if (term.on == on) all.emplace_back(term, held);
+  return all;
+}
+
+double step_about(const std::vector<double>& time, std::size_t row, bool held) {
+  const std::size_t end = held ? std::min(row + 1, time.size() - 1) : row;
+  return end > 0 ? time[end] - time[end - 1] : 0.0;
+}
+
+std::string place_of_output(const Equations& equations, const std::string& output) {
+  const bool is_state = std::any_of(equations.states.begin(), equations.states.end(),
+                                    [&](const auto& state) { return state.name == output; });
+  return is_state ? "output." + output : output;
+}
 
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns) {
@@ -52,43 +104,9 @@ void run_over(const Model& model, const std::vector<std::string>& names,
 
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held) {
-  for (const auto& term : model.terms) {
-    if (term.on != on) continue;
-    const double p = term.values[0];
-    switch (equations_kind(*term.info)->memory) {
-      case EquationsMemory::upper_limit:
-        for (double& v : values) v = std::min(v, p);
-        break;
-      case EquationsMemory::lower_limit:
-        for (double& v : values) v = std::max(v, p);
-        break;
-      case EquationsMemory::dead_zone:
-        for (double& v : values) v -= std::clamp(v, -p, p);
-        break;
-      case EquationsMemory::lag:
-        if (p > 0.0) follow(time, values, p, 1.0, held);
-        break;
-      case EquationsMemory::hidden_state:
-        follow(time, values, term.values[1], p, held);
-        break;
-      case EquationsMemory::delay: {
-        if (!(p > 0.0)) break;
-        const auto before = values;
-        std::size_t a = 0;
-        for (std::size_t i = 0; i < values.size(); ++i) {
-          const double when = time[i] - p;
-          while (a + 1 < before.size() && time[a + 1] <= when) ++a;
-          const std::size_t b = std::min(a + 1, before.size() - 1);
-          const double h = time[b] - time[a];
-          const double share = h > 0.0 ? std::clamp((when - time[a]) / h, 0.0, 1.0) : 0.0;
-          values[i] = before[a] + share * (before[b] - before[a]);
-        }
-        break;
-      }
-      default:
-        break;
-    }
-  }
+  for (auto& bending : bendings(model, on, held))
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = bending(time[i], step_about(time, i, held), values[i]);
 }
 
 }  // namespace invar::physics

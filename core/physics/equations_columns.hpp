@@ -1,16 +1,48 @@
-// What terms at the inputs and outputs of a model in the user's own equations do to whole columns.
+// What terms at the inputs and outputs of a model in the user's own equations do to their values.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "core/physics/equations_hooks.hpp"
 #include "core/physics/model.hpp"
 
 namespace invar::physics {
 
+/// What a term at an output is `on`: its name, or `output.NAME` where a state has that name too.
+std::string place_of_output(const Equations& equations, const std::string& output);
+
 /// What passes a limit of one column goes, in part, to another. `names` are those of the columns.
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns);
+
+/// A term at an input or output, value by value in order of time: what a controller decides is only known as it comes.
+class Bending {
+ public:
+  /// `held`: from row to row, as an input is.
+  Bending(const Term& term, bool held);
+  /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next.
+  double operator()(double now, double step, double value);
+
+ private:
+  /// A share arrives by way of a first-order store, in balance at the start. What is held counts with the mean over its step,
+  /// as a machine feels it; what is smooth goes straight from row to row.
+  double through_store(double step, double value, double time_constant, double share);
+  double late(double now, double value);
+
+  EquationsMemory kind_;
+  double first_, second_;
+  bool held_, begun_ = false;
+  double store_ = 0.0, last_ = 0.0;
+  std::vector<double> times_, values_;
+  std::size_t place_ = 0;
+};
+
+/// The terms `on` this signal, one after another.
+std::vector<Bending> bendings(const Model& model, const std::string& on, bool held);
+
+/// The `step` of a row.
+double step_about(const std::vector<double>& time, std::size_t row, bool held);
 
 /// Terms `on` this signal bend its column. `held`: from row to row, as an input is.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,

@@ -120,6 +120,9 @@ class OwnEquations final : public Simulation {
     }
     machine.balance_hidden(s);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
+    std::array<std::vector<Bending>, lanes> way;  // from the controller to the machine
+    if (closed)
+      for (std::size_t l = 0; l < lanes; ++l) way[l] = bendings(*models[l], equations.controlled_input, true);
     typename EquationsMachine<lanes>::Rates own, fastest;
     auto restart = restarts_.begin();
     for (std::size_t row = 0; row < n; ++row) {
@@ -135,8 +138,11 @@ class OwnEquations final : public Simulation {
       machine.show(s, time_[row]);
       if (closed) {
         const double* commanded = machine.law();
-        for (std::size_t l = 0; l < lanes; ++l)
-          machine.set_input(machine.controlled() - machine.states(), l, commanded[l]);
+        for (std::size_t l = 0; l < lanes; ++l) {
+          double felt = commanded[l];
+          for (auto& bending : way[l]) felt = bending(time_[row], step_about(time_, row, true), felt);
+          machine.set_input(machine.controlled() - machine.states(), l, felt);
+        }
       }
       if (row % std::max<std::size_t>(1, n / 32) == 0) {
         const auto renew = [&](auto& rates, bool of_own) {  // where it was fast, it may soon be again
@@ -179,7 +185,7 @@ class OwnEquations final : public Simulation {
       }
     }
     std::vector<std::string> names;
-    for (const auto& output : equations.outputs) names.push_back(output.name);
+    for (const auto& output : equations.outputs) names.push_back(place_of_output(equations, output.name));
     for (std::size_t l = 0; l < lanes; ++l) {
       if (outputs[l] == nullptr) continue;
       run_over(*models[l], names, *outputs[l]);

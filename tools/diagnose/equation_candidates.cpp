@@ -4,6 +4,7 @@
 #include <map>
 #include <numbers>
 
+#include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
 
@@ -34,18 +35,25 @@ class Spans {
     std::erase_if(model.signals, [](const auto& signal) { return signal.is_output; });
     for (const auto& state : model.equations.states)
       model.signals.push_back({state.name, state.name, "", true});
+    const auto& decided = model.equations.controlled_input;  // recorded or not
+    if (!decided.empty()) {
+      model.equations.outputs.push_back({decided, decided, {}});
+      model.signals.push_back({decided, decided, "", true});
+    }
     for (const auto& recording : data.recordings) {
       const auto& time = recording.inputs.time;
       duration = std::max(duration, time.back() - time.front());
       rows = std::max(rows, time.size());
       physics::Outputs states;
       physics::prepare(model, recording.inputs)->run(model, states);
-      for (std::size_t i = 0; i < states.size(); ++i) widen(model.equations.states[i].name, time, states[i]);
+      for (std::size_t i = 0; i < states.size(); ++i) widen(model.equations.outputs[i].name, time, states[i]);
       for (const auto& input : model.equations.inputs)
-        if (const auto* values = recording.inputs.find(input.signal)) widen(input.symbol, time, *values);
+        if (const auto* values = recording.inputs.find(input.signal);
+            values != nullptr && input.symbol != decided)
+          widen(input.symbol, time, *values);
       widen("t", time, time);
       for (std::size_t o = 0; o < data.outputs.size(); ++o)
-        widen(data.outputs[o], time, recording.measured[o]);
+        widen(physics::place_of_output(data.model.equations, data.outputs[o]), time, recording.measured[o]);
     }
   }
   const Span& of(const std::string& name) const { return spans_.at(name); }
@@ -135,9 +143,10 @@ class Candidates {
       add_limits(input.symbol, span);
     }
     for (const auto& output : equations_.outputs) {
-      add_late(output.name, step);
-      add("hidden_state", output.name, "", 0.1, store_times());
-      add_limits(output.name, spans_.of(output.name));
+      const auto place = physics::place_of_output(equations_, output.name);
+      add_late(place, step);
+      add("hidden_state", place, "", 0.1, store_times());
+      add_limits(place, spans_.of(place));
     }
     return std::move(starts_);
   }

@@ -31,9 +31,14 @@ Series past_of(const Series& values, double rows) {
 /// What acts on the machine, whatever it answers: an answer holds the noise that is to be judged.
 std::vector<Series> causes(const Case& data, const physics::Outputs& simulated, std::size_t recording) {
   const auto& inputs = data.recordings[recording].inputs;
+  const auto& equations = data.model.equations;
+  std::string decided;  // by the model's own controller, from readings
+  for (const auto& input : equations.inputs)
+    if (input.symbol == equations.controlled_input) decided = input.signal;
   std::vector<Series> all;
   for (const auto& [name, values] : inputs.signals) {
     if (std::find(data.outputs.begin(), data.outputs.end(), name) != data.outputs.end()) continue;
+    if (name == decided) continue;
     all.push_back(physics::bridged(inputs.time, values));
     if (data.is_time_series && (name == "reference" || name == "true_position")) {
       all.push_back(rate_of(inputs.time, all.back()));

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/windows.hpp"
@@ -16,7 +17,7 @@ std::string site_of(const Case& data, const physics::Term& term) {
     for (const auto& input : data.model.equations.inputs)
       if (input.symbol == term.on) return plant + ".input";
     for (const auto& output : data.model.equations.outputs)
-      if (output.name == term.on) return plant + ".output";
+      if (physics::place_of_output(data.model.equations, output.name) == term.on) return plant + ".output";
     return plant + "." + term.on;
   }
   return plant + "." + std::string{term.info->site};
@@ -45,6 +46,8 @@ std::vector<std::string> dependence(const Case& data, const Finding& finding) {
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
   const std::string unit{term.info->parameters[parameter].unit};
   if (unit != "*") return unit;
+  const auto name = term.info->parameters[parameter].name;
+  if (name == "delay" || name == "time_constant" || (name == "period" && term.with == "t")) return "s";
   const auto* signal = data.model.signal(term.on);
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
 }
@@ -124,7 +127,8 @@ std::string place_of(const Case& data, const physics::Term& term) {
     for (const auto& input : data.model.equations.inputs)
       if (input.symbol == term.on) return "input " + term.on;
     for (const auto& output : data.model.equations.outputs)
-      if (output.name == term.on) return "output " + term.on;
+      if (physics::place_of_output(data.model.equations, output.name) == term.on)
+        return "output " + output.name;
     return "state " + term.on + (term.with.empty() || term.with == term.on ? "" : ", with " + term.with);
   }
   std::string text = site;

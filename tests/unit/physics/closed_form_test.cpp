@@ -208,5 +208,52 @@ TEST(Equations, TermsActAsTheContractSays) {
   EXPECT_NEAR(last(constant, -0.5), -0.5, 1e-6);
 }
 
+TEST(Equations, AnOutputThatBearsAStatesNameIsAPlaceOfItsOwn) {
+  const auto at = [](const char* place) {
+    const std::string text =
+        "plant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+        "states: {x: {derivative: u, initial: {value: 0, unit: m, sigma: 0}}}\n"
+        "outputs: {x: {column: y, expression: x}}\nparameters: {}\n"
+        "terms: [{term: upper_limit, on: " +
+        std::string{place} + ", limit: {value: 0.3, unit: m}}]\n";
+    std::vector<double> time, input;
+    for (int i = 0; i <= 240; ++i) time.push_back(0.005 * i), input.push_back(i < 200 ? 0.5 : -0.5);
+    return simulated(text, time, {{"u", input}}).back();  // 0.2 s after it turned
+  };
+  EXPECT_NEAR(at("x"), 0.2, 1e-3);         // a stop
+  EXPECT_NEAR(at("output.x"), 0.3, 1e-9);  // an instrument at its end: the state is at 0.4
+}
+
+// --- a loop of the model's own: a term between the controller and the machine
+
+std::vector<double> looped(const std::string& rate, const std::string& more, const std::string& term) {
+  const std::string text =
+      "plant: equations\ncolumns: {time: t}\ninputs: {r: r, u: u}\nstates:\n"
+      "  x: {derivative: '" +
+      rate + "', initial: {value: 0, unit: m, sigma: 0}}\n" + more +
+      "outputs: {y: {column: y, expression: x}}\nparameters: {}\n"
+      "controller: {output: u, expression: '3*(r - x)'}\nterms: [" +
+      term + "]\n";
+  std::vector<double> time, target;
+  for (int i = 0; i <= 800; ++i) time.push_back(0.005 * i), target.push_back(i % 200 < 100 ? 1.0 : -0.5);
+  return simulated(text, time, {{"r", target}});
+}
+
+TEST(OwnLoop, WhatStandsBetweenControllerAndMachineActs) {
+  const auto compare = [](const std::vector<double>& a, const std::vector<double>& b, double within) {
+    for (std::size_t i = 0; i < a.size(); ++i) ASSERT_NEAR(a[i], b[i], within) << "row " << i;
+  };
+  compare(looped("u - x", "", "{term: dead_zone, on: u, width: {value: 0.2, unit: 1}}"),
+          looped("u - max(-0.2, min(0.2, u)) - x", "", ""), 1e-9);
+  compare(looped("u - x", "", "{term: upper_limit, on: u, limit: {value: 1.5, unit: 1}}"),
+          looped("min(u, 1.5) - x", "", ""), 1e-9);
+  compare(looped("u - x", "", "{term: lag, on: u, time_constant: {value: 0.1, unit: s}}"),
+          looped("z - x", "  z: {derivative: '(u - z)/0.1', initial: {value: 3, unit: m, sigma: 0}}\n", ""),
+          2e-3);
+  // What comes late by a step of 0.5 s: until then the first command stands, x' = 3 - x.
+  const auto late = looped("u - x", "", "{term: delay, on: u, delay: {value: 0.5, unit: s}}");
+  EXPECT_NEAR(late[80], 3.0 * (1.0 - std::exp(-0.4)), 1e-6);
+}
+
 }  // namespace
 }  // namespace invar::physics

@@ -1,0 +1,93 @@
+// Loops that the user wrote down, against a cart made here: its controller reads with noise, and the noise goes round.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
+#include "tools/diagnose/report.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+/// A cart that is pushed as its controller reads it, exact between rows; what is commanded may arrive late.
+Case cart(double push, double lag) {
+  std::mt19937 random{5};
+  std::normal_distribution<double> normal;
+  constexpr double h = 0.02;
+  std::vector<double> time, target, command, reading;
+  double x = 0.0, v = 0.0, felt = 0.0, to = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    if (i % 150 == 149) to = std::uniform_real_distribution<double>{-0.3, 0.3}(random);
+    const double read = x + 2e-3 * normal(random), u = 9.0 * (to - read) - 4.0 * v;
+    time.push_back(h * i), target.push_back(to), command.push_back(u), reading.push_back(read);
+    for (int part = 0; part < 40; ++part) {
+      const double s = h / 40.0, kept = lag > 0.0 ? std::exp(-s / lag) : 0.0;
+      felt = u + (felt - u) * kept;
+      const double a = 1.1 * felt - 0.3 * v + push;
+      x += s * (v + 0.5 * s * a);
+      v += s * a;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("to", "m", target);
+  table.add("u", "", command);
+  table.add("y", "m", reading);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {r: to, u: u}\nstates:\n"
+                     "  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0.01}}\n"
+                     "  v: {derivative: 'k*u - c*v', initial: {value: 0, unit: m/s, sigma: 0.01}}\n"
+                     "outputs: {y: {column: y, expression: x}}\nnoise: {y: 0.002}\n"
+                     "controller: {output: u, expression: '9*(r - x) - 4*v'}\n"
+                     "parameters:\n  k: {value: 1.08, unit: 1/kg, sigma: 0.03}\n"
+                     "  c: {value: 0.32, unit: 1/s, sigma: 0.05}\n"),
+      {table});
+}
+
+TEST(OwnLoop, TheNoiseThatGoesRoundInItIsNoPhysics) {
+  auto data = cart(0.0, 0.0);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch);
+}
+
+TEST(OwnLoop, AForceIsExplainedThoughTheNoiseGoesRound) {
+  auto data = cart(0.08, 0.0);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "constant");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.08, 0.004);
+}
+
+TEST(OwnLoop, WhatTheControllerDecidesMayArriveLate) {
+  auto data = cart(0.0, 0.12);
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "lag");
+  EXPECT_EQ(d.findings[0].term.on, "u");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.12, 0.01);
+}
+
+TEST(OwnLoop, ATermAtAStateIsThereThoughAnOutputBearsItsName) {
+  Case data;
+  data.model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: 'u - x', initial: {value: 0, unit: m}}}\n"
+      "outputs: {x: {column: x, expression: x}}\nparameters: {}\n");
+  physics::Term drag;
+  drag.info = physics::find_term(physics::Plant::equations, "quadratic");
+  drag.on = "x";
+  EXPECT_EQ(site_of(data, drag), "equations.x");
+  EXPECT_EQ(place_of(data, drag), "state x");
+  drag.info = physics::find_term(physics::Plant::equations, "lag");
+  drag.on = "output.x";
+  EXPECT_EQ(site_of(data, drag), "equations.output");
+  EXPECT_EQ(place_of(data, drag), "output x");
+  EXPECT_EQ(unit_of(data, drag, 0), "s");
+}
+
+}  // namespace
+}  // namespace invar::diagnose
