@@ -28,6 +28,8 @@ using physics::Model;
 constexpr std::size_t fewest_rows = 60, most_starts = 100;
 /// A window is at most as long as a disturbance of its first state takes to grow so much.
 constexpr double most_growth = 30.0;
+/// What integrates goes on by this factor from the middle to the end of a recording.
+constexpr double still_going = 1.6;
 
 double reach(const std::vector<double>& values, double begin, double end) {
   const auto n = static_cast<double>(values.size());
@@ -38,32 +40,45 @@ double reach(const std::vector<double>& values, double begin, double end) {
 }
 
 /// How much farther a small steady push on any state has carried an output by the end of a recording than by its middle. A
-/// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves.
+/// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves, or it forgets the push once that
+/// is over: then it goes farther for another reason, as a vessel does whose flow has ebbed.
 double goes_on(const Case& data, const Recording& recording) {
   const auto& model = data.model;
   physics::Outputs at;
   recording.simulation->run(model, at);
   double most = 0.0;
   for (const auto& state : model.equations.states) {
-    auto pushed = model;
     const auto* start = model.find(state.name + ".initial");
     double size = std::max(std::abs(start->value), start->sigma.value_or(0.0));
     for (const auto& output : at) size = std::max(size, std::min(1e6, reach(output, 0.0, 1.0)));
     const double duration = recording.inputs.time.back() - recording.inputs.time.front();
-    for (auto& one : pushed.equations.states)
-      if (one.name == state.name) {
-        std::ostringstream by;
-        by.precision(17);
-        by << "(" << one.derivative << ") + " << 1e-6 * std::max(size, 1e-9) / duration;
-        one.derivative = by.str();
-      }
-    physics::Outputs moved;
-    physics::prepare(pushed, recording.inputs)->run(pushed, moved);
+    const auto changes = [&](double share) {  // of the recording that the push lasts
+      auto pushed = model;
+      for (auto& one : pushed.equations.states)
+        if (one.name == state.name) {
+          std::ostringstream by;
+          by.precision(17);
+          by << "(" << one.derivative << ") + if(t < " << recording.inputs.time.front() + share * duration
+             << ", " << 1e-6 * std::max(size, 1e-9) / duration << ", 0)";
+          one.derivative = by.str();
+        }
+      physics::Outputs moved;
+      physics::prepare(pushed, recording.inputs)->run(pushed, moved);
+      for (std::size_t o = 0; o < at.size(); ++o)
+        for (std::size_t i = 0; i < at[o].size(); ++i) moved[o][i] -= at[o][i];
+      return moved;
+    };
+    const auto steady = changes(2.0);
+    physics::Outputs brief;  // where it is asked for
     for (std::size_t o = 0; o < at.size(); ++o) {
-      std::vector<double> change(at[o].size());
-      for (std::size_t i = 0; i < change.size(); ++i) change[i] = moved[o][i] - at[o][i];
-      const double early = reach(change, 0.25, 0.5), late = reach(change, 0.75, 1.0);
-      if (late > 1e-9 * size) most = std::max(most, late / std::max(early, 1e-12 * size));
+      const double early = reach(steady[o], 0.25, 0.5), late = reach(steady[o], 0.75, 1.0);
+      if (!(late > 1e-9 * size) || late / std::max(early, 1e-12 * size) <= most) continue;
+      if (late > still_going * early) {
+        if (brief.empty()) brief = changes(0.25);
+        constexpr double forgotten = 0.02;
+        if (reach(brief[o], 0.75, 1.0) < forgotten * reach(brief[o], 0.0, 0.5)) continue;
+      }
+      most = late / std::max(early, 1e-12 * size);
     }
   }
   return most;
@@ -233,7 +248,6 @@ void cut_into_windows(Case& data) {
   const auto states = physics::states_of(data.model).size();
   const bool is_axis = data.model.plant == physics::Plant::axis;
   if (data.model.plant != physics::Plant::equations && !(is_axis && states > 0)) return;
-  constexpr double still_going = 1.6;
   // Nobody says that an axis is at rest where the recording of its current begins.
   const auto anew = is_axis ? Rows(data.recordings.size(), {0})
                             : begun_anew(data, most_starts / std::max<std::size_t>(1, states));
