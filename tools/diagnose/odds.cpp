@@ -79,9 +79,15 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
          odds_of_sliding_at_once(data, best, place, finding);
 }
 
+bool is_another_cause(const Finding& finding, const Alternative& alternative) {
+  const auto &one = finding.term, &other = alternative.term;
+  return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
+}
+
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, Finding& finding) {
   double sum = 1.0;
-  for (const auto& a : finding.alternatives) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+  for (const auto& a : finding.alternatives)
+    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);

@@ -22,6 +22,10 @@ double odds_of_another_cause(double gain, double left, double shape, double shar
 /// lag or a delay, friction that slides at once or springs first, a sine that enters at the motor or the carriage.
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding);
 
+/// Does an alternative say anything else than the finding? A term of equations that acts at the same place over a variable
+/// that runs alike is the same name for the same cause.
+bool is_another_cause(const Finding& finding, const Alternative& alternative);
+
 /// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known.
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, Finding& finding);
 

@@ -184,7 +184,8 @@ void conclude(const Case& data, Diagnosis& d) {
                                          [](const Finding& f) { return f.stand_in != nullptr; });
   bool ambiguous = false;
   for (const auto& finding : d.findings)
-    for (const auto& a : finding.alternatives) ambiguous = ambiguous || a.log_odds > -ambiguous_margin;
+    for (const auto& a : finding.alternatives)
+      ambiguous = ambiguous || (a.log_odds > -ambiguous_margin && is_another_cause(finding, a));
   if (d.findings.empty())
     // What follows the recording is no noise, even where no curve and no name describes it.
     d.verdict = most_followed > 0.5 || is_above_noise(data, d.best) || is_louder_in_motion(data, d.best)
