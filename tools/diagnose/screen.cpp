@@ -338,10 +338,11 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
           p.bounds.lower >= 0.0
               ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
               : p.bounds.clamp(value);
-      // A loop of so many times the force over the same way is also so many times as stiff.
+      // Where the force is less than it began with, the loop goes over the same way: it is as much less stiff.
       if (info.name == "presliding_friction" && d == 0) {
         const auto stiffness = info.index_of("stiffness");
-        const double times = term.values[direction.amplitude] / s->start.term.values[direction.amplitude];
+        const double times =
+            std::min(1.0, term.values[direction.amplitude] / s->start.term.values[direction.amplitude]);
         term.values[stiffness] =
             info.parameters[stiffness].bounds.clamp(times * s->start.term.values[stiffness]);
       }
