@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/physics/library.hpp"
+#include "tools/diagnose/statistics.hpp"
 
 namespace invar::diagnose {
 
@@ -23,16 +24,22 @@ std::optional<Jump> jump_in(std::vector<std::pair<double, double>> points) {
   std::sort(points.begin(), points.end());
   const std::size_t n = points.size(), least = std::max<std::size_t>(5, n / 50);
   if (n < 4 * least) return std::nullopt;
-  double all = 0.0, sum = 0.0, best = 0.0;
-  for (const auto& p : points) all += p.second;
+  double best = 0.0;
   std::optional<Jump> jump;
-  for (std::size_t i = 1; i + least < n; ++i) {
-    sum += points[i - 1].second;
-    if (i < least || !(points[i].first > points[i - 1].first)) continue;
+  std::vector<double> sums{0.0}, steps;
+  for (const auto& p : points) sums.push_back(sums.back() + p.second);
+  double step = 0.0;
+  for (std::size_t i = least; i + least < n; ++i) {
+    const double here = std::abs(sums[i + least] - 2.0 * sums[i] + sums[i - least]);
+    steps.push_back(here);
+    if (!(points[i].first > points[i - 1].first)) continue;
     const auto k = static_cast<double>(i), rows = static_cast<double>(n);
-    const double apart = sum - k / rows * all, gain = apart * apart / (k * (rows - k));
-    if (gain > best) best = gain, jump = Jump{points[i - 1].first, points[i].first};
+    const double apart = sums[i] - k / rows * sums[n], gain = apart * apart / (k * (rows - k));
+    if (gain > best) best = gain, step = here, jump = Jump{points[i - 1].first, points[i].first};
   }
+  // Noise that wanders goes as far in many a place.
+  constexpr double far = 5.0;
+  if (step < far * 1.4826 * median(std::move(steps))) return std::nullopt;
   return jump;
 }
 
