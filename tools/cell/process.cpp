@@ -211,7 +211,9 @@ class RunningProcess {
       orphan_since_ = now;
       spdlog::warn("{}: `invar run` is no more: coming to rest and stopping", file_.name);
     }
-    over = now - *orphan_since_ > executor_.options().wind_down;
+    // Nobody says who notices first; who records leaves last, or the end of the others would be missing.
+    const Duration lingers = recorder_ != nullptr ? Duration::seconds(1.0) : Duration{};
+    over = now - *orphan_since_ > executor_.options().wind_down + lingers;
     return true;
   }
 
