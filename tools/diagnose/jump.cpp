@@ -22,7 +22,7 @@ struct Jump {
 std::optional<Jump> jump_in(std::vector<std::pair<double, double>> points) {
   std::erase_if(points, [](const auto& p) { return !std::isfinite(p.first) || !std::isfinite(p.second); });
   std::sort(points.begin(), points.end());
-  const std::size_t n = points.size(), least = std::max<std::size_t>(5, n / 50);
+  const std::size_t n = points.size(), least = std::max<std::size_t>(5, n / 20);
   if (n < 4 * least) return std::nullopt;
   double best = 0.0;
   std::optional<Jump> jump;
