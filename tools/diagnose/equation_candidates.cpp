@@ -285,7 +285,7 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
 }
 
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name) {
-  const auto& span = Spans{data, model}.of(name);
+  const auto span = Spans{data, model}.of(name);
   return {span.low, span.high};
 }
 
