@@ -30,25 +30,22 @@ Stretch stretch_of(const AxisControllerSettings& settings, const std::vector<dou
   AxisController controller{settings};
   const auto n = static_cast<Eigen::Index>(end - begin - settles);
   Stretch stretch{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd(n, parts)};
-  double sum = 0.0, of_error = 0.0, of_motion = 0.0;
-  const double share =
-      settings.velocity_filter_hz
-          ? -std::expm1(-2.0 * std::numbers::pi * *settings.velocity_filter_hz / settings.rate)
-          : 1.0;
+  // The law's own sum and filtered difference, each alone.
+  AxisControllerSettings integral, derivative;
+  integral.rate = derivative.rate = settings.rate;
+  integral.ki = derivative.kd = 1.0;
+  derivative.velocity_filter_hz = settings.velocity_filter_hz;
+  AxisController sum{integral}, of_error{derivative}, of_motion{derivative};
   for (std::size_t i = begin; i < end; ++i) {
     const double command = controller.step(reference[i], position[i]) + (forward.empty() ? 0.0 : forward[i]);
-    const double error = reference[i] - simulated[i];
-    sum += error / settings.rate;
-    if (i > begin) {
-      const double moved = simulated[i] - simulated[i - 1];
-      of_motion += share * (moved * settings.rate - of_motion);
-      of_error += share * ((reference[i] - reference[i - 1] - moved) * settings.rate - of_error);
-    }
+    const double error = reference[i] - simulated[i], summed = sum.step(reference[i], simulated[i]),
+                 error_slope = of_error.step(reference[i], simulated[i]),
+                 motion_slope = of_motion.step(0.0, simulated[i]);
     if (i < begin + settles) continue;
     const auto row = static_cast<Eigen::Index>(i - begin - settles);
     stretch.left(row) = current[i] - command;
     stretch.current(row) = current[i];
-    stretch.motion.row(row) << error, sum, of_error, of_motion, reference[i];
+    stretch.motion.row(row) << error, summed, error_slope, motion_slope, reference[i];
   }
   // The sum began somewhere.
   stretch.left.array() -= stretch.left.mean();

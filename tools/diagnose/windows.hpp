@@ -6,8 +6,8 @@
 namespace invar::diagnose {
 
 /// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
-/// on a state goes on to grow to the end of the recording. So does an axis without controller always. Each window begins at states of its own, parameters
-/// "<state>.start<k>" that every fit estimates beside the others, under a prior as wide as the state itself goes. A closed
+/// on a state goes on to grow to the end of the recording. An axis without controller always does. Each window begins at
+/// states of its own, parameters "<state>.start<k>" that every fit estimates beside the others, under a prior as wide as the state itself goes. A closed
 /// loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
 /// (anew.hpp).
 void cut_into_windows(Case& data);
