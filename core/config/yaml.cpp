@@ -1,13 +1,15 @@
 #include "core/config/yaml.hpp"
 
+#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <fstream>
 #include <set>
 #include <sstream>
 
+#include "core/base/input_file.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 #include "core/config/quotes.hpp"
@@ -401,13 +403,14 @@ bool Node::flag(std::string_view name, bool otherwise) const {
 }
 
 Yaml Yaml::load(const std::filesystem::path& file) {
-  std::error_code unseen;  // what cannot be looked at cannot be opened either
-  if (std::filesystem::is_directory(file, unseen)) return fail(file, "is a folder", "name a file");
-  std::ifstream stream{file, std::ios::binary};
-  if (!stream) return fail(file, "cannot be read", "check the path and its permissions");
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return parse(text.str(), file.string());
+  const int opened = open_input(file, "a YAML file");
+  std::string text;
+  std::array<char, 1U << 16U> block{};
+  ssize_t got = 0;
+  while ((got = read(opened, block.data(), block.size())) > 0)
+    text.append(block.data(), static_cast<std::size_t>(got));
+  close(opened);
+  return parse(text, file.string());
 }
 
 Yaml Yaml::parse(const std::string& text, const std::string& name) {

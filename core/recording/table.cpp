@@ -1,8 +1,5 @@
 #include "core/recording/table.hpp"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -14,6 +11,7 @@
 #include <utility>
 
 #include "core/base/contract.hpp"
+#include "core/base/input_file.hpp"
 #include "core/base/new_file.hpp"
 #include "core/base/unit.hpp"
 
@@ -27,12 +25,7 @@ constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 class Lines {
  public:
   explicit Lines(const std::filesystem::path& file) : file_{file.string()} {
-    if (std::filesystem::is_directory(file)) throw InputError{file_, "is a folder", "name a CSV file"};
-    std::error_code unknown;
-    const bool is_pipe = std::filesystem::is_fifo(file, unknown);
-    const int opened = open(file.c_str(), O_RDONLY | O_CLOEXEC | (is_pipe ? O_NONBLOCK : 0));
-    if (opened >= 0 && is_pipe) wait_for_writer(opened);
-    if (opened >= 0) stream_.reset(gzdopen(opened, "rb"));  // reads plain files too
+    stream_.reset(gzdopen(open_input(file, "a CSV file"), "rb"));  // reads plain files too
     if (!stream_) throw InputError{file_, "cannot be read", "check the path and its permissions"};
     (void)gzbuffer(stream_.get(), 1U << 17U);
     more();
@@ -58,18 +51,6 @@ class Lines {
   }
 
  private:
-  /// A pipe may bring a table, but one into which nobody writes would be waited for without end.
-  void wait_for_writer(int opened) const {
-    constexpr int patience = 5'000;  // ms
-    pollfd pipe{opened, POLLIN, 0};
-    if (poll(&pipe, 1, patience) > 0) {
-      (void)fcntl(opened, F_SETFL, O_RDONLY);  // from here on as any file
-      return;
-    }
-    close(opened);
-    throw InputError{file_, "is a pipe into which nobody has written for five seconds", "name a CSV file"};
-  }
-
   void more() {
     text_.erase(0, std::exchange(at_, 0));
     const std::size_t kept = text_.size();

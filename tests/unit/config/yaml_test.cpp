@@ -1,6 +1,12 @@
 #include "core/config/yaml.hpp"
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <future>
+
+#include "core/base/temporary_folder.hpp"
 
 namespace invar::config {
 namespace {
@@ -146,6 +152,24 @@ TEST(Yaml, RefusesNumbersThatAreNotFinite) {
   const auto yaml = Yaml::parse("x: .nan\n", "a.yaml");
   (void)yaml.root().number("x", "m");
   EXPECT_THAT(only_fault(yaml), HasSubstr("not finite"));
+}
+
+TEST(Yaml, DoesNotWaitForAPipeIntoWhichNobodyWrites) {
+  const TemporaryFolder folder{"yaml"};
+  const auto pipe = folder / "model.yaml";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  auto said = std::async(std::launch::async, [&]() -> std::string {
+    try {
+      return "accepted " + Yaml::load(pipe).root().key();
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  });
+  if (said.wait_for(std::chrono::seconds{60}) != std::future_status::ready) {
+    std::ofstream{pipe} << "a: 1\n";  // ends the wait
+    FAIL() << "waits without end";
+  }
+  EXPECT_THAT(said.get(), HasSubstr("model.yaml: is a pipe into which nobody has written; name a YAML file"));
 }
 
 }  // namespace
