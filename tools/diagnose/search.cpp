@@ -116,9 +116,11 @@ void Search::prepare() {
   cut_into_windows(data_);
   progress_(0.02, "simulating the nominal model");
   auto simulated = simulate(data_, data_.model);
+  const Case as_read = data_;
   drop_outliers(data_, simulated);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
+  drop_outliers_anew(data_, as_read, simulate(data_, d_.retuned.model));
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
     d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
     d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
