@@ -233,6 +233,15 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         }
         continue;
       }
+      if (info->name == "speed_dependent_convection") {
+        double sum = 0.0, rows = 0.0;
+        for (const auto& r : data.recordings)
+          for (const double v : *r.inputs.find("speed"))
+            if (std::isfinite(v) && v != 0.0) sum += std::abs(v), rows += 1.0;
+        const auto at = info->index_of("at_speed");
+        term.values[at] = rows > 0.0 ? sum / rows : 1.0;
+        term.given[at] = true;
+      }
       if (info->name == "ambient_drift") {
         double until = 0.0;
         for (const auto& r : data.recordings) until = std::max(until, r.inputs.time.back());
