@@ -7,11 +7,12 @@
 
 namespace invar::physics {
 
-Bending::Bending(const Term& term, bool held)
+Bending::Bending(const Term& term, bool held, bool has_changes)
     : kind_{equations_kind(*term.info)->memory},
       first_{term.values[0]},
       second_{term.values[1]},
-      held_{held} {}
+      held_{held},
+      has_changes_{has_changes} {}
 
 double Bending::through_store(double step, double value, double time_constant, double share) {
   if (!begun_) store_ = last_ = value;
@@ -31,8 +32,9 @@ double Bending::through_store(double step, double value, double time_constant, d
 double Bending::late(double now, double value) {
   times_.push_back(now);
   values_.push_back(value);
-  const double when = now - first_;
-  while (place_ + 1 < times_.size() && times_[place_ + 1] <= when) ++place_;
+  const double when = now - first_, rounding = has_changes_ ? 1e-12 * std::abs(now) : 0.0;
+  while (place_ + 1 < times_.size() && times_[place_ + 1] <= when + rounding) ++place_;
+  if (has_changes_) return values_[place_];
   const std::size_t next = std::min(place_ + 1, times_.size() - 1);
   const double h = times_[next] - times_[place_];
   const double share = h > 0.0 ? std::clamp((when - times_[place_]) / h, 0.0, 1.0) : 0.0;
@@ -67,10 +69,10 @@ double Bending::operator()(double now, double step, double value) {
   return bent;
 }
 
-std::vector<Bending> bendings(const Model& model, const std::string& on, bool held) {
+std::vector<Bending> bendings(const Model& model, const std::string& on, bool held, bool has_changes) {
   std::vector<Bending> all;
   for (const auto& term : model.terms)
-    if (term.on == on) all.emplace_back(term, held);
+    if (term.on == on) all.emplace_back(term, held, has_changes);
   return all;
 }
 
@@ -104,7 +106,7 @@ void run_over(const Model& model, const std::vector<std::string>& names,
 
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held) {
-  for (auto& bending : bendings(model, on, held))
+  for (auto& bending : bendings(model, on, held, held))
     for (std::size_t i = 0; i < values.size(); ++i)
       values[i] = bending(time[i], step_about(time, i, held), values[i]);
 }

@@ -19,8 +19,9 @@ void run_over(const Model& model, const std::vector<std::string>& names,
 /// A term at an input or output, value by value in order of time: what a controller decides is only known as it comes.
 class Bending {
  public:
-  /// `held`: from row to row, as an input is.
-  Bending(const Term& term, bool held);
+  /// `held`: from row to row, as an input is. `has_changes`: there is a row at every instant at which what is held changes
+  /// late; without them what comes late by a part of a step counts with the mean over it.
+  Bending(const Term& term, bool held, bool has_changes);
   /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next.
   double operator()(double now, double step, double value);
 
@@ -32,19 +33,19 @@ class Bending {
 
   EquationsMemory kind_;
   double first_, second_;
-  bool held_, begun_ = false;
+  bool held_, has_changes_, begun_ = false;
   double store_ = 0.0, last_ = 0.0;
   std::vector<double> times_, values_;
   std::size_t place_ = 0;
 };
 
 /// The terms `on` this signal, one after another.
-std::vector<Bending> bendings(const Model& model, const std::string& on, bool held);
+std::vector<Bending> bendings(const Model& model, const std::string& on, bool held, bool has_changes);
 
 /// The `step` of a row.
 double step_about(const std::vector<double>& time, std::size_t row, bool held);
 
-/// Terms `on` this signal bend its column. `held`: from row to row, as an input is.
+/// Terms `on` this signal bend its column. `held`: from row to row, as an input is; then with rows where it changes late.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held);
 

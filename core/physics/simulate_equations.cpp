@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "core/base/fault.hpp"
 #include "core/physics/equations_columns.hpp"
@@ -78,8 +79,62 @@ class OwnEquations final : public Simulation {
     run_lanes<lanes>(some, into);
   }
 
-  /// The inputs as the terms of one model bend them; the recorded ones where none does.
-  [[nodiscard]] std::vector<std::vector<double>> bent_inputs(const Model& model) const {
+  /// The rows, and between them the instants at which held inputs change because they come late.
+  struct Grid {
+    std::vector<double> time;
+    std::vector<std::vector<double>> inputs;
+    std::vector<bool> is_row;
+  };
+
+  /// Nothing where no held input comes late by a part of the time between two rows.
+  template <std::size_t lanes>
+  [[nodiscard]] std::optional<Grid> changes_between_rows(
+      const std::array<const Model*, lanes>& models) const {
+    const auto& equations = models[0]->equations;
+    std::vector<double> between;
+    for (const auto* model : models)
+      for (const auto& term : model->terms) {
+        if (equations_kind(*term.info)->memory != EquationsMemory::delay || !(term.values[0] > 0.0) ||
+            term.on == equations.controlled_input)
+          continue;
+        const bool alone = std::count_if(model->terms.begin(), model->terms.end(),
+                                         [&](const Term& other) { return other.on == term.on; }) == 1;
+        for (std::size_t i = 0; i < inputs_.size(); ++i) {
+          if (equations.inputs[i].symbol != term.on || equations.inputs[i].linear) continue;
+          for (std::size_t row = 1; row < time_.size(); ++row)
+            if (!alone || inputs_[i][row] != inputs_[i][row - 1])
+              between.push_back(time_[row] + term.values[0]);
+        }
+      }
+    if (between.empty()) return std::nullopt;
+    std::sort(between.begin(), between.end());
+    Grid grid;
+    grid.inputs.resize(inputs_.size());
+    const auto add = [&](double time, std::size_t row, bool is_row) {
+      grid.time.push_back(time);
+      grid.is_row.push_back(is_row);
+      const double h = row + 1 < time_.size() ? time_[row + 1] - time_[row] : 0.0;
+      const double share = h > 0.0 ? (time - time_[row]) / h : 0.0;
+      for (std::size_t i = 0; i < inputs_.size(); ++i) {
+        const double held = inputs_[i][row];
+        grid.inputs[i].push_back(
+            equations.inputs[i].linear && !is_row ? held + share * (inputs_[i][row + 1] - held) : held);
+      }
+    };
+    auto next = between.begin();
+    for (std::size_t row = 0; row < time_.size(); ++row) {
+      add(time_[row], row, true);
+      if (row + 1 == time_.size()) break;
+      for (; next != between.end() && *next < time_[row + 1]; ++next)
+        if (*next > grid.time.back()) add(*next, row, false);
+    }
+    return grid;
+  }
+
+  /// The inputs as the terms of one model bend them; `inputs` where none does.
+  [[nodiscard]] std::vector<std::vector<double>> bent_inputs(
+      const Model& model, const std::vector<double>& time,
+      const std::vector<std::vector<double>>& as_recorded) const {
     const auto& equations = model.equations;
     std::vector<std::string> names;
     for (const auto& input : equations.inputs) names.push_back(input.symbol);
@@ -87,9 +142,9 @@ class OwnEquations final : public Simulation {
           return std::find(names.begin(), names.end(), term.on) != names.end();
         }))
       return {};
-    auto inputs = inputs_;
+    auto inputs = as_recorded;
     for (std::size_t i = 0; i < inputs.size(); ++i)
-      bend(model, names[i], time_, inputs[i], !equations.inputs[i].linear);
+      bend(model, names[i], time, inputs[i], !equations.inputs[i].linear);
     run_over(model, names, inputs);
     return inputs;
   }
@@ -99,15 +154,18 @@ class OwnEquations final : public Simulation {
                  const std::array<Outputs*, lanes>& outputs) const {
     EquationsMachine<lanes> machine{compiled_, models};
     const auto& equations = models[0]->equations;
-    const std::size_t n = time_.size(), count = equations.outputs.size();
+    const auto grid = changes_between_rows<lanes>(models);
+    const auto& time = grid ? grid->time : time_;
+    const auto& recorded = grid ? grid->inputs : inputs_;
+    const std::size_t n = time.size(), count = equations.outputs.size();
     std::array<std::vector<std::vector<double>>, lanes> bent;
     std::array<const std::vector<std::vector<double>>*, lanes> inputs;
     typename EquationsMachine<lanes>::State s{};
     std::vector<std::vector<double*>> out(count, std::vector<double*>(lanes, nullptr));
     for (std::size_t l = 0; l < lanes; ++l) {
       const Model& model = *models[l];
-      bent[l] = bent_inputs(model);
-      inputs[l] = bent[l].empty() ? &inputs_ : &bent[l];
+      bent[l] = bent_inputs(model, time, recorded);
+      inputs[l] = bent[l].empty() ? &recorded : &bent[l];
       for (std::size_t i = 0; i < machine.states(); ++i)
         s[i][l] = model.value(equations.states[i].name + ".initial");
       for (std::size_t o = 0; o < first_.size(); ++o)  // an output that is a state, given in the first row
@@ -115,18 +173,20 @@ class OwnEquations final : public Simulation {
           if (std::isfinite(first_[o]) && equations.outputs[o].expression == equations.states[i].name)
             s[i][l] = first_[o];
       if (outputs[l] == nullptr) continue;
-      outputs[l]->assign(count, std::vector<double>(n, 0.0));
+      outputs[l]->assign(count, std::vector<double>(time_.size(), 0.0));
       for (std::size_t o = 0; o < count; ++o) out[o][l] = (*outputs[l])[o].data();
     }
     machine.balance_hidden(s);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
     std::array<std::vector<Bending>, lanes> way;  // from the controller to the machine
     if (closed)
-      for (std::size_t l = 0; l < lanes; ++l) way[l] = bendings(*models[l], equations.controlled_input, true);
+      for (std::size_t l = 0; l < lanes; ++l)
+        way[l] = bendings(*models[l], equations.controlled_input, true, false);
     typename EquationsMachine<lanes>::Rates own, fastest;
     auto restart = restarts_.begin();
-    for (std::size_t row = 0; row < n; ++row) {
-      if (restart != restarts_.end() && restart->row == row) {
+    for (std::size_t at = 0, row = 0; at < n; ++at) {
+      const bool is_row = !grid || grid->is_row[at];
+      if (is_row && restart != restarts_.end() && restart->row == row) {
         for (std::size_t i = 0; i < machine.states(); ++i)
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
@@ -134,9 +194,9 @@ class OwnEquations final : public Simulation {
         ++restart;
       }
       for (std::size_t i = 0; i < inputs_.size(); ++i)
-        for (std::size_t l = 0; l < lanes; ++l) machine.set_input(i, l, (*inputs[l])[i][row]);
-      machine.show(s, time_[row]);
-      if (closed) {
+        for (std::size_t l = 0; l < lanes; ++l) machine.set_input(i, l, (*inputs[l])[i][at]);
+      machine.show(s, time[at]);
+      if (closed && is_row) {
         const double* commanded = machine.law();
         for (std::size_t l = 0; l < lanes; ++l) {
           double felt = commanded[l];
@@ -144,26 +204,29 @@ class OwnEquations final : public Simulation {
           machine.set_input(machine.controlled() - machine.states(), l, felt);
         }
       }
-      if (row % std::max<std::size_t>(1, n / 32) == 0) {
+      if (is_row && row % std::max<std::size_t>(1, time_.size() / 32) == 0) {
         const auto renew = [&](auto& rates, bool of_own) {  // where it was fast, it may soon be again
-          const auto now = machine.fastest(s, time_[row], of_own);
+          const auto now = machine.fastest(s, time[at], of_own);
           rates.radius = std::max(now.radius, 0.5 * rates.radius);
           rates.swing = std::max(now.swing, 0.5 * rates.swing);
         };
         renew(own, true);
         if (machine.has_added_states()) {
-          const double usual = (time_.back() - time_.front()) / static_cast<double>(n);
+          const double usual = (time_.back() - time_.front()) / static_cast<double>(time_.size());
           machine.set_shortest(usual / parts_for(usual * own.swing) / 2.5);
         }
         renew(fastest, false);
       }
-      machine.show(s, time_[row]);
-      machine.work_out_outputs();
-      for (std::size_t o = 0; o < count; ++o)
-        for (std::size_t l = 0; l < lanes; ++l)
-          if (out[o][l] != nullptr) out[o][l][row] = machine.output(o)[l];
-      if (row + 1 == n) break;
-      const double h = time_[row + 1] - time_[row];
+      machine.show(s, time[at]);
+      if (is_row) {
+        machine.work_out_outputs();
+        for (std::size_t o = 0; o < count; ++o)
+          for (std::size_t l = 0; l < lanes; ++l)
+            if (out[o][l] != nullptr) out[o][l][row] = machine.output(o)[l];
+        ++row;
+      }
+      if (at + 1 == n) break;
+      const double h = time[at + 1] - time[at];
       if (!(h > 0.0)) continue;
       // What is faster than the shortest explicit steps bear is at its balance after an implicit one; the rest needs few.
       constexpr double stiff_parts = 15.0;
@@ -171,7 +234,7 @@ class OwnEquations final : public Simulation {
       const int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
       machine.set_stiff(stiff);
       if (!is_linear_) {
-        machine.advance(s, time_[row], h, parts);
+        machine.advance(s, time[at], h, parts);
         continue;
       }
       for (int part = 0; part < parts; ++part) {
@@ -179,9 +242,9 @@ class OwnEquations final : public Simulation {
         for (std::size_t i = 0; i < inputs_.size(); ++i)
           for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
             const auto& values = (*inputs[l])[i];
-            machine.set_input(i, l, values[row] + middle * (values[row + 1] - values[row]));
+            machine.set_input(i, l, values[at] + middle * (values[at + 1] - values[at]));
           }
-        machine.advance(s, time_[row] + h * part / parts, h / parts, 1);
+        machine.advance(s, time[at] + h * part / parts, h / parts, 1);
       }
     }
     std::vector<std::string> names;

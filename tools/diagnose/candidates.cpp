@@ -103,10 +103,6 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
     for (const double share : {0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.57, 0.45}) clips.push_back(share * top);
     return clips;
   }
-  if (info.plant == Plant::thermal && info.name == "hidden_node") {
-    const double c = data.model.value(on + ".capacity", 100.0);
-    return {0.3 * c, 1.0 * c, 3.0 * c, 0.08 * c};
-  }
   if (info.plant == Plant::sensor && info.name == "periodic_error") return sensor_pitches(data, fitted);
   if ((info.plant == Plant::error_map || info.plant == Plant::sensor) && info.name == "periodic_error") {
     std::vector<double> all;
@@ -237,11 +233,33 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         }
         continue;
       }
+      if (info->name == "speed_dependent_convection") {
+        double sum = 0.0, rows = 0.0;
+        for (const auto& r : data.recordings)
+          for (const double v : *r.inputs.find("speed"))
+            if (std::isfinite(v) && v != 0.0) sum += std::abs(v), rows += 1.0;
+        const auto at = info->index_of("at_speed");
+        term.values[at] = rows > 0.0 ? sum / rows : 1.0;
+        term.given[at] = true;
+      }
       if (info->name == "ambient_drift") {
         double until = 0.0;
         for (const auto& r : data.recordings) until = std::max(until, r.inputs.time.back());
         term.values[info->index_of("over")] = until;
         term.given[info->index_of("over")] = true;
+      }
+      if (info->name == "hidden_node" && info->plant == Plant::thermal) {
+        // A small store, that what it does goes with its size: how fast it fills is the shape, and `with` keeps that.
+        double lasts = 0.0;
+        for (const auto& r : data.recordings)
+          lasts = std::max(lasts, r.inputs.time.back() - r.inputs.time.front());
+        const double capacity = 0.02 * data.model.value(on + ".capacity", 100.0);
+        for (const double share : {0.003, 0.015, 0.07, 0.3, 1.5}) {
+          term.values[0] = capacity / (share * lasts);
+          term.given[0] = true;
+          add_starts(starts, term, {capacity});
+        }
+        continue;
       }
       if (info->name == "node_coupling") {
         for (const auto& other : data.model.thermal.nodes) {

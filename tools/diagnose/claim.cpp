@@ -315,6 +315,21 @@ bool is_lag(const Fit& fit, std::size_t term) {
   return store.values[0] > 1.0 - std::max(0.05, 3.0 * sigma);
 }
 
+/// A store behind a state that fills so slowly that the recording cannot tell it from one that never does: that is a rate
+/// in proportion and a steady one.
+bool never_fills(const Case& data, const Fit& fit, std::size_t term) {
+  const auto& store = fit.model.terms[term];
+  if (store.info->plant != physics::Plant::equations || store.info->name != "hidden_state") return false;
+  double lasts = 0.0;
+  for (const auto& recording : data.recordings)
+    lasts = std::max(lasts, recording.inputs.time.back() - recording.inputs.time.front());
+  if (!(store.values[1] > lasts)) return false;
+  for (std::size_t k = 0; k < fit.free.size(); ++k)
+    if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 1)
+      return store.values[1] < 3.0 * fit.sigma(static_cast<Eigen::Index>(k));  // 1 / time constant: 0 +- sigma
+  return false;
+}
+
 }  // namespace
 
 bool is_affordable(const Case& data, const Fit& fit) {
@@ -347,7 +362,7 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term) ||
       !turns_with_direction(data, fit.model, term))
     return false;
-  if (is_lag(fit, term)) return false;
+  if (is_lag(fit, term) || never_fills(data, fit, term)) return false;
   if (info.name == "overflow" && values[1] < 0.05)
     return false;  // what runs over to nowhere is an upper limit
   // Friction that is smaller at rest than at speed is none.

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/course.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/report/page.hpp"
 
@@ -35,21 +36,20 @@ std::vector<std::vector<double>> power_of_effect(const Case& data, const Diagnos
 /// From the first to the last cell whose weight is more than a third of the greatest; nothing where the variable stands
 /// still or is not recorded.
 std::optional<Region> region_over(const Case& data, const std::string& variable,
+                                  std::vector<std::vector<double>> values,
                                   const std::vector<std::vector<double>>& power) {
   Region region{variable, unit_of_variable(data, variable), {}, false};
-  std::vector<std::vector<double>> values;
   double low = 1e300, high = -1e300;
-  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-    values.push_back(variable_values(data, r, variable));
-    values.back().resize(power[r].size(), std::nan(""));
-    for (const double v : values.back())
+  for (std::size_t r = 0; r < values.size(); ++r) {
+    values[r].resize(power[r].size(), std::nan(""));
+    for (const double v : values[r])
       if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
   }
   if (!(high > low)) return std::nullopt;
   std::vector<double> sum(cells, 0.0), count(cells, 0.0);
   for (std::size_t r = 0; r < values.size(); ++r)
     for (std::size_t i = 0; i < values[r].size(); ++i) {
-      if (!std::isfinite(values[r][i])) continue;
+      if (!std::isfinite(values[r][i]) || !std::isfinite(power[r][i])) continue;
       const auto cell = std::min(cells - 1, static_cast<std::size_t>((values[r][i] - low) / (high - low) *
                                                                      static_cast<double>(cells)));
       sum[cell] += power[r][i], count[cell] += 1.0;
@@ -90,11 +90,21 @@ Region region_of_curve(const Case& data, const physics::Curve& curve) {
 std::vector<Region> regions_of(const Case& data, const Diagnosis& d, std::size_t finding) {
   const auto& term = d.findings[finding].term;
   if (!term.curve.knots.empty()) return {region_of_curve(data, term.curve)};
-  if (data.model.plant == physics::Plant::thermal || data.model.plant == physics::Plant::equations) return {};
+  if (data.model.plant == physics::Plant::thermal || data.model.plant == physics::Plant::equations) {
+    // There an effect goes on long after its cause: what the term does says where it acts.
+    const auto course = course_of(data, d, term);
+    if (course.values.empty()) return {};
+    auto region = region_over(data, course.variable, course.values, course.power);
+    return region ? std::vector<Region>{*region} : std::vector<Region>{};
+  }
   const auto power = power_of_effect(data, d, finding);
   std::vector<Region> regions;
   for (const auto& variable : dependence(data, d.findings[finding])) {
-    if (auto region = region_over(data, variable, power)) regions.push_back(std::move(*region));
+    std::vector<std::vector<double>> values;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r)
+      values.push_back(variable_values(data, r, variable));
+    if (auto region = region_over(data, variable, std::move(values), power))
+      regions.push_back(std::move(*region));
   }
   return regions;
 }

@@ -24,6 +24,8 @@ std::string site_of(const Case& data, const physics::Term& term);
 /// The signals on which a term, or a finding, depends.
 std::vector<std::string> dependence(const Case& data, const physics::Term& term);
 std::vector<std::string> dependence(const Case& data, const Finding& finding);
+/// The output and the column by which a variable of own equations is recorded, where they have names of their own.
+std::vector<std::string> recorded_as(const Case& data, const std::string& variable);
 /// "stribeck friction", or for what has no name "an effect without a name".
 std::string title_of(const Finding& finding);
 /// "coulomb friction"

@@ -54,7 +54,10 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
     const auto& term = finding.term;
-    const auto depends = dependence(data, finding);
+    auto depends = dependence(data, finding);
+    for (const auto& variable : dependence(data, finding))
+      for (const auto& name : recorded_as(data, variable))
+        if (std::find(depends.begin(), depends.end(), name) == depends.end()) depends.push_back(name);
     json where = json::object();
     for (const auto& region : regions_of(data, d, i))
       where[region.variable] = {region.within.lower, region.within.upper};

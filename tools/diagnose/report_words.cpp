@@ -32,8 +32,30 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
   }
-  if (data.model.plant == physics::Plant::equations && term.curve.over.empty())
+  if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
+    if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
     names.push_back(term.with.empty() ? term.on : term.with);
+  }
+  return names;
+}
+
+std::vector<std::string> recorded_as(const Case& data, const std::string& variable) {
+  const auto& equations = data.model.equations;
+  if (data.model.plant == physics::Plant::equations && variable == "t") return {"time"};
+  std::vector<std::string> signals;
+  for (const auto& input : equations.inputs)
+    if (input.symbol == variable) signals.push_back(input.signal);
+  for (const auto& output : equations.outputs)
+    if (output.expression == variable || physics::place_of_output(equations, output.name) == variable)
+      signals.push_back(output.name);
+  std::vector<std::string> names;
+  const auto add = [&](const std::string& name) {
+    if (name != variable && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const auto& name : signals) {
+    add(name);
+    if (const auto* signal = data.model.signal(name)) add(signal->column);
+  }
   return names;
 }
 
@@ -72,6 +94,10 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
 std::string unit_of_variable(const Case& data, const std::string& variable) {
   if (variable == "time") return "s";
   if (variable == "velocity") return "m/s";
+  if (data.model.plant == physics::Plant::thermal) {
+    if (variable == "temperature" || variable == "ambient") return "degC";
+    if (variable == "power") return "W";
+  }
   const auto* signal = data.model.signal(variable);
   return signal != nullptr ? signal->unit : "";
 }

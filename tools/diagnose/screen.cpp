@@ -338,6 +338,12 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
           p.bounds.lower >= 0.0
               ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
               : p.bounds.clamp(value);
+      // A store as fast as it was, however large.
+      if (info.name == "hidden_node" && d == 0) {
+        const auto capacity = info.index_of("capacity");
+        term.values[capacity] = info.parameters[capacity].bounds.clamp(
+            term.values[0] / s->start.term.values[0] * s->start.term.values[capacity]);
+      }
       // Where the force is less than it began with, the loop goes over the same way: it is as much less stiff.
       if (info.name == "presliding_friction" && d == 0) {
         const auto stiffness = info.index_of("stiffness");

@@ -220,6 +220,32 @@ double last(const std::string& term, double input = 0.5) {
   return simulated(text, time, {{"u", std::vector<double>(time.size(), input)}}).back();  // after 2 s
 }
 
+/// x' = a (u - x) where u is held: each change arrives `delay` late, between two rows, and x goes there as exp(-a t).
+TEST(Equations, WhatIsHeldChangesLateBetweenTheRows) {
+  constexpr double a = 3.0, delay = 0.13;
+  const std::string text =
+      "plant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: \"3*(u - x)\", initial: {value: 0, unit: m, sigma: 0}}}\n"
+      "outputs: {y: {column: y, expression: \"x\"}}\nparameters: {}\n"
+      "terms: [{term: delay, on: u, delay: {value: 0.13, unit: s}}]\n";
+  std::vector<double> time, u;
+  for (int i = 0; i < 40; ++i)
+    time.push_back(0.4 * i + (i % 3 == 0 ? 0.05 : 0.0)), u.push_back(i % 5 < 2 ? 1.0 : -0.5);
+  const auto y = simulated(text, time, {{"u", u}});
+  double x = 0.0, felt = u[0], now = time[0];
+  std::size_t next = 1;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    while (next < time.size() && time[next] + delay <= time[i]) {
+      x = felt + (x - felt) * std::exp(-a * (time[next] + delay - now));
+      now = time[next] + delay;
+      felt = u[next++];
+    }
+    x = felt + (x - felt) * std::exp(-a * (time[i] - now));
+    now = time[i];
+    EXPECT_NEAR(y[i], x, 5e-4) << time[i];
+  }
+}
+
 TEST(Equations, TermsActAsTheContractSays) {
   EXPECT_NEAR(last(""), 1.0, 1e-9);
   EXPECT_NEAR(last("{term: upper_limit, on: y, limit: {value: 0.6, unit: m}}"), 0.6, 1e-9);

@@ -1,0 +1,82 @@
+// The diagnosis of heated bodies against networks made here: other sizes than any recording at hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "tests/support/model_of.hpp"
+#include "tools/diagnose/search.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+/// A body of `capacity` [J/K] that loses `loss` [W/K] to air of 22 degC, heated in random steps up to `most` [W]; `more`
+/// gives what else flows into it [W] and advances a store of its own. A stage beside it moves at 0, 0.25 ... 1 m/s.
+Case heated(double capacity, double loss, double most, double noise,
+            const std::function<double(double temperature, double speed, double step, double& store)>& more) {
+  std::mt19937 random{11};
+  std::normal_distribution<double> normal{0.0, noise};
+  std::uniform_real_distribution<double> uniform{0.0, most};
+  const double row = 0.04 * capacity / loss;
+  constexpr int parts = 50;
+  std::vector<double> time, power, reading, speeds;
+  double body = 22.0, store = 22.0, now = 0.0;
+  for (int i = 0; i < 1600; ++i) {
+    if (i % 80 == 0) now = (i / 80) % 3 == 2 ? 0.0 : uniform(random);
+    speeds.push_back(0.25 * static_cast<double>((i / 50) % 5));
+    time.push_back(row * i), power.push_back(now), reading.push_back(body + normal(random));
+    for (int part = 0; part < parts; ++part) {
+      const double step = row / parts;
+      const double flow = more(body, speeds.back(), step, store);
+      body += step * (now + flow - loss * (body - 22.0)) / capacity;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("P", "W", power);
+  table.add("T", "degC", reading);
+  table.add("v", "m/s", speeds);
+  const auto text = [](double v) { return std::to_string(v); };
+  return make_case(
+      test::model_of(
+          "invar_model: 1\nplant: thermal\ncolumns: {time: t, speed: v}\nnodes:\n  body: {column: T, "
+          "capacity: {value: " +
+          text(capacity) + ", unit: J/K, sigma: " + text(0.04 * capacity) +
+          "}, loss: {value: " + text(0.97 * loss) + ", unit: W/K, sigma: " + text(0.1 * loss) +
+          "}}\nheaters:\n  pad: {node: body, column: P, gain: {value: 1, unit: W/W, sigma: "
+          "0.01}}\nambient: {value: 22.2, unit: degC, sigma: 0.4}\nnoise: {T: " +
+          text(noise) + "}\n"),
+      {table});
+}
+
+TEST(Heat, AStoreBehindAWeakContactIsAStore) {
+  // It takes half a percent of what the air takes, and fills no faster than the recording lasts: much as if the air grew warm.
+  auto data = heated(10400.0, 32.0, 1000.0, 0.005, [](double body, double, double step, double& store) {
+    const double flow = 0.16 * (body - store);
+    store += step * flow / 3000.0;
+    return -flow;
+  });
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "hidden_node");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.16, 0.02);
+  EXPECT_NEAR(d.findings[0].term.values[1], 3000.0, 600.0);
+}
+
+TEST(Heat, AirThatIsDrivenCarriesHeatAwayWithAPowerOfTheSpeed) {
+  auto data = heated(2000.0, 10.0, 300.0, 0.02, [](double body, double speed, double, double&) {
+    return -1.5 * std::pow(speed, 0.7) * (body - 22.0);
+  });
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_EQ(d.findings[0].stand_in, nullptr);
+  EXPECT_EQ(d.findings[0].term.info->name, "speed_dependent_convection");
+  const auto& values = d.findings[0].term.values;
+  EXPECT_NEAR(values[1], 0.7, 0.03);
+  EXPECT_NEAR(values[0] * std::pow(values[2], 0.3), 1.5, 0.05);
+}
+
+}  // namespace
+}  // namespace invar::diagnose

@@ -1,0 +1,68 @@
+// What a fit that does well must show of its term before the term's name is said.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/physics/library.hpp"
+#include "tests/support/model_of.hpp"
+#include "tools/diagnose/claim.hpp"
+
+namespace invar::diagnose {
+namespace {
+
+/// A vessel x' = u - 0.2 x and behind it a second one that takes 0.1 of the difference a second and fills with this time
+/// constant [s]. Exact for steps this small.
+Case vessel(double time_constant) {
+  std::mt19937 random{3};
+  std::normal_distribution<double> noise{0.0, 0.002};
+  std::vector<double> time, input, output;
+  double x = 5.0, z = 5.0, u = 1.0;
+  for (int i = 0; i < 600; ++i) {
+    if (i % 60 == 0) u = i % 120 == 0 ? 1.5 : 0.6;
+    time.push_back(0.5 * i), input.push_back(u), output.push_back(x + noise(random));
+    for (int part = 0; part < 500; ++part) {
+      const double into = 0.1 * (z - x);
+      x += 1e-3 * (u - 0.2 * x + into);
+      z += 1e-3 * (x - z) / time_constant;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("u", "", input);
+  table.add("x", "", output);
+  return make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                                  "states: {x: {derivative: 'u - k*x', initial: {value: 5, sigma: 0.01}}}\n"
+                                  "outputs: {x: {column: x, expression: x}}\n"
+                                  "parameters: {k: {value: 0.2, sigma: 0.01}}\n"),
+                   {table});
+}
+
+Fit with_store(const Case& data, double time_constant) {
+  auto model = data.model;
+  physics::Term store;
+  store.info = physics::find_term(physics::Plant::equations, "hidden_state");
+  store.on = std::string{"x"};
+  store.values = {0.09, time_constant};
+  store.given = {true, true};
+  model.terms.push_back(store);
+  const auto plain = weigh(data, simulate(data, model), false);
+  return fit(data, plain, model, data.model, 30);
+}
+
+TEST(Stands, AStoreThatNeverFillsIsNone) {
+  const auto data = vessel(1e6);  // the recording lasts 300 s: 0.5 a second, less 0.1 x
+  const auto found = with_store(data, 1e6);
+  EXPECT_NEAR(found.model.terms[0].values[0], 0.1, 0.01);
+  EXPECT_FALSE(stands(data, found, 0));
+}
+
+TEST(Stands, AStoreThatFillsIsOne) {
+  const auto data = vessel(40.0);
+  const auto found = with_store(data, 100.0);
+  EXPECT_NEAR(found.model.terms[0].values[1], 40.0, 2.0);
+  EXPECT_TRUE(stands(data, found, 0));
+}
+
+}  // namespace
+}  // namespace invar::diagnose
