@@ -100,6 +100,16 @@ TEST(AxisLoop, FrictionThatTheNoiseShakesLooseIsFoundAndMeasured) {
   EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
 }
 
+TEST(AxisLoop, FrictionThatNoiseSmearsHasItsWholeLevel) {
+  Axis axis;
+  axis.friction = 0.3;
+  axis.noise = 2.0e-7;
+  const auto d = searched(recorded(axis, 1.5, 5));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
+}
+
 TEST(AxisLoop, FrictionAtOneSpeedIsNotMoreThanCoulombs) {
   Axis axis;
   axis.friction = 4.0;
