@@ -13,8 +13,9 @@ class LoopNoise {
   using Readings = std::vector<std::vector<std::vector<double>>>;  // by recording, output, row
 
   explicit LoopNoise(Case& data);
-  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer.
-  void take_off(const physics::Model& model);
+  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer, and without
+  /// the rows in which noise decides when the carriage sticks and slips. The share of these.
+  double take_off(const physics::Model& model);
   /// The readings as recorded; what was in their place.
   Readings put_back();
   void put(Readings readings);

@@ -75,8 +75,9 @@ class Search {
   void try_pairs(const Diagnosis& begun);
   /// What is said where the machine's controller is another than the model's: nothing of what lies behind it.
   void stop_at_the_law();
-  /// Takes off the readings what their noise makes of the claims so far, and fits anew.
-  void quieten();
+  /// Takes off the readings what their noise makes of the claims so far, and fits anew. The share of rows that it leaves to
+  /// chance.
+  double quieten();
   /// The same until the strengths stay: what noise makes of a bend goes with its size, which a fit to readings that still
   /// hold it takes too small.
   void settle();
@@ -300,19 +301,20 @@ bool Search::add_named(double round) {
   return false;
 }
 
-void Search::quieten() {
-  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
-  noise_->take_off(d_.best.model);
+double Search::quieten() {
+  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return 0.0;
+  const double untold = noise_->take_off(d_.best.model);
   d_.weighing = weigh(data_, simulate(data_, d_.best.model));
   d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
+  return untold;
 }
 
 void Search::settle() {
   if (d_.best.model.terms.size() == given()) return;
   for (int again = 0; again < 4; ++again) {
     const auto was = d_.best.model;
-    quieten();
+    (void)quieten();
     if (settled(was, d_.best.model)) return;
   }
 }
@@ -337,13 +339,17 @@ bool Search::add_pair(const Fit* rival) {
   d_.weighing = std::move(claim->weighing);
   rivals_ = std::move(claim->rivals);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-  quieten();
+  (void)quieten();
   return true;
 }
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
-    if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
+    if (!take([&] { return add_named(round); }) || !take([&] {
+          if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size
+          return true;
+        }))
+      break;
   take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
   if (options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
   progress_(0.7, "comparing with near twins");
@@ -368,7 +374,9 @@ void Search::finish() {
     return true;
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
+  // What a run without noise left over may be what noise makes of the others.
   if (!curved) take([&] { return settle(), true; });
+  if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped

@@ -133,6 +133,19 @@ TEST(AxisLoop, BristlesOfAWeakSealBendAsFarAsThoseOfAStrongOne) {
   EXPECT_NEAR(d.findings[0].term.values[1], axis.stiffness, 0.2 * axis.stiffness);
 }
 
+TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
+  for (const double noise : {1.0e-8, 1.0e-7})
+    for (const unsigned seed : {5U, 7U}) {
+      Axis axis;
+      axis.friction = 1.0;
+      axis.noise = noise;
+      const auto d = searched(recorded(axis, 1.5, seed));
+      ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise << ", seed " << seed;
+      EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+      EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.03 * axis.friction);
+    }
+}
+
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const auto d = searched(recorded({}, 1.0, seed));
