@@ -19,39 +19,46 @@ std::optional<std::size_t> fed_back(const Case& data) {
   return static_cast<std::size_t>(at - data.outputs.begin());
 }
 
-/// How far runs with noise on the encoder lie, on average, from the run without. The noise is what the model leaves of the
-/// readings, shifted against the motion, with either sign: what is linear in it cancels.
-std::vector<physics::Outputs> softened(const Case& data, const LoopNoise::Readings& recorded,
-                                       const physics::Model& model, std::size_t position) {
-  constexpr std::size_t shifts = 4;
-  const auto quiet = simulate(data, model);
-  auto mean = quiet;
-  for (std::size_t r = 0; r < quiet.size(); ++r) {
+/// Runs of a model with noise on the encoder. The noise is what the model `of` leaves of the readings, shifted against the
+/// motion, with either sign: what is linear in it cancels.
+std::vector<LoopNoise::Readings> shaken(const Case& data, const LoopNoise::Readings& recorded,
+                                        const physics::Model& model, const physics::Model& of,
+                                        std::size_t position, std::size_t shifts) {
+  const auto quiet = simulate(data, of);
+  std::vector<LoopNoise::Readings> runs(2 * shifts, LoopNoise::Readings(quiet.size()));
+  in_parallel(runs.size() * quiet.size(), [&](std::size_t at) {
+    if (data.stopped && data.stopped()) throw Stopped{};
+    const std::size_t k = at % runs.size(), r = at / runs.size();
     const auto& time = data.recordings[r].inputs.time;
-    const std::size_t n = time.size();
-    std::vector<physics::Outputs> shaken(2 * shifts);
-    in_parallel(shaken.size(), [&](std::size_t k) {
-      if (data.stopped && data.stopped()) throw Stopped{};
-      physics::Model noisy = model;
-      auto& reading = noisy.terms.emplace_back();
-      reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
-      reading.curve.over = "time";
-      reading.curve.knots = time;
-      const std::size_t by = (k / 2 + 1) * n / (shifts + 1);
-      for (std::size_t i = 0; i < n; ++i) {
-        const std::size_t from = (i + by) % n;
-        const double e = recorded[r][position][from] - quiet[r][position][from];
-        reading.curve.values.push_back(std::isfinite(e) ? (k % 2 == 0 ? e : -e) : 0.0);
-      }
-      data.recordings[r].simulation->run(noisy, shaken[k]);
-    });
+    const std::size_t n = time.size(), by = (k / 2 + 1) * n / (shifts + 1);
+    physics::Model noisy = model;
+    auto& reading = noisy.terms.emplace_back();
+    reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
+    reading.curve.over = "time";
+    reading.curve.knots = time;
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::size_t from = (i + by) % n;
+      const double e = recorded[r][position][from] - quiet[r][position][from];
+      reading.curve.values.push_back(std::isfinite(e) ? (k % 2 == 0 ? e : -e) : 0.0);
+    }
+    data.recordings[r].simulation->run(noisy, runs[k][r]);
+  });
+  return runs;
+}
+
+/// How far such runs lie, on average, from the run without noise.
+LoopNoise::Readings softened(const Case& data, const LoopNoise::Readings& recorded,
+                             const physics::Model& model, std::size_t position) {
+  const auto quiet = simulate(data, model);
+  const auto runs = shaken(data, recorded, model, model, position, 4);
+  auto mean = quiet;
+  for (std::size_t r = 0; r < mean.size(); ++r)
     for (std::size_t o = 0; o < mean[r].size(); ++o)
-      for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t i = 0; i < mean[r][o].size(); ++i) {
         double sum = 0.0;
-        for (const auto& one : shaken) sum += one[o][i] - quiet[r][o][i];
-        mean[r][o][i] = sum / static_cast<double>(shaken.size());
+        for (const auto& one : runs) sum += one[r][o][i] - quiet[r][o][i];
+        mean[r][o][i] = sum / static_cast<double>(runs.size());
       }
-  }
   return mean;
 }
 
@@ -75,6 +82,8 @@ std::vector<double> squares(const LoopNoise::Readings& readings,
 LoopNoise::LoopNoise(Case& data) : data_{data} {
   for (const auto& recording : data.recordings) recorded_.push_back(recording.measured);
 }
+
+bool LoopNoise::is_fed_back() const { return fed_back(data_).has_value(); }
 
 LoopNoise::Readings LoopNoise::now() const {
   Readings readings;
@@ -120,6 +129,31 @@ bool LoopNoise::shows(const physics::Model& with, const physics::Model& without,
   for (std::size_t o = 0; o < shaken.size(); ++o)
     if (shaken[o] < ratio * ratio * farther[o] || quiet[o] < plain * plain * farther[o]) return true;
   return false;
+}
+
+double LoopNoise::beyond(const physics::Model& with, const physics::Model& without,
+                         const Weighing& weighing) const {
+  const auto position = fed_back(data_);
+  if (!position) return std::numeric_limits<double>::infinity();
+  const auto quiet = simulate(data_, without);
+  const auto apart = [&](const Readings& readings) {
+    Eigen::VectorXd all(weighing.rows);
+    Eigen::Index at = 0;
+    for (std::size_t r = 0; r < quiet.size(); ++r)
+      for (std::size_t o = 0; o < quiet[r].size(); ++o)
+        for (std::size_t i = 0; i < quiet[r][o].size(); ++i) all(at++) = readings[r][o][i] - quiet[r][o][i];
+    return filtered(data_, weighing, all);
+  };
+  const Eigen::VectorXd effect = apart(simulate(data_, with));
+  double sum = 0.0, square = 0.0;
+  const auto runs = shaken(data_, recorded_, without, with, *position, 8);
+  for (const auto& one : runs) {
+    const double score = effect.dot(apart(one));
+    sum += score, square += score * score;
+  }
+  const auto n = static_cast<double>(runs.size());
+  const double variance = (square - sum * sum / n) / (n - 1.0), off = effect.dot(apart(recorded_)) - sum / n;
+  return off > 0.0 && variance > 0.0 ? 0.5 * off * off / variance : 0.0;
 }
 
 double LoopNoise::gain(const physics::Model& with, const physics::Model& without,
