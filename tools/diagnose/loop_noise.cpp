@@ -19,66 +19,100 @@ std::optional<std::size_t> fed_back(const Case& data) {
   return static_cast<std::size_t>(at - data.outputs.begin());
 }
 
-/// Runs with noise on the encoder, by recording, output and row.
-struct Shaken {
-  std::vector<physics::Outputs> mean;    // how far they lie, on average, from the run without
-  std::vector<physics::Outputs> spread;  // root mean square about that average
-};
+using Noise = std::vector<std::vector<double>>;  // of the encoder, by recording
 
-/// What a model leaves of the readings of the encoder, by recording, without those that no run can tell.
-std::vector<std::vector<double>> noise_of(const LoopNoise::Readings& readings,
-                                          const std::vector<physics::Outputs>& simulated,
-                                          std::size_t position) {
-  std::vector<std::vector<double>> noise(readings.size());
-  for (std::size_t r = 0; r < readings.size(); ++r)
-    for (std::size_t i = 0; i < readings[r][position].size(); ++i)
-      if (const double e = readings[r][position][i] - simulated[r][position][i]; std::isfinite(e))
-        noise[r].push_back(e);
+/// What a model leaves of the readings of the encoder, without the rows in which chance decides.
+Noise noise_left_by(const physics::Model& model, const Case& data, const LoopNoise::Readings& recorded,
+                    std::size_t position) {
+  const auto simulated = simulate(data, model);
+  Noise noise(recorded.size());
+  for (std::size_t r = 0; r < recorded.size(); ++r)
+    for (std::size_t i = 0; i < recorded[r][position].size(); ++i)
+      if (std::isfinite(data.recordings[r].measured[position][i]))
+        noise[r].push_back(recorded[r][position][i] - simulated[r][position][i]);
   return noise;
 }
 
-/// The noise is shifted against the motion, with either sign: what is linear in it cancels in the mean.
-Shaken shaken_by(const std::vector<std::vector<double>>& noise, const Case& data,
-                 const physics::Model& model) {
-  constexpr std::size_t shifts = 4;
-  const auto quiet = simulate(data, model);
-  Shaken out{quiet, quiet};
-  for (std::size_t r = 0; r < quiet.size(); ++r) {
+/// Runs of a model with noise on the encoder, shifted against the motion, with either sign: what is linear in it cancels in
+/// their average.
+std::vector<LoopNoise::Readings> shaken(const physics::Model& model, const Case& data, const Noise& noise,
+                                        std::size_t shifts) {
+  std::vector<LoopNoise::Readings> runs(2 * shifts, LoopNoise::Readings(noise.size()));
+  in_parallel(runs.size() * noise.size(), [&](std::size_t at) {
+    if (data.stopped && data.stopped()) throw Stopped{};
+    const std::size_t k = at % runs.size(), r = at / runs.size();
     const auto& time = data.recordings[r].inputs.time;
-    const std::size_t n = time.size();
-    std::vector<physics::Outputs> runs(2 * shifts);
-    in_parallel(runs.size(), [&](std::size_t k) {
-      if (data.stopped && data.stopped()) throw Stopped{};
-      physics::Model noisy = model;
-      auto& reading = noisy.terms.emplace_back();
-      reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
-      reading.curve.over = "time";
-      reading.curve.knots = time;
-      const std::size_t by = (k / 2 + 1) * n / (shifts + 1);
-      for (std::size_t i = 0; i < n; ++i) {
-        const double e = noise[r].empty() ? 0.0 : noise[r][(i + by) % noise[r].size()];
-        reading.curve.values.push_back(k % 2 == 0 ? e : -e);
+    const std::size_t n = time.size(), by = (k / 2 + 1) * n / (shifts + 1);
+    physics::Model noisy = model;
+    auto& reading = noisy.terms.emplace_back();
+    reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
+    reading.curve.over = "time";
+    reading.curve.knots = time;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double e = noise[r].empty() ? 0.0 : noise[r][(i + by) % noise[r].size()];
+      reading.curve.values.push_back(k % 2 == 0 ? e : -e);
+    }
+    data.recordings[r].simulation->run(noisy, runs[k][r]);
+  });
+  return runs;
+}
+
+/// Of each row of the runs, this of where they lie beside the run without noise.
+template <class Of>
+LoopNoise::Readings row_by_row(const std::vector<LoopNoise::Readings>& runs, const LoopNoise::Readings& quiet,
+                               Of of) {
+  auto out = quiet;
+  std::vector<double> apart(runs.size());
+  for (std::size_t r = 0; r < out.size(); ++r)
+    for (std::size_t o = 0; o < out[r].size(); ++o)
+      for (std::size_t i = 0; i < out[r][o].size(); ++i) {
+        for (std::size_t k = 0; k < runs.size(); ++k) apart[k] = runs[k][r][o][i] - quiet[r][o][i];
+        out[r][o][i] = of(apart);
       }
-      data.recordings[r].simulation->run(noisy, runs[k]);
-    });
-    const auto count = static_cast<double>(runs.size());
-    for (std::size_t o = 0; o < quiet[r].size(); ++o)
-      for (std::size_t i = 0; i < n; ++i) {
-        double sum = 0.0, square = 0.0;
-        for (const auto& one : runs) {
-          const double apart = one[o][i] - quiet[r][o][i];
-          sum += apart, square += apart * apart;
-        }
-        out.mean[r][o][i] = sum / count;
-        out.spread[r][o][i] = std::sqrt(std::max(0.0, square / count - sum * sum / count / count));
-      }
-  }
   return out;
 }
 
-std::vector<physics::Outputs> softened(const Case& data, const LoopNoise::Readings& recorded,
-                                       const physics::Model& model, std::size_t position) {
-  return shaken_by(noise_of(recorded, simulate(data, model), position), data, model).mean;
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+double variance_of(const std::vector<double>& values) {
+  const double mean = mean_of(values);
+  double sum = 0.0;
+  for (double v : values) sum += (v - mean) * (v - mean);
+  return sum / static_cast<double>(values.size() - 1);
+}
+
+constexpr std::size_t few_shifts = 4;
+
+/// How far runs with noise lie, on average, from the run without.
+LoopNoise::Readings softened(const Case& data, const LoopNoise::Readings& recorded,
+                             const physics::Model& model, std::size_t position) {
+  const auto noise = noise_left_by(model, data, recorded, position);
+  return row_by_row(shaken(model, data, noise, few_shifts), simulate(data, model), mean_of);
+}
+
+/// By recording and row: do runs with noise scatter there as noise does that goes round in a loop without bends? Where the
+/// carriage sticks in one run and slips in another, none says when it did in the recording.
+std::vector<std::vector<bool>> told_by(const LoopNoise::Readings& variance,
+                                       const LoopNoise::Readings& without_bends) {
+  constexpr double most = 4.0;
+  constexpr std::size_t beside = 10;  // rows, since eight runs alone say little of their scatter
+  std::vector<std::vector<bool>> told(variance.size());
+  for (std::size_t r = 0; r < told.size(); ++r) {
+    const std::size_t n = variance[r].front().size();
+    told[r].assign(n, true);
+    for (std::size_t o = 0; o < variance[r].size(); ++o)
+      for (std::size_t i = 0; i < n; ++i) {
+        double with = 0.0, expected = 0.0;
+        for (std::size_t k = i > beside ? i - beside : 0; k < std::min(n, i + beside + 1); ++k)
+          with += variance[r][o][k], expected += without_bends[r][o][k];
+        if (with > most * expected) told[r][i] = false;
+      }
+  }
+  return told;
 }
 
 /// By output: the sum of squares of readings - simulated - off.
@@ -102,6 +136,8 @@ LoopNoise::LoopNoise(Case& data) : data_{data} {
   for (const auto& recording : data.recordings) recorded_.push_back(recording.measured);
 }
 
+bool LoopNoise::is_fed_back() const { return fed_back(data_).has_value(); }
+
 LoopNoise::Readings LoopNoise::now() const {
   Readings readings;
   for (const auto& recording : data_.recordings) readings.push_back(recording.measured);
@@ -121,47 +157,30 @@ void LoopNoise::put(Readings readings) {
 double LoopNoise::take_off(const physics::Model& model) {
   const auto position = fed_back(data_);
   if (!position) return 0.0;
-  const auto simulated = simulate(data_, model);
-  auto told = recorded_;
-  for (std::size_t r = 0; r < told.size(); ++r)
-    for (std::size_t i = 0; i < told[r][*position].size(); ++i)
-      if (!std::isfinite(data_.recordings[r].measured[*position][i]))
-        told[r][*position][i] = std::numeric_limits<double>::quiet_NaN();
-  const auto noise = noise_of(told, simulated, *position);
+  const auto noise = noise_left_by(model, data_, recorded_, *position);
   (void)put_back();
-  const auto shaken = shaken_by(noise, data_, model);
-  const auto& off = shaken.mean;
+  const auto simulated = simulate(data_, model);
+  const auto runs = shaken(model, data_, noise, few_shifts);
+  const auto off = row_by_row(runs, simulated, mean_of);
   const auto before = squares(recorded_, simulated, nullptr), after = squares(recorded_, simulated, &off);
   double nearer = 0.0;
   for (std::size_t o = 0; o < before.size(); ++o)
     if (before[o] > 0.0 && after[o] > 0.0) nearer += std::log(before[o] / after[o]);
-  if (nearer > 0.0)
-    for (std::size_t r = 0; r < off.size(); ++r)
-      for (std::size_t o = 0; o < off[r].size(); ++o)
-        for (std::size_t i = 0; i < off[r][o].size(); ++i) data_.recordings[r].measured[o][i] -= off[r][o][i];
-  // Where the carriage sticks in one run and slips in another, no run says when it did in the recording.
   auto without = model;
   without.terms.resize(data_.model.terms.size());
-  const auto linear = shaken_by(noise, data_, without).spread;
-  constexpr double chance = 2.0;
+  const auto told =
+      told_by(row_by_row(runs, simulated, variance_of),
+              row_by_row(shaken(without, data_, noise, few_shifts), simulate(data_, without), variance_of));
   double untold = 0.0, rows = 0.0;
-  constexpr std::size_t beside = 10;  // rows, so that eight runs say how far they lie apart
   for (std::size_t r = 0; r < off.size(); ++r) {
-    const std::size_t n = off[r].front().size();
-    for (std::size_t i = 0; i < n; ++i) {
-      bool is_told = true;
-      for (std::size_t o = 0; o < off[r].size(); ++o) {
-        double with = 0.0, expected = 0.0;
-        for (std::size_t k = i > beside ? i - beside : 0; k < std::min(n, i + beside + 1); ++k) {
-          with += shaken.spread[r][o][k] * shaken.spread[r][o][k];
-          expected += linear[r][o][k] * linear[r][o][k];
-        }
-        is_told = is_told && with <= chance * chance * expected;
+    for (std::size_t o = 0; o < off[r].size(); ++o)
+      for (std::size_t i = 0; i < off[r][o].size(); ++i) {
+        auto& measured = data_.recordings[r].measured[o][i];
+        if (nearer > 0.0) measured -= off[r][o][i];
+        if (!told[r][i]) measured = std::numeric_limits<double>::quiet_NaN();
       }
-      ++rows, untold += is_told ? 0.0 : 1.0;
-      for (auto& measured : data_.recordings[r].measured)
-        if (!is_told) measured[i] = std::numeric_limits<double>::quiet_NaN();
-    }
+    rows += static_cast<double>(told[r].size());
+    untold += static_cast<double>(std::count(told[r].begin(), told[r].end(), false));
   }
   return untold / rows;
 }
@@ -178,6 +197,27 @@ bool LoopNoise::shows(const physics::Model& with, const physics::Model& without,
   for (std::size_t o = 0; o < shaken.size(); ++o)
     if (shaken[o] < ratio * ratio * farther[o] || quiet[o] < plain * plain * farther[o]) return true;
   return false;
+}
+
+double LoopNoise::beyond(const physics::Model& with, const physics::Model& without,
+                         const Weighing& weighing) const {
+  const auto position = fed_back(data_);
+  if (!position) return std::numeric_limits<double>::infinity();
+  const auto quiet = simulate(data_, without);
+  const auto apart = [&](const Readings& readings) {
+    Eigen::VectorXd all(weighing.rows);
+    Eigen::Index at = 0;
+    for (std::size_t r = 0; r < quiet.size(); ++r)
+      for (std::size_t o = 0; o < quiet[r].size(); ++o)
+        for (std::size_t i = 0; i < quiet[r][o].size(); ++i) all(at++) = readings[r][o][i] - quiet[r][o][i];
+    return filtered(data_, weighing, all);
+  };
+  const Eigen::VectorXd effect = apart(simulate(data_, with));
+  std::vector<double> scores;
+  for (const auto& one : shaken(without, data_, noise_left_by(with, data_, recorded_, *position), 8))
+    scores.push_back(effect.dot(apart(one)));
+  const double variance = variance_of(scores), off = effect.dot(apart(recorded_)) - mean_of(scores);
+  return off > 0.0 && variance > 0.0 ? 0.5 * off * off / variance : 0.0;
 }
 
 double LoopNoise::gain(const physics::Model& with, const physics::Model& without,

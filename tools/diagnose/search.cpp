@@ -209,7 +209,7 @@ bool Search::add_named(double round) {
     struct Settled {
       Weighing weighing;
       Fit with, without;
-      double gain = -1e300;
+      double gain = -1e300, rank = -1e300;
     };
     std::vector<Settled> settled_fits(leaders.size());
     in_parallel(leaders.size(), [&](std::size_t k) {
@@ -232,7 +232,9 @@ bool Search::add_named(double round) {
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double evidence = advantage(data_, own, with_term, without);
-      double gain = std::min(evidence, advantage_over_wander(data_, own, with_term, without));
+      double gain =
+          std::min(evidence, noise_->is_fed_back() ? noise_->beyond(with_term.model, without.model, own)
+                                                   : advantage_over_wander(data_, own, with_term, without));
       if (const double counted = std::min(evidence, lead(data_, with_term, without));
           options_.refuses && gain < 2.0 * margin() && counted > 2.0 * margin() &&
           goes_with_recording(data_, with_term, without))
@@ -244,15 +246,19 @@ bool Search::add_named(double round) {
           least_ratio(data_, with_term, without) < ratio ||
           (rivals_.empty() ? lead(data_, with_term, without) > claim_margin : gain > plainly * margin());
       if (shows && (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)))
-        settled_fits[k] = {own, std::move(with_term), std::move(without), gain};
+        settled_fits[k] = {own, std::move(with_term), std::move(without), gain, gain};
+      // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.
+      if (auto& one = settled_fits[k]; one.gain >= margin() && leaders.size() > 1 && noise_->is_fed_back())
+        one.rank = evidence + noise_->gain(one.with.model, one.without.model, own) -
+                   (one.without.data_cost - one.with.data_cost);
     });
-    double best_gain = -1e300;
+    double best_gain = -1e300, best_rank = -1e300;
     std::size_t winner = 0;
     Weighing own_weighing;
     Fit own_fit, own_base;
     for (std::size_t k = 0; k < leaders.size(); ++k)
-      if (auto& one = settled_fits[k]; one.gain > best_gain) {
-        best_gain = one.gain, winner = leaders[k];
+      if (auto& one = settled_fits[k]; one.rank > best_rank) {
+        best_gain = one.gain, best_rank = one.rank, winner = leaders[k];
         own_weighing = std::move(one.weighing), own_fit = std::move(one.with),
         own_base = std::move(one.without);
       }

@@ -145,6 +145,20 @@ TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
   }
 }
 
+TEST(AxisLoop, ATiltBesideFrictionThatTheNoiseShakesIsFound) {
+  Axis axis;
+  axis.friction = 0.12;
+  axis.push = [](double) { return -0.12; };
+  axis.noise = 5.0e-8;
+  const auto d = searched(recorded(axis, 0.3, 7));
+  ASSERT_EQ(d.findings.size(), 2U);
+  for (const auto& finding : d.findings) {
+    const bool is_tilt = finding.term.info->name == "constant_force";
+    EXPECT_TRUE(is_tilt || finding.term.info->name == "coulomb_friction") << finding.term.info->name;
+    EXPECT_NEAR(finding.term.values[0], is_tilt ? -0.12 : axis.friction, 0.15 * axis.friction);
+  }
+}
+
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const auto d = searched(recorded({}, 1.0, seed));
