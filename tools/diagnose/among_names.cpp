@@ -15,27 +15,34 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
   const auto is_friction = [](const Term& term) {
     return term.info->name.find("friction") != std::string_view::npos;
   };
-  for (std::size_t i = 0; i < rivals.size() && rivals.size() > 1; ++i) {
-    const std::size_t place = data.model.terms.size() + i;
+  const std::size_t given = data.model.terms.size();
+  for (std::size_t i = 0; given + i < d.best.model.terms.size() && d.best.model.terms.size() > given + 1;
+       ++i) {
+    const std::size_t place = given + i;
     const Term removed = d.best.model.terms[place];
     Model model = physics::without_term(d.best.model, place);
     // What one friction law gives up another may take over.
-    for (std::size_t t = data.model.terms.size(); t < model.terms.size(); ++t)
+    for (std::size_t t = given; t < model.terms.size(); ++t)
       if (is_friction(removed) && is_friction(model.terms[t])) {
         model.terms[t].values[0] += 0.7 * removed.values[0];
         if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
       }
     auto without = fit(data, d.weighing, model, data.model, 10);
     bool possible = true;
-    for (std::size_t t = data.model.terms.size(); t < without.model.terms.size(); ++t)
+    for (std::size_t t = given; t < without.model.terms.size(); ++t)
       possible = possible && (stands(data, without, t) || !stands(data, d.best, t < place ? t : t + 1));
     if (!possible) continue;
     const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing);
-    if (gain > margin && (least_ratio(data, d.best, without) < 0.95 || gain > plainly * margin)) continue;
+    // What makes the readings themselves lie farther off pleases the filters only.
+    if (gain > margin && lead(data, d.best, without) > 0.0 &&
+        (least_ratio(data, d.best, without) < 0.95 || gain > plainly * margin))
+      continue;
     d.reject(std::string{removed.info->name}, "the others explain it without",
              d.best.evidence - without.evidence);
     d.best = std::move(without);
-    rivals.erase(rivals.begin() + static_cast<std::ptrdiff_t>(i));
+    const auto at = static_cast<std::ptrdiff_t>(i);
+    if (i < rivals.size()) rivals.erase(rivals.begin() + at);
+    if (i < d.findings.size()) d.findings.erase(d.findings.begin() + at);
     d.weighing = weigh(data, simulate(data, d.best.model));
     d.best = fit(data, d.weighing, d.best.model, data.model, 4, &d.best);
     d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);

@@ -19,40 +19,100 @@ std::optional<std::size_t> fed_back(const Case& data) {
   return static_cast<std::size_t>(at - data.outputs.begin());
 }
 
-/// How far runs with noise on the encoder lie, on average, from the run without. The noise is what the model leaves of the
-/// readings, shifted against the motion, with either sign: what is linear in it cancels.
-std::vector<physics::Outputs> softened(const Case& data, const LoopNoise::Readings& recorded,
-                                       const physics::Model& model, std::size_t position) {
-  constexpr std::size_t shifts = 4;
-  const auto quiet = simulate(data, model);
-  auto mean = quiet;
-  for (std::size_t r = 0; r < quiet.size(); ++r) {
+using Noise = std::vector<std::vector<double>>;  // of the encoder, by recording
+
+/// What a model leaves of the readings of the encoder, without the rows in which chance decides.
+Noise noise_left_by(const physics::Model& model, const Case& data, const LoopNoise::Readings& recorded,
+                    std::size_t position) {
+  const auto simulated = simulate(data, model);
+  Noise noise(recorded.size());
+  for (std::size_t r = 0; r < recorded.size(); ++r)
+    for (std::size_t i = 0; i < recorded[r][position].size(); ++i)
+      if (std::isfinite(data.recordings[r].measured[position][i]))
+        noise[r].push_back(recorded[r][position][i] - simulated[r][position][i]);
+  return noise;
+}
+
+/// Runs of a model with noise on the encoder, shifted against the motion, with either sign: what is linear in it cancels in
+/// their average.
+std::vector<LoopNoise::Readings> shaken(const physics::Model& model, const Case& data, const Noise& noise,
+                                        std::size_t shifts) {
+  std::vector<LoopNoise::Readings> runs(2 * shifts, LoopNoise::Readings(noise.size()));
+  in_parallel(runs.size() * noise.size(), [&](std::size_t at) {
+    if (data.stopped && data.stopped()) throw Stopped{};
+    const std::size_t k = at % runs.size(), r = at / runs.size();
     const auto& time = data.recordings[r].inputs.time;
-    const std::size_t n = time.size();
-    std::vector<physics::Outputs> shaken(2 * shifts);
-    in_parallel(shaken.size(), [&](std::size_t k) {
-      if (data.stopped && data.stopped()) throw Stopped{};
-      physics::Model noisy = model;
-      auto& reading = noisy.terms.emplace_back();
-      reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
-      reading.curve.over = "time";
-      reading.curve.knots = time;
-      const std::size_t by = (k / 2 + 1) * n / (shifts + 1);
-      for (std::size_t i = 0; i < n; ++i) {
-        const std::size_t from = (i + by) % n;
-        const double e = recorded[r][position][from] - quiet[r][position][from];
-        reading.curve.values.push_back(std::isfinite(e) ? (k % 2 == 0 ? e : -e) : 0.0);
+    const std::size_t n = time.size(), by = (k / 2 + 1) * n / (shifts + 1);
+    physics::Model noisy = model;
+    auto& reading = noisy.terms.emplace_back();
+    reading.info = physics::unmodelled(physics::Plant::axis, "measurement");
+    reading.curve.over = "time";
+    reading.curve.knots = time;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double e = noise[r].empty() ? 0.0 : noise[r][(i + by) % noise[r].size()];
+      reading.curve.values.push_back(k % 2 == 0 ? e : -e);
+    }
+    data.recordings[r].simulation->run(noisy, runs[k][r]);
+  });
+  return runs;
+}
+
+/// Of each row of the runs, this of where they lie beside the run without noise.
+template <class Of>
+LoopNoise::Readings row_by_row(const std::vector<LoopNoise::Readings>& runs, const LoopNoise::Readings& quiet,
+                               Of of) {
+  auto out = quiet;
+  std::vector<double> apart(runs.size());
+  for (std::size_t r = 0; r < out.size(); ++r)
+    for (std::size_t o = 0; o < out[r].size(); ++o)
+      for (std::size_t i = 0; i < out[r][o].size(); ++i) {
+        for (std::size_t k = 0; k < runs.size(); ++k) apart[k] = runs[k][r][o][i] - quiet[r][o][i];
+        out[r][o][i] = of(apart);
       }
-      data.recordings[r].simulation->run(noisy, shaken[k]);
-    });
-    for (std::size_t o = 0; o < mean[r].size(); ++o)
+  return out;
+}
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0.0;
+  for (double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+double variance_of(const std::vector<double>& values) {
+  const double mean = mean_of(values);
+  double sum = 0.0;
+  for (double v : values) sum += (v - mean) * (v - mean);
+  return sum / static_cast<double>(values.size() - 1);
+}
+
+constexpr std::size_t few_shifts = 4;
+
+/// How far runs with noise lie, on average, from the run without.
+LoopNoise::Readings softened(const Case& data, const LoopNoise::Readings& recorded,
+                             const physics::Model& model, std::size_t position) {
+  const auto noise = noise_left_by(model, data, recorded, position);
+  return row_by_row(shaken(model, data, noise, few_shifts), simulate(data, model), mean_of);
+}
+
+/// By recording and row: do runs with noise scatter there as noise does that goes round in a loop without bends? Where the
+/// carriage sticks in one run and slips in another, none says when it did in the recording.
+std::vector<std::vector<bool>> told_by(const LoopNoise::Readings& variance,
+                                       const LoopNoise::Readings& without_bends) {
+  constexpr double most = 4.0;
+  constexpr std::size_t beside = 10;  // rows, since eight runs alone say little of their scatter
+  std::vector<std::vector<bool>> told(variance.size());
+  for (std::size_t r = 0; r < told.size(); ++r) {
+    const std::size_t n = variance[r].front().size();
+    told[r].assign(n, true);
+    for (std::size_t o = 0; o < variance[r].size(); ++o)
       for (std::size_t i = 0; i < n; ++i) {
-        double sum = 0.0;
-        for (const auto& one : shaken) sum += one[o][i] - quiet[r][o][i];
-        mean[r][o][i] = sum / static_cast<double>(shaken.size());
+        double with = 0.0, expected = 0.0;
+        for (std::size_t k = i > beside ? i - beside : 0; k < std::min(n, i + beside + 1); ++k)
+          with += variance[r][o][k], expected += without_bends[r][o][k];
+        if (with > most * expected) told[r][i] = false;
       }
   }
-  return mean;
+  return told;
 }
 
 /// By output: the sum of squares of readings - simulated - off.
@@ -76,6 +136,8 @@ LoopNoise::LoopNoise(Case& data) : data_{data} {
   for (const auto& recording : data.recordings) recorded_.push_back(recording.measured);
 }
 
+bool LoopNoise::is_fed_back() const { return fed_back(data_).has_value(); }
+
 LoopNoise::Readings LoopNoise::now() const {
   Readings readings;
   for (const auto& recording : data_.recordings) readings.push_back(recording.measured);
@@ -92,20 +154,35 @@ void LoopNoise::put(Readings readings) {
   for (std::size_t r = 0; r < readings.size(); ++r) data_.recordings[r].measured = std::move(readings[r]);
 }
 
-void LoopNoise::take_off(const physics::Model& model) {
+double LoopNoise::take_off(const physics::Model& model) {
   const auto position = fed_back(data_);
-  if (!position) return;
+  if (!position) return 0.0;
+  const auto noise = noise_left_by(model, data_, recorded_, *position);
   (void)put_back();
-  const auto off = softened(data_, recorded_, model, *position);
   const auto simulated = simulate(data_, model);
+  const auto runs = shaken(model, data_, noise, few_shifts);
+  const auto off = row_by_row(runs, simulated, mean_of);
   const auto before = squares(recorded_, simulated, nullptr), after = squares(recorded_, simulated, &off);
   double nearer = 0.0;
   for (std::size_t o = 0; o < before.size(); ++o)
     if (before[o] > 0.0 && after[o] > 0.0) nearer += std::log(before[o] / after[o]);
-  if (!(nearer > 0.0)) return;
-  for (std::size_t r = 0; r < off.size(); ++r)
+  auto without = model;
+  without.terms.resize(data_.model.terms.size());
+  const auto told =
+      told_by(row_by_row(runs, simulated, variance_of),
+              row_by_row(shaken(without, data_, noise, few_shifts), simulate(data_, without), variance_of));
+  double untold = 0.0, rows = 0.0;
+  for (std::size_t r = 0; r < off.size(); ++r) {
     for (std::size_t o = 0; o < off[r].size(); ++o)
-      for (std::size_t i = 0; i < off[r][o].size(); ++i) data_.recordings[r].measured[o][i] -= off[r][o][i];
+      for (std::size_t i = 0; i < off[r][o].size(); ++i) {
+        auto& measured = data_.recordings[r].measured[o][i];
+        if (nearer > 0.0) measured -= off[r][o][i];
+        if (!told[r][i]) measured = std::numeric_limits<double>::quiet_NaN();
+      }
+    rows += static_cast<double>(told[r].size());
+    untold += static_cast<double>(std::count(told[r].begin(), told[r].end(), false));
+  }
+  return untold / rows;
 }
 
 bool LoopNoise::shows(const physics::Model& with, const physics::Model& without, double ratio) const {
@@ -120,6 +197,27 @@ bool LoopNoise::shows(const physics::Model& with, const physics::Model& without,
   for (std::size_t o = 0; o < shaken.size(); ++o)
     if (shaken[o] < ratio * ratio * farther[o] || quiet[o] < plain * plain * farther[o]) return true;
   return false;
+}
+
+double LoopNoise::beyond(const physics::Model& with, const physics::Model& without,
+                         const Weighing& weighing) const {
+  const auto position = fed_back(data_);
+  if (!position) return std::numeric_limits<double>::infinity();
+  const auto quiet = simulate(data_, without);
+  const auto apart = [&](const Readings& readings) {
+    Eigen::VectorXd all(weighing.rows);
+    Eigen::Index at = 0;
+    for (std::size_t r = 0; r < quiet.size(); ++r)
+      for (std::size_t o = 0; o < quiet[r].size(); ++o)
+        for (std::size_t i = 0; i < quiet[r][o].size(); ++i) all(at++) = readings[r][o][i] - quiet[r][o][i];
+    return filtered(data_, weighing, all);
+  };
+  const Eigen::VectorXd effect = apart(simulate(data_, with));
+  std::vector<double> scores;
+  for (const auto& one : shaken(without, data_, noise_left_by(with, data_, recorded_, *position), 8))
+    scores.push_back(effect.dot(apart(one)));
+  const double variance = variance_of(scores), off = effect.dot(apart(recorded_)) - mean_of(scores);
+  return off > 0.0 && variance > 0.0 ? 0.5 * off * off / variance : 0.0;
 }
 
 double LoopNoise::gain(const physics::Model& with, const physics::Model& without,

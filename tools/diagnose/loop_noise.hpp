@@ -13,8 +13,11 @@ class LoopNoise {
   using Readings = std::vector<std::vector<std::vector<double>>>;  // by recording, output, row
 
   explicit LoopNoise(Case& data);
-  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer.
-  void take_off(const physics::Model& model);
+  /// Does a loop feed the noise of the readings back?
+  [[nodiscard]] bool is_fed_back() const;
+  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer, and without
+  /// the rows in which noise decides when the carriage sticks and slips. The share of these.
+  double take_off(const physics::Model& model);
   /// The readings as recorded; what was in their place.
   Readings put_back();
   void put(Readings readings);
@@ -25,6 +28,11 @@ class LoopNoise {
   /// By how much log likelihood does it then, under this weighing? Infinite where no loop feeds noise back.
   [[nodiscard]] double gain(const physics::Model& with, const physics::Model& without,
                             const Weighing& weighing) const;
+  /// What `with` explains beyond `without`, in log likelihood by what noise itself makes of it: along their difference the
+  /// readings lie so far from runs of `without` that noise shakes, against the scatter of these. Where a carriage sticks and
+  /// slips noise goes far, and a fit follows it. Infinite where no loop feeds noise back.
+  [[nodiscard]] double beyond(const physics::Model& with, const physics::Model& without,
+                              const Weighing& weighing) const;
 
  private:
   Case& data_;

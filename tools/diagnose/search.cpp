@@ -75,8 +75,9 @@ class Search {
   void try_pairs(const Diagnosis& begun);
   /// What is said where the machine's controller is another than the model's: nothing of what lies behind it.
   void stop_at_the_law();
-  /// Takes off the readings what their noise makes of the claims so far, and fits anew.
-  void quieten();
+  /// Takes off the readings what their noise makes of the claims so far, and fits anew. The share of rows that it leaves to
+  /// chance.
+  double quieten();
   /// The same until the strengths stay: what noise makes of a bend goes with its size, which a fit to readings that still
   /// hold it takes too small.
   void settle();
@@ -210,7 +211,7 @@ bool Search::add_named(double round) {
     struct Settled {
       Weighing weighing;
       Fit with, without;
-      double gain = -1e300;
+      double gain = -1e300, rank = -1e300;
     };
     std::vector<Settled> settled_fits(leaders.size());
     in_parallel(leaders.size(), [&](std::size_t k) {
@@ -233,7 +234,9 @@ bool Search::add_named(double round) {
         with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
       auto without = fit(data_, own, base.model, data_.model, 4, &base);
       const double evidence = advantage(data_, own, with_term, without);
-      double gain = std::min(evidence, advantage_over_wander(data_, own, with_term, without));
+      double gain =
+          std::min(evidence, noise_->is_fed_back() ? noise_->beyond(with_term.model, without.model, own)
+                                                   : advantage_over_wander(data_, own, with_term, without));
       if (const double counted = std::min(evidence, lead(data_, with_term, without));
           options_.refuses && gain < 2.0 * margin() && counted > 2.0 * margin() &&
           goes_with_recording(data_, with_term, without))
@@ -245,15 +248,19 @@ bool Search::add_named(double round) {
           least_ratio(data_, with_term, without) < ratio ||
           (rivals_.empty() ? lead(data_, with_term, without) > claim_margin : gain > plainly * margin());
       if (shows && (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)))
-        settled_fits[k] = {own, std::move(with_term), std::move(without), gain};
+        settled_fits[k] = {own, std::move(with_term), std::move(without), gain, gain};
+      // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.
+      if (auto& one = settled_fits[k]; one.gain >= margin() && leaders.size() > 1 && noise_->is_fed_back())
+        one.rank = evidence + noise_->gain(one.with.model, one.without.model, own) -
+                   (one.without.data_cost - one.with.data_cost);
     });
-    double best_gain = -1e300;
+    double best_gain = -1e300, best_rank = -1e300;
     std::size_t winner = 0;
     Weighing own_weighing;
     Fit own_fit, own_base;
     for (std::size_t k = 0; k < leaders.size(); ++k)
-      if (auto& one = settled_fits[k]; one.gain > best_gain) {
-        best_gain = one.gain, winner = leaders[k];
+      if (auto& one = settled_fits[k]; one.rank > best_rank) {
+        best_gain = one.gain, best_rank = one.rank, winner = leaders[k];
         own_weighing = std::move(one.weighing), own_fit = std::move(one.with),
         own_base = std::move(one.without);
       }
@@ -302,19 +309,20 @@ bool Search::add_named(double round) {
   return false;
 }
 
-void Search::quieten() {
-  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return;
-  noise_->take_off(d_.best.model);
+double Search::quieten() {
+  if (!options_.refuses || data_.model.plant != physics::Plant::axis) return 0.0;
+  const double untold = noise_->take_off(d_.best.model);
   d_.weighing = weigh(data_, simulate(data_, d_.best.model));
   d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
+  return untold;
 }
 
 void Search::settle() {
   if (d_.best.model.terms.size() == given()) return;
   for (int again = 0; again < 4; ++again) {
     const auto was = d_.best.model;
-    quieten();
+    (void)quieten();
     if (settled(was, d_.best.model)) return;
   }
 }
@@ -339,13 +347,17 @@ bool Search::add_pair(const Fit* rival) {
   d_.weighing = std::move(claim->weighing);
   rivals_ = std::move(claim->rivals);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-  quieten();
+  (void)quieten();
   return true;
 }
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
-    if (!take([&] { return add_named(round); }) || !take([&] { return quieten(), true; })) break;
+    if (!take([&] { return add_named(round); }) || !take([&] {
+          if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size
+          return true;
+        }))
+      break;
   take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
   if (options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
   progress_(0.7, "comparing with near twins");
@@ -370,7 +382,9 @@ void Search::finish() {
     return true;
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
+  // What a run without noise left over may be what noise makes of the others.
   if (!curved) take([&] { return settle(), true; });
+  if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped

@@ -100,6 +100,16 @@ TEST(AxisLoop, FrictionThatTheNoiseShakesLooseIsFoundAndMeasured) {
   EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
 }
 
+TEST(AxisLoop, FrictionThatNoiseSmearsHasItsWholeLevel) {
+  Axis axis;
+  axis.friction = 0.3;
+  axis.noise = 2.0e-7;
+  const auto d = searched(recorded(axis, 1.5, 5));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.15 * axis.friction);
+}
+
 TEST(AxisLoop, FrictionAtOneSpeedIsNotMoreThanCoulombs) {
   Axis axis;
   axis.friction = 4.0;
@@ -121,6 +131,32 @@ TEST(AxisLoop, BristlesOfAWeakSealBendAsFarAsThoseOfAStrongOne) {
   EXPECT_EQ(d.findings[0].term.info->name, "presliding_friction");
   EXPECT_NEAR(d.findings[0].term.values[0], axis.bristles, 0.1 * axis.bristles);
   EXPECT_NEAR(d.findings[0].term.values[1], axis.stiffness, 0.2 * axis.stiffness);
+}
+
+TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
+  for (const auto& [noise, seed] : {std::pair{1.0e-8, 5U}, {1.0e-7, 7U}}) {
+    Axis axis;
+    axis.friction = 1.0;
+    axis.noise = noise;
+    const auto d = searched(recorded(axis, 1.5, seed));
+    ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise;
+    EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+    EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.03 * axis.friction);
+  }
+}
+
+TEST(AxisLoop, ATiltBesideFrictionThatTheNoiseShakesIsFound) {
+  Axis axis;
+  axis.friction = 0.12;
+  axis.push = [](double) { return -0.12; };
+  axis.noise = 5.0e-8;
+  const auto d = searched(recorded(axis, 0.3, 7));
+  ASSERT_EQ(d.findings.size(), 2U);
+  for (const auto& finding : d.findings) {
+    const bool is_tilt = finding.term.info->name == "constant_force";
+    EXPECT_TRUE(is_tilt || finding.term.info->name == "coulomb_friction") << finding.term.info->name;
+    EXPECT_NEAR(finding.term.values[0], is_tilt ? -0.12 : axis.friction, 0.15 * axis.friction);
+  }
 }
 
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
