@@ -1,14 +1,17 @@
 // Error maps, drops and instruments whose truth is written out here, point by point.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
+#include "tools/diagnose/wander.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -216,6 +219,83 @@ TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "periodic_error");
   EXPECT_NEAR(d.findings[0].term.values[1], 0.0037, 1e-4);
+}
+
+/// A scale beside a reference over strokes of 0.4 s between which the carriage rests for `rest` [s]; `shown` of where the
+/// carriage stands at any time, and of the time [s].
+template <class Shown>
+Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> reading{0.0, noise_of_scale};
+  std::uniform_real_distribution<double> ends{-0.04, 0.04};
+  std::vector<double> stops(1, 0.0);
+  for (int k = 0; k < 200; ++k) stops.push_back(ends(random));
+  const auto place = [&](double t) {
+    const auto k = static_cast<std::size_t>(std::max(0.0, t) / (0.4 + rest));
+    const double q = std::clamp((t - static_cast<double>(k) * (0.4 + rest)) / 0.4, 0.0, 1.0);
+    return stops[k] + (stops[k + 1] - stops[k]) * q * q * q * (10.0 - 15.0 * q + 6.0 * q * q);
+  };
+  std::vector<double> time, position, shows;
+  for (std::size_t k = 0; k < rows; ++k) {
+    time.push_back(2e-3 * static_cast<double>(k)), position.push_back(place(time.back()));
+    shows.push_back(shown(place, time.back()) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shows);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+      {table});
+}
+
+std::set<std::string> names_of(const Diagnosis& d) {
+  std::set<std::string> names;
+  for (const auto& finding : d.findings) names.emplace(finding.term.info->name);
+  return names;
+}
+
+TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
+  double shown = 0.0;
+  auto data = stroked(
+      0.1, 4000, 3e-8,
+      [&](const auto& place, double t) {
+        const double late = place(t - 3e-5);
+        return shown = std::clamp(shown, late - 5e-8, late + 5e-8);
+      },
+      23);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(names_of(d), (std::set<std::string>{"hysteresis", "latency"}));
+  for (const auto& finding : d.findings)
+    EXPECT_NEAR(finding.term.values[0], finding.term.info->name == "latency" ? 3e-5 : 1e-7,
+                finding.term.info->name == "latency" ? 3e-7 : 1e-8);
+}
+
+// At one speed there and back, what is late stands behind by as much as play holds back, and turns with the direction too.
+TEST(Instruments, LatenessAtOneSpeedIsNotToldFromPlay) {
+  std::mt19937 random{26};
+  std::normal_distribution<double> reading{0.0, 7e-8};
+  std::vector<double> time, position, shown;
+  constexpr double late = 4.6e-4, rate = 2.8e-4;
+  const auto place = [](double t) { return rate * std::abs(std::remainder(t, 80.0)); };
+  for (int k = 0; k < 4000; ++k) {
+    time.push_back(10.0 + 0.2 * k), position.push_back(place(time.back()));
+    shown.push_back(place(time.back() - late) + reading(random));
+  }
+  shown[0] = std::nan("");  // where the play stood at first nobody knows
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shown);
+  auto data = make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::ambiguous);
+  EXPECT_THAT(names_of(d),
+              ::testing::AnyOf(std::set<std::string>{"latency"}, std::set<std::string>{"hysteresis"}));
 }
 
 TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
