@@ -256,6 +256,18 @@ std::set<std::string> names_of(const Diagnosis& d) {
   return names;
 }
 
+TEST(Instruments, AWaveAlongTheWayIsFoundThoughTheCarriageMostlyRests) {
+  auto data = stroked(
+      0.6, 6000, 3e-8,
+      [](const auto& place, double t) {
+        return place(t) + 2.5e-8 * std::sin(2.0 * M_PI * place(t) / 0.0031 + 1.0);
+      },
+      22);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
+  EXPECT_EQ(d.verdict, Verdict::explained);
+}
+
 TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
   double shown = 0.0;
   auto data = stroked(
