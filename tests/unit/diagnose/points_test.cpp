@@ -310,6 +310,25 @@ TEST(Instruments, LatenessAtOneSpeedIsNotToldFromPlay) {
               ::testing::AnyOf(std::set<std::string>{"latency"}, std::set<std::string>{"hysteresis"}));
 }
 
+TEST(Wander, IsNotSeenInNoiseWithoutMemory) {
+  int seen = 0, found = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    std::mt19937 random{seed};
+    std::normal_distribution<double> normal;
+    std::vector<double> white(1500), walked(1500);
+    double walk = 0.0;
+    for (std::size_t i = 0; i < white.size(); ++i) {
+      white[i] = normal(random);
+      walk = 0.99 * walk + 0.05 * normal(random);
+      walked[i] = white[i] + walk;
+    }
+    seen += wander_of({white}).driven > 0.0 ? 1 : 0;
+    found += wander_of({walked}).driven > 0.0 ? 1 : 0;
+  }
+  EXPECT_LE(seen, 2);
+  EXPECT_GE(found, 36);
+}
+
 TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   std::mt19937 random{19};
   std::normal_distribution<double> reading{0.0, 4e-4};
