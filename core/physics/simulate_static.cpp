@@ -205,7 +205,8 @@ class Sensors final : public Simulation {
             const auto derived = term.curve.over == "velocity"       ? velocity[i]
                                  : term.curve.over == "acceleration" ? acceleration_[i]
                                                                      : position[i];
-            out[i] += term.curve(over != nullptr ? (*over)[i] : derived);
+            out[i] += term.curve(over != nullptr ? (*over)[i] : derived) *
+                      (term.with == "velocity" ? velocity[i] : 1.0);
           }
         }
         if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);

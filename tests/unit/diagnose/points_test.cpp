@@ -113,6 +113,19 @@ TEST(ErrorMaps, AnErrorThatGoesWithTheTemperatureAndNotWithThePlaceIsLocatedTher
   EXPECT_EQ(d.best.model.terms.back().info->site, "kinematic");  // not in proportion to the position
 }
 
+TEST(ErrorMaps, AHumOverManyPointsIsDrawnAsAWaveInTime) {
+  constexpr double period = 23000.0;
+  auto data = watched([](double t, double) { return 4e-7 * std::sin(2.0 * M_PI * t / period + 0.4); }, 24);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.best.model.terms.back().curve;
+  EXPECT_EQ(curve.over, "time");
+  EXPECT_NEAR(curve.period, period, 0.02 * period);
+  for (const double t : {1e4, 9e4, 1.7e5})
+    EXPECT_NEAR(curve(t), 4e-7 * std::sin(2.0 * M_PI * t / period + 0.4), 1.2e-7);
+}
+
 /// A carriage that is swept there and back for an hour, 1 s a row; the air warms at once by 2 K now and then.
 template <class Error>
 Case swept(const std::string& more_columns, const std::string& expansion, Error error, unsigned seed) {
@@ -349,6 +362,31 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "velocity");
+}
+
+TEST(Instruments, ATachometerThatRipplesWithItsSpeedIsDrawnAlongTheWay) {
+  std::mt19937 random{25};
+  std::normal_distribution<double> reading{0.0, 4e-4};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 6000; ++k) {
+    const double t = 1e-3 * k;
+    const double v = 0.12 * std::cos(2.3 * t) + 0.05 * std::cos(5.1 * t + 1.0);
+    time.push_back(t);
+    position.push_back(0.12 / 2.3 * std::sin(2.3 * t) + 0.05 / 5.1 * std::sin(5.1 * t + 1.0));
+    velocity.push_back(v * (1.0 + 5e-3 * std::sin(2.0 * M_PI * position.back() / 0.013)) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(tachometer(), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.best.model.terms.back();
+  EXPECT_EQ(term.curve.over, "true_position");
+  EXPECT_EQ(term.with, "velocity");
+  EXPECT_NEAR(term.curve.period, 0.013, 2e-4);
 }
 
 TEST(Drops, WhatMovesThemInTwoDirectionsIsDrawnInBoth) {
