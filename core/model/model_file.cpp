@@ -284,6 +284,11 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     if (term.curve.knots.empty() || term.curve.knots.size() != term.curve.values.size() ||
         !std::is_sorted(term.curve.knots.begin(), term.curve.knots.end()))
       node["knots"].fault("knots must ascend and be as many as values", "write one value a knot");
+    else if (node.has("period")) {
+      term.curve.period = node["period"].as_number("", {1e-300, 1e300});
+      if (!(term.curve.knots.back() - term.curve.knots.front() < term.curve.period))
+        node["period"].fault("the knots reach over more than one period", "keep them within it");
+    }
   } else {
     term.info = physics::find_term(model.plant, name);
   }
@@ -375,6 +380,7 @@ YAML::Node term_yaml(const Term& term, const Model& model) {
     for (double value : term.curve.values) node["values"].push_back(value);
     node["knots"].SetStyle(YAML::EmitterStyle::Flow);
     node["values"].SetStyle(YAML::EmitterStyle::Flow);
+    if (term.curve.period > 0.0) node["period"] = term.curve.period;
     return node;
   }
   for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {

@@ -2,20 +2,31 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
 
 namespace invar::physics {
 
-/// Linear between its knots (ascending, at least one) and constant outside them. Evaluation is real-time.
+/// Linear between its knots (ascending, at least one) and constant outside them; with a `period` it comes again, and its knots
+/// lie within one. Evaluation is real-time.
 struct Curve {
   std::string over;  // the signal that it goes over: "position", "velocity", "time", ...
   std::vector<double> knots;
   std::vector<double> values;
+  double period = 0.0;  // 0: none
 
   [[nodiscard]] double operator()(double x) const noexcept {
     if (knots.empty()) return 0.0;
+    if (period > 0.0) {
+      x -= std::floor((x - knots.front()) / period) * period;
+      if (x >= knots.back()) {
+        const double gap = knots.front() + period - knots.back();
+        const double share = gap > 0.0 ? (x - knots.back()) / gap : 0.0;
+        return values.back() + share * (values.front() - values.back());
+      }
+    }
     if (!(x > knots.front())) return values.front();
     if (x >= knots.back()) return values.back();
     // The first knot beyond x; knots at equal steps, as a diagnosis lays them, are met at once or beside.

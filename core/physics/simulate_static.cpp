@@ -184,12 +184,13 @@ class Sensors final : public Simulation {
     for (std::size_t o = 0; o < outputs_.size(); ++o) {
       const bool encoder = outputs_[o] == "encoder";
       std::vector<double> position = position_, velocity = velocity_;
-      for (const auto& term : model.terms) {
-        if (term.on != outputs_[o]) continue;
-        const auto* kind = sensor_kind(*term.info);
-        if (kind->delays && term.values[0] > 0.0) delay(term.values[0], position, velocity);
-        if (kind->plays) play(term.values[0], encoder ? position : velocity);
-      }
+      double late = 0.0;  // what is late shows through the play, in whatever order the model names them
+      for (const auto& term : model.terms)
+        if (term.on == outputs_[o] && sensor_kind(*term.info)->delays) late += term.values[0];
+      if (late > 0.0) delay(late, position, velocity);
+      for (const auto& term : model.terms)
+        if (term.on == outputs_[o] && sensor_kind(*term.info)->plays)
+          play(term.values[0], encoder ? position : velocity);
       auto& out = outputs[o];
       out.resize(n);
       for (std::size_t i = 0; i < n; ++i) {
@@ -204,7 +205,8 @@ class Sensors final : public Simulation {
             const auto derived = term.curve.over == "velocity"       ? velocity[i]
                                  : term.curve.over == "acceleration" ? acceleration_[i]
                                                                      : position[i];
-            out[i] += term.curve(over != nullptr ? (*over)[i] : derived);
+            out[i] += term.curve(over != nullptr ? (*over)[i] : derived) *
+                      (term.with == "velocity" ? velocity[i] : 1.0);
           }
         }
         if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);
@@ -213,7 +215,25 @@ class Sensors final : public Simulation {
   }
 
  private:
-  /// Position and velocity some time ago, on the cubic through the rows (velocities as slopes).
+  /// The second divided difference of the smoother of the two parabolas between two rows: where the motion turns at once, what
+  /// lies on the other side of the corner says nothing of this one (Harten's essentially non-oscillatory choice).
+  [[nodiscard]] double bend(std::size_t a, std::size_t b) const {
+    const auto over = [this](std::size_t first) {
+      const double one = (position_[first + 1] - position_[first]) / (time_[first + 1] - time_[first]);
+      const double two =
+          (position_[first + 2] - position_[first + 1]) / (time_[first + 2] - time_[first + 1]);
+      return (two - one) / (time_[first + 2] - time_[first]);
+    };
+    double least = 0.0;
+    bool any = false;
+    for (const std::size_t first : {a - 1, a})
+      if (first < a + 1 && first + 2 < time_.size() && b == a + 1)
+        if (const double here = over(first);
+            std::isfinite(here) && (!any || std::abs(here) < std::abs(least)))
+          least = here, any = true;
+    return least;
+  }
+  /// Position and velocity some time ago: by a parabola through the rows, and by a straight line.
   void delay(double by, std::vector<double>& position, std::vector<double>& velocity) const {
     const std::size_t n = time_.size();
     std::size_t a = 0;
@@ -227,8 +247,7 @@ class Sensors final : public Simulation {
         continue;
       }
       const double s = (when - time_[a]) / h, r = 1.0 - s;
-      position[i] = position_[a] * (1.0 + 2.0 * s) * r * r + velocity_[a] * h * s * r * r +
-                    position_[b] * s * s * (3.0 - 2.0 * s) - velocity_[b] * h * s * s * r;
+      position[i] = position_[a] * r + position_[b] * s + bend(a, b) * (when - time_[a]) * (when - time_[b]);
       velocity[i] = velocity_[a] * r + velocity_[b] * s;
     }
   }

@@ -191,42 +191,45 @@ std::vector<Square> squares(const Spectrum& spectrum, const std::vector<double>&
 
 }  // namespace
 
-namespace {
-
-/// The waves along the way, up to a hundred, by least squares: where a carriage stood says no more of a wave than where it
-/// passed, though it left many rows there. Sums and counts of the residual in bins over the span.
-std::vector<double> long_pitches(const std::vector<double>& sums, const std::vector<double>& counts,
+// Where a carriage stood says no more of a wave than where it passed, though it left many rows there.
+std::vector<double> long_pitches(const std::vector<double>& sums, const std::vector<double>& weights,
                                  double span) {
   constexpr std::size_t cells = 1024;
   constexpr double step = 0.1;  // waves over the span
-  std::array<double, cells> sum{}, count{};
+  std::array<double, cells> sum{}, weight{};
   for (std::size_t i = 0; i < sums.size(); ++i)
-    sum[i * cells / sums.size()] += sums[i], count[i * cells / sums.size()] += counts[i];
+    sum[i * cells / sums.size()] += sums[i], weight[i * cells / sums.size()] += weights[i];
+  double level = 0.0, all = 0.0;
+  for (std::size_t i = 0; i < cells; ++i) level += sum[i], all += weight[i];
   std::vector<double> gain(1001, 0.0), pitches;
-  for (std::size_t k = 8; k < gain.size(); ++k) {
-    Eigen::Matrix3d normal = 1e-12 * Eigen::Matrix3d::Identity();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    double level = 0.0, rows = 0.0;
-    for (std::size_t i = 0; i < cells; ++i) {
-      if (count[i] == 0.0) continue;
-      const double angle = 2.0 * std::numbers::pi * step * static_cast<double>(k) *
-                           (static_cast<double>(i) + 0.5) / static_cast<double>(cells);
-      const Eigen::Vector3d wave{1.0, std::cos(angle), std::sin(angle)};
-      normal += count[i] * wave * wave.transpose(), right += sum[i] * wave;
-      level += sum[i], rows += count[i];
+  for (std::size_t k = 8; k < gain.size() && all > 0.0; ++k) {
+    const double turn = 2.0 * std::numbers::pi * step * static_cast<double>(k) / static_cast<double>(cells);
+    const std::complex<double> next = std::polar(1.0, turn);
+    std::complex<double> wave = std::polar(1.0, 0.5 * turn), mean, right;
+    double cc = 0.0, cs = 0.0, ss = 0.0;
+    for (std::size_t i = 0; i < cells; ++i, wave *= next) {
+      if (weight[i] == 0.0) continue;
+      const double c = wave.real(), s = wave.imag(), w = weight[i];
+      mean += w * wave, right += sum[i] * wave;
+      cc += w * c * c, cs += w * c * s, ss += w * s * s;
     }
-    if (rows > 0.0) gain[k] = right.dot(normal.ldlt().solve(right)) - level * level / rows;
+    Eigen::Matrix3d normal;
+    normal << all, mean.real(), mean.imag(), mean.real(), cc, cs, mean.imag(), cs, ss;
+    normal.diagonal().array() += 1e-12 * all;
+    const Eigen::Vector3d slope{level, right.real(), right.imag()};
+    gain[k] = slope.dot(normal.ldlt().solve(slope)) - level * level / all;
   }
   std::vector<std::pair<double, double>> tops;
   for (std::size_t k = 9; k + 1 < gain.size(); ++k)
-    if (gain[k] > gain[k - 1] && gain[k] >= gain[k + 1]) tops.emplace_back(gain[k], static_cast<double>(k));
+    if (gain[k] > gain[k - 1] && gain[k] >= gain[k + 1]) {
+      const double bend = gain[k - 1] - 2.0 * gain[k] + gain[k + 1];
+      tops.emplace_back(gain[k], static_cast<double>(k) + 0.5 * (gain[k - 1] - gain[k + 1]) / bend);
+    }
   std::sort(tops.rbegin(), tops.rend());
   for (std::size_t i = 0; i < std::min<std::size_t>(4, tops.size()); ++i)
     pitches.push_back(span / (step * tops[i].second));
   return pitches;
 }
-
-}  // namespace
 
 std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
   std::vector<std::vector<double>> positions;

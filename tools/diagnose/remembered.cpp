@@ -18,7 +18,8 @@ bool same(const std::vector<physics::Term>& a, const std::vector<physics::Term>&
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& one, const auto& other) {
     return one.info == other.info && one.values == other.values && one.on == other.on &&
            one.with == other.with && one.curve.values == other.curve.values &&
-           one.curve.knots == other.curve.knots && one.curve.over == other.curve.over;
+           one.curve.knots == other.curve.knots && one.curve.over == other.curve.over &&
+           one.curve.period == other.curve.period;
   });
 }
 

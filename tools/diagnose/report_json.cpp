@@ -94,6 +94,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     if (!term.curve.knots.empty())
       entry["curve"] = {
           {"over", term.curve.over}, {"knots", term.curve.knots}, {"values", term.curve.values}};
+    if (term.curve.period > 0.0) entry["curve"]["period"] = term.curve.period;
     report["findings"].push_back(entry);
   }
   if (d.is_partial && d.findings.empty() && d.verdict == Verdict::ambiguous)

@@ -31,6 +31,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
+    if (data.model.plant == physics::Plant::sensor && !term.with.empty()) names.push_back(term.with);
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
     if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
@@ -179,6 +180,9 @@ std::string sizes_of(const Case& data, const Finding& finding) {
     for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
     text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over + ", up to " +
             report::si(top, unit_of_curve(data, finding.term));
+    if (const double period = finding.term.curve.period; period > 0.0)
+      text +=
+          ", that comes again every " + report::si(period, unit_of_variable(data, finding.term.curve.over));
   }
   return text;
 }

@@ -1,14 +1,17 @@
 // Error maps, drops and instruments whose truth is written out here, point by point.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
+#include "tools/diagnose/wander.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -108,6 +111,19 @@ TEST(ErrorMaps, AnErrorThatGoesWithTheTemperatureAndNotWithThePlaceIsLocatedTher
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "temperature");
   EXPECT_EQ(d.best.model.terms.back().info->site, "kinematic");  // not in proportion to the position
+}
+
+TEST(ErrorMaps, AHumOverManyPointsIsDrawnAsAWaveInTime) {
+  constexpr double period = 23000.0;
+  auto data = watched([](double t, double) { return 4e-7 * std::sin(2.0 * M_PI * t / period + 0.4); }, 24);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.best.model.terms.back().curve;
+  EXPECT_EQ(curve.over, "time");
+  EXPECT_NEAR(curve.period, period, 0.02 * period);
+  for (const double t : {1e4, 9e4, 1.7e5})
+    EXPECT_NEAR(curve(t), 4e-7 * std::sin(2.0 * M_PI * t / period + 0.4), 1.2e-7);
 }
 
 /// A carriage that is swept there and back for an hour, 1 s a row; the air warms at once by 2 K now and then.
@@ -218,6 +234,114 @@ TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
   EXPECT_NEAR(d.findings[0].term.values[1], 0.0037, 1e-4);
 }
 
+/// A scale beside a reference over strokes of 0.4 s between which the carriage rests for `rest` [s]; `shown` of where the
+/// carriage stands at any time, and of the time [s].
+template <class Shown>
+Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, unsigned seed) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> reading{0.0, noise_of_scale};
+  std::uniform_real_distribution<double> ends{-0.04, 0.04};
+  std::vector<double> stops(1, 0.0);
+  for (int k = 0; k < 200; ++k) stops.push_back(ends(random));
+  const auto place = [&](double t) {
+    const auto k = static_cast<std::size_t>(std::max(0.0, t) / (0.4 + rest));
+    const double q = std::clamp((t - static_cast<double>(k) * (0.4 + rest)) / 0.4, 0.0, 1.0);
+    return stops[k] + (stops[k + 1] - stops[k]) * q * q * q * (10.0 - 15.0 * q + 6.0 * q * q);
+  };
+  std::vector<double> time, position, shows;
+  for (std::size_t k = 0; k < rows; ++k) {
+    time.push_back(2e-3 * static_cast<double>(k)), position.push_back(place(time.back()));
+    shows.push_back(shown(place, time.back()) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shows);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+      {table});
+}
+
+std::set<std::string> names_of(const Diagnosis& d) {
+  std::set<std::string> names;
+  for (const auto& finding : d.findings) names.emplace(finding.term.info->name);
+  return names;
+}
+
+TEST(Instruments, AWaveAlongTheWayIsFoundThoughTheCarriageMostlyRests) {
+  auto data = stroked(
+      0.6, 6000, 3e-8,
+      [](const auto& place, double t) {
+        return place(t) + 2.5e-8 * std::sin(2.0 * M_PI * place(t) / 0.0031 + 1.0);
+      },
+      22);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
+  EXPECT_EQ(d.verdict, Verdict::explained);
+}
+
+TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
+  double shown = 0.0;
+  auto data = stroked(
+      0.1, 4000, 3e-8,
+      [&](const auto& place, double t) {
+        const double late = place(t - 3e-5);
+        return shown = std::clamp(shown, late - 5e-8, late + 5e-8);
+      },
+      23);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(names_of(d), (std::set<std::string>{"hysteresis", "latency"}));
+  for (const auto& finding : d.findings)
+    EXPECT_NEAR(finding.term.values[0], finding.term.info->name == "latency" ? 3e-5 : 1e-7,
+                finding.term.info->name == "latency" ? 3e-7 : 1e-8);
+}
+
+// At one speed there and back, what is late stands behind by as much as play holds back, and turns with the direction too.
+TEST(Instruments, LatenessAtOneSpeedIsNotToldFromPlay) {
+  std::mt19937 random{26};
+  std::normal_distribution<double> reading{0.0, 7e-8};
+  std::vector<double> time, position, shown;
+  constexpr double late = 4.6e-4, rate = 2.8e-4;
+  const auto place = [](double t) { return rate * std::abs(std::remainder(t, 80.0)); };
+  for (int k = 0; k < 4000; ++k) {
+    time.push_back(10.0 + 0.2 * k), position.push_back(place(time.back()));
+    shown.push_back(place(time.back() - late) + reading(random));
+  }
+  shown[0] = std::nan("");  // where the play stood at first nobody knows
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shown);
+  auto data = make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::ambiguous);
+  EXPECT_THAT(names_of(d),
+              ::testing::AnyOf(std::set<std::string>{"latency"}, std::set<std::string>{"hysteresis"}));
+}
+
+TEST(Wander, IsNotSeenInNoiseWithoutMemory) {
+  int seen = 0, found = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    std::mt19937 random{seed};
+    std::normal_distribution<double> normal;
+    std::vector<double> white(1500), walked(1500);
+    double walk = 0.0;
+    for (std::size_t i = 0; i < white.size(); ++i) {
+      white[i] = normal(random);
+      walk = 0.99 * walk + 0.05 * normal(random);
+      walked[i] = white[i] + walk;
+    }
+    seen += wander_of({white}).driven > 0.0 ? 1 : 0;
+    found += wander_of({walked}).driven > 0.0 ? 1 : 0;
+  }
+  EXPECT_LE(seen, 2);
+  EXPECT_GE(found, 36);
+}
+
 TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   std::mt19937 random{19};
   std::normal_distribution<double> reading{0.0, 4e-4};
@@ -238,6 +362,31 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "velocity");
+}
+
+TEST(Instruments, ATachometerThatRipplesWithItsSpeedIsDrawnAlongTheWay) {
+  std::mt19937 random{25};
+  std::normal_distribution<double> reading{0.0, 4e-4};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 6000; ++k) {
+    const double t = 1e-3 * k;
+    const double v = 0.12 * std::cos(2.3 * t) + 0.05 * std::cos(5.1 * t + 1.0);
+    time.push_back(t);
+    position.push_back(0.12 / 2.3 * std::sin(2.3 * t) + 0.05 / 5.1 * std::sin(5.1 * t + 1.0));
+    velocity.push_back(v * (1.0 + 5e-3 * std::sin(2.0 * M_PI * position.back() / 0.013)) + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(tachometer(), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.best.model.terms.back();
+  EXPECT_EQ(term.curve.over, "true_position");
+  EXPECT_EQ(term.with, "velocity");
+  EXPECT_NEAR(term.curve.period, 0.013, 2e-4);
 }
 
 TEST(Drops, WhatMovesThemInTwoDirectionsIsDrawnInBoth) {
