@@ -7,6 +7,7 @@
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/fine_periods.hpp"
 
 namespace invar::diagnose {
 
@@ -175,6 +176,7 @@ class Candidates {
   void add_rates(const std::string& state) {
     const auto& own = spans_.of(state);
     const double rate = 1e-3 * std::max(own.rate, own.size() / spans_.duration);
+    const auto asked = rate_asked_for(data_, model_, state, rate);
     for (const auto& other : equations_.states) {
       const bool itself = other.name == state;
       const double s = spans_.of(other.name).size();
@@ -183,6 +185,8 @@ class Candidates {
       add("quadratic", state, with, rate / (s * s));
       add("cubic", state, with, rate / (s * s * s));
       add("periodic", state, other.name, rate, periods_of(spans_.of(other.name)));
+      if (const auto fine = fine_periods(data_, model_, asked, other.name, 3); !fine.empty())
+        add("periodic", state, other.name, rate, fine);
     }
     for (const auto& input : equations_.inputs)
       add("coupling", state, input.symbol, rate / spans_.of(input.symbol).size());
