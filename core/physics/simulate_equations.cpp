@@ -21,7 +21,6 @@ class OwnEquations final : public Simulation {
     for (const auto& input : structure.equations.inputs) {
       const auto* values = inputs.find(input.signal);
       inputs_.push_back(values == nullptr ? std::vector<double>(time_.size(), 0.0) : bridged(time_, *values));
-      is_linear_ = is_linear_ || input.linear;
     }
     restarts_ = restarts_of(structure, inputs);
     for (const auto& output : structure.equations.outputs) {
@@ -233,19 +232,13 @@ class OwnEquations final : public Simulation {
       const bool stiff = h * fastest.radius > 1.5 * most_parts;
       const int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
       machine.set_stiff(stiff);
-      if (!is_linear_) {
-        machine.advance(s, time[at], h, parts);
-        continue;
-      }
-      for (int part = 0; part < parts; ++part) {
-        const double middle = (part + 0.5) / parts;
-        for (std::size_t i = 0; i < inputs_.size(); ++i)
-          for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
-            const auto& values = (*inputs[l])[i];
-            machine.set_input(i, l, values[at] + middle * (values[at + 1] - values[at]));
-          }
-        machine.advance(s, time[at] + h * part / parts, h / parts, 1);
-      }
+      for (std::size_t i = 0; i < inputs_.size(); ++i)
+        for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
+          const auto& values = (*inputs[l])[i];
+          machine.set_input(i, l, values[at], (values[at + 1] - values[at]) / h, time[at]);
+        }
+      machine.advance(s, time[at], h, parts);
+      machine.hold_inputs();
     }
     std::vector<std::string> names;
     for (const auto& output : equations.outputs) names.push_back(place_of_output(equations, output.name));
@@ -268,7 +261,6 @@ class OwnEquations final : public Simulation {
   CompiledEquations compiled_;
   std::vector<std::vector<double>> inputs_;
   std::vector<double> first_;
-  bool is_linear_ = false;  // an input goes straight from row to row
 };
 
 }  // namespace
