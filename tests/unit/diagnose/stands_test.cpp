@@ -64,5 +64,29 @@ TEST(Stands, AStoreThatFillsIsOne) {
   EXPECT_TRUE(stands(data, found, 0));
 }
 
+TEST(Stands, NothingIsTriedAtAnInputThatTheModelDoesNotLookAt) {
+  recording::Table table;
+  std::vector<double> time, u, air, x;
+  for (int i = 0; i < 100; ++i)
+    time.push_back(i), u.push_back(i % 7), air.push_back(20.0 + i % 5), x.push_back(0.1 * i);
+  table.add("t", "s", time);
+  table.add("u", "", u);
+  table.add("air", "", air);
+  table.add("x", "", x);
+  const auto data = make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u, u2: air}\n"
+                     "states: {x: {derivative: 'u - 0.1*x', initial: {value: 5, sigma: 0.01}}}\n"
+                     "outputs: {x: {column: x, expression: x}}\nparameters: {}\n"),
+      {table});
+  bool at_used = false, to_unused = false;
+  for (const auto& start : equation_starts(data, data.model)) {
+    EXPECT_NE(start.term.on, "u2") << start.term.info->name;
+    at_used = at_used || start.term.on == "u";
+    to_unused = to_unused || start.term.with == "u2";  // what it may do beside is another matter
+  }
+  EXPECT_TRUE(at_used);
+  EXPECT_TRUE(to_unused);
+}
+
 }  // namespace
 }  // namespace invar::diagnose
