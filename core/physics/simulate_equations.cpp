@@ -15,7 +15,8 @@ namespace {
 
 class OwnEquations final : public Simulation {
  public:
-  OwnEquations(const Model& structure, const Record& inputs) : time_{inputs.time}, compiled_{structure} {
+  OwnEquations(const Model& structure, const Record& inputs)
+      : time_{inputs.time}, turn_{inputs.turn}, compiled_{structure} {
     if (structure.equations.states.size() > 12)
       throw InputError{"states", "are more than 12", "split the model"};
     for (const auto& input : structure.equations.inputs) {
@@ -254,9 +255,12 @@ class OwnEquations final : public Simulation {
 
   static constexpr double most_parts = 60.0;
   /// Steps of the classical Runge-Kutta rule over a time in which the fastest turns so far [rad].
-  static double parts_for(double turn) { return std::clamp(std::ceil(turn / 0.25), 1.0, most_parts); }
+  [[nodiscard]] double parts_for(double turn) const {
+    return std::clamp(std::ceil(turn / turn_), 1.0, most_parts);
+  }
 
   std::vector<double> time_;
+  double turn_;
   std::vector<Restart> restarts_;
   CompiledEquations compiled_;
   std::vector<std::vector<double>> inputs_;
