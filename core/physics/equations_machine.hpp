@@ -83,8 +83,21 @@ class EquationsMachine {
   [[nodiscard]] std::size_t controlled() const { return controlled_; }
 
   void set_input(std::size_t i, std::size_t lane, double value) { slot(states_ + i)[lane] = value; }
+  /// From `value` at `time` on straight on by `rate`, until it is set or left.
+  void set_input(std::size_t i, std::size_t lane, double value, double rate, double time) {
+    if (courses_.size() <= i) courses_.resize(i + 1);
+    auto& course = courses_[i];
+    course.value[lane] = value, course.rate[lane] = rate, course.time = time, course.runs = true;
+  }
+  /// All inputs stay where they are.
+  void hold_inputs() {
+    for (auto& course : courses_) course.runs = false;
+  }
 
   void show(const State& s, double t) {
+    for (std::size_t i = 0; i < courses_.size(); ++i)
+      for (std::size_t l = 0; courses_[i].runs && l < lanes; ++l)
+        slot(states_ + i)[l] = courses_[i].value[l] + courses_[i].rate[l] * (t - courses_[i].time);
     for (std::size_t i = 0; i < states_; ++i) std::copy_n(s[i].begin(), lanes, slot(i));
     std::fill_n(slot(compiled_.variables() - 1), lanes, t);
   }
@@ -188,6 +201,11 @@ class EquationsMachine {
   struct Course {
     std::size_t on, with;
     std::array<const Curve*, lanes> curve;
+  };
+  struct InputCourse {
+    Lane value{}, rate{};
+    double time = 0.0;
+    bool runs = false;
   };
   struct Friction {
     Use use;
@@ -428,6 +446,7 @@ class EquationsMachine {
   std::vector<Friction> frictions_;
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
+  std::vector<InputCourse> courses_;
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
   double shortest_ = 0.0;
   bool stiff_ = false;

@@ -15,13 +15,13 @@ namespace {
 
 class OwnEquations final : public Simulation {
  public:
-  OwnEquations(const Model& structure, const Record& inputs) : time_{inputs.time}, compiled_{structure} {
+  OwnEquations(const Model& structure, const Record& inputs)
+      : time_{inputs.time}, turn_{inputs.turn}, compiled_{structure} {
     if (structure.equations.states.size() > 12)
       throw InputError{"states", "are more than 12", "split the model"};
     for (const auto& input : structure.equations.inputs) {
       const auto* values = inputs.find(input.signal);
       inputs_.push_back(values == nullptr ? std::vector<double>(time_.size(), 0.0) : bridged(time_, *values));
-      is_linear_ = is_linear_ || input.linear;
     }
     restarts_ = restarts_of(structure, inputs);
     for (const auto& output : structure.equations.outputs) {
@@ -233,19 +233,13 @@ class OwnEquations final : public Simulation {
       const bool stiff = h * fastest.radius > 1.5 * most_parts;
       const int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
       machine.set_stiff(stiff);
-      if (!is_linear_) {
-        machine.advance(s, time[at], h, parts);
-        continue;
-      }
-      for (int part = 0; part < parts; ++part) {
-        const double middle = (part + 0.5) / parts;
-        for (std::size_t i = 0; i < inputs_.size(); ++i)
-          for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
-            const auto& values = (*inputs[l])[i];
-            machine.set_input(i, l, values[at] + middle * (values[at + 1] - values[at]));
-          }
-        machine.advance(s, time[at] + h * part / parts, h / parts, 1);
-      }
+      for (std::size_t i = 0; i < inputs_.size(); ++i)
+        for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
+          const auto& values = (*inputs[l])[i];
+          machine.set_input(i, l, values[at], (values[at + 1] - values[at]) / h, time[at]);
+        }
+      machine.advance(s, time[at], h, parts);
+      machine.hold_inputs();
     }
     std::vector<std::string> names;
     for (const auto& output : equations.outputs) names.push_back(place_of_output(equations, output.name));
@@ -261,14 +255,16 @@ class OwnEquations final : public Simulation {
 
   static constexpr double most_parts = 60.0;
   /// Steps of the classical Runge-Kutta rule over a time in which the fastest turns so far [rad].
-  static double parts_for(double turn) { return std::clamp(std::ceil(turn / 0.25), 1.0, most_parts); }
+  [[nodiscard]] double parts_for(double turn) const {
+    return std::clamp(std::ceil(turn / turn_), 1.0, most_parts);
+  }
 
   std::vector<double> time_;
+  double turn_;
   std::vector<Restart> restarts_;
   CompiledEquations compiled_;
   std::vector<std::vector<double>> inputs_;
   std::vector<double> first_;
-  bool is_linear_ = false;  // an input goes straight from row to row
 };
 
 }  // namespace

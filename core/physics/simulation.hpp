@@ -18,6 +18,8 @@ struct Record {
   /// "<state>.start<first_restart + k>" say: an integrating model drifts without that.
   std::vector<std::size_t> restarts{};
   std::size_t first_restart = 0;
+  /// [rad] Own equations: how far the fastest of a model may turn in a step, what dies away counted half.
+  double turn = 0.25;
 
   [[nodiscard]] std::size_t rows() const { return time.size(); }
   [[nodiscard]] const std::vector<double>* find(std::string_view name) const {

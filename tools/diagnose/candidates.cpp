@@ -101,7 +101,9 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
           for (double p : *r.inputs.find(heater.name))
             if (std::isfinite(p)) top = std::max(top, p);
     std::vector<double> clips;  // close: from one to the next a fit cannot go where no power lies between
-    for (const double share : {0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.57, 0.45}) clips.push_back(share * top);
+    for (const double share :
+         {0.999, 0.998, 0.996, 0.992, 0.985, 0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.57, 0.45})
+      clips.push_back(share * top);
     return clips;
   }
   if (info.plant == Plant::sensor && info.name == "periodic_error") return sensor_pitches(data, fitted);

@@ -1,5 +1,6 @@
 // Candidates for a model in the user's own equations: which terms, on which state, input or output, from which sizes.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -7,6 +8,7 @@
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/fine_periods.hpp"
 
 namespace invar::diagnose {
 
@@ -122,6 +124,27 @@ bool is_kinematic(const physics::Equations& equations, const physics::Equations:
                      [&](const auto& other) { return state.derivative == other.name; });
 }
 
+/// Does the model look at this input? Else nothing at it can matter but what leads it elsewhere.
+bool is_used(const physics::Equations& equations, const std::string& symbol) {
+  const auto names = [&](const std::string& formula) {
+    const auto part_of_name = [](char c) {
+      return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
+    };
+    for (auto at = formula.find(symbol); at != std::string::npos; at = formula.find(symbol, at + 1)) {
+      const std::size_t end = at + symbol.size();
+      if ((at == 0 || !part_of_name(formula[at - 1])) &&
+          (end == formula.size() || !part_of_name(formula[end])))
+        return true;
+    }
+    return false;
+  };
+  return symbol == equations.controlled_input || names(equations.control_law) ||
+         std::any_of(equations.states.begin(), equations.states.end(),
+                     [&](const auto& state) { return names(state.derivative); }) ||
+         std::any_of(equations.outputs.begin(), equations.outputs.end(),
+                     [&](const auto& output) { return names(output.expression); });
+}
+
 class Candidates {
  public:
   Candidates(const Case& data, const physics::Model& fitted)
@@ -136,6 +159,7 @@ class Candidates {
       add_stores(state.name);
     }
     for (const auto& input : equations_.inputs) {
+      if (!is_used(equations_, input.symbol)) continue;
       const auto& span = spans_.of(input.symbol);
       add_late(input.symbol, step);
       add("hidden_state", input.symbol, "", 0.1, store_times());
@@ -175,6 +199,7 @@ class Candidates {
   void add_rates(const std::string& state) {
     const auto& own = spans_.of(state);
     const double rate = 1e-3 * std::max(own.rate, own.size() / spans_.duration);
+    const auto asked = rate_asked_for(data_, model_, state, rate);
     for (const auto& other : equations_.states) {
       const bool itself = other.name == state;
       const double s = spans_.of(other.name).size();
@@ -183,6 +208,8 @@ class Candidates {
       add("quadratic", state, with, rate / (s * s));
       add("cubic", state, with, rate / (s * s * s));
       add("periodic", state, other.name, rate, periods_of(spans_.of(other.name)));
+      if (const auto fine = fine_periods(data_, model_, asked, other.name, 3); !fine.empty())
+        add("periodic", state, other.name, rate, fine);
     }
     for (const auto& input : equations_.inputs)
       add("coupling", state, input.symbol, rate / spans_.of(input.symbol).size());

@@ -53,6 +53,7 @@ std::optional<Excerpt> excerpt(const Case& whole, const Weighing& weighing, cons
       auto& stretch = some.data.recordings.emplace_back();
       stretch.name = recording.name;
       stretch.inputs.time = part(recording.inputs.time, begin, length);
+      stretch.inputs.turn = recording.inputs.turn;
       for (const auto& [name, values] : recording.inputs.signals)
         stretch.inputs.signals[name] = part(values, begin, length);
       auto& present = some.weighing.present.emplace_back();

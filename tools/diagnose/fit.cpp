@@ -203,11 +203,32 @@ double price_of_current(double frequency) {
   return 4.0;
 }
 
+namespace {
+
+/// A limit that no row reaches does nothing, and from there no slope leads back: it is kept where some do.
+void keep_reached(const Case& data, const Model& model, std::vector<Freedom>& free) {
+  for (auto& f : free) {
+    if (f.where != Freedom::Where::term || f.sigma > 0.0) continue;
+    const auto& term = model.terms[f.term];
+    if (term.info->name != "heater_saturation") continue;
+    double top = 0.0;
+    for (const auto& heater : model.thermal.heaters)
+      for (const auto& r : data.recordings)
+        if (const auto* power = r.inputs.find(heater.name); heater.node == term.on && power != nullptr)
+          for (const double p : *power)
+            if (std::isfinite(p)) top = std::max(top, p);
+    if (top > 0.0) f.bounds.upper = (1.0 - 1e-4) * top;
+  }
+}
+
+}  // namespace
+
 Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
         const Fit* near) {
   Fit best;
   best.model = start;
   best.free = freedoms(start, believed);
+  if (data.model.plant == physics::Plant::thermal) keep_reached(data, start, best.free);
   const auto n = static_cast<Eigen::Index>(best.free.size());
   const auto priors = [&](const Model& model) {
     double sum = 0.0;

@@ -19,6 +19,7 @@
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/quiet_inputs.hpp"
 #include "tools/diagnose/screen.hpp"
+#include "tools/diagnose/steps.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
@@ -126,6 +127,13 @@ void Search::prepare() {
     d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
     d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
   }
+  std::vector<double> noise;
+  for (const auto& filter : d_.weighing.filters) noise.push_back(filter.sigma);
+  if (step_finely(data_, d_.retuned.model, noise))
+    for (int again = 0; again < 2; ++again) {
+      d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
+      d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
+    }
   simulated = simulate(data_, d_.retuned.model);
   noise_.emplace(data_);
   d_.weighing = weigh(data_, simulated);

@@ -65,6 +65,14 @@ constexpr Machine motor{
     "parameters: {b: {value: 1.5, unit: 1/s, sigma: 0.3}}\n",
     0.02, 0.05, 900, levels<29, -100, 100>};
 
+constexpr Machine turntable{
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states:\n  th: {derivative: w, initial: {value: 0, unit: rad, sigma: 0.01}}\n"
+    "  w: {derivative: '20*u - b*w', initial: {value: 0, unit: rad/s, sigma: 0.01}}\n"
+    "outputs: {angle: {column: y, expression: th}}\n"
+    "parameters: {b: {value: 1.5, unit: 1/s, sigma: 0.2}}\n",
+    0.02, 1e-4, 2000, levels<57, -10, 16>};
+
 class Equations : public ::testing::Test {
  protected:
   Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed) {
@@ -109,6 +117,15 @@ TEST_F(Equations, NamesASpringThatHardens) {
 
 TEST_F(Equations, NamesDryFriction) {
   expect(diagnose(motor, {term("dry_friction", "w", {4.0})}, 3), "dry_friction", "w", 4.0, 0.3);
+}
+
+TEST_F(Equations, NamesTeethOfWhichManyPass) {
+  const auto d = diagnose(turntable, {term("periodic", "w", {0.15, 0.2618, 0.7}, "th")}, 5);
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "periodic");
+  EXPECT_EQ(d.findings[0].term.with, "th");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.15, 0.015);
+  EXPECT_NEAR(d.findings[0].term.values[1], 0.2618, 2e-4);
 }
 
 TEST_F(Equations, NamesALateInput) {

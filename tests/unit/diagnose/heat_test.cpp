@@ -11,10 +11,16 @@
 namespace invar::diagnose {
 namespace {
 
+/// What a body feels, for so long.
+struct Moment {
+  double temperature, speed, power, step;
+  double& store;
+};
+
 /// A body of `capacity` [J/K] that loses `loss` [W/K] to air of 22 degC, heated in random steps up to `most` [W]; `more`
 /// gives what else flows into it [W] and advances a store of its own. A stage beside it moves at 0, 0.25 ... 1 m/s.
 Case heated(double capacity, double loss, double most, double noise,
-            const std::function<double(double temperature, double speed, double step, double& store)>& more) {
+            const std::function<double(const Moment&)>& more) {
   std::mt19937 random{11};
   std::normal_distribution<double> normal{0.0, noise};
   std::uniform_real_distribution<double> uniform{0.0, most};
@@ -28,7 +34,7 @@ Case heated(double capacity, double loss, double most, double noise,
     time.push_back(row * i), power.push_back(now), reading.push_back(body + normal(random));
     for (int part = 0; part < parts; ++part) {
       const double step = row / parts;
-      const double flow = more(body, speeds.back(), step, store);
+      const double flow = more({body, speeds.back(), now, step, store});
       body += step * (now + flow - loss * (body - 22.0)) / capacity;
     }
   }
@@ -52,9 +58,9 @@ Case heated(double capacity, double loss, double most, double noise,
 
 TEST(Heat, AStoreBehindAWeakContactIsAStore) {
   // It takes half a percent of what the air takes, and fills no faster than the recording lasts: much as if the air grew warm.
-  auto data = heated(10400.0, 32.0, 1000.0, 0.005, [](double body, double, double step, double& store) {
-    const double flow = 0.16 * (body - store);
-    store += step * flow / 3000.0;
+  auto data = heated(10400.0, 32.0, 1000.0, 0.005, [](const Moment& at) {
+    const double flow = 0.16 * (at.temperature - at.store);
+    at.store += at.step * flow / 3000.0;
     return -flow;
   });
   const auto d = search(data, [](double, const std::string&) {});
@@ -65,8 +71,8 @@ TEST(Heat, AStoreBehindAWeakContactIsAStore) {
 }
 
 TEST(Heat, AirThatIsDrivenCarriesHeatAwayWithAPowerOfTheSpeed) {
-  auto data = heated(2000.0, 10.0, 300.0, 0.02, [](double body, double speed, double, double&) {
-    return -1.5 * std::pow(speed, 0.7) * (body - 22.0);
+  auto data = heated(2000.0, 10.0, 300.0, 0.02, [](const Moment& at) {
+    return -1.5 * std::pow(at.speed, 0.7) * (at.temperature - 22.0);
   });
   const auto d = search(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
@@ -76,6 +82,21 @@ TEST(Heat, AirThatIsDrivenCarriesHeatAwayWithAPowerOfTheSpeed) {
   const auto& values = d.findings[0].term.values;
   EXPECT_NEAR(values[1], 0.7, 0.03);
   EXPECT_NEAR(values[0] * std::pow(values[2], 0.3), 1.5, 0.05);
+}
+
+TEST(Heat, AHeaterThatOneStepAloneDrivesTooFarSaturates) {
+  constexpr double most = 33.9;
+  double top = 0.0;
+  auto data = heated(70.0, 1.7, 36.0, 0.004, [&](const Moment& at) {
+    top = std::max(top, at.power);
+    return -std::max(0.0, at.power - most);
+  });
+  EXPECT_GT(top, most);
+  EXPECT_LT(top, 1.02 * most);
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "heater_saturation");
+  EXPECT_NEAR(d.findings[0].term.values[0], most, 0.02);
 }
 
 }  // namespace

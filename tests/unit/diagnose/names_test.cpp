@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
@@ -106,6 +107,27 @@ TEST(Names, ASmallShareBesideOthersIsDoubted) {
   EXPECT_LT(odds_of_another_cause(1000.0, 0.0, 0.0, 1.0), 0.1);
   EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 2e-4), unlikely_odds);
   EXPECT_GT(odds_of_another_cause(20.0, 0.0, 0.0, 1.0), odds_of_another_cause(1000.0, 0.0, 0.0, 1.0));
+}
+
+TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {
+  const Case data;
+  const auto term = [](const char* name, const char* with) {
+    physics::Term t;
+    t.info = physics::find_term(physics::Plant::equations, name);
+    t.on = std::string{"v"}, t.with = std::string{with};
+    return t;
+  };
+  const auto probability_beside = [&](const physics::Term& other) {
+    Diagnosis d;
+    Finding finding;
+    finding.term = term("quadratic", "x");
+    finding.gain = 1000.0, finding.share = 1.0;
+    finding.alternatives.push_back({other, 0.0});
+    weigh_name(data, d, 0, finding);
+    return finding.probability;
+  };
+  EXPECT_GT(probability_beside(term("quadratic", "y")), 0.9);
+  EXPECT_LT(probability_beside(term("cubic", "x")), 0.5);
 }
 
 }  // namespace

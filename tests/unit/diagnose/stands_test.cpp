@@ -1,12 +1,14 @@
 // What a fit that does well must show of its term before the term's name is said.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/steps.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -62,6 +64,73 @@ TEST(Stands, AStoreThatFillsIsOne) {
   const auto found = with_store(data, 100.0);
   EXPECT_NEAR(found.model.terms[0].values[1], 40.0, 2.0);
   EXPECT_TRUE(stands(data, found, 0));
+}
+
+TEST(Stands, NothingIsTriedAtAnInputThatTheModelDoesNotLookAt) {
+  recording::Table table;
+  std::vector<double> time, u, air, x;
+  for (int i = 0; i < 100; ++i)
+    time.push_back(i), u.push_back(i % 7), air.push_back(20.0 + i % 5), x.push_back(0.1 * i);
+  table.add("t", "s", time);
+  table.add("u", "", u);
+  table.add("air", "", air);
+  table.add("x", "", x);
+  const auto data = make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u, u2: air}\n"
+                     "states: {x: {derivative: 'u - 0.1*x', initial: {value: 5, sigma: 0.01}}}\n"
+                     "outputs: {x: {column: x, expression: x}}\nparameters: {}\n"),
+      {table});
+  bool at_used = false, to_unused = false;
+  for (const auto& start : equation_starts(data, data.model)) {
+    EXPECT_NE(start.term.on, "u2") << start.term.info->name;
+    at_used = at_used || start.term.on == "u";
+    to_unused = to_unused || start.term.with == "u2";  // what it may do beside is another matter
+  }
+  EXPECT_TRUE(at_used);
+  EXPECT_TRUE(to_unused);
+}
+
+/// x' = 3 (u - x), u held: off the exponential by so much at most.
+double off_the_closed_form(const Case& data, const std::vector<double>& u) {
+  const auto x = simulate(data, data.model)[0][0];
+  const auto& time = data.recordings[0].inputs.time;
+  double exact = 0.0, most = 0.0;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    exact = u[i - 1] + (exact - u[i - 1]) * std::exp(-3.0 * (time[i] - time[i - 1]));
+    most = std::max(most, std::abs(x[i] - exact));
+  }
+  return most;
+}
+
+TEST(Steps, AreAsFineAsTheNoiseAsks) {
+  for (const double sigma : {1e-4, 1e-2}) {
+    std::mt19937 random{5};
+    std::normal_distribution<double> noise{0.0, sigma};
+    std::vector<double> time, u, x;
+    double at = 0.0;
+    for (int i = 0; i < 400; ++i) {
+      if (i > 0) at = u.back() + (at - u.back()) * std::exp(-3.0 * 0.16);
+      time.push_back(0.16 * i), u.push_back(i % 9 < 4 ? 1.0 : -1.0), x.push_back(at + noise(random));
+    }
+    recording::Table table;
+    table.add("t", "s", time);
+    table.add("u", "", u);
+    table.add("x", "", x);
+    auto data =
+        make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                                 "states: {x: {derivative: '3*(u - x)', initial: {value: 0, sigma: 0}}}\n"
+                                 "outputs: {x: {column: x, expression: x}}\nparameters: {}\n"),
+                  {table});
+    const double before = off_the_closed_form(data, u);
+    const bool finer = step_finely(data, data.model, {sigma});
+    EXPECT_EQ(finer, sigma < 1e-3);
+    if (finer) {
+      EXPECT_GT(before, 2.0 * sigma);
+      EXPECT_LT(off_the_closed_form(data, u), 0.3 * sigma);
+    } else {
+      EXPECT_EQ(off_the_closed_form(data, u), before);  // finer steps would cost, and show nothing
+    }
+  }
 }
 
 }  // namespace

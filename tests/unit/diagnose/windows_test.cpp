@@ -174,5 +174,25 @@ TEST(Windows, WhatTheCurrentDidInAGapIsNotKnown) {
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
 }
 
+TEST(Windows, AVesselWhoseFlowEbbsForgetsAllTheSame) {
+  Recorded r;
+  for (int i = 0; i < 600; ++i) {
+    r.time.push_back(0.5 * i), r.way.push_back(2.0);
+    r.drive.push_back(i < 300 ? 1.0 : 0.3);  // 10 s to fill anew, then 33 s of 300 s
+  }
+  auto vessel =
+      r.with(model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {q: drive}\n"
+                      "states:\n  c: {derivative: 'q*(2 - c)/10', initial: {value: 2, sigma: 0.01}}\n"
+                      "outputs: {way: {column: y, expression: c}}\nparameters: {}\n"));
+  cut_into_windows(vessel);
+  EXPECT_EQ(vessel.windows.count, 0U);
+  auto level =
+      r.with(model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {q: drive}\n"
+                      "states:\n  c: {derivative: 'q - 0.65', initial: {value: 2, sigma: 0.01}}\n"
+                      "outputs: {way: {column: y, expression: c}}\nparameters: {}\n"));
+  cut_into_windows(level);
+  EXPECT_GT(level.windows.count, 0U);  // what it was given it keeps
+}
+
 }  // namespace
 }  // namespace invar::diagnose

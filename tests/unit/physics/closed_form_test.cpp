@@ -246,6 +246,24 @@ TEST(Equations, WhatIsHeldChangesLateBetweenTheRows) {
   }
 }
 
+/// x' = a (u - x) where u goes straight from row to row: x = u - r / a beside what dies away, r the slope.
+TEST(Equations, WhatIsHeldLinearlyActsStraightFromRowToRow) {
+  constexpr double a = 3.0, row = 0.08;
+  const std::string text =
+      "plant: equations\ncolumns: {time: t}\ninputs: {u: {column: u, hold: linear}}\n"
+      "states: {x: {derivative: \"3*(u - x)\", initial: {value: 0, unit: m, sigma: 0}}}\n"
+      "outputs: {y: {column: y, expression: \"x\"}}\nparameters: {}\n";
+  std::vector<double> time, u;
+  for (int i = 0; i < 100; ++i) time.push_back(row * i), u.push_back(std::sin(1.7 * i) + 0.1 * i);
+  const auto y = simulated(text, time, {{"u", u}});
+  double x = 0.0;
+  for (std::size_t i = 1; i < time.size(); ++i) {
+    const double slope = (u[i] - u[i - 1]) / row;
+    x = u[i] - slope / a + (x - u[i - 1] + slope / a) * std::exp(-a * row);
+    EXPECT_NEAR(y[i], x, 1e-4) << time[i];
+  }
+}
+
 TEST(Equations, TermsActAsTheContractSays) {
   EXPECT_NEAR(last(""), 1.0, 1e-9);
   EXPECT_NEAR(last("{term: upper_limit, on: y, limit: {value: 0.6, unit: m}}"), 0.6, 1e-9);
