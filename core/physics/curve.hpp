@@ -13,6 +13,8 @@ struct Curve {
   std::string over;  // the signal that it goes over: "position", "velocity", "time", ...
   std::vector<double> knots;
   std::vector<double> values;
+  double usual =
+      0.0;  // how large a value is expected to be, where the curve itself does not tell; 0: it does
 
   [[nodiscard]] double operator()(double x) const noexcept {
     if (knots.empty()) return 0.0;

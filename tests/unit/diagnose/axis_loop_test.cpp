@@ -191,6 +191,18 @@ TEST(AxisLoop, FrictionThatFallsWithTheSpeedIsReachedFromCoulombs) {
   EXPECT_NEAR(found.values[2], axis.fades, 0.2 * axis.fades);
 }
 
+TEST(AxisLoop, AnEncoderThatReadsWrongInOnePlaceIsSeenToDoSo) {
+  Axis axis;
+  axis.misread = [](double x) { return 3e-7 * std::exp(-0.5 * std::pow((x - 0.004) / 0.0012, 2)); };
+  const auto d = searched(recorded(axis, 0.1, 9));
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.findings[0].term.curve;
+  EXPECT_EQ(d.findings[0].term.info->site, "measurement");
+  EXPECT_EQ(curve.over, "position");
+  EXPECT_NEAR(curve(0.004) - 0.5 * (curve(-0.002) + curve(0.010)), 3e-7, 1e-7);
+}
+
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const auto d = searched(recorded({}, 1.0, seed));
