@@ -16,6 +16,8 @@ struct Curve {
   std::vector<double> knots;
   std::vector<double> values;
   double period = 0.0;  // 0: none
+  double usual =
+      0.0;  // how large a value is expected to be, where the curve itself does not tell; 0: it does
 
   [[nodiscard]] double operator()(double x) const noexcept {
     if (knots.empty()) return 0.0;

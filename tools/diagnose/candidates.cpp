@@ -333,6 +333,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       choices = {{"force", "position", 10},  {"force", "position", 28},     {"force", "position", 60},
                  {"force", "velocity", 12},  {"force", "time", 12},         {"force", "temperature", 6},
                  {"actuator", "current", 9}, {"actuator", "temperature", 5}};
+      if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:
       choices = {{"loss", "temperature", 6}, {"loss", "time", 12},   {"source", "time", 12},
@@ -389,6 +390,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
         start.term.curve.values.push_back(0.0);
         start.directions.push_back({none, k, false});
       }
+      // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
+      if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
+        start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
       starts.push_back(std::move(start));
     }
   }

@@ -60,12 +60,13 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
     const auto& term = model.terms[t];
     const bool is_nominal = t < believed.terms.size();
     for (std::size_t i = 0; i < term.curve.values.size(); ++i) {
-      double size = 0.0;
-      for (double v : term.curve.values) size = std::max(size, std::abs(v));
+      double size = term.curve.usual;
+      for (double v : term.curve.values)
+        if (!(term.curve.usual > 0.0)) size = std::max(size, std::abs(v));
       Freedom f;
       f.where = Freedom::Where::curve, f.term = t, f.index = i;
       f.scale = std::max(0.1 * size, 1e-12);
-      f.sigma = 30.0 * std::max(size, 1e-11);
+      f.sigma = term.curve.usual > 0.0 ? size : 30.0 * std::max(size, 1e-11);
       free.push_back(f);
     }
     for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {

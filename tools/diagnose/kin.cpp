@@ -42,22 +42,33 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
     return others;
   }
   // Friction of three numbers may hold the one that is right where a fit from nothing would not begin: at nearly one speed
-  // damping has taken all of it, and more.
-  if (found.info->plant == physics::Plant::axis && !without.contains("coulomb_friction") &&
-      (name == "stribeck_friction" || name == "presliding_friction")) {
+  // damping has taken all of it, and more. And what falls with the speed begins at a law that does not: from a carriage
+  // without friction a fit does not see the small excess at rest.
+  if (found.info->plant == physics::Plant::axis && name.ends_with("_friction")) {
+    double rms = 0.0, rows = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r)
+      for (const double v : variable_values(data, r, "velocity")) rms += v * v, rows += 1.0;
+    const double usual = std::sqrt(rms / std::max(1.0, rows));
     double level = found.values[0];
     if (name == "stribeck_friction") {
-      double rms = 0.0, rows = 0.0;
-      for (std::size_t r = 0; r < data.recordings.size(); ++r)
-        for (const double v : variable_values(data, r, "velocity")) rms += v * v, rows += 1.0;
-      const double speeds = std::sqrt(rms / std::max(1.0, rows)) / found.values[2];
+      const double speeds = usual / found.values[2];
       level += (found.values[1] - level) * std::exp(-speeds * speeds);
     }
-    auto& put = others.emplace_back(model).terms[term];
-    put = {};
-    put.info = physics::find_term(physics::Plant::axis, "coulomb_friction");
-    put.values[0] = level;
-    put.given[0] = true;
+    const auto put = [&](const char* instead) -> physics::Term& {
+      auto& other = others.emplace_back(model).terms[term];
+      other = {};
+      other.info = physics::find_term(physics::Plant::axis, instead);
+      other.given.fill(true);
+      return other;
+    };
+    if (name != "coulomb_friction" && !without.contains("coulomb_friction"))
+      put("coulomb_friction").values[0] = level;
+    if (name != "stribeck_friction" && !without.contains("stribeck_friction"))
+      for (const double share : {0.1, 0.4}) {
+        auto& other = put("stribeck_friction");
+        other.values[0] = 0.8 * level, other.values[1] = 1.4 * level;
+        other.values[2] = other.info->parameters[2].bounds.clamp(share * usual);
+      }
     return others;
   }
   const int power = found.info->plant == physics::Plant::equations ? power_of(name) : 0;

@@ -43,7 +43,7 @@ void sharpen(const Case& data, Curved& found) {
   auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
   if (least_ratio(data, rough, sharp) < 0.97) sharp = fit(data, own, rough.model, data.model, 0, &rough);
   const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
-  if (sharp.evidence < blunt.evidence) return;
+  if (sharp.evidence < blunt.evidence || least_ratio(data, curved, sharp) < 0.97) return;
   found.gain += sharp.evidence - blunt.evidence;
   curved = std::move(sharp);
   weighing = own;

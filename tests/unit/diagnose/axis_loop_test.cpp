@@ -7,7 +7,9 @@
 #include <numbers>
 #include <random>
 
+#include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
+#include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/search.hpp"
 
 namespace invar::diagnose {
@@ -17,10 +19,13 @@ constexpr double mass = 20.0, motor = 23.0, damping = 19.0, period = 1e-3;
 
 struct Axis {
   std::function<double(double time)> push = [](double) { return 0.0; };  // [N]
-  double friction = 0.0;                                                 // Coulomb's [N]
-  double noise = 2.3e-8;                                                 // of the encoder [m]
-  double bristles = 0.0, stiffness = 1e4;                                // Dahl's friction [N], [N/m]
-  double reach = 0.02;                                                   // of the moves [m]
+  double friction = 0.0;                                                 // at speed [N]
+  double excess = 0.0,
+         fades = 0.01;  // of the friction at rest [N], and the speed at which it has fallen to 1/e [m/s]
+  std::function<double(double place)> misread = [](double) { return 0.0; };  // by the encoder [m]
+  double noise = 2.3e-8;                                                     // of the encoder [m]
+  double bristles = 0.0, stiffness = 1e4;                                    // Dahl's friction [N], [N/m]
+  double reach = 0.02;                                                       // of the moves [m]
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
 
@@ -39,7 +44,7 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     const double s = std::min(1.0, (now - begun) / 0.3);
     const double r = axis.steady > 0.0 ? axis.steady * now
                                        : from + (to - from) * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
-    const double y = x + noise(random), e = r - y;
+    const double y = x + axis.misread(x) + noise(random), e = r - y;
     if (k == 0) last = e;
     slope += share * ((e - last) / period - slope);
     last = e;
@@ -54,9 +59,12 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
       }
-      if (v == 0.0 && std::abs(given) <= axis.friction) continue;
+      if (v == 0.0 && std::abs(given) <= axis.friction + axis.excess) continue;
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
-      const auto slows = [&](double speed) { return (given - damping * speed - way * axis.friction) / mass; };
+      const auto slows = [&](double speed) {
+        const double held = axis.friction + axis.excess * std::exp(-std::pow(speed / axis.fades, 2));
+        return (given - damping * speed - way * held) / mass;
+      };
       const double a = slows(v), b = slows(v + h * a), next = v + 0.5 * h * (a + b);
       x += h * (v + 0.5 * h * a);
       v = axis.friction > 0.0 && next * way < 0.0 ? 0.0 : next;
@@ -157,6 +165,42 @@ TEST(AxisLoop, ATiltBesideFrictionThatTheNoiseShakesIsFound) {
     EXPECT_TRUE(is_tilt || finding.term.info->name == "coulomb_friction") << finding.term.info->name;
     EXPECT_NEAR(finding.term.values[0], is_tilt ? -0.12 : axis.friction, 0.15 * axis.friction);
   }
+}
+
+TEST(AxisLoop, FrictionThatFallsWithTheSpeedIsReachedFromCoulombs) {
+  Axis axis;
+  axis.friction = 0.6;
+  axis.excess = 0.5;
+  axis.fades = 0.012;
+  axis.reach = 0.004;
+  const auto data = recorded(axis, 0.1, 8);
+  auto model = data.model;
+  auto& term = model.terms.emplace_back();
+  term.info = physics::find_term(physics::Plant::axis, "coulomb_friction");
+  term.values[0] = axis.friction;
+  term.given[0] = true;
+  const auto plain = weigh(data, simulate(data, model), false);
+  const auto coulomb = fit(data, plain, model, data.model, 8);
+  const auto others = fits_of_other_laws(data, plain, coulomb, 0, {});
+  ASSERT_FALSE(others.empty());
+  EXPECT_GT(others[0].evidence, coulomb.evidence + 100.0);
+  const auto& found = others[0].model.terms[0];
+  EXPECT_EQ(found.info->name, "stribeck_friction");
+  EXPECT_NEAR(found.values[0], axis.friction, 0.1 * axis.friction);
+  EXPECT_NEAR(found.values[1], axis.friction + axis.excess, 0.1);
+  EXPECT_NEAR(found.values[2], axis.fades, 0.2 * axis.fades);
+}
+
+TEST(AxisLoop, AnEncoderThatReadsWrongInOnePlaceIsSeenToDoSo) {
+  Axis axis;
+  axis.misread = [](double x) { return 3e-7 * std::exp(-0.5 * std::pow((x - 0.004) / 0.0012, 2)); };
+  const auto d = searched(recorded(axis, 0.1, 9));
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.findings[0].term.curve;
+  EXPECT_EQ(d.findings[0].term.info->site, "measurement");
+  EXPECT_EQ(curve.over, "position");
+  EXPECT_NEAR(curve(0.004) - 0.5 * (curve(-0.002) + curve(0.010)), 3e-7, 1e-7);
 }
 
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
