@@ -51,15 +51,15 @@ double likelihood(const std::vector<std::vector<double>>& series, const Wander& 
   return count > 0.0 && squares > 0.0 ? -0.5 * (count * std::log(squares / count) + logs) : 0.0;
 }
 
-Wander wander_of(const std::vector<std::vector<double>>& series) {
+Wander wander_of(const std::vector<std::vector<double>>& series, bool is_instrument) {
   std::size_t longest = 0;
   for (const auto& one : series) longest = std::max(longest, one.size());
   // White noise alone seems to wander by a nat or two, the best of many tried. What many rows do not show, however long it
-  // could last, hides nothing; a few hundred would not show it.
+  // could last, hides nothing in a reading; a few hundred would not show it.
   constexpr std::size_t many = 1500;
   std::size_t rows = 0;
   for (const auto& one : series) rows += one.size();
-  const double by_chance = rows < many ? 0.0 : 3.0;
+  const double by_chance = is_instrument && rows >= many ? 3.0 : 0.0;
   Wander best;
   double most = likelihood(series, best) + by_chance;
   for (double memory = 8.0; memory < 4.0 * static_cast<double>(longest); memory *= 4.0) {
@@ -87,7 +87,7 @@ double advantage_over_wander(const Case& data, const Weighing& weighing, const F
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto with = series_of(data, weighing, one.residual, o),
                without = series_of(data, weighing, other.residual, o);
-    const auto wander = wander_of(with);
+    const auto wander = wander_of(with, data.model.plant == physics::Plant::sensor);
     any = any || wander.driven > 0.0;
     double least = std::numeric_limits<double>::infinity();
     for (const double longer : {1.0, 4.0, 16.0}) {

@@ -11,8 +11,9 @@ struct Wander {
   double driven = 0.0;  // variance that enters it in a row; 0: there is none
 };
 
-/// The wander that makes these numbers likeliest. NaN: nothing was measured.
-Wander wander_of(const std::vector<std::vector<double>>& series);
+/// The wander that makes these numbers likeliest. NaN: nothing was measured. The noise of an instrument wanders where it shows;
+/// what is stored in a machine, as heat, also wanders unseen.
+Wander wander_of(const std::vector<std::vector<double>>& series, bool is_instrument);
 /// Log likelihood of the numbers as such noise, of whatever scale; comparable between series over the same rows.
 double likelihood(const std::vector<std::vector<double>>& series, const Wander& wander);
 
