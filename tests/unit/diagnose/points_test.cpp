@@ -237,9 +237,10 @@ TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
 /// A scale beside a reference over strokes of 0.4 s between which the carriage rests for `rest` [s]; `shown` of where the
 /// carriage stands at any time, and of the time [s].
 template <class Shown>
-Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, unsigned seed) {
+Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, unsigned seed,
+             double step = 1e-9) {
   std::mt19937 random{seed};
-  std::normal_distribution<double> reading{0.0, noise_of_scale};
+  std::normal_distribution<double> reading;
   std::uniform_real_distribution<double> ends{-0.04, 0.04};
   std::vector<double> stops(1, 0.0);
   for (int k = 0; k < 200; ++k) stops.push_back(ends(random));
@@ -251,7 +252,7 @@ Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, 
   std::vector<double> time, position, shows;
   for (std::size_t k = 0; k < rows; ++k) {
     time.push_back(2e-3 * static_cast<double>(k)), position.push_back(place(time.back()));
-    shows.push_back(shown(place, time.back()) + reading(random));
+    shows.push_back(shown(place, time.back()) + noise_of_scale * reading(random));
   }
   recording::Table table;
   table.add("t", "s", time);
@@ -259,7 +260,8 @@ Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, 
   table.add("y", "m", shows);
   return make_case(
       test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
-                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
+                     "parameters: {resolution: {value: " +
+                     std::to_string(1e9 * step) + ", unit: nm, sigma: 0}}\nterms: []\n"),
       {table});
 }
 
@@ -279,6 +281,21 @@ TEST(Instruments, AWaveAlongTheWayIsFoundThoughTheCarriageMostlyRests) {
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
   EXPECT_EQ(d.verdict, Verdict::explained);
+}
+
+TEST(Instruments, AWaveIsNotTakenForABeatOfTheStepsWithTheDigitsTheyAreWrittenIn) {
+  constexpr double step = 1.07792971e-6;
+  auto data = stroked(
+      0.02, 12000, 0.0,
+      [random = std::mt19937{27}](const auto& place, double t) mutable {
+        const double noise_of_scale = std::normal_distribution<double>{0.0, 5e-7}(random);
+        const double shows =
+            place(t) + 2.5e-7 * std::sin(2.0 * M_PI * place(t) / 0.01653 + 1.0) + noise_of_scale;
+        return 1e-9 * std::round(1e9 * step * std::round(shows / step));
+      },
+      27, step);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
 }
 
 TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
