@@ -334,7 +334,8 @@ bool never_fills(const Case& data, const Fit& fit, std::size_t term) {
   if (!(store.values[1] > lasts)) return false;
   for (std::size_t k = 0; k < fit.free.size(); ++k)
     if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 1)
-      return store.values[1] < 3.0 * fit.sigma(static_cast<Eigen::Index>(k));  // 1 / time constant: 0 +- sigma
+      return store.values[1] <
+             3.0 * fit.sigma(static_cast<Eigen::Index>(k));  // 1 / time constant: 0 +- sigma
   return false;
 }
 
