@@ -1,6 +1,8 @@
 #include "tools/diagnose/unsure.hpp"
 
 #include <cmath>
+#include <set>
+#include <string_view>
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/odds.hpp"
@@ -35,6 +37,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
   auto model = d.best.model;
   std::vector<Finding> kept;
   std::optional<Finding> nearest;  // of the names that go
+  std::set<std::string_view> sites;
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     const auto& finding = d.findings[i];
     const bool is_curve = !finding.term.curve.knots.empty();
@@ -43,7 +46,9 @@ bool set_aside(const Case& data, Diagnosis& d) {
       continue;
     }
     model = physics::without_term(std::move(model), given + i);
-    if (!is_curve && (!nearest || finding.gain > nearest->gain)) nearest = finding;
+    if (is_curve) continue;
+    sites.insert(finding.term.info->site);
+    if (!nearest || finding.gain > nearest->gain) nearest = finding;
   }
   if (!nearest) return false;
   const auto plain = weigh(data, simulate(data, d.best.model), false);
@@ -54,7 +59,10 @@ bool set_aside(const Case& data, Diagnosis& d) {
   std::size_t curves = 0;
   while (curves < 3 && lead(data, found.fit, d.best) < 0.0) {
     auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
-    if (next.gain < 2.0 * claim_margin_of(d.weighing)) return false;
+    // What another place explains beside them says nothing against the names here.
+    if (next.gain < 2.0 * claim_margin_of(d.weighing) ||
+        !sites.contains(next.fit.model.terms.back().info->site))
+      return false;
     found = std::move(next);
     ++curves;
   }
