@@ -144,6 +144,15 @@ LoopNoise::Readings LoopNoise::now() const {
   return readings;
 }
 
+std::size_t LoopNoise::left_to_chance() const {
+  std::size_t rows = 0;
+  for (std::size_t r = 0; r < recorded_.size(); ++r)
+    for (std::size_t i = 0; i < recorded_[r].front().size(); ++i)
+      if (std::isfinite(recorded_[r].front()[i]) && !std::isfinite(data_.recordings[r].measured.front()[i]))
+        ++rows;
+  return rows;
+}
+
 LoopNoise::Readings LoopNoise::put_back() {
   auto was = now();
   put(recorded_);

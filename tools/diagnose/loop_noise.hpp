@@ -22,6 +22,8 @@ class LoopNoise {
   Readings put_back();
   void put(Readings readings);
   [[nodiscard]] Readings now() const;
+  /// Rows that are left out now since chance decides in them.
+  [[nodiscard]] std::size_t left_to_chance() const;
   /// Does `with` lie nearer than `without`, by this ratio of the residual of any output, when it is shaken too? Play that is
   /// finer than the noise shows in a run without noise alone.
   [[nodiscard]] bool shows(const physics::Model& with, const physics::Model& without, double ratio) const;

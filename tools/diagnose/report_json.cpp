@@ -168,7 +168,8 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       {"gaps", data.count.gaps},
       {"before_standstill", data.count.before_standstill},
       {"behind_rest", data.count.behind_rest},
-      {"not_run_through", data.count.shortened}};
+      {"not_run_through", data.count.shortened},
+      {"left_to_chance", data.count.left_to_chance}};
   if (const auto part = what_was_looked_at(data); !part.empty()) report["data"]["looked_at"] = part;
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);

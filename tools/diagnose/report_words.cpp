@@ -213,6 +213,9 @@ std::string what_was_looked_at(const Case& data) {
         (cut.empty() ? "" : "; ") +
         std::string{"the inputs as recorded carry noise that the machine did not feel: their median over "} +
         std::to_string(data.quiet_rows) + " rows stands in their place";
+  if (data.count.left_to_chance > 0)
+    cut += (cut.empty() ? "in " : "; in ") + std::to_string(data.count.left_to_chance) +
+           " rows noise decides when the carriage sticks and slips: they are not judged";
   if (data.count.shortened == 0) return cut;
   return (cut.empty() ? "" : cut + "; ") + "a long recording: of " + std::to_string(data.count.rows) +
          " rows " + how_shortened(data.model) + " looked at, " + std::to_string(data.count.shortened) +

@@ -494,6 +494,7 @@ Diagnosis Search::run() {
         conclude(data_, d_);
     }
   }
+  data_.count.left_to_chance = noise_->left_to_chance();
   (void)noise_->put_back();
   // Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
   if (d_.is_partial && (d_.verdict == Verdict::no_mismatch || d_.verdict == Verdict::parameters_only))
