@@ -253,8 +253,9 @@ bool is_rounding(const Case& data, const physics::Model& model, std::size_t term
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto& y = data.recordings[r].measured[o];
       const double step = step_of(y);
+      if (!(step > 0.0)) continue;
       // Its own steps, written with so many digits, are no second lattice that beats against them.
-      if (!(step > 0.0) || std::abs(step - known) < 0.02 * known) continue;
+      const bool is_known = std::abs(step - known) < 0.02 * known;
       const std::size_t n = y.size();
       std::vector<double> noise(n);
       double square = 0.0;
@@ -263,7 +264,7 @@ bool is_rounding(const Case& data, const physics::Model& model, std::size_t term
         square += noise[i] * noise[i] / static_cast<double>(n);
       }
       // What is left holds the rounding already; that much of it is taken away.
-      const double fine = (step * step + known * known) / 12.0;
+      const double fine = ((is_known ? 0.0 : step * step) + known * known) / 12.0;
       const double share = std::sqrt(std::max(0.0, 1.0 - fine / std::max(square, 1e-300)));
       const auto angles = angles_of(data, model, model.terms[term], r);
       for (std::size_t i = 0; i < n; ++i) {
@@ -272,9 +273,10 @@ bool is_rounding(const Case& data, const physics::Model& model, std::size_t term
         seen += (y[i] - without[r][o][i]) * turn;
         constexpr std::size_t shifts = 5;  // of the noise against the motion
         for (std::size_t k = 1; k <= shifts; ++k) {
-          const double level =
-              to_steps(without[r][o][i] + share * noise[(i + k * n / (shifts + 1)) % n], known);
-          rounded += (to_steps(level, step) - level) * turn / static_cast<double>(shifts);
+          const double exact = without[r][o][i] + share * noise[(i + k * n / (shifts + 1)) % n],
+                       level = to_steps(exact, known);
+          rounded +=
+              (is_known ? level - exact : to_steps(level, step) - level) * turn / static_cast<double>(shifts);
         }
       }
     }

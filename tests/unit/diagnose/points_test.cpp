@@ -283,6 +283,28 @@ TEST(Instruments, AWaveAlongTheWayIsFoundThoughTheCarriageMostlyRests) {
   EXPECT_EQ(d.verdict, Verdict::explained);
 }
 
+TEST(Instruments, WhatTheirOwnStepsMakeOfASteadyMotionIsNoWave) {
+  constexpr double step = 7.01704e-8, reach = 0.0221, stroke = 1.3017;  // [m], [m], [s]
+  std::mt19937 random{34};
+  std::normal_distribution<double> shaken{0.0, 1.5e-8};
+  const auto place = [](double t) { return reach * (2.0 * std::abs(std::remainder(t / stroke, 2.0)) - 1.0); };
+  std::vector<double> time, position, shows;
+  for (std::size_t k = 0; k < 20000; ++k) {
+    time.push_back(1e-3 * static_cast<double>(k)), position.push_back(place(time.back()));
+    shows.push_back(
+        1e-11 * std::round(1e11 * step * std::round((place(time.back() - 3e-7) + shaken(random)) / step)));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shows);
+  auto data = make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: 70.1704, unit: nm, sigma: 0}}\nterms: []\n"),
+      {table});
+  EXPECT_FALSE(names_of(search(data, [](double, const std::string&) {})).contains("periodic_error"));
+}
+
 TEST(Instruments, AWaveIsNotTakenForABeatOfTheStepsWithTheDigitsTheyAreWrittenIn) {
   constexpr double step = 1.07792971e-6;
   auto data = stroked(
