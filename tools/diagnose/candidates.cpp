@@ -94,12 +94,7 @@ std::vector<double> pitch_grid(const std::vector<double>& positions, std::size_t
 std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermInfo& info,
                                const std::string& on) {
   if (info.name == "heater_saturation") {
-    double top = 0.0;
-    for (const auto& heater : data.model.thermal.heaters)
-      if (heater.node == on)
-        for (const auto& r : data.recordings)
-          for (double p : *r.inputs.find(heater.name))
-            if (std::isfinite(p)) top = std::max(top, p);
+    const double top = highest_power(data, on);
     std::vector<double> clips;  // close: from one to the next a fit cannot go where no power lies between
     for (const double share :
          {0.999, 0.998, 0.996, 0.992, 0.985, 0.97, 0.93, 0.88, 0.82, 0.75, 0.67, 0.57, 0.45})
@@ -226,9 +221,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
       }
       if (info->name == "heating_rate_lag") {
         // What is late by a minute and what is late by hours lies too far apart for one beginning.
-        double lasts = 0.0;
-        for (const auto& r : data.recordings)
-          lasts = std::max(lasts, r.inputs.time.back() - r.inputs.time.front());
+        const double lasts = longest(data);
         for (const double share : {0.01, 0.03, 0.1, 0.3}) {
           term.values[0] = info->parameters[0].bounds.clamp(share * lasts);
           term.given[0] = true;
@@ -253,9 +246,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
       }
       if (info->name == "hidden_node" && info->plant == Plant::thermal) {
         // A small store, that what it does goes with its size: how fast it fills is the shape, and `with` keeps that.
-        double lasts = 0.0;
-        for (const auto& r : data.recordings)
-          lasts = std::max(lasts, r.inputs.time.back() - r.inputs.time.front());
+        const double lasts = longest(data);
         const double capacity = 0.02 * data.model.value(on + ".capacity", 100.0);
         for (const double share : {0.003, 0.015, 0.07, 0.3, 1.5}) {
           term.values[0] = capacity / (share * lasts);

@@ -330,10 +330,7 @@ bool is_lag(const Fit& fit, std::size_t term) {
 bool never_fills(const Case& data, const Fit& fit, std::size_t term) {
   const auto& store = fit.model.terms[term];
   if (store.info->plant != physics::Plant::equations || store.info->name != "hidden_state") return false;
-  double lasts = 0.0;
-  for (const auto& recording : data.recordings)
-    lasts = std::max(lasts, recording.inputs.time.back() - recording.inputs.time.front());
-  if (!(store.values[1] > lasts)) return false;
+  if (!(store.values[1] > longest(data))) return false;
   for (std::size_t k = 0; k < fit.free.size(); ++k)
     if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 1)
       return store.values[1] <

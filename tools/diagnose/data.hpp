@@ -66,6 +66,10 @@ Case make_case(const physics::Model& model, const std::vector<recording::Table>&
 
 /// From where to where a signal goes in the recordings; nothing where none has a number of it.
 std::optional<Range> covered(const Case& data, std::string_view signal);
+/// [s] How long the longest recording lasts.
+double longest(const Case& data);
+/// [W] The most that a heater of this node was given; 0 where there is none.
+double highest_power(const Case& data, std::string_view node);
 
 /// Marks lone values far from their neighbours in the residual (measured - simulated) as unusable and counts them.
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated);

@@ -212,13 +212,7 @@ void keep_reached(const Case& data, const Model& model, std::vector<Freedom>& fr
     if (f.where != Freedom::Where::term || f.sigma > 0.0) continue;
     const auto& term = model.terms[f.term];
     if (term.info->name != "heater_saturation") continue;
-    double top = 0.0;
-    for (const auto& heater : model.thermal.heaters)
-      for (const auto& r : data.recordings)
-        if (const auto* power = r.inputs.find(heater.name); heater.node == term.on && power != nullptr)
-          for (const double p : *power)
-            if (std::isfinite(p)) top = std::max(top, p);
-    if (top > 0.0) f.bounds.upper = (1.0 - 1e-4) * top;
+    if (const double top = highest_power(data, term.on); top > 0.0) f.bounds.upper = (1.0 - 1e-4) * top;
   }
 }
 

@@ -54,8 +54,9 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
     const auto& term = finding.term;
-    auto depends = dependence(data, finding);
-    for (const auto& variable : dependence(data, finding))
+    const auto variables = dependence(data, finding);
+    auto depends = variables;
+    for (const auto& variable : variables)
       for (const auto& name : recorded_as(data, variable))
         if (std::find(depends.begin(), depends.end(), name) == depends.end()) depends.push_back(name);
     json where = json::object();

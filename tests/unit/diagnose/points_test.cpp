@@ -205,6 +205,20 @@ TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
   EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
 }
 
+/// A scale that reads in steps [m] beside a reference.
+Case scale_beside(const std::vector<double>& time, const std::vector<double>& position,
+                  const std::vector<double>& shown, double step) {
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("y", "m", shown);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
+                     "parameters: {resolution: {value: " +
+                     std::to_string(1e9 * step) + ", unit: nm, sigma: 0}}\nterms: []\n"),
+      {table});
+}
+
 TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
   std::mt19937 random{21};
   std::normal_distribution<double> reading{0.0, 2e-8};
@@ -220,14 +234,7 @@ TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
     time.push_back(2e-3 * k), position.push_back(x);
     shown.push_back(x + 4e-8 * std::sin(2.0 * M_PI * x / 0.0037 + 1.0) + reading(random));
   }
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("x", "m", position);
-  table.add("y", "m", shown);
-  auto data = make_case(
-      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
-                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
-      {table});
+  auto data = scale_beside(time, position, shown, 1e-9);
   const auto d = search(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "periodic_error");
@@ -254,15 +261,7 @@ Case stroked(double rest, std::size_t rows, double noise_of_scale, Shown shown, 
     time.push_back(2e-3 * static_cast<double>(k)), position.push_back(place(time.back()));
     shows.push_back(shown(place, time.back()) + noise_of_scale * reading(random));
   }
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("x", "m", position);
-  table.add("y", "m", shows);
-  return make_case(
-      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
-                     "parameters: {resolution: {value: " +
-                     std::to_string(1e9 * step) + ", unit: nm, sigma: 0}}\nterms: []\n"),
-      {table});
+  return scale_beside(time, position, shows, step);
 }
 
 std::set<std::string> names_of(const Diagnosis& d) {
@@ -294,14 +293,7 @@ TEST(Instruments, WhatTheirOwnStepsMakeOfASteadyMotionIsNoWave) {
     shows.push_back(
         1e-11 * std::round(1e11 * step * std::round((place(time.back() - 3e-7) + shaken(random)) / step)));
   }
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("x", "m", position);
-  table.add("y", "m", shows);
-  auto data = make_case(
-      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
-                     "parameters: {resolution: {value: 70.1704, unit: nm, sigma: 0}}\nterms: []\n"),
-      {table});
+  auto data = scale_beside(time, position, shows, step);
   EXPECT_FALSE(names_of(search(data, [](double, const std::string&) {})).contains("periodic_error"));
 }
 
@@ -348,14 +340,7 @@ TEST(Instruments, LatenessAtOneSpeedIsNotToldFromPlay) {
     shown.push_back(place(time.back() - late) + reading(random));
   }
   shown[0] = std::nan("");  // where the play stood at first nobody knows
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("x", "m", position);
-  table.add("y", "m", shown);
-  auto data = make_case(
-      test::model_of("invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, encoder: y}\n"
-                     "parameters: {resolution: {value: 1e-9, unit: m, sigma: 0}}\nterms: []\n"),
-      {table});
+  auto data = scale_beside(time, position, shown, 1e-9);
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::ambiguous);
   EXPECT_THAT(names_of(d),
