@@ -5,7 +5,9 @@
 #include <cmath>
 
 #include "tools/diagnose/common_factor.hpp"
+#include "tools/diagnose/own_rows.hpp"
 #include "tools/diagnose/sensitivities.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -245,17 +247,30 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   constexpr Eigen::Index cheap_values = 60000, many = 40;
   const bool cheap = data.model.plant == physics::Plant::equations && n * raw.size() <= cheap_values;
   Eigen::MatrixXd j = whitened(data, weighing, best.columns);
+  std::vector<bool> of_window(best.free.size());
+  for (std::size_t k = 0; k < of_window.size(); ++k)
+    of_window[k] = best.free[k].where == Freedom::Where::parameter &&
+                   is_start(best.model.parameters[best.free[k].index]);
+  OwnRows white_rows{j, of_window}, raw_rows{best.columns, of_window};
+  const auto find_anew = [&] {
+    best.columns = sensitivities(data, best.model, best.free);
+    j = whitened(data, weighing, best.columns);
+    white_rows = OwnRows{j, of_window}, raw_rows = OwnRows{best.columns, of_window};
+  };
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   const auto derive = [&] {
-    if (n > many) {  // half of it: the products are most of what windows cost
+    if (white_rows.any()) {  // the products are most of what windows cost
+      hessian = weighing.temper * white_rows.normal(j);
+    } else if (n > many) {  // half of it
       hessian.setZero(n, n);
       hessian.selfadjointView<Eigen::Lower>().rankUpdate(j.transpose(), weighing.temper);
       hessian = Eigen::MatrixXd{hessian.selfadjointView<Eigen::Lower>()};
     } else {
       hessian = weighing.temper * (j.transpose() * j);
     }
-    gradient = weighing.temper * (j.transpose() * best.residual);
+    gradient = weighing.temper * (white_rows.any() ? white_rows.times(j, best.residual)
+                                                   : Eigen::VectorXd{j.transpose() * best.residual});
     for (Eigen::Index k = 0; k < n; ++k) {
       const auto& f = best.free[static_cast<std::size_t>(k)];
       if (!(f.sigma > 0.0)) continue;
@@ -309,10 +324,16 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
       if (const double length = taken.dot(by_scale); length > 0.0 && !cheap) {
         // Broyden: the sensitivities now give the change that was seen.
-        j += (r - best.residual - j * taken) * by_scale.transpose() / length;
+        const Eigen::VectorXd error = r - best.residual - j * taken;
         Eigen::VectorXd change = raw_tried - raw - best.columns * taken;
         change = change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
-        best.columns += change * by_scale.transpose() / length;
+        if (white_rows.any()) {
+          white_rows.update(j, error, taken, scale);
+          raw_rows.update(best.columns, change, taken, scale);
+        } else {
+          j += error * by_scale.transpose() / length;
+          best.columns += change * by_scale.transpose() / length;
+        }
       }
       const double gained = best.cost - cost;
       best.model = std::move(tried);
@@ -325,8 +346,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       const bool settled = gained < 0.2;
       if (settled && (verified || iterations < 4)) break;
       if (settled || cheap) {  // with sensitivities from elsewhere: only fresh ones can say so
-        best.columns = sensitivities(data, best.model, best.free);
-        j = whitened(data, weighing, best.columns);
+        find_anew();
         verified = true;
       }
       fresh = settled || cheap;
@@ -335,8 +355,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       break;  // as good as it gets
     } else if (!fresh) {
       verified = true;
-      best.columns = sensitivities(data, best.model, best.free);
-      j = whitened(data, weighing, best.columns);
+      find_anew();
       fresh = true;
       derive();
     } else {

@@ -82,11 +82,17 @@ void whiten(const Whitening& filter, const std::vector<double>& r, const std::ve
             double* out) {
   const std::size_t order = filter.a.size();
   std::vector<double> filled(r.size());
+  std::size_t zeros = order;  // that many before this row: of zeros only zeros come
   for (std::size_t i = 0; i < r.size(); ++i) {
+    if (zeros >= order && (r[i] == 0.0 || !present[i])) {
+      out[i] = 0.0;
+      continue;
+    }
     double predicted = 0.0;
     for (std::size_t j = 0; j < order && j < i; ++j) predicted += filter.a[j] * filled[i - 1 - j];
     filled[i] = present[i] ? r[i] : predicted;
     out[i] = present[i] ? (r[i] - predicted) / filter.sigma : 0.0;
+    zeros = filled[i] == 0.0 ? zeros + 1 : 0;
   }
 }
 

@@ -39,6 +39,21 @@ TEST(Whitening, LeavesWhiteNoiseAsItIs) {
   EXPECT_NEAR(filter.sigma, 1.0, 0.03);
 }
 
+TEST(Whitening, OfZerosOnlyZerosCome) {
+  const Whitening filter{{0.7, -0.2, 0.1}, 2.0};
+  std::vector<double> values(60, 0.0), filled(60), white(60);
+  std::vector<bool> present(60, true);
+  for (const std::size_t i : {5U, 6U, 8U, 30U, 47U}) values[i] = static_cast<double>(i);
+  for (const std::size_t i : {7U, 31U, 32U, 33U, 34U, 35U, 50U}) present[i] = false;
+  whiten(filter, values, present, white.data());
+  for (std::size_t i = 0; i < 60; ++i) {  // by the definition
+    double predicted = 0.0;
+    for (std::size_t j = 0; j < 3 && j < i; ++j) predicted += filter.a[j] * filled[i - 1 - j];
+    filled[i] = present[i] ? values[i] : predicted;
+    EXPECT_EQ(white[i], present[i] ? (values[i] - predicted) / 2.0 : 0.0) << i;
+  }
+}
+
 TEST(Whitening, MakesColouredNoiseWhite) {
   const auto noise = coloured(0.9, 13, 20000);
   const auto filter = fit_whitening({noise}, 8);
