@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <random>
+
 #include "tests/support/fault_of.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
@@ -54,6 +57,42 @@ TEST(Clock, WhereNumbersOfTheModelAreStartValuesTheFitDecides) {
     recording.simulation = physics::prepare(model, recording.inputs);
   }
   EXPECT_NO_THROW(diagnose::check_clock(data));
+}
+
+/// An axis without controller, 2 x'' = 6 u - 8 x', at rest for 0.3 s and then under steps of current; exact.
+Machine pushed_axis() {
+  std::mt19937 random{5};
+  std::uniform_real_distribution<double> currents{-1.0, 1.0};
+  std::normal_distribution<double> noise{0.0, 1e-6};
+  constexpr double rate = 4.0, gain = 3.0, period = 2e-3;
+  const double kept = std::exp(-rate * period);
+  double x = 0.0, v = 0.0, u = 0.0;
+  recording::Table table;
+  std::vector<double> time, current, position;
+  for (int k = 0; k < 4000; ++k) {
+    if (k >= 150 && k % 100 == 50) u = currents(random);
+    time.push_back(k * period), current.push_back(u), position.push_back(x + noise(random));
+    const double end = gain / rate * u;
+    x += end * period + (v - end) * (1.0 - kept) / rate;
+    v = end + (v - end) * kept;
+  }
+  table.add("t", "s", time);
+  table.add("u", "A", current);
+  table.add("y", "m", position);
+  Machine machine;
+  machine.yaml =
+      "invar_model: 1\nplant: axis\ncolumns: {time: t, position: y, current: u}\nparameters:\n"
+      "  mass: {value: 2, unit: kg, sigma: 0.02}\n  motor_constant: {value: 6, unit: N/A, sigma: 0.05}\n"
+      "  viscous_damping: {value: 8, unit: N s/m, sigma: 0.4}\n";
+  machine.recordings = {table};
+  return machine;
+}
+
+TEST(Clock, AnAxisWhoseTimeIsInAnotherUnitIsRefused) {
+  EXPECT_EQ(said_of(pushed_axis(), 1.0), "accepted");
+  EXPECT_THAT(said_of(pushed_axis(), 1e3), HasSubstr("were the time 1000 times shorter"));
+  EXPECT_THAT(said_of(pushed_axis(), 1e-3), HasSubstr("were the time 1000 times longer"));
+  EXPECT_THAT(said_of(pushed_axis(), 1.0 / 60.0), HasSubstr("were the time 60 times longer"));
 }
 
 TEST(Clock, RowsThatAreNoTicksOfTheControllerAreRefused) {
