@@ -157,6 +157,40 @@ std::vector<double> angles_of(const Case& data, const physics::Model& model, con
   return angles;
 }
 
+/// Is what a wave in time does to the machine, for the most part, a motion at its own frequency? What is faster than the
+/// machine also shakes friction loose, as the noise of the readings does, and then explains what noise made.
+bool acts_at_its_frequency(const Case& data, const physics::Model& model, std::size_t term) {
+  constexpr double turns = 5.0;  // in a block
+  const auto square = model.terms[term].info->index_of("squareness");
+  const double frequency = wave_of(model, model.terms[term]);
+  if (model.plant != physics::Plant::axis || !(frequency > 0.0) ||
+      (square < physics::most_parameters && model.terms[term].values[square] > 0.5))
+    return true;
+  const auto with = simulate(data, model), without = simulate(data, physics::without_term(model, term));
+  double own = 0.0, all = 0.0;  // of all outputs, each by what it leaves
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    double own_here = 0.0, all_here = 0.0, left = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& time = data.recordings[r].inputs.time;
+      for (std::size_t i = 0; i < time.size();) {
+        const double until = time[i] + turns / frequency;
+        const std::size_t begin = i;
+        std::complex<double> sum;
+        for (; i < time.size() && time[i] < until; ++i) {
+          const double e = with[r][o][i] - without[r][o][i];
+          all_here += e * e;
+          sum += e * std::polar(1.0, -2.0 * std::numbers::pi * frequency * time[i]);
+          if (const double rest = data.recordings[r].measured[o][i] - with[r][o][i]; std::isfinite(rest))
+            left += rest * rest;
+        }
+        own_here += 2.0 * std::norm(sum) / static_cast<double>(i - begin);
+      }
+    }
+    if (left > 0.0) own += own_here / left, all += all_here / left;
+  }
+  return own >= 0.5 * all;
+}
+
 /// Is what a sine explains a line, with one phase from beginning to end? A hum of the noise has a band, and what coarse
 /// steps make of a motion has another phase in every pass, however much evidence a sine in it gathers. Against the scatter
 /// of its amplitude from block to block (Fisher's F), strictly where that is more than rows without memory would make.
@@ -214,8 +248,10 @@ bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
     // F of 2 and 2 (n - 1) degrees of freedom and its tail.
     const double share = scatter > 0.0 ? n * std::norm(mean) / scatter : 1e300;
     const double by_chance = std::pow(1.0 + share, 1.0 - n), white = squares / rows * weights_squared;
+    // Mildly only where the evidence for it comes from its own frequency too, which was looked for among many.
     constexpr double strict = 1e-5, mild = 1e-2, louder = 2.0;
-    if (by_chance < (scatter < louder * white ? mild : strict)) return true;
+    if (by_chance < strict) return true;
+    if (by_chance < mild && scatter < louder * white && acts_at_its_frequency(data, model, term)) return true;
   }
   return false;
 }

@@ -56,6 +56,29 @@ Weighing weights_of(const Case& data, const Weighing& coloured, const Fit& whole
   return least_ratio(data, whole, again) < 0.97 ? weigh(data, simulate(data, whole.model), false) : coloured;
 }
 
+/// How many rows of what a model leaves are independent, as a share of them: of the output that has the least.
+double independent_share_of(const Case& data, const std::vector<physics::Outputs>& simulated) {
+  double share = 1.0;
+  for (std::size_t o = 0; data.is_time_series && o < data.outputs.size(); ++o) {
+    std::vector<std::vector<double>> left;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      auto& one = left.emplace_back(data.recordings[r].measured[o]);
+      for (std::size_t i = 0; i < one.size(); ++i) one[i] -= simulated[r][o][i];
+    }
+    share = std::min(share, independent_share(left));
+  }
+  return share;
+}
+
+/// The weights for a model that lacks something. What it leaves is no noise, whatever its colour, and goes on from row to row:
+/// counted in every one of them, a part of the recording would outweigh what the user believes, and lead astray elsewhere.
+Weighing weights_of_rival(const Case& data, const Fit& whole) {
+  const auto simulated = simulate(data, whole.model);
+  auto weights = weigh(data, simulated, false);
+  weights.temper *= independent_share_of(data, simulated);
+  return weights;
+}
+
 /// The outputs of the model fitted anew without the held-out rows. It begins where the whole recording put it: what is
 /// asked is whether the model holds where it was not fitted, not whether the search finds it again.
 std::vector<physics::Outputs> refitted(const Case& data, const Weighing& weights, std::size_t fold,
@@ -73,6 +96,9 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
   const auto for_retuned = d.is_partial ? d.weighing : weights_of(data, d.weighing, d.retuned);
   const auto for_best = any && !d.is_partial ? weights_of(data, d.weighing, d.best) : for_retuned;
   const int iterations = d.is_partial ? 1 : 6;  // who stopped it does not want to wait
+  // A claim must win by the weights of what it leaves itself; shown is the rival by those that suit it.
+  const bool differs = any && !d.is_partial;
+  const auto for_rival = differs ? weights_of_rival(data, d.retuned) : for_retuned;
   struct Sums {
     Squares before, retuned, after;
   };
@@ -82,10 +108,11 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     const auto fold = fold_of(data, d.weighing, k);
     const auto retuned = refitted(data, for_retuned, k, d.retuned, iterations);
     const auto after = any ? refitted(data, for_best, k, d.best, iterations) : retuned;
+    const auto rival = differs ? refitted(data, for_rival, k, d.retuned, iterations) : retuned;
     for (const bool test : {true, false}) {
       const auto& on = test ? fold.test : fold.train;
       auto& sums = test ? tested : trained;
-      const auto before = squares_left(recorded, nominal, on), without = squares_left(recorded, retuned, on),
+      const auto before = squares_left(recorded, nominal, on), without = squares_left(recorded, rival, on),
                  with = squares_left(recorded, after, on);
       for (std::size_t o = 0; o < sums.size(); ++o)
         sums[o].before += before[o], sums[o].retuned += without[o], sums[o].after += with[o];
