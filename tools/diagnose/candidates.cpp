@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <numbers>
 #include <set>
 
@@ -23,6 +24,16 @@ constexpr auto none = physics::most_parameters;
 
 bool has(const Case& data, const char* name) { return data.recordings.front().inputs.find(name) != nullptr; }
 
+/// Does an input take values that differ by more than a thousandth of their size?
+bool varies(const Case& data, const char* name) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const auto& recording : data.recordings)
+    if (const auto* values = recording.inputs.find(name))
+      for (const double v : *values)
+        if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  return high - low > 1e-3 * std::max(std::abs(low), std::abs(high));
+}
+
 /// Does anything in the recordings let this term show?
 bool may_show(const Case& data, const physics::Model& model, const TermInfo& info) {
   const auto name = info.name;
@@ -41,7 +52,8 @@ bool may_show(const Case& data, const physics::Model& model, const TermInfo& inf
         return has(data, "temperature") && data.model.find("expansion") == nullptr;
       if (name == "heating_rate_lag") return has(data, "temperature") && expands;
       if (name == "refractive_index") return has(data, "pressure");
-      if (name == "abbe_offset") return has(data, "offset");
+      // Beside one offset a tilt is any course over the position.
+      if (name == "abbe_offset") return varies(data, "offset");
       return true;
     }
     case Plant::droplet:

@@ -18,9 +18,10 @@ namespace {
 
 constexpr double travel = 0.2, noise = 2e-7;
 
-physics::Model straight_axis() {
+physics::Model straight_axis(const std::string& more_columns = "") {
   return test::model_of(
-      "invar_model: 1\nplant: error_map\ncolumns: {time: t, position: x, error: e}\n"
+      "invar_model: 1\nplant: error_map\ncolumns: {time: t, position: x, error: e" + more_columns +
+      "}\n"
       "baseline: {positions: [0, 0.05, 0.1, 0.15, 0.2], errors: [0, 0, 0, 0, 0]}\n"
       "parameters: {reference_temperature: {value: 20, unit: degC, sigma: 0.1}}\nterms: []\n");
 }
@@ -68,6 +69,25 @@ TEST(ErrorMaps, AConstantIsNoPlayWhereAllPointsWereApproachedFromOneSide) {
   auto data = calibrated(8e-7, false, 12);
   const auto d = search(data, [](double, const std::string&) {});
   for (const auto& finding : d.findings) EXPECT_NE(finding.term.info->name, "backlash");
+}
+
+TEST(ErrorMaps, ABendBesideOneOffsetIsNoTilt) {
+  const auto level = calibrated(0.0, true, 25);
+  const auto& recording = level.recordings.front();
+  const auto& at = *recording.inputs.find("position");
+  auto error = recording.measured.front();
+  for (std::size_t i = 0; i < at.size(); ++i) error[i] += 8e-6 * std::sin(M_PI * at[i] / travel);
+  recording::Table table;
+  table.add("t", "s", recording.inputs.time);
+  table.add("x", "m", at);
+  table.add("e", "m", error);
+  table.add("beside", "m", std::vector<double>(at.size(), 0.044));
+  auto data = make_case(straight_axis(", offset: beside"), {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_FALSE(d.findings.empty());
+  EXPECT_EQ(d.findings[0].term.info->name, "sag");
+  EXPECT_NEAR(std::abs(d.findings[0].term.values[0]), 8e-6, 1e-6);  // a parabola, not a sine
+  for (const auto& finding : d.findings) EXPECT_NE(finding.term.info->name, "abbe_offset");
 }
 
 /// Two days of points all over the travel; the shop warms and cools by 2 K. `error` of time [s] and warmth [K].
