@@ -33,10 +33,11 @@ double odds_of_other_site(const Finding& finding) {
   return std::exp(0.5 * (is_current ? price : -price));
 }
 
+/// By a lag or by a delay: an instrument's latency is the name of either.
 bool comes_late(const Term& term) {
   const auto name = term.info->name;
   return name == "lag" || name == "delay" || name == "amplifier_lag" || name == "transport_delay" ||
-         name == "measurement_delay" || name == "sensor_lag" || name == "latency";
+         name == "measurement_delay" || name == "sensor_lag";
 }
 
 /// A lag and a delay of one time T differ by (s T)^2 / 2 and more: how plainly would the recording show that?

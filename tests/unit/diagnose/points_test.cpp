@@ -343,9 +343,13 @@ TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
       23);
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_EQ(names_of(d), (std::set<std::string>{"hysteresis", "latency"}));
-  for (const auto& finding : d.findings)
+  for (const auto& finding : d.findings) {
     EXPECT_NEAR(finding.term.values[0], finding.term.info->name == "latency" ? 3e-5 : 1e-7,
                 finding.term.info->name == "latency" ? 3e-7 : 1e-8);
+    if (finding.term.info->name == "latency") {
+      EXPECT_GT(finding.probability, 0.9);
+    }
+  }
 }
 
 // At one speed there and back, what is late stands behind by as much as play holds back, and turns with the direction too.
