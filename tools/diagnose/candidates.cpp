@@ -358,10 +358,10 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   std::vector<Choice> choices;
   switch (data.model.plant) {
     case Plant::axis:
-      // Coarse knots lie among the fine ones: their columns cost nothing more.
-      choices = {{"force", "position", 11},
-                 {"force", "position", 31},
-                 {"force", "position", 61},
+      // Of friction and damping coarse knots lie among the fine ones: their columns cost nothing more.
+      choices = {{"force", "position", 10},
+                 {"force", "position", 28},
+                 {"force", "position", 60},
                  {"force", "position", 11, "direction"},
                  {"force", "position", 31, "direction"},
                  {"force", "position", 11, "velocity"},
@@ -399,7 +399,12 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       break;
   }
   std::vector<Start> starts;
+  // Beside a law of friction that was found, a course along the way would only take over what the law does.
+  const bool has_law = std::any_of(
+      fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
+      fitted.model.terms.end(), [](const Term& term) { return term.info->name.ends_with("_friction"); });
   for (const auto& choice : choices) {
+    if (has_law && choice.with[0] != '\0') continue;
     std::vector<double> all;
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto values = variable_values(data, r, choice.over);

@@ -47,8 +47,8 @@ std::size_t finer_than(const std::vector<Start>& starts, std::size_t start) {
     const auto& other = starts[i].term;
     const auto& knots = other.curve.knots;
     if (other.info != own.info || other.on != own.on || other.with != own.with ||
-        other.curve.over != own.curve.over || own.curve.knots.empty() || own.curve.period > 0.0 ||
-        other.curve.period > 0.0 || starts[i].step != starts[start].step ||
+        other.curve.over != own.curve.over || own.with.empty() || own.curve.knots.empty() ||
+        own.curve.period > 0.0 || other.curve.period > 0.0 || starts[i].step != starts[start].step ||
         knots.size() <= starts[finest].term.curve.knots.size())
       continue;
     const double near = 1e-9 * (knots.back() - knots.front());
