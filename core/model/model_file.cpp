@@ -294,6 +294,11 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
   }
   term.on = node.text("on", node.text("node", ""));
   term.with = node.text("with", "");
+  if (model.plant == Plant::axis && !term.with.empty() &&
+      (name != "unmodelled" || term.info->site != "force" ||
+       (term.with != "direction" && term.with != "velocity")))
+    node["with"].fault("only an unmodelled force goes with something, `direction` or `velocity`",
+                       "`direction`: its curve is dry friction; `velocity`: damping; leave it out: a force");
   if (node.has("between")) {
     const auto pair = node["between"].as_texts();
     if (pair.size() == 2) term.on = pair[0], term.with = pair[1];
@@ -373,6 +378,7 @@ YAML::Node term_yaml(const Term& term, const Model& model) {
     if (!term.on.empty()) node["on"] = term.on;
     if (!term.with.empty()) node["with"] = term.with;
   }
+  if (model.plant == Plant::axis && !term.with.empty()) node["with"] = term.with;
   if (!term.curve.knots.empty()) {
     node["site"] = std::string{term.info->site};
     node["over"] = term.curve.over;

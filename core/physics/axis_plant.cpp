@@ -39,8 +39,13 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
     if (!term.curve.knots.empty()) {
       auto& curves = term.kind->info->site == "actuator"      ? motor_curves_
                      : term.kind->info->site == "measurement" ? reading_curves_
+                     : term.acts == CurveActs::as_friction    ? friction_curves_
+                     : term.acts == CurveActs::as_damping     ? damping_curves_
                                                               : force_curves_;
       curves.emplace_back(&term, code_of(term.curve.over));
+      if (term.acts == CurveActs::as_damping)
+        for (const double damping : term.curve.values)
+          fastest = std::max(fastest, (parameters.viscous_damping + std::abs(damping)) / parameters.mass);
     }
     switch (term.kind->memory) {
       case AxisMemory::none:
@@ -135,6 +140,7 @@ inline double AxisPlant::pushed(const AxisPoint& at) const noexcept {
                  outside_force_;
   for (const auto& effect : forces_) force += effect.function(at, effect.parameters);
   for (const auto& [term, code] : force_curves_) force += term->curve(variable(code, at));
+  for (const auto& [term, code] : damping_curves_) force -= term->curve(variable(code, at)) * at.velocity;
   for (std::size_t i = 0; i < bristles_.size(); ++i) {
     const auto* p = bristles_[i]->parameters.data();
     force -= PreslidingFriction::force(
@@ -143,19 +149,21 @@ inline double AxisPlant::pushed(const AxisPoint& at) const noexcept {
   return force;
 }
 
-inline double AxisPlant::held(double speed) const noexcept {
+inline double AxisPlant::held(const AxisPoint& at, double speed) const noexcept {
   double friction = 0.0;
   for (const auto& effect : frictions_) friction += effect.function(speed, effect.parameters);
-  return friction;
+  if (friction_curves_.empty()) return friction;
+  for (const auto& [term, code] : friction_curves_) friction += term->curve(variable(code, at));
+  return std::max(0.0, friction);  // what is less here than elsewhere pushes nothing
 }
 
 double AxisPlant::push(const AxisPoint& at) const noexcept { return pushed(at); }
-double AxisPlant::hold(double speed) const noexcept { return held(speed); }
+double AxisPlant::hold(const AxisPoint& at, double speed) const noexcept { return held(at, speed); }
 
 AxisPlant::Slope AxisPlant::slope(const State& s, double time, double direction, bool stuck) const noexcept {
   const AxisPoint at{time, s.position, s.velocity, current_mean_, temperature_};
   double force = push(at);
-  if (direction != 0.0) force -= direction * hold(std::abs(s.velocity));
+  if (direction != 0.0) force -= direction * hold(at, std::abs(s.velocity));
   const double spring =
       mode_.stiffness * s.swing + mode_.damping * s.swing_speed;  // pulls the carriage along
   const double carriage = stuck ? 0.0 : (force + spring) / (parameters_.mass * (1.0 - mode_.share));
@@ -167,8 +175,9 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
   if (mode_.share > 0.0) return advanced_with_mode(s, h, direction, stuck);
   const auto acceleration = [&](double position, double velocity, double time) {
     if (stuck) return 0.0;
-    double force = pushed({time, position, velocity, current_mean_, temperature_});
-    if (direction != 0.0) force -= direction * held(std::abs(velocity));
+    const AxisPoint at{time, position, velocity, current_mean_, temperature_};
+    double force = pushed(at);
+    if (direction != 0.0) force -= direction * held(at, std::abs(velocity));
     return force / parameters_.mass;
   };
   const double half = 0.5 * h, middle = time_ + half;
@@ -210,7 +219,7 @@ void AxisPlant::follow(double position) noexcept {
 }
 
 void AxisPlant::move(double h) noexcept {
-  const bool dry = !frictions_.empty();
+  const bool dry = !frictions_.empty() || !friction_curves_.empty();
   // A sub-step may hold a reversal or two; what is left after eight events is done in one go.
   for (int events = 0; h > 0.0 && events < 8; ++events) {
     const State now{position_, velocity_, swing_, swing_speed_};
@@ -219,9 +228,10 @@ void AxisPlant::move(double h) noexcept {
     if (dry) {
       direction = velocity_ > 0.0 ? 1.0 : (velocity_ < 0.0 ? -1.0 : 0.0);
       if (direction == 0.0) {
-        double force = push({time_, position_, 0.0, current_mean_, temperature_});
+        const AxisPoint at{time_, position_, 0.0, current_mean_, temperature_};
+        double force = push(at);
         if (mode_.share > 0.0) force += mode_.stiffness * swing_ + mode_.damping * swing_speed_;
-        stuck = std::abs(force) <= hold(0.0);
+        stuck = std::abs(force) <= hold(at, 0.0);
         if (!stuck) direction = force > 0.0 ? 1.0 : -1.0;
       }
     }

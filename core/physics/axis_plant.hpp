@@ -15,11 +15,15 @@ struct AxisParameters {
   double viscous_damping = 0.0;  // [N s/m]
 };
 
+/// What the curve of an `unmodelled` force is: a force [N], dry friction [N] against the motion, or damping [N s/m].
+enum class CurveActs { as_force, as_friction, as_damping };
+
 /// A term with its numbers, in the order of its info.
 struct AxisTerm {
   const AxisTermKind* kind = nullptr;
   std::array<double, most_parameters> parameters{};
   Curve curve{};  // only of an `unmodelled` term: a force [N] (or relative motor force) over one variable
+  CurveActs acts = CurveActs::as_force;
 };
 
 /// The truth side of an axis: `world` steps one at the loop's rate, `simulate` one for each recording. The
@@ -63,7 +67,7 @@ class AxisPlant {
 
   /// For feedforward: all forces on the carriage in a motion, dry friction against `direction` (+1, -1, 0) included [N].
   [[nodiscard]] double force(const AxisPoint& at, double direction) const noexcept {
-    return push(at) - direction * hold(direction * at.velocity);
+    return push(at) - direction * hold(at, direction * at.velocity);
   }
   /// For feedforward: goes to a position in no time; bristles bend on the way. Real-time.
   void follow(double position) noexcept;
@@ -106,10 +110,10 @@ class AxisPlant {
   using NumberEffect = Effect<double (*)(double, const double*)>;
 
   [[nodiscard]] double variable(int code, const AxisPoint& at) const noexcept;
-  [[nodiscard]] double push(const AxisPoint& at) const noexcept;    // all forces but dry friction and swing
-  [[nodiscard]] double hold(double speed) const noexcept;           // dry friction
+  [[nodiscard]] double push(const AxisPoint& at) const noexcept;  // all forces but dry friction and swing
+  [[nodiscard]] double hold(const AxisPoint& at, double speed) const noexcept;  // dry friction
   [[nodiscard]] double pushed(const AxisPoint& at) const noexcept;  // the same two for the innermost loop
-  [[nodiscard]] double held(double speed) const noexcept;
+  [[nodiscard]] double held(const AxisPoint& at, double speed) const noexcept;
   [[nodiscard]] Slope slope(const State& s, double time, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced(const State& s, double h, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced_with_mode(const State& s, double h, double direction,
@@ -123,7 +127,8 @@ class AxisPlant {
   std::vector<PointEffect> forces_, motors_;
   std::vector<NumberEffect> frictions_, readings_;
   std::vector<const AxisTerm*> commands_, bristles_;
-  std::vector<std::pair<const AxisTerm*, int>> force_curves_, motor_curves_, reading_curves_;
+  std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_,
+      motor_curves_, reading_curves_;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;
   Mode mode_{};

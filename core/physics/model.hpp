@@ -33,8 +33,10 @@ struct Term {
   std::array<std::optional<double>, most_parameters> sigmas{};
   std::array<bool, most_parameters> given{};  // written in the file; the others stand at their defaults
   std::string on;                             // thermal: the node; equations: the state, input or output
-  std::string with;  // thermal coupling: the other node; equations: what it couples to
-  Curve curve;       // `unmodelled` alone
+  std::string
+      with;  // thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis:
+             // "direction" where its curve is dry friction, "velocity" where it is damping
+  Curve curve;  // `unmodelled` alone
 };
 
 /// One signal of the plant and the column that records it.

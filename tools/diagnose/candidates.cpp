@@ -323,19 +323,66 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   return starts;
 }
 
+namespace {
+
+double rms_of(const std::vector<std::vector<double>>& series) {
+  double square = 0.0, rows = 0.0;
+  for (const auto& one : series)
+    for (const double v : one)
+      if (std::isfinite(v)) square += v * v, rows += 1.0;
+  return rows > 0.0 ? std::sqrt(square / rows) : 0.0;
+}
+
+/// [m/s]
+double usual_speed(const Case& data) {
+  std::vector<std::vector<double>> all;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    all.push_back(variable_values(data, r, "velocity"));
+  return std::max(1e-9, rms_of(all));
+}
+
+/// How much force the motor of an axis gives beyond what the model asks for [N]; without controller a hundredth of all.
+double missing_force(const Case& data, const Fit& fitted) {
+  const auto simulated = simulate(data, fitted.model);
+  std::vector<std::vector<double>> all;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    auto& left = all.emplace_back(variable_values(data, r, "current"));
+    for (std::size_t o = 0; o < data.outputs.size(); ++o)
+      if (data.outputs[o] == "current") {
+        left = data.recordings[r].measured[o];
+        for (std::size_t i = 0; i < left.size(); ++i) left[i] -= simulated[r][o][i];
+      }
+  }
+  const double share = data.model.controller ? 1.0 : 0.01;
+  return std::max(1e-9, share * fitted.model.value("motor_constant", 1.0) * rms_of(all));
+}
+
+}  // namespace
+
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   if (data.model.plant == Plant::equations) return equation_curves(data, fitted.model);
   struct Choice {
     const char* site;
     const char* over;
     std::size_t knots;
+    const char* with = "";
   };
   std::vector<Choice> choices;
   switch (data.model.plant) {
     case Plant::axis:
-      choices = {{"force", "position", 10},  {"force", "position", 28},     {"force", "position", 60},
-                 {"force", "velocity", 12},  {"force", "time", 12},         {"force", "temperature", 6},
-                 {"actuator", "current", 9}, {"actuator", "temperature", 5}};
+      // Of friction and damping coarse knots lie among the fine ones: their columns cost nothing more.
+      choices = {{"force", "position", 10},
+                 {"force", "position", 28},
+                 {"force", "position", 60},
+                 {"force", "position", 11, "direction"},
+                 {"force", "position", 31, "direction"},
+                 {"force", "position", 11, "velocity"},
+                 {"force", "position", 31, "velocity"},
+                 {"force", "velocity", 12},
+                 {"force", "time", 12},
+                 {"force", "temperature", 6},
+                 {"actuator", "current", 9},
+                 {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:
@@ -364,7 +411,12 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       break;
   }
   std::vector<Start> starts;
+  // Beside a law of friction that was found, a course along the way would only take over what the law does.
+  const bool has_law = std::any_of(
+      fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
+      fitted.model.terms.end(), [](const Term& term) { return term.info->name.ends_with("_friction"); });
   for (const auto& choice : choices) {
+    if (has_law && choice.with[0] != '\0') continue;
     std::vector<double> all;
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto values = variable_values(data, r, choice.over);
@@ -382,6 +434,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       Start start;
       start.term.info = physics::unmodelled(data.model.plant, choice.site);
       start.term.on = place;
+      start.term.with = choice.with;
       start.term.curve.over = choice.over;
       for (std::size_t k = 0; k < choice.knots; ++k) {
         const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
@@ -396,6 +449,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
       if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
         start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
+      if (!start.term.with.empty())
+        start.step =
+            0.1 * missing_force(data, fitted) / (start.term.with == "velocity" ? usual_speed(data) : 1.0);
       starts.push_back(std::move(start));
     }
   }

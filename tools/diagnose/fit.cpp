@@ -58,6 +58,9 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
     f.bounds = parameter.bounds;
     free.push_back(f);
   }
+  const bool has_friction = std::any_of(model.terms.begin(), model.terms.end(), [](const auto& term) {
+    return term.info->name.ends_with("_friction");
+  });
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto& term = model.terms[t];
     const bool is_nominal = t < believed.terms.size();
@@ -68,6 +71,8 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
       Freedom f;
       f.where = Freedom::Where::curve, f.term = t, f.index = i;
       f.scale = std::max(0.1 * size, 1e-12);
+      if (term.with == "direction" && model.plant == physics::Plant::axis && !has_friction)
+        f.bounds.lower = 0.0;  // friction takes energy
       f.sigma = term.curve.usual > 0.0 ? size : 30.0 * std::max(size, 1e-11);
       free.push_back(f);
     }
@@ -133,7 +138,8 @@ namespace {
 bool same_term(const Model& a, const Model& b, std::size_t term) {
   if (term >= a.terms.size() || term >= b.terms.size()) return false;
   const auto &one = a.terms[term], &other = b.terms[term];
-  return one.info == other.info && one.on == other.on && one.curve.knots == other.curve.knots;
+  return one.info == other.info && one.on == other.on && one.with == other.with &&
+         one.curve.knots == other.curve.knots;
 }
 
 /// The sensitivities of `free`, as far as possible those of `near`.
@@ -226,6 +232,8 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   best.model = start;
   best.free = freedoms(start, believed);
   if (data.model.plant == physics::Plant::thermal) keep_reached(data, start, best.free);
+  for (const auto& f : best.free)  // first order does not know that friction takes energy
+    if (f.where == Freedom::Where::curve) set(best.model, f, f.bounds.clamp(get(best.model, f)));
   const auto n = static_cast<Eigen::Index>(best.free.size());
   const auto priors = [&](const Model& model) {
     double sum = 0.0;

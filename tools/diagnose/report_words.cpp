@@ -31,7 +31,10 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
-    if (data.model.plant == physics::Plant::sensor && !term.with.empty()) names.push_back(term.with);
+    const bool goes_with =
+        data.model.plant == physics::Plant::sensor || data.model.plant == physics::Plant::axis;
+    if (goes_with && !term.with.empty()) names.push_back(term.with);
+    if (term.with == "direction") names.emplace_back("velocity");  // whose sign it is
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
     if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
@@ -79,7 +82,8 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
   using physics::Plant;
   switch (data.model.plant) {
     case Plant::axis:
-      return term.info->site == "force" ? "N" : term.info->site == "measurement" ? "m" : "1";
+      if (term.info->site == "force") return term.with == "velocity" ? "N s/m" : "N";
+      return term.info->site == "measurement" ? "m" : "1";
     case Plant::thermal:
       return term.info->site == "loss" ? "W/K" : "W";
     case Plant::error_map:
@@ -162,6 +166,8 @@ std::string place_of(const Case& data, const physics::Term& term) {
   for (const auto& one : known)
     if (site == one.site) text = one.words;
   if (!term.on.empty()) text += " of " + term.on;
+  if (!term.with.empty() && data.model.plant == physics::Plant::axis)
+    return term.with == "direction" ? "dry friction of the carriage" : "damping of the carriage";
   if (!term.with.empty()) text += " and " + term.with;
   return text;
 }

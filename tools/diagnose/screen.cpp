@@ -39,12 +39,57 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   return n;
 }
 
-/// Of all directions of all starts, one after another: terms of one kind at one place run together.
+/// The start among `starts` whose curve has every knot of that of `start` and more; none: `start` itself.
+std::size_t finer_than(const std::vector<Start>& starts, std::size_t start) {
+  const auto& own = starts[start].term;
+  std::size_t finest = start;
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const auto& other = starts[i].term;
+    const auto& knots = other.curve.knots;
+    if (other.info != own.info || other.on != own.on || other.with != own.with ||
+        other.curve.over != own.curve.over || own.with.empty() || own.curve.knots.empty() ||
+        own.curve.period > 0.0 || other.curve.period > 0.0 || starts[i].step != starts[start].step ||
+        knots.size() <= starts[finest].term.curve.knots.size())
+      continue;
+    const double near = 1e-9 * (knots.back() - knots.front());
+    const bool has_all = own.curve.knots.front() <= knots.front() + near &&
+                         own.curve.knots.back() >= knots.back() - near &&
+                         std::all_of(own.curve.knots.begin(), own.curve.knots.end(), [&](double at) {
+                           return std::any_of(knots.begin(), knots.end(),
+                                              [&](double knot) { return std::abs(knot - at) <= near; });
+                         });
+    if (has_all) finest = i;
+  }
+  return finest;
+}
+
+/// What each direction of a curve is of those of a finer one.
+Eigen::MatrixXd shares_of(const Start& start, const Start& finer) {
+  const auto& knots = finer.term.curve.knots;
+  Eigen::MatrixXd shares{static_cast<Eigen::Index>(finer.directions.size()),
+                         static_cast<Eigen::Index>(start.directions.size())};
+  auto curve = start.term.curve;
+  for (std::size_t d = 0; d < start.directions.size(); ++d) {
+    curve.values.assign(curve.knots.size(), 0.0);
+    curve.values[start.directions[d].knot] = 1.0;
+    for (std::size_t f = 0; f < finer.directions.size(); ++f)
+      shares(static_cast<Eigen::Index>(f), static_cast<Eigen::Index>(d)) =
+          curve(knots[finer.directions[f].knot]);
+  }
+  return shares;
+}
+
+/// Of all directions of all starts, one after another: terms of one kind at one place run together. A curve of few knots is
+/// the sum of one of many that has them too.
 std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at,
                                         const std::vector<Start>& starts) {
   std::vector<physics::Model> models;
   std::vector<double> steps;
-  for (const auto& start : starts)
+  std::vector<std::size_t> source;
+  for (std::size_t i = 0; i < starts.size(); ++i) source.push_back(finer_than(starts, i));
+  for (std::size_t s = 0; s < starts.size(); ++s) {
+    if (source[s] != s) continue;
+    const auto& start = starts[s];
     for (const auto& direction : start.directions) {
       auto& model = models.emplace_back(base.model);
       Term term = start.term;
@@ -69,17 +114,22 @@ std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const
       model.terms.push_back(std::move(term));
       steps.push_back(by);
     }
+  }
   const Eigen::MatrixXd differences = differences_of(data, models);
-  std::vector<Eigen::MatrixXd> all;
+  std::vector<Eigen::MatrixXd> all(starts.size());
   Eigen::Index next = 0;
-  for (const auto& start : starts) {
-    auto& columns = all.emplace_back(at.size(), static_cast<Eigen::Index>(start.directions.size()));
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    if (source[i] != i) continue;
+    auto& columns = all[i];
+    columns.resize(at.size(), static_cast<Eigen::Index>(starts[i].directions.size()));
     for (Eigen::Index d = 0; d < columns.cols(); ++d, ++next)
       columns.col(d) =
           ((differences.col(next) - at) / steps[static_cast<std::size_t>(next)]).unaryExpr([](double v) {
             return std::isfinite(v) ? v : 0.0;
           });
   }
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    if (source[i] != i) all[i] = all[source[i]] * shares_of(starts[i], starts[source[i]]);
   return all;
 }
 

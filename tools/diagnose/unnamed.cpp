@@ -36,7 +36,8 @@ void sharpen(const Case& data, Curved& found) {
   constexpr int count = 18;
   for (int k = 0; k < count; ++k) {
     fine.knots.push_back(low + (high - low) * k / (count - 1));
-    fine.values.push_back(curve(fine.knots.back()) - level);
+    const bool is_force = model.terms.back().with.empty();  // friction and damping are everywhere
+    fine.values.push_back(curve(fine.knots.back()) - (is_force ? level : 0.0));
   }
   auto rough = fit(data, weighing, model, data.model, 4);
   const Weighing own = weigh(data, simulate(data, rough.model));

@@ -29,6 +29,8 @@ struct Axis {
   double noise = 2.3e-8;                                                     // of the encoder [m]
   double bristles = 0.0, stiffness = 1e4;                                    // Dahl's friction [N], [N/m]
   double reach = 0.02;                                                       // of the moves [m]
+  std::function<double(double place)> rub = [](double) { return 0.0; };      // dry friction there [N]
+  std::function<double(double place)> grease = [](double) { return 0.0; };   // damping there [N s/m]
   double far = 0.0;     // place to which the third move goes [m]; 0: as the others
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
@@ -67,15 +69,16 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
       }
-      if (v == 0.0 && std::abs(given) <= axis.friction + axis.excess) continue;
+      const double dry = axis.friction + axis.rub(x), damps = damping + axis.grease(x);
+      if (v == 0.0 && std::abs(given) <= dry + axis.excess) continue;
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
       const auto slows = [&](double speed) {
-        const double held = axis.friction + axis.excess * std::exp(-std::pow(speed / axis.fades, 2));
-        return (given - damping * speed - way * held) / mass;
+        const double held = dry + axis.excess * std::exp(-std::pow(speed / axis.fades, 2));
+        return (given - damps * speed - way * held) / mass;
       };
       const double a = slows(v), b = slows(v + h * a), next = v + 0.5 * h * (a + b);
       x += h * (v + 0.5 * h * a);
-      v = axis.friction > 0.0 && next * way < 0.0 ? 0.0 : next;
+      v = dry > 0.0 && next * way < 0.0 ? 0.0 : next;
     }
   }
   recording::Table table;
@@ -211,6 +214,33 @@ TEST(AxisLoop, AnEncoderThatReadsWrongInOnePlaceIsSeenToDoSo) {
   EXPECT_EQ(d.findings[0].term.info->site, "measurement");
   EXPECT_EQ(curve.over, "position");
   EXPECT_NEAR(curve(0.004) - 0.5 * (curve(-0.002) + curve(0.010)), 3e-7, 1e-7);
+}
+
+TEST(AxisLoop, FrictionInOneStretchIsFoundThereAndNowhereElse) {
+  Axis axis;
+  axis.rub = [](double x) { return x > 0.002 && x < 0.008 ? 0.8 : 0.0; };
+  const auto d = searched(recorded(axis, 0.05, 7));
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  EXPECT_EQ(term.with, "direction");
+  EXPECT_EQ(term.curve.over, "position");
+  EXPECT_NEAR(term.curve(0.005), 0.8, 0.2);
+  EXPECT_NEAR(term.curve(-0.005), 0.0, 0.1);
+  EXPECT_NEAR(term.curve(0.015), 0.0, 0.1);
+}
+
+TEST(AxisLoop, DampingInOneStretchIsFoundThereAndNowhereElse) {
+  Axis axis;
+  axis.grease = [](double x) { return x > 0.002 && x < 0.008 ? 20.0 : 0.0; };
+  const auto d = searched(recorded(axis, 0.05, 7));
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  EXPECT_EQ(term.with, "velocity");
+  EXPECT_EQ(term.curve.over, "position");
+  EXPECT_NEAR(term.curve(0.005) - term.curve(-0.005), 20.0, 5.0);
+  EXPECT_NEAR(term.curve(0.015) - term.curve(-0.005), 0.0, 4.0);
 }
 
 /// The model with a term more.

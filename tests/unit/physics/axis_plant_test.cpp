@@ -28,6 +28,10 @@ AxisTerm term(std::string_view name, std::array<double, most_parameters> paramet
   return {axis_kind(*find_term(Plant::axis, name)), parameters, {}};
 }
 
+AxisTerm course(CurveActs acts, Curve curve) {
+  return {axis_kind(*unmodelled(Plant::axis, "force")), {}, std::move(curve), acts};
+}
+
 TEST(AxisPlant, ApproachesItsTerminalSpeedLikeAFirstOrderLag) {
   AxisPlant axis{{2.0, 10.0, 4.0}, {}};
   for (int i = 0; i < 500; ++i) axis.step(1.0, 1e-3);
@@ -47,6 +51,32 @@ TEST(AxisPlant, DryFrictionStopsAMassAfterTheWayOfItsEnergyAndHoldsIt) {
   EXPECT_EQ(axis.position(), rest);
   for (int i = 0; i < 100; ++i) axis.step(-0.31, 1e-3);  // 0.1 N more than friction
   EXPECT_NEAR(axis.position() - rest, -0.5 * 0.05 * 0.01, 1e-9);
+}
+
+TEST(AxisPlant, FrictionInOneStretchTakesItsEnergyThereWhereverTheCarriageComesFrom) {
+  const Curve rough{"position", {0.1, 0.2, 0.3}, {0.0, 3.0, 0.0}};  // 0.3 J along the way
+  for (const double way : {1.0, -1.0}) {
+    AxisPlant axis{{2.0, 10.0, 0.0}, {course(CurveActs::as_friction, rough)}};
+    axis.rest_at(way > 0.0 ? 0.0 : 0.4);
+    axis.set_velocity(way);
+    for (int i = 0; i < 1000; ++i) axis.step(0.0, 1e-3);
+    EXPECT_NEAR(axis.velocity(), way * std::sqrt(1.0 - 0.3), 1e-6);
+  }
+  AxisPlant axis{{2.0, 10.0, 0.0}, {course(CurveActs::as_friction, rough)}};
+  axis.rest_at(0.2);
+  for (int i = 0; i < 100; ++i) axis.step(0.29, 1e-3);  // 2.9 N pushes, 3 N holds
+  EXPECT_EQ(axis.position(), 0.2);
+}
+
+TEST(AxisPlant, DampingInOneStretchTakesItsAreaOverTheMassOfTheSpeed) {
+  const Curve thick{"position", {0.1, 0.2, 0.3}, {0.0, 4.0, 0.0}};  // 0.4 N s along the way
+  for (const double way : {1.0, -1.0}) {
+    AxisPlant axis{{2.0, 10.0, 0.0}, {course(CurveActs::as_damping, thick)}};
+    axis.rest_at(way > 0.0 ? 0.0 : 0.4);
+    axis.set_velocity(way);
+    for (int i = 0; i < 1000; ++i) axis.step(0.0, 1e-3);
+    EXPECT_NEAR(axis.velocity(), way * 0.8, 1e-6);
+  }
 }
 
 TEST(AxisPlant, StribeckFrictionNeedsItsStaticForceToBreakAway) {
