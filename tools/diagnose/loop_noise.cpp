@@ -194,6 +194,17 @@ double LoopNoise::take_off(const physics::Model& model) {
   return untold / rows;
 }
 
+std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model) const {
+  auto mean = simulate(data_, model);
+  const auto position = fed_back(data_);
+  if (!position) return mean;
+  const auto off = softened(data_, recorded_, model, *position);
+  for (std::size_t r = 0; r < off.size(); ++r)
+    for (std::size_t o = 0; o < off[r].size(); ++o)
+      for (std::size_t i = 0; i < off[r][o].size(); ++i) mean[r][o][i] += off[r][o][i];
+  return mean;
+}
+
 bool LoopNoise::shows(const physics::Model& with, const physics::Model& without, double ratio) const {
   const auto position = fed_back(data_);
   if (!position) return true;

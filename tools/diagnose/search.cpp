@@ -19,6 +19,7 @@
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/quiet_inputs.hpp"
 #include "tools/diagnose/screen.hpp"
+#include "tools/diagnose/shaken_loose.hpp"
 #include "tools/diagnose/steps.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/unsure.hpp"
@@ -45,6 +46,8 @@ bool settled(const Model& before, const Model& now) {
   return true;
 }
 
+bool is_friction(const Term& term) { return term.info->name.find("friction") != std::string_view::npos; }
+
 /// By how many of the user's sigmas his numbers moved at most.
 double excursion_of(const Fit& fit) {
   double most = 0.0;
@@ -68,6 +71,9 @@ class Search {
   bool add_named(double round);
   /// Two terms at once, where neither does anything alone. `rival`: what the search one by one came to.
   bool add_pair(const Fit* rival = nullptr);
+  /// Claims friction, play or a dead zone that the noise shakes loose, where it explains more than what leads without noise
+  /// (null: nothing does). Where that is the same, it gets its size under noise and is left to be claimed.
+  bool take_shaken(const Fit& base, Fit* otherwise);
   /// Names one by one, weighed against each other, on top of what is claimed.
   void name(int first_round);
   /// What has no name, what holds on held-out stretches, and the verdict.
@@ -272,6 +278,7 @@ bool Search::add_named(double round) {
         own_weighing = std::move(one.weighing), own_fit = std::move(one.with),
         own_base = std::move(one.without);
       }
+    if (coloured && take_shaken(base, best_gain < margin() ? nullptr : &own_fit)) return true;
     if (best_gain < margin()) {
       for (const auto& f : fits)
         d_.reject(std::string{f.model.terms.back().info->name},
@@ -315,6 +322,40 @@ bool Search::add_named(double round) {
     return true;
   }
   return false;
+}
+
+bool Search::take_shaken(const Fit& base, Fit* otherwise) {
+  if (!options_.refuses) return false;
+  const auto found = shaken_loose(data_, *noise_, d_.weighing, base, options_.without);
+  if (!found || found->gain < (rivals_.empty() ? 1.0 : plainly) * margin()) return false;
+  if (otherwise != nullptr) {
+    const double numbers =
+                     static_cast<double>(otherwise->free.size()) - static_cast<double>(base.free.size()),
+                 rows = std::max(10.0, found->weighing.temper * static_cast<double>(base.residual.size())),
+                 gain = noise_->gain(otherwise->model, found->without, found->weighing) -
+                        0.5 * numbers * std::log(rows);
+    if (gain > found->gain) return false;
+    const auto &term = otherwise->model.terms.back(), &own = found->model.terms.back();
+    if (term.info == own.info) {
+      otherwise->model = found->model;
+      return false;
+    }
+    if (is_friction(term) && is_friction(own)) return false;  // of the laws the ordinary way decides
+  }
+  const auto without = d_;
+  const auto readings = noise_->now();
+  d_.best.model = found->model;
+  (void)quieten();
+  if (!stands(data_, d_.best, d_.best.model.terms.size() - 1)) {
+    d_ = without;
+    noise_->put(readings);
+    return false;
+  }
+  rivals_.emplace_back();
+  if (otherwise != nullptr)
+    d_.reject(std::string{otherwise->model.terms.back().info->name},
+              "what the noise shakes loose explains the same better", found->gain);
+  return true;
 }
 
 double Search::quieten() {

@@ -31,6 +31,7 @@ struct Axis {
   double reach = 0.02;                                                       // of the moves [m]
   std::function<double(double place)> rub = [](double) { return 0.0; };      // dry friction there [N]
   std::function<double(double place)> grease = [](double) { return 0.0; };   // damping there [N s/m]
+  double dead = 0.0;    // current that moves nothing, to either side [A]
   double far = 0.0;     // place to which the third move goes [m]; 0: as the others
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
@@ -60,11 +61,12 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     last = e;
     sum += e;
     const double u = kp * e + ki * sum * period + kd * slope;
+    const double felt = std::copysign(std::max(0.0, std::abs(u) - axis.dead), u);
     time.push_back(now), reference.push_back(r), position.push_back(y), current.push_back(u);
     constexpr int parts = 40;
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
-      double given = motor * u + axis.push(now + part * h);
+      double given = motor * felt + axis.push(now + part * h);
       if (axis.bristles > 0.0) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
@@ -163,6 +165,28 @@ TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
     ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise;
     EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
     EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.03 * axis.friction);
+  }
+}
+
+TEST(AxisLoop, FrictionFarBelowTheNoiseThatShakesItIsFound) {
+  Axis axis;  // the noise makes the motor push with 0.5 N
+  axis.friction = 0.015;
+  axis.noise = 8.0e-8;
+  const auto d = searched(recorded(axis, 1.2, 5));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], axis.friction, 0.1 * axis.friction);
+}
+
+TEST(AxisLoop, ADeadZoneFarBelowTheNoiseThatShakesItIsFound) {
+  for (const double dead : {0.0003, 0.003}) {
+    Axis axis;
+    axis.dead = dead;
+    axis.noise = 6.0e-8;
+    const auto d = searched(recorded(axis, 1.2, 6));
+    ASSERT_EQ(d.findings.size(), 1U);
+    EXPECT_EQ(d.findings[0].term.info->name, "dead_zone");
+    EXPECT_NEAR(d.findings[0].term.values[0], dead, 0.08 * dead);
   }
 }
 
