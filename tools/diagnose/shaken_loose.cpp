@@ -42,10 +42,9 @@ Step solved(const Weighing& weighing, const Fit& base, const Eigen::MatrixXd& co
 }
 
 std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, const Weighing& weighing,
-                                     const Fit& base, const Eigen::MatrixXd& columns, const char* name,
-                                     double size) {
+                                     const Fit& base, const Eigen::MatrixXd& columns,
+                                     const Eigen::VectorXd& at, const char* name, double size) {
   constexpr double sure = 3.0;  // sigmas
-  const Eigen::VectorXd at = differences(data, simulate(data, base.model));
   Step step;
   for (int i = 0; i < 5; ++i) {
     const Eigen::VectorXd raw = differences(data, noise.shaken_mean(with_bend(base, name, size))) - at;
@@ -86,12 +85,13 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
     double size;
   };
   const Eigen::MatrixXd columns = whitened(data, weighing, base.columns);
+  const Eigen::VectorXd at = differences(data, noise.shaken_mean(base.model));
   std::optional<ShakenLoose> best;
   for (const Bend& bend :
        {Bend{"coulomb_friction", "friction", 0.05 * base.model.value("motor_constant", 1.0) * current},
         Bend{"dead_zone", "dead_zone", 0.2 * current}, Bend{"backlash", "backlash", reading}}) {
     if (without.contains(bend.name) || has(bend.kin)) continue;
-    auto one = best_size(data, noise, weighing, base, columns, bend.name, bend.size);
+    auto one = best_size(data, noise, weighing, base, columns, at, bend.name, bend.size);
     if (one && (!best || one->gain > best->gain)) best = std::move(one);
   }
   return best;
