@@ -209,11 +209,8 @@ TEST(SimulateEquations, AStoreOnTheWayOfAnInputAndWhatRunsOverFromOneToAnother) 
   physics::Outputs out;
   model.terms = {term("hidden_state", "u", {0.4, 0.7})};
   physics::prepare(model, inputs)->run(model, out);
-  const double mean =
-      0.7 / 0.1 * (1.0 - std::exp(-0.1 / 0.7));  // of what decays, over a step of the held input
   for (std::size_t i = 10; i < 50; ++i)
-    EXPECT_NEAR(out[0][i], 2.0 * (1.0 - 0.4 * mean * std::exp(-0.1 * (static_cast<double>(i) - 10.0) / 0.7)),
-                1e-9);
+    EXPECT_NEAR(out[0][i], 2.0 * (1.0 - 0.4 * std::exp(-0.1 * (static_cast<double>(i) - 10.0) / 0.7)), 1e-9);
   model.terms = {term("overflow", "u", {1.5, 0.25}, "w")};
   physics::prepare(model, inputs)->run(model, out);
   EXPECT_DOUBLE_EQ(out[0][5], 0.0);
@@ -254,6 +251,20 @@ TEST(SimulateEquations, WhatIsFarFasterThanTheRowsIsAtItsBalance) {
     EXPECT_NEAR(out[0][i], u, 1e-6) << i;
     EXPECT_NEAR(out[1][i], z, 5e-3) << i;
   }
+}
+
+/// S' = F - V S / (K + S): full, it empties slowly, and near its balance it is two thousand times as fast.
+TEST(SimulateEquations, WhatBecomesFastBetweenTwoLooksAtTheRatesIsFollowed) {
+  const auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+      "states:\n  S: {derivative: '0.1 - S/(0.02 + S)', initial: {value: 1, unit: g/l}}\n"
+      "outputs: {left: {column: a, expression: S}}\n");
+  physics::Record inputs;
+  for (int i = 0; i < 1000; ++i) inputs.time.push_back(0.1 * i);
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_GT(out[0][i], 0.1) << i;
+  for (std::size_t i = 16; i < 1000; ++i) EXPECT_NEAR(out[0][i], 0.02 * 0.1 / 0.9, 1e-6) << i;
 }
 
 TEST(EquationsModel, SaysWhereATermCannotAct) {
