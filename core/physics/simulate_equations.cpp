@@ -280,18 +280,17 @@ class OwnEquations final : public Simulation {
     }
   }
 
-  /// Advances in so many steps, or in more where what moves turns farther in one than it was seen to: rates are looked at
-  /// in a few rows alone, and between two of them a store may run empty. [1/s] what it took for.
+  /// Advances in so many steps, or in more where what moves turns farther in one than the rule of a step bears: rates are
+  /// looked at in a few rows alone, and between two of them a store may run empty. [1/s] what it took for.
   template <std::size_t lanes>
   double finely(EquationsMachine<lanes>& machine, typename EquationsMachine<lanes>::State& s, double t,
                 double h, int parts, bool stiff) const {
-    constexpr double farthest =
-        4.0;  // times what a step may turn: what is damped counts half, and it is a rough guess
+    constexpr double bears = 2.5;
     constexpr double is_jump = 0.8;
     const auto before = s;
     machine.advance(s, t, h, parts);
     double turned = machine.turned(), swing = 0.0;
-    while (!stiff && turned > farthest * turn_ && 2 * parts <= static_cast<int>(most_parts)) {
+    while (!stiff && turned > bears && 2 * parts <= static_cast<int>(most_parts)) {
       machine.take_back();
       s = before;
       machine.advance(s, t, h, 2 * parts);

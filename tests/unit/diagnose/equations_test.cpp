@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "core/model/model_file.hpp"
@@ -130,6 +131,52 @@ TEST_F(Equations, NamesTeethOfWhichManyPass) {
 
 TEST_F(Equations, NamesALateInput) {
   expect(diagnose(motor, {term("delay", "u", {0.07})}, 4), "delay", "u", 0.07, 0.01);
+}
+
+/// A room and its walls, which nobody measures. The numbers of the room answer for what the walls get of the sun until none
+/// is right, and from there the sun on the walls is not seen.
+TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
+  const auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {I: sun, To: outdoor, Q: radiator}\n"
+      "states:\n"
+      "  Tr: {derivative: '(g*I + Q - Uv*(Tr - To) - Uw*(Tr - Tw))/Cr', initial: {value: 19, unit: degC, "
+      "sigma: "
+      "0.3}}\n"
+      "  Tw: {derivative: '(Uw*(Tr - Tw) - Uo*(Tw - To))/Cw', initial: {value: 16, unit: degC, sigma: 1}}\n"
+      "outputs: {room: {column: room, expression: Tr}}\n"
+      "parameters:\n  Cr: {value: 1.04e6, unit: J/K, sigma: 5.2e4}\n"
+      "  Cw: {value: 7.8e6, unit: J/K, sigma: 6e5}\n  Uw: {value: 130, unit: W/K, sigma: 10}\n"
+      "  Uo: {value: 31, unit: W/K, sigma: 2.5}\n  Uv: {value: 13, unit: W/K, sigma: 1.3}\n"
+      "  g: {value: 1, unit: m2, sigma: 0.08}\n");
+  auto truth = model;
+  truth.terms = {term("coupling", "Tw", {1.7e-7}, "I")};
+  std::mt19937 random{6};
+  std::uniform_real_distribution<double> share{0.0, 1.0};
+  physics::Record inputs;
+  double clouds = 0.5, power = 390.0;
+  for (int i = 0; i < 2600; ++i) {
+    const double day = 2.0 * std::numbers::pi * i / 288.0;
+    if (i % 40 == 0) clouds = share(random);
+    if (i % 70 == 0) power = 780.0 * share(random);
+    inputs.time.push_back(300.0 * i);
+    inputs.signals["I"].push_back(600.0 * clouds * std::max(0.0, -std::cos(day)));
+    inputs.signals["To"].push_back(7.0 - 5.0 * std::cos(day - 0.7));
+    inputs.signals["Q"].push_back(power);
+  }
+  physics::Outputs out;
+  physics::prepare(truth, inputs)->run(truth, out);
+  std::normal_distribution<double> noise{0.0, 0.03};
+  for (double& y : out[0]) y += noise(random);
+  recording::Table table;
+  table.add("t", "s", inputs.time);
+  table.add("sun", "", inputs.signals["I"]);
+  table.add("outdoor", "", inputs.signals["To"]);
+  table.add("radiator", "", inputs.signals["Q"]);
+  table.add("room", "", out[0]);
+  table.write(folder / "recording.csv");
+  auto data = load_case(model, {folder / "recording.csv"});
+  const auto d = search(data, [](double, const std::string&) {});
+  expect(d, "coupling", "Tw", 1.7e-7, 1e-8);
 }
 
 TEST_F(Equations, ClaimsNothingWhereNothingIsHidden) {
