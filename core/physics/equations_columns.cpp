@@ -14,19 +14,19 @@ Bending::Bending(const Term& term, bool held, bool has_changes)
       held_{held},
       has_changes_{has_changes} {}
 
-double Bending::through_store(double step, double value, double time_constant, double share) {
+double Bending::through_store(double step, double value) {
   if (!begun_) store_ = last_ = value;
-  const double kept = std::exp(-step / time_constant);
+  const double kept = std::exp(-step / time_constant());
   double felt = store_;
   if (held_) {
-    felt = step > 0.0 ? value + (store_ - value) * (1.0 - kept) * time_constant / step : store_;
+    if (step > 0.0 && !at_rows_) felt = value + (store_ - value) * (1.0 - kept) * time_constant() / step;
     store_ = value + (store_ - value) * kept;
   } else if (begun_ && step > 0.0) {
-    const double behind = (value - last_) / step * time_constant;
+    const double behind = (value - last_) / step * time_constant();
     felt = store_ = value - behind + (store_ - last_ + behind) * kept;
   }
   last_ = value;
-  return value + share * (felt - value);
+  return value + share() * (felt - value);
 }
 
 double Bending::late(double now, double value) {
@@ -54,10 +54,8 @@ double Bending::operator()(double now, double step, double value) {
       bent = value - std::clamp(value, -first_, first_);
       break;
     case EquationsMemory::lag:
-      if (first_ > 0.0) bent = through_store(step, value, first_, 1.0);
-      break;
     case EquationsMemory::hidden_state:
-      bent = through_store(step, value, second_, first_);
+      if (time_constant() > 0.0) bent = through_store(step, value);
       break;
     case EquationsMemory::delay:
       if (first_ > 0.0) bent = late(now, value);
@@ -109,6 +107,30 @@ void bend(const Model& model, const std::string& on, const std::vector<double>& 
   for (auto& bending : bendings(model, on, held, held))
     for (std::size_t i = 0; i < values.size(); ++i)
       values[i] = bending(time[i], step_about(time, i, held), values[i]);
+}
+
+std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,
+                                       const std::vector<double>& time, std::vector<double>& values,
+                                       bool held) {
+  auto all = bendings(model, on, held, held);
+  const bool overflows = std::any_of(model.terms.begin(), model.terms.end(), [](const Term& term) {
+    return equations_kind(*term.info)->memory == EquationsMemory::overflow;
+  });
+  if (all.empty() || !all.back().is_store() || overflows) return {};
+  all.back().give_rows();
+  std::vector<double> before(values.size());
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    if (k + 1 == all.size()) before = values;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = all[k](time[i], step_about(time, i, held), values[i]);
+  }
+  std::vector<InputCourse> courses;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double h = i + 1 < values.size() ? time[i + 1] - time[i] : 0.0;
+    courses.push_back(
+        all.back().course(before[i], !held && h > 0.0 ? (before[i + 1] - before[i]) / h : 0.0, values[i]));
+  }
+  return courses;
 }
 
 }  // namespace invar::physics

@@ -16,6 +16,11 @@ std::string place_of_output(const Equations& equations, const std::string& outpu
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns);
 
+/// What an input does from its row on, until the next: `value` + `rate` t + `fading` exp(-t / `time_constant`).
+struct InputCourse {
+  double value = 0.0, rate = 0.0, fading = 0.0, time_constant = 1.0;
+};
+
 /// A term at an input or output, value by value in order of time: what a controller decides is only known as it comes.
 class Bending {
  public:
@@ -25,15 +30,30 @@ class Bending {
   /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next.
   double operator()(double now, double step, double value);
 
+  /// Does a share arrive by way of a first-order store?
+  [[nodiscard]] bool is_store() const { return share() > 0.0; }
+  /// Of a store: where a value `felt` at a row goes from there, when what comes in goes from `value` straight on by `rate`.
+  [[nodiscard]] InputCourse course(double value, double rate, double felt) const {
+    const double aim = value - share() * rate * time_constant();
+    return {aim, rate, felt - aim, time_constant()};
+  }
+  /// A store gives what is felt at each row; else what is held counts with the mean over its step.
+  void give_rows() { at_rows_ = true; }
+
  private:
+  [[nodiscard]] double time_constant() const { return kind_ == EquationsMemory::lag ? first_ : second_; }
+  [[nodiscard]] double share() const {
+    if (!(time_constant() > 0.0)) return 0.0;
+    return kind_ == EquationsMemory::lag ? 1.0 : kind_ == EquationsMemory::hidden_state ? first_ : 0.0;
+  }
   /// A share arrives by way of a first-order store, in balance at the start. What is held counts with the mean over its step,
   /// as a machine feels it; what is smooth goes straight from row to row.
-  double through_store(double step, double value, double time_constant, double share);
+  double through_store(double step, double value);
   double late(double now, double value);
 
   EquationsMemory kind_;
   double first_, second_;
-  bool held_, has_changes_, begun_ = false;
+  bool held_, has_changes_, at_rows_ = false, begun_ = false;
   double store_ = 0.0, last_ = 0.0;
   std::vector<double> times_, values_;
   std::size_t place_ = 0;
@@ -48,5 +68,10 @@ double step_about(const std::vector<double>& time, std::size_t row, bool held);
 /// Terms `on` this signal bend its column. `held`: from row to row, as an input is; then with rows where it changes late.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held);
+/// The same of an input where the last thing that bends it is a store: the values as they are felt at the rows, and by row
+/// what they do until the next one. Empty, and nothing bent, where it is none.
+std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,
+                                       const std::vector<double>& time, std::vector<double>& values,
+                                       bool held);
 
 }  // namespace invar::physics

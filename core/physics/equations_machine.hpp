@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 
+#include "core/physics/equations_columns.hpp"
 #include "core/physics/expression.hpp"
 #include "core/physics/model.hpp"
 #include "core/physics/static_plants.hpp"
@@ -83,21 +84,21 @@ class EquationsMachine {
   [[nodiscard]] std::size_t controlled() const { return controlled_; }
 
   void set_input(std::size_t i, std::size_t lane, double value) { slot(states_ + i)[lane] = value; }
-  /// From `value` at `time` on straight on by `rate`, until it is set or left.
-  void set_input(std::size_t i, std::size_t lane, double value, double rate, double time) {
+  /// From `time` on it goes so, until it is set or left.
+  void set_input(std::size_t i, std::size_t lane, const InputCourse& course, double time) {
     if (courses_.size() <= i) courses_.resize(i + 1);
-    auto& course = courses_[i];
-    course.value[lane] = value, course.rate[lane] = rate, course.time = time, course.runs = true;
+    courses_[i].of[lane] = course, courses_[i].runs[lane] = true;
+    courses_[i].time = time;
   }
   /// All inputs stay where they are.
   void hold_inputs() {
-    for (auto& course : courses_) course.runs = false;
+    for (auto& course : courses_) course.runs.fill(false);
   }
 
   void show(const State& s, double t) {
     for (std::size_t i = 0; i < courses_.size(); ++i)
-      for (std::size_t l = 0; courses_[i].runs && l < lanes; ++l)
-        slot(states_ + i)[l] = courses_[i].value[l] + courses_[i].rate[l] * (t - courses_[i].time);
+      for (std::size_t l = 0; l < lanes; ++l)
+        if (courses_[i].runs[l]) slot(states_ + i)[l] = value_of(courses_[i].of[l], t - courses_[i].time);
     for (std::size_t i = 0; i < states_; ++i) std::copy_n(s[i].begin(), lanes, slot(i));
     std::fill_n(slot(compiled_.variables() - 1), lanes, t);
   }
@@ -126,6 +127,9 @@ class EquationsMachine {
 
   void advance(State& s, double t, double h, int parts) {
     h /= parts;
+    step_ = h;
+    turned_ = 0.0;
+    for (auto& late : delays_) late.before = late.past.size();
     for (int part = 0; part < parts; ++part, t += h) {
       for (auto& late : delays_) late.past.emplace_back(t, s[late.use.on]);
       if (frictions_.empty())
@@ -142,7 +146,16 @@ class EquationsMachine {
         }
       }
     }
+    step_ = 0.0;
     for (auto& rub : frictions_) rub.direction.fill(0.0), rub.stuck.fill(false);
+  }
+
+  /// [rad] How far the fastest that moved in the last advance turned in one of its steps: what the slopes within a step
+  /// tell of it. A jump turns as far in a step of half the size.
+  [[nodiscard]] double turned() const { return turned_; }
+  /// Forgets the last advance, to take it again in other steps.
+  void take_back() {
+    for (auto& late : delays_) late.past.resize(late.before);
   }
 
   /// Of all outputs of what was shown.
@@ -202,10 +215,10 @@ class EquationsMachine {
     std::size_t on, with;
     std::array<const Curve*, lanes> curve;
   };
-  struct InputCourse {
-    Lane value{}, rate{};
+  struct Courses {
+    std::array<InputCourse, lanes> of{};
+    std::array<bool, lanes> runs{};
     double time = 0.0;
-    bool runs = false;
   };
   struct Friction {
     Use use;
@@ -215,8 +228,22 @@ class EquationsMachine {
   struct Delay {
     Use use;
     std::vector<std::pair<double, Lane>> past;  // time, value
+    std::size_t before = 0;                     // as many before the last advance
   };
 
+  /// What fades within a step counts, at the few places where the rule of the step looks, with its mean over the step.
+  [[nodiscard]] double value_of(const InputCourse& course, double since) const {
+    const double straight = course.value + course.rate * since;
+    if (course.fading == 0.0) return straight;
+    const double x = step_ / course.time_constant;
+    double share = 1.0;
+    if (x > 1e-3) {
+      const double looked = stiff_ ? 0.5 * (1.0 + std::exp(-x))  // trapezoid, Simpson
+                                   : (1.0 + 4.0 * std::exp(-0.5 * x) + std::exp(-x)) / 6.0;
+      share = -std::expm1(-x) / (x * looked);
+    }
+    return straight + share * course.fading * std::exp(-since / course.time_constant);
+  }
   [[nodiscard]] double* slot(std::size_t s) { return slots_.data() + s * lanes; }
   [[nodiscard]] std::size_t first_lag() const { return states_ + hidden_.size(); }
   /// Never so short that a step could not follow; what is shorter is blended out.
@@ -341,11 +368,29 @@ class EquationsMachine {
     };
     const State a = slope(s, t), b = slope(by(a, 0.5 * h), t + 0.5 * h),
                 c = slope(by(b, 0.5 * h), t + 0.5 * h), d = slope(by(c, h), t + h);
+    note_turn(s, a, b, c, h);
     State next;
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t l = 0; l < lanes; ++l)
         next[i][l] = s[i][l] + h / 6.0 * (a[i][l] + 2.0 * (b[i][l] + c[i][l]) + d[i][l]);
     return next;
+  }
+
+  /// Two slopes at one instant, and how far apart the states are that they were taken at: the rate at which these part.
+  void note_turn(const State& s, const State& a, const State& b, const State& c, double h) {
+    constexpr double trifle =
+        1e-6;  // of the largest that a state was: what moves so little may turn as it will
+    for (std::size_t l = 0; l < lanes; ++l) {
+      double slopes = 0.0, apart = 0.0;
+      for (std::size_t i = 0; i < all_states(); ++i) {
+        double& size = largest_[i][l];
+        size = std::max({size, std::abs(s[i][l]), std::abs(h * a[i][l]), 1e-300});
+        slopes += std::pow((c[i][l] - b[i][l]) / size, 2);
+        apart += std::pow(0.5 * h * (b[i][l] - a[i][l]) / size, 2);
+      }
+      if (apart > trifle * trifle && std::isfinite(slopes))
+        turned_ = std::max(turned_, h * std::sqrt(slopes / apart));
+    }
   }
 
   static double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
@@ -446,9 +491,12 @@ class EquationsMachine {
   std::vector<Friction> frictions_;
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
-  std::vector<InputCourse> courses_;
+  std::vector<Courses> courses_;
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
   double shortest_ = 0.0;
+  double step_ = 0.0;  // [s] that is being taken; 0: none
+  double turned_ = 0.0;
+  State largest_{};
   bool stiff_ = false;
 };
 

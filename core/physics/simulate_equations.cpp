@@ -131,10 +131,14 @@ class OwnEquations final : public Simulation {
     return grid;
   }
 
-  /// The inputs as the terms of one model bend them; `inputs` where none does.
-  [[nodiscard]] std::vector<std::vector<double>> bent_inputs(
-      const Model& model, const std::vector<double>& time,
-      const std::vector<std::vector<double>>& as_recorded) const {
+  /// Inputs as the terms of one model bend them: their columns, none where nothing bends any, and by row what those do
+  /// until the next that pass a store.
+  struct Bent {
+    std::vector<std::vector<double>> columns;
+    std::vector<std::vector<InputCourse>> courses;
+  };
+  [[nodiscard]] Bent bent_inputs(const Model& model, const std::vector<double>& time,
+                                 const std::vector<std::vector<double>>& as_recorded) const {
     const auto& equations = model.equations;
     std::vector<std::string> names;
     for (const auto& input : equations.inputs) names.push_back(input.symbol);
@@ -142,11 +146,14 @@ class OwnEquations final : public Simulation {
           return std::find(names.begin(), names.end(), term.on) != names.end();
         }))
       return {};
-    auto inputs = as_recorded;
-    for (std::size_t i = 0; i < inputs.size(); ++i)
-      bend(model, names[i], time, inputs[i], !equations.inputs[i].linear);
-    run_over(model, names, inputs);
-    return inputs;
+    Bent bent{as_recorded, {}};
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const bool held = !equations.inputs[i].linear;
+      bent.courses.push_back(bend_by_store(model, names[i], time, bent.columns[i], held));
+      if (bent.courses.back().empty()) bend(model, names[i], time, bent.columns[i], held);
+    }
+    run_over(model, names, bent.columns);
+    return bent;
   }
 
   template <std::size_t lanes>
@@ -158,14 +165,14 @@ class OwnEquations final : public Simulation {
     const auto& time = grid ? grid->time : time_;
     const auto& recorded = grid ? grid->inputs : inputs_;
     const std::size_t n = time.size(), count = equations.outputs.size();
-    std::array<std::vector<std::vector<double>>, lanes> bent;
+    std::array<Bent, lanes> bent;
     std::array<const std::vector<std::vector<double>>*, lanes> inputs;
     typename EquationsMachine<lanes>::State s{};
     std::vector<std::vector<double*>> out(count, std::vector<double*>(lanes, nullptr));
     for (std::size_t l = 0; l < lanes; ++l) {
       const Model& model = *models[l];
       bent[l] = bent_inputs(model, time, recorded);
-      inputs[l] = bent[l].empty() ? &recorded : &bent[l];
+      inputs[l] = bent[l].columns.empty() ? &recorded : &bent[l].columns;
       for (std::size_t i = 0; i < machine.states(); ++i)
         s[i][l] = model.value(equations.states[i].name + ".initial");
       for (std::size_t o = 0; o < first_.size(); ++o)  // an output that is a state, given in the first row
@@ -180,8 +187,12 @@ class OwnEquations final : public Simulation {
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
     std::array<std::vector<Bending>, lanes> way;  // from the controller to the machine
     if (closed)
-      for (std::size_t l = 0; l < lanes; ++l)
+      for (std::size_t l = 0; l < lanes; ++l) {
         way[l] = bendings(*models[l], equations.controlled_input, true, false);
+        if (!way[l].empty() && way[l].back().is_store()) way[l].back().give_rows();
+      }
+    std::array<InputCourse, lanes> commanded_course{};
+    double commanded_at = 0.0;
     typename EquationsMachine<lanes>::Rates own, fastest;
     auto restart = restarts_.begin();
     for (std::size_t at = 0, row = 0; at < n; ++at) {
@@ -193,15 +204,20 @@ class OwnEquations final : public Simulation {
         if (row == 0) machine.balance_hidden(s);
         ++restart;
       }
+      const std::size_t commanded_input = closed ? machine.controlled() - machine.states() : inputs_.size();
       for (std::size_t i = 0; i < inputs_.size(); ++i)
-        for (std::size_t l = 0; l < lanes; ++l) machine.set_input(i, l, (*inputs[l])[i][at]);
+        for (std::size_t l = 0; (is_row || i != commanded_input) && l < lanes; ++l)
+          machine.set_input(i, l, (*inputs[l])[i][at]);
       machine.show(s, time[at]);
       if (closed && is_row) {
         const double* commanded = machine.law();
         for (std::size_t l = 0; l < lanes; ++l) {
-          double felt = commanded[l];
-          for (auto& bending : way[l]) felt = bending(time_[row], step_about(time_, row, true), felt);
-          machine.set_input(machine.controlled() - machine.states(), l, felt);
+          double felt = commanded[l], before = felt;
+          for (auto& bending : way[l])
+            before = felt, felt = bending(time_[row], step_about(time_, row, true), felt);
+          machine.set_input(commanded_input, l, felt);
+          if (!way[l].empty() && way[l].back().is_store())
+            commanded_course[l] = way[l].back().course(before, 0.0, felt), commanded_at = time_[row];
         }
       }
       if (is_row && row % std::max<std::size_t>(1, time_.size() / 32) == 0) {
@@ -231,14 +247,25 @@ class OwnEquations final : public Simulation {
       // What is faster than the shortest explicit steps bear is at its balance after an implicit one; the rest needs few.
       constexpr double stiff_parts = 15.0;
       const bool stiff = h * fastest.radius > 1.5 * most_parts;
-      const int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
+      int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
       machine.set_stiff(stiff);
+      const auto follow = [&](std::size_t input, std::size_t lane, const InputCourse& course, double from) {
+        machine.set_input(input, lane, course, from);
+        parts = std::max(parts, parts_for_fading(course, h));
+      };
       for (std::size_t i = 0; i < inputs_.size(); ++i)
-        for (std::size_t l = 0; l < lanes && equations.inputs[i].linear; ++l) {
+        for (std::size_t l = 0; l < lanes; ++l) {
           const auto& values = (*inputs[l])[i];
-          machine.set_input(i, l, values[at], (values[at + 1] - values[at]) / h, time[at]);
+          if (i == commanded_input) {
+            if (!way[l].empty() && way[l].back().is_store()) follow(i, l, commanded_course[l], commanded_at);
+            continue;
+          }
+          if (!bent[l].courses.empty() && !bent[l].courses[i].empty())
+            follow(i, l, bent[l].courses[i][at], time[at]);
+          else if (equations.inputs[i].linear)
+            machine.set_input(i, l, {values[at], (values[at + 1] - values[at]) / h}, time[at]);
         }
-      machine.advance(s, time[at], h, parts);
+      fastest.swing = std::max(fastest.swing, finely(machine, s, time[at], h, parts, stiff));
       machine.hold_inputs();
     }
     std::vector<std::string> names;
@@ -251,6 +278,33 @@ class OwnEquations final : public Simulation {
         for (double& value : (*outputs[l])[o]) value = equations.outputs[o].limits.clamp(value);
       }
     }
+  }
+
+  /// Advances in so many steps, or in more where what moves turns farther in one than the rule of a step bears: rates are
+  /// looked at in a few rows alone, and between two of them a store may run empty. [1/s] what it took for.
+  template <std::size_t lanes>
+  double finely(EquationsMachine<lanes>& machine, typename EquationsMachine<lanes>::State& s, double t,
+                double h, int parts, bool stiff) const {
+    constexpr double bears = 2.5;
+    constexpr double is_jump = 0.8;
+    const auto before = s;
+    machine.advance(s, t, h, parts);
+    double turned = machine.turned(), swing = 0.0;
+    while (!stiff && turned > bears && 2 * parts <= static_cast<int>(most_parts)) {
+      machine.take_back();
+      s = before;
+      machine.advance(s, t, h, 2 * parts);
+      if (!(machine.turned() < is_jump * turned)) break;
+      parts *= 2, turned = machine.turned(), swing = parts * turn_ / h;
+    }
+    return swing;
+  }
+
+  /// What fades far within a step acts at its beginning, and only so finely is that known.
+  static int parts_for_fading(const InputCourse& course, double h) {
+    constexpr double trifle = 1e-3, most = 4.0;
+    if (!(std::abs(course.fading) > trifle * std::abs(course.value))) return 1;
+    return static_cast<int>(std::clamp(std::ceil(h / course.time_constant), 1.0, most));
   }
 
   static constexpr double most_parts = 60.0;

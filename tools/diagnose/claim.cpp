@@ -124,6 +124,7 @@ bool is_its_own(const Case& data, const physics::Model& model, std::size_t term)
         const std::size_t begin = i;
         double mean = 0.0;
         for (; i < time.size() && time[i] < until; ++i) mean += x[i];
+        if (time.back() < until) break;  // any motion is a part of a wave
         const auto n = static_cast<double>(i - begin);
         double all = 0.0;
         std::complex<double> sum;
@@ -136,7 +137,7 @@ bool is_its_own(const Case& data, const physics::Model& model, std::size_t term)
         if (all > 0.0 && 2.0 * std::norm(sum) / n > 0.7 * all) own += 1.0;
       }
     }
-    if (own >= 0.25 * blocks)
+    if (own > 0.0 && own >= 0.25 * blocks)
       return true;  // a swing that decays has its small one's frequency for a part alone
   }
   return false;

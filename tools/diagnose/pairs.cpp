@@ -60,15 +60,20 @@ Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const Scr
   return fit(data, weighing, best, data.model, 8, &base);
 }
 
-/// Does a single term, of those that do most to first order, do as well as a pair?
-bool is_done_by_one(const Case& data, const Weighing& plain, const Fit& under,
-                    const std::set<std::string, std::less<>>& without, const Settled& pair) {
-  const auto singles = screen(data, plain, under, named_starts(data, plain, under, without), 0);
-  std::vector<Settled> settled(std::min<std::size_t>(4, singles.size()));
+/// The single terms that do most to first order, followed to their end.
+std::vector<Settled> singles(const Case& data, const Weighing& plain, const Fit& under,
+                             const std::set<std::string, std::less<>>& without) {
+  const auto screened = screen(data, plain, under, named_starts(data, plain, under, without), 0);
+  std::vector<Settled> settled(std::min<std::size_t>(4, screened.size()));
   in_parallel(settled.size(), [&](std::size_t i) {
-    settled[i] = settle(data, fit_with(data, plain, under, singles[i], 8), 3);
+    settled[i] = settle(data, fit_with(data, plain, under, screened[i], 8), 3);
   });
-  return std::any_of(settled.begin(), settled.end(), [&](const Settled& one) {
+  return settled;
+}
+
+/// Does one of them do as well as a pair?
+bool is_done_by_one(const Case& data, const std::vector<Settled>& all, const Settled& pair) {
+  return std::any_of(all.begin(), all.end(), [&](const Settled& one) {
     return lead(data, pair.fit, one.fit) < claim_margin &&
            stands(data, one.fit, one.fit.model.terms.size() - 1);
   });
@@ -76,8 +81,9 @@ bool is_done_by_one(const Case& data, const Weighing& plain, const Fit& under,
 
 }  // namespace
 
-std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
-                                     const std::set<std::string, std::less<>>& without, const Fit* rival) {
+Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
+                 const Fit* rival) {
+  Pairs found;
   const Weighing plain = weigh(data, simulate(data, base.model), false);
   const Fit under = fit(data, plain, base.model, data.model, 4, &base);
   // A model of the user's own equations offers many terms of one kind, and is quick to simulate.
@@ -98,20 +104,31 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
               [&](std::size_t i) { settled[i] = settle(data, std::move(rough[i]), quick ? 12 : 3); });
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   const std::size_t given = data.model.terms.size();
+  const auto keep = [&](const physics::Model& single) {
+    if (std::none_of(found.alone.begin(), found.alone.end(), [&](const physics::Model& model) {
+          return label(model.terms.back()) == label(single.terms.back());
+        }))
+      found.alone.push_back(single);
+  };
   for (auto& best : settled) {
     const std::size_t first = best.fit.model.terms.size() - 2;
     if (rival != nullptr && lead(data, best.fit, *rival) < claim_margin) continue;
-    if (first < given || !stands(data, best.fit, first) || !stands(data, best.fit, first + 1)) continue;
+    if (first < given) continue;
+    const bool one = stands(data, best.fit, first), two = stands(data, best.fit, first + 1);
+    if (one != two) keep(physics::without_term(best.fit.model, one ? first + 1 : first));
+    if (!one || !two) continue;
     // Neither alone: an engineer must see what the other adds.
     bool needed = true;
     for (const std::size_t dropped : {first, first + 1}) {
       const auto alone = physics::without_term(best.fit.model, dropped);
       const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
-      needed = needed && least_ratio(data, best.fit, single.fit) < 0.8;
+      const bool adds = least_ratio(data, best.fit, single.fit) < 0.8;
+      if (!adds) keep(single.fit.model);
+      needed = needed && adds;
     }
     if (!needed) continue;
     // Two of the late outputs of a machine are one late input.
-    if (rival == nullptr && is_done_by_one(data, plain, under, without, best)) return std::nullopt;
+    if (rival == nullptr && is_done_by_one(data, singles(data, plain, under, without), best)) return found;
     JointClaim claim;
     claim.weighing = weigh(data, simulate(data, best.fit.model));
     claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
@@ -130,9 +147,12 @@ std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
           if (label(kept) == label(same) && label(mine) != label(instead)) claim.rivals[i].push_back(instead);
         }
     }
-    return claim;
+    found.claim = std::move(claim);
+    return found;
   }
-  return std::nullopt;
+  if (!found.alone.empty() && rival == nullptr)  // others have their turn from the same numbers
+    for (const auto& one : singles(data, plain, under, without)) keep(one.fit.model);
+  return found;
 }
 
 }  // namespace invar::diagnose

@@ -17,10 +17,17 @@ struct JointClaim {
   std::vector<std::vector<physics::Term>> rivals;  // of each: terms that did nearly as well in its place
 };
 
-/// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size of
-/// what is left both say so. `rival`: what one by one came to, which a pair must clearly better.
-std::optional<JointClaim> claim_pair(const Case& data, const Fit& base,
-                                     const std::set<std::string, std::less<>>& without,
-                                     const Fit* rival = nullptr);
+struct Pairs {
+  /// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size
+  /// of what is left both say so.
+  std::optional<JointClaim> claim;
+  /// Of pairs that one of the two explains alone, that one: a search one by one, which goes by first order from numbers that
+  /// what is missing led astray, need not come upon it.
+  std::vector<physics::Model> alone;
+};
+
+/// `rival`: what one by one came to, which a pair must clearly better.
+Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
+                 const Fit* rival = nullptr);
 
 }  // namespace invar::diagnose

@@ -116,6 +116,7 @@ class Search {
   Diagnosis d_;
   Rivals rivals_;
   std::vector<Screened> last_screen_;
+  std::vector<Model> alone_;  // with one term, which a pair that was tried came to
   std::optional<LoopNoise> noise_;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
@@ -190,6 +191,8 @@ std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, 
     for (auto& other : fits_of_other_laws(data_, weighing, *best, place, options_.without))
       fits.push_back(std::move(other));
   }
+  if (base.model.terms.size() == given())
+    for (const auto& model : alone_) fits.push_back(fit(data_, weighing, model, data_.model, 8));
   if (options_.refuses)
     std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
   std::sort(fits.begin(), fits.end(), by_evidence);
@@ -390,7 +393,8 @@ void Search::check(bool refuses) {
 
 bool Search::add_pair(const Fit* rival) {
   progress_(rival == nullptr ? 0.05 : 0.9, "screening pairs");
-  auto claim = claim_pair(data_, d_.best, options_.without, rival);
+  auto [claim, alone] = claim_pair(data_, d_.best, options_.without, rival);
+  alone_ = std::move(alone);
   if (!claim) return false;
   d_.best = std::move(claim->fit);
   d_.weighing = std::move(claim->weighing);

@@ -12,8 +12,11 @@ namespace {
 using State = std::array<double, 2>;
 using Slope = std::function<State(double, const State&, double)>;  // time, state, input
 
-std::vector<State> integrate(const Slope& slope, State s, const std::vector<double>& input, double period) {
+/// `late` [s]: the input, held from row to row, arrives through a lag; 0: at once.
+std::vector<State> integrate(const Slope& slope, State s, const std::vector<double>& input, double period,
+                             double late) {
   std::vector<State> all;
+  double arrived = input.front();
   constexpr int parts = 10;
   const double h = period / parts;
   const auto moved = [](const State& a, const State& b, double by) {
@@ -23,9 +26,13 @@ std::vector<State> integrate(const Slope& slope, State s, const std::vector<doub
     all.push_back(s);
     for (int p = 0; p < parts; ++p) {
       const double t = period * static_cast<double>(i) + p * h;
-      const State a = slope(t, s, input[i]), b = slope(t + 0.5 * h, moved(s, a, 0.5 * h), input[i]),
-                  c = slope(t + 0.5 * h, moved(s, b, 0.5 * h), input[i]),
-                  d = slope(t + h, moved(s, c, h), input[i]);
+      const auto felt = [&](double since) {
+        return late > 0.0 ? input[i] + (arrived - input[i]) * std::exp(-since / late) : input[i];
+      };
+      const State a = slope(t, s, felt(0.0)), b = slope(t + 0.5 * h, moved(s, a, 0.5 * h), felt(0.5 * h)),
+                  c = slope(t + 0.5 * h, moved(s, b, 0.5 * h), felt(0.5 * h)),
+                  d = slope(t + h, moved(s, c, h), felt(h));
+      arrived = felt(h);
       s = moved(moved(moved(moved(s, a, h / 6.0), b, h / 3.0), c, h / 3.0), d, h / 6.0);
     }
   }
@@ -92,18 +99,7 @@ Machine make_equations(const Wish& wish, Draw& draw) {
     return u;
   };
   const auto table = [&](const std::vector<double>& u, double noise, bool inputs, bool outputs) {
-    auto arrives = u;
-    if (late > 0.0) {
-      const double kept = std::exp(-period / late);
-      double value = 0.0;
-      // The mean over a step of what a lag lets through.
-      for (double& v : arrives) {
-        const double to = v, mean = to + (value - to) * late / period * (1.0 - kept);
-        value = to + (value - to) * kept;
-        v = mean;
-      }
-    }
-    const auto states = integrate(slope, begin, arrives, period);
+    const auto states = integrate(slope, begin, u, period, late);
     recording::Table t;
     std::vector<double> time, x, y;
     Noise wobble_x{draw, noise * output_scale, wish.colour, wish.pole(draw, 0.8, 0.8)}, wobble_y = wobble_x;

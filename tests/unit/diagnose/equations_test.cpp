@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "core/model/model_file.hpp"
@@ -132,6 +133,52 @@ TEST_F(Equations, NamesALateInput) {
   expect(diagnose(motor, {term("delay", "u", {0.07})}, 4), "delay", "u", 0.07, 0.01);
 }
 
+/// A room and its walls, which nobody measures. The numbers of the room answer for what the walls get of the sun until none
+/// is right, and from there the sun on the walls is not seen.
+TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
+  const auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {I: sun, To: outdoor, Q: radiator}\n"
+      "states:\n"
+      "  Tr: {derivative: '(g*I + Q - Uv*(Tr - To) - Uw*(Tr - Tw))/Cr', initial: {value: 19, unit: degC, "
+      "sigma: "
+      "0.3}}\n"
+      "  Tw: {derivative: '(Uw*(Tr - Tw) - Uo*(Tw - To))/Cw', initial: {value: 16, unit: degC, sigma: 1}}\n"
+      "outputs: {room: {column: room, expression: Tr}}\n"
+      "parameters:\n  Cr: {value: 1.04e6, unit: J/K, sigma: 5.2e4}\n"
+      "  Cw: {value: 7.8e6, unit: J/K, sigma: 6e5}\n  Uw: {value: 130, unit: W/K, sigma: 10}\n"
+      "  Uo: {value: 31, unit: W/K, sigma: 2.5}\n  Uv: {value: 13, unit: W/K, sigma: 1.3}\n"
+      "  g: {value: 1, unit: m2, sigma: 0.08}\n");
+  auto truth = model;
+  truth.terms = {term("coupling", "Tw", {1.7e-7}, "I")};
+  std::mt19937 random{6};
+  std::uniform_real_distribution<double> share{0.0, 1.0};
+  physics::Record inputs;
+  double clouds = 0.5, power = 390.0;
+  for (int i = 0; i < 2600; ++i) {
+    const double day = 2.0 * std::numbers::pi * i / 288.0;
+    if (i % 40 == 0) clouds = share(random);
+    if (i % 70 == 0) power = 780.0 * share(random);
+    inputs.time.push_back(300.0 * i);
+    inputs.signals["I"].push_back(600.0 * clouds * std::max(0.0, -std::cos(day)));
+    inputs.signals["To"].push_back(7.0 - 5.0 * std::cos(day - 0.7));
+    inputs.signals["Q"].push_back(power);
+  }
+  physics::Outputs out;
+  physics::prepare(truth, inputs)->run(truth, out);
+  std::normal_distribution<double> noise{0.0, 0.03};
+  for (double& y : out[0]) y += noise(random);
+  recording::Table table;
+  table.add("t", "s", inputs.time);
+  table.add("sun", "", inputs.signals["I"]);
+  table.add("outdoor", "", inputs.signals["To"]);
+  table.add("radiator", "", inputs.signals["Q"]);
+  table.add("room", "", out[0]);
+  table.write(folder / "recording.csv");
+  auto data = load_case(model, {folder / "recording.csv"});
+  const auto d = search(data, [](double, const std::string&) {});
+  expect(d, "coupling", "Tw", 1.7e-7, 1e-8);
+}
+
 TEST_F(Equations, ClaimsNothingWhereNothingIsHidden) {
   for (const Machine* machine : {&oscillator, &tanks, &motor})
     EXPECT_TRUE(diagnose(*machine, {}, 11).findings.empty()) << machine->yaml;
@@ -209,11 +256,8 @@ TEST(SimulateEquations, AStoreOnTheWayOfAnInputAndWhatRunsOverFromOneToAnother) 
   physics::Outputs out;
   model.terms = {term("hidden_state", "u", {0.4, 0.7})};
   physics::prepare(model, inputs)->run(model, out);
-  const double mean =
-      0.7 / 0.1 * (1.0 - std::exp(-0.1 / 0.7));  // of what decays, over a step of the held input
   for (std::size_t i = 10; i < 50; ++i)
-    EXPECT_NEAR(out[0][i], 2.0 * (1.0 - 0.4 * mean * std::exp(-0.1 * (static_cast<double>(i) - 10.0) / 0.7)),
-                1e-9);
+    EXPECT_NEAR(out[0][i], 2.0 * (1.0 - 0.4 * std::exp(-0.1 * (static_cast<double>(i) - 10.0) / 0.7)), 1e-9);
   model.terms = {term("overflow", "u", {1.5, 0.25}, "w")};
   physics::prepare(model, inputs)->run(model, out);
   EXPECT_DOUBLE_EQ(out[0][5], 0.0);
@@ -254,6 +298,20 @@ TEST(SimulateEquations, WhatIsFarFasterThanTheRowsIsAtItsBalance) {
     EXPECT_NEAR(out[0][i], u, 1e-6) << i;
     EXPECT_NEAR(out[1][i], z, 5e-3) << i;
   }
+}
+
+/// S' = F - V S / (K + S): full, it empties slowly, and near its balance it is two thousand times as fast.
+TEST(SimulateEquations, WhatBecomesFastBetweenTwoLooksAtTheRatesIsFollowed) {
+  const auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+      "states:\n  S: {derivative: '0.1 - S/(0.02 + S)', initial: {value: 1, unit: g/l}}\n"
+      "outputs: {left: {column: a, expression: S}}\n");
+  physics::Record inputs;
+  for (int i = 0; i < 1000; ++i) inputs.time.push_back(0.1 * i);
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_GT(out[0][i], 0.1) << i;
+  for (std::size_t i = 16; i < 1000; ++i) EXPECT_NEAR(out[0][i], 0.02 * 0.1 / 0.9, 1e-6) << i;
 }
 
 TEST(EquationsModel, SaysWhereATermCannotAct) {

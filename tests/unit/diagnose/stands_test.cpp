@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 
 #include "core/physics/library.hpp"
@@ -63,6 +64,41 @@ TEST(Stands, AStoreThatFillsIsOne) {
   const auto data = vessel(40.0);
   const auto found = with_store(data, 100.0);
   EXPECT_NEAR(found.model.terms[0].values[1], 40.0, 2.0);
+  EXPECT_TRUE(stands(data, found, 0));
+}
+
+/// Ten turns of a wave that pushes a vessel which slowly fills, and a half: in so little of one any course is a part of it.
+TEST(Stands, WhatAMachineDoesInAPartOfAWaveIsNotThatWave) {
+  constexpr double period = 4.0, w = 2.0 * std::numbers::pi / period;
+  std::mt19937 random{9};
+  std::normal_distribution<double> noise{0.0, 0.002};
+  std::vector<double> time, input, output;
+  double x = 0.0;
+  for (int i = 0; i <= 420; ++i) {
+    time.push_back(0.1 * i), input.push_back(0.02 * i), output.push_back(x + noise(random));
+    for (int part = 0; part < 100; ++part)
+      x += 1e-3 * (0.02 * i - 0.5 * x + 0.3 * std::sin(w * (0.1 * i + 1e-3 * part)));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("u", "", input);
+  table.add("x", "", output);
+  const auto data =
+      make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                               "states: {x: {derivative: 'u - k*x', initial: {value: 0, sigma: 0.01}}}\n"
+                               "outputs: {x: {column: x, expression: x}}\n"
+                               "parameters: {k: {value: 0.5, sigma: 0.01}}\n"),
+                {table});
+  auto model = data.model;
+  physics::Term wave;
+  wave.info = physics::find_term(physics::Plant::equations, "periodic");
+  wave.on = std::string{"x"};
+  wave.with = std::string{"t"};
+  wave.values = {0.25, period, 0.1};
+  wave.given = {true, true, true};
+  model.terms.push_back(wave);
+  const auto found = fit(data, weigh(data, simulate(data, model), false), model, data.model, 20);
+  EXPECT_NEAR(found.model.terms[0].values[0], 0.3, 0.01);
   EXPECT_TRUE(stands(data, found, 0));
 }
 
