@@ -1,0 +1,57 @@
+// Courses of friction and damping over the position, as model.yaml carries them.
+#include <gmock/gmock.h>
+
+#include "core/model/model_file.hpp"
+#include "core/physics/library.hpp"
+#include "tests/support/fault_of.hpp"
+
+namespace invar::model {
+namespace {
+
+config::Yaml axis(const std::string& terms) {
+  return config::Yaml::parse(
+      "invar_model: 1\nplant: axis\ncolumns: {time: t, current: i, position: y}\nparameters:\n"
+      "  mass: {value: 2, unit: kg}\n  motor_constant: {value: 10, unit: N/A}\n"
+      "  viscous_damping: {value: 4, unit: N s/m}\nterms: " +
+          terms + "\n",
+      "model.yaml");
+}
+
+physics::Model read_all(const config::Yaml& yaml) {
+  auto model = read(yaml);
+  yaml.finish();
+  return model;
+}
+
+TEST(CoursesInFiles, WhatAForceGoesWithComesBack) {
+  for (const char* with : {"", "direction", "velocity"}) {
+    const auto empty = axis("[]");
+    auto model = read_all(empty);
+    auto& term = model.terms.emplace_back();
+    term.info = physics::unmodelled(physics::Plant::axis, "force");
+    term.with = with;
+    term.curve = {"position", {0.0, 0.1}, {1.0, 2.0}};
+    const auto again = read_all(config::Yaml::parse(patched(empty, model), "patched.yaml"));
+    ASSERT_EQ(again.terms.size(), 1U);
+    EXPECT_EQ(again.terms[0].with, with);
+    EXPECT_EQ(again.terms[0].curve.values, term.curve.values);
+  }
+}
+
+TEST(CoursesInFiles, OnlyAForceGoesWithTheMotion) {
+  using ::testing::HasSubstr;
+  const auto fault = [](const std::string& term) {
+    return testing::fault_of([&] { (void)read_all(axis("[" + term + "]")); });
+  };
+  EXPECT_THAT(
+      fault("{term: unmodelled, site: force, with: speed, over: position, knots: [0, 1], values: [1, 2]}"),
+      HasSubstr("`direction` or `velocity`"));
+  EXPECT_THAT(fault("{term: unmodelled, site: actuator, with: velocity, over: position, knots: [0, 1], "
+                    "values: [1, 2]}"),
+              HasSubstr("only an unmodelled force"));
+  EXPECT_THAT(fault("{term: constant_force, with: velocity, force: {value: 1, unit: N}}"),
+              HasSubstr("only an unmodelled force"));
+}
+
+}  // namespace
+}  // namespace invar::model
