@@ -84,8 +84,9 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
   const auto& [plain, named, courses] = beside;
   if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
     return std::nullopt;
-  const auto starts = unmodelled_starts(data, named);
   const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, 6);
+  // In place of a law of friction a course of it along the way is a cause of its own, which beside the law is none.
+  const auto starts = unmodelled_starts(data, data.model.plant == physics::Plant::axis ? base : named);
   const auto instead = screen(data, plain, base, starts, 4);
   std::optional<OtherCause> found;
   for (const auto& s : instead) {
@@ -96,7 +97,10 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
     one.fit = fit(data, plain, start.model, data.model, 4, &start);
     one.lead = lead(data, one.fit, named);
     // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
-    const bool is_form = is_course_of(s.start.term, named.model.terms[term]);
+    // Friction need not be the same everywhere to be friction.
+    const bool is_form =
+        is_course_of(s.start.term, named.model.terms[term]) ||
+        (s.start.term.with == "direction" && named.model.terms[term].info->name.ends_with("_friction"));
     if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }
