@@ -33,9 +33,9 @@ struct Term {
   std::array<std::optional<double>, most_parameters> sigmas{};
   std::array<bool, most_parameters> given{};  // written in the file; the others stand at their defaults
   std::string on;                             // thermal: the node; equations: the state, input or output
-  std::string
-      with;  // thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis:
-             // "direction" where its curve is dry friction, "velocity" where it is damping
+  /// Thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis: "direction" where its
+  /// curve is dry friction, "velocity" where it is damping.
+  std::string with;
   Curve curve;  // `unmodelled` alone
 };
 
