@@ -89,9 +89,10 @@ constexpr std::size_t few_shifts = 4;
 
 /// How far runs with noise lie, on average, from the run without.
 LoopNoise::Readings softened(const Case& data, const LoopNoise::Readings& recorded,
-                             const physics::Model& model, std::size_t position) {
+                             const physics::Model& model, std::size_t position,
+                             std::size_t shifts = few_shifts) {
   const auto noise = noise_left_by(model, data, recorded, position);
-  return row_by_row(shaken(model, data, noise, few_shifts), simulate(data, model), mean_of);
+  return row_by_row(shaken(model, data, noise, shifts), simulate(data, model), mean_of);
 }
 
 /// By recording and row: do runs with noise scatter there as noise does that goes round in a loop without bends? Where the
@@ -194,11 +195,11 @@ double LoopNoise::take_off(const physics::Model& model) {
   return untold / rows;
 }
 
-std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model) const {
+std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model, bool roughly) const {
   auto mean = simulate(data_, model);
   const auto position = fed_back(data_);
   if (!position) return mean;
-  const auto off = softened(data_, recorded_, model, *position);
+  const auto off = softened(data_, recorded_, model, *position, roughly ? 1 : few_shifts);
   for (std::size_t r = 0; r < off.size(); ++r)
     for (std::size_t o = 0; o < off[r].size(); ++o)
       for (std::size_t i = 0; i < off[r][o].size(); ++i) mean[r][o][i] += off[r][o][i];

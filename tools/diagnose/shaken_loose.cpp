@@ -41,15 +41,26 @@ Step solved(const Weighing& weighing, const Fit& base, const Eigen::MatrixXd& co
   return {found(last), std::sqrt(std::max(0.0, covariance(last, last))), found.head(last)};
 }
 
+/// Size and numbers as the runs of this size say, if `at` are those without it.
+Step looked_for(const Case& data, const LoopNoise& noise, const Weighing& weighing, const Fit& base,
+                const Eigen::MatrixXd& columns, const Eigen::VectorXd& at, const char* name, double size,
+                bool roughly) {
+  const Eigen::VectorXd raw = differences(data, noise.shaken_mean(with_bend(base, name, size), roughly)) - at;
+  return solved(weighing, base, columns, filtered(data, weighing, raw), size);
+}
+
+bool is_seen(const Step& step, double sigmas) {
+  return std::isfinite(step.size) && step.size >= sigmas * step.sigma;
+}
+
 std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, const Weighing& weighing,
                                      const Fit& base, const Eigen::MatrixXd& columns,
                                      const Eigen::VectorXd& at, const char* name, double size) {
   constexpr double sure = 3.0;  // sigmas
   Step step;
   for (int i = 0; i < 5; ++i) {
-    const Eigen::VectorXd raw = differences(data, noise.shaken_mean(with_bend(base, name, size))) - at;
-    step = solved(weighing, base, columns, filtered(data, weighing, raw), size);
-    if (!std::isfinite(step.size) || step.size < sure * step.sigma) return std::nullopt;
+    step = looked_for(data, noise, weighing, base, columns, at, name, size, false);
+    if (!is_seen(step, sure)) return std::nullopt;
     const double next = std::clamp(step.size, 0.1 * size, 10.0 * size);
     const bool arrived = std::abs(next - size) < 0.1 * size;
     size = next;
@@ -85,12 +96,18 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
     double size;
   };
   const Eigen::MatrixXd columns = whitened(data, weighing, base.columns);
-  const Eigen::VectorXd at = differences(data, noise.shaken_mean(base.model));
+  constexpr double perhaps = 1.0;  // sigmas
+  const Eigen::VectorXd roughly_at = differences(data, noise.shaken_mean(base.model, true));
+  Eigen::VectorXd at;  // once something is seen
   std::optional<ShakenLoose> best;
   for (const Bend& bend :
        {Bend{"coulomb_friction", "friction", 0.05 * base.model.value("motor_constant", 1.0) * current},
         Bend{"dead_zone", "dead_zone", 0.2 * current}, Bend{"backlash", "backlash", reading}}) {
     if (without.contains(bend.name) || has(bend.kin)) continue;
+    if (!is_seen(looked_for(data, noise, weighing, base, columns, roughly_at, bend.name, bend.size, true),
+                 perhaps))
+      continue;
+    if (at.size() == 0) at = differences(data, noise.shaken_mean(base.model));
     auto one = best_size(data, noise, weighing, base, columns, at, bend.name, bend.size);
     if (one && (!best || one->gain > best->gain)) best = std::move(one);
   }

@@ -108,7 +108,7 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     const auto fold = fold_of(data, d.weighing, k);
     const auto retuned = refitted(data, for_retuned, k, d.retuned, iterations);
     const auto after = any ? refitted(data, for_best, k, d.best, iterations) : retuned;
-    const auto rival = differs ? refitted(data, for_rival, k, d.retuned, iterations) : retuned;
+    const auto rival = differs ? refitted(data, for_rival, k, d.retuned, 3) : retuned;
     for (const bool test : {true, false}) {
       const auto& on = test ? fold.test : fold.train;
       auto& sums = test ? tested : trained;
