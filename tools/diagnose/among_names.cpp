@@ -12,9 +12,6 @@ using physics::Model;
 using physics::Term;
 
 void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
-  const auto is_friction = [](const Term& term) {
-    return term.info->name.find("friction") != std::string_view::npos;
-  };
   const std::size_t given = data.model.terms.size();
   for (std::size_t i = 0; given + i < d.best.model.terms.size() && d.best.model.terms.size() > given + 1;
        ++i) {

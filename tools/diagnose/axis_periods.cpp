@@ -10,6 +10,7 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/kin.hpp"
 
 namespace invar::diagnose {
 
@@ -41,8 +42,7 @@ std::vector<std::vector<double>> pulse_responses(const Case& data, const Weighin
   // Friction would hold the carriage against a small pulse; the loop's linear part is wanted.
   physics::Model smooth = model;
   std::erase_if(smooth.terms, [](const physics::Term& term) {
-    return term.info->name.find("friction") != std::string_view::npos || term.info->name == "backlash" ||
-           term.info->name == "dead_zone";
+    return is_friction(term) || term.info->name == "backlash" || term.info->name == "dead_zone";
   });
   physics::Model pulsed = smooth;
   physics::Term pulse;

@@ -9,6 +9,7 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/jump.hpp"
+#include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/wave.hpp"
 
 namespace invar::diagnose {
@@ -412,9 +413,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   }
   std::vector<Start> starts;
   // Beside a law of friction that was found, a course along the way would only take over what the law does.
-  const bool has_law = std::any_of(
-      fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
-      fitted.model.terms.end(), [](const Term& term) { return term.info->name.ends_with("_friction"); });
+  const bool has_law =
+      std::any_of(fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
+                  fitted.model.terms.end(), is_friction);
   for (const auto& choice : choices) {
     if (has_law && choice.with[0] != '\0') continue;
     std::vector<double> all;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tools/diagnose/common_factor.hpp"
+#include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/own_rows.hpp"
 #include "tools/diagnose/sensitivities.hpp"
 #include "tools/diagnose/windows.hpp"
@@ -58,9 +59,7 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
     f.bounds = parameter.bounds;
     free.push_back(f);
   }
-  const bool has_friction = std::any_of(model.terms.begin(), model.terms.end(), [](const auto& term) {
-    return term.info->name.ends_with("_friction");
-  });
+  const bool has_friction = std::any_of(model.terms.begin(), model.terms.end(), is_friction);
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto& term = model.terms[t];
     const bool is_nominal = t < believed.terms.size();

@@ -44,7 +44,7 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
   // Friction of three numbers may hold the one that is right where a fit from nothing would not begin: at nearly one speed
   // damping has taken all of it, and more. And what falls with the speed begins at a law that does not: from a carriage
   // without friction a fit does not see the small excess at rest.
-  if (found.info->plant == physics::Plant::axis && name.ends_with("_friction")) {
+  if (found.info->plant == physics::Plant::axis && is_friction(found)) {
     double rms = 0.0, rows = 0.0;
     for (std::size_t r = 0; r < data.recordings.size(); ++r)
       for (const double v : variable_values(data, r, "velocity")) rms += v * v, rows += 1.0;

@@ -5,6 +5,9 @@
 
 namespace invar::diagnose {
 
+/// A law of dry friction, sliding or springing first.
+inline bool is_friction(const physics::Term& term) { return term.info->name.ends_with("_friction"); }
+
 /// The model with found term `term` put as another law of the same variable: another power, with the strength that gives as
 /// much at the sizes that the variable takes; of what comes late, a lag or a delay of the same
 /// time, there and of each input. A machine that swings for long answers in phase: from strength zero no such fit arrives.

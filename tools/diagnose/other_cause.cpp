@@ -5,6 +5,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/screen.hpp"
 
 namespace invar::diagnose {
@@ -98,9 +99,8 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
     one.lead = lead(data, one.fit, named);
     // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
     // Friction need not be the same everywhere to be friction.
-    const bool is_form =
-        is_course_of(s.start.term, named.model.terms[term]) ||
-        (s.start.term.with == "direction" && named.model.terms[term].info->name.ends_with("_friction"));
+    const bool is_form = is_course_of(s.start.term, named.model.terms[term]) ||
+                         (s.start.term.with == "direction" && is_friction(named.model.terms[term]));
     if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }

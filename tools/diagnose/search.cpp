@@ -46,8 +46,6 @@ bool settled(const Model& before, const Model& now) {
   return true;
 }
 
-bool is_friction(const Term& term) { return term.info->name.find("friction") != std::string_view::npos; }
-
 /// By how many of the user's sigmas his numbers moved at most.
 double excursion_of(const Fit& fit) {
   double most = 0.0;
