@@ -206,6 +206,16 @@ void add_own(Model& model, std::string name, const Node& node) {
   model.parameters.push_back({std::move(name), std::move(unit), quantity.value, quantity.sigma, {}});
 }
 
+/// What the controller decides is an input that needs no column, whether the user lists it or not.
+void add_decided_input(const Node& root, Model& model) {
+  const auto& decided = model.equations.controlled_input;
+  if (decided.empty() || root["inputs"].has(decided) || root["states"].has(decided) ||
+      root["parameters"].has(decided))
+    return;
+  model.equations.inputs.push_back({decided, decided, false});
+  model.signals.push_back({decided, decided, "", false});
+}
+
 void read_equations(const Node& root, Model& model) {
   for (const auto& node : root["inputs"].children()) {
     physics::Equations::Input input{node.key(), node.key(), false};
@@ -233,6 +243,7 @@ void read_equations(const Node& root, Model& model) {
   if (root.has("controller")) {
     model.equations.controlled_input = root["controller"].text("output");
     model.equations.control_law = root["controller"].text("expression");
+    add_decided_input(root, model);
   }
 }
 

@@ -26,8 +26,8 @@ bool is_letter(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0
 /// States, inputs and parameters share one list of names.
 class Names {
  public:
-  void take(const Node& node, const std::string& what) {
-    const auto name = node.key();
+  void take(const Node& node, const std::string& what) { take(node, node.key(), what); }
+  void take(const Node& node, const std::string& name, const std::string& what) {
     if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front())) != 0 ||
         !std::all_of(name.begin(), name.end(), is_letter))
       node.fault("`" + name + "` is no name for an expression", "use letters, digits and _, a letter first");
@@ -123,19 +123,25 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
     if (const auto at = names.all().find(node.key()); at != names.all().end() && at->second == "an input")
       node.fault("`" + node.key() + "` is an input already", "give the output another name");
   }
-  if (root.has("controller")) formulas.push_back(root["controller"]["expression"]);
+  if (root.has("controller")) {
+    const auto controller = root["controller"];
+    if (const auto& output = model.equations.controlled_input; !output.empty() && !root["inputs"].has(output))
+      names.take(controller["output"], output, "an input");
+    formulas.push_back(controller["expression"]);
+  }
   for (const auto& node : formulas)
     if (is_one_value(node) && names.are_good()) check_formula(node, model);
   if (model.equations.states.empty())
     root["states"].fault("names no state", "add one, with derivative and initial");
   if (model.equations.outputs.empty())
     root["outputs"].fault("names no output", "add one, with column and expression");
-  if (!root.has("controller")) return;
+  if (!root.has("controller") || model.equations.controlled_input.empty()) return;
   const auto controller = root["controller"];
   const auto& output = model.equations.controlled_input;
-  const auto at = names.all().find(output);
-  if (at == names.all().end() || at->second != "an input")
-    controller["output"].fault("`" + output + "` is no input of this model", "name one of `inputs`");
+  const auto drives = [&](const Node& node) { return node.exists() && mentions(node.as_text(), output); };
+  if (!root["inputs"].has(output) && std::none_of(formulas.begin(), formulas.end() - 1, drives))
+    controller["output"].fault("`" + output + "` is no input of this model and drives none of its states",
+                               "name one of `inputs`, or what a derivative uses");
   else if (mentions(model.equations.control_law, output))
     controller["expression"].fault("`" + output + "` follows from itself",
                                    "write it from states, other inputs and parameters");

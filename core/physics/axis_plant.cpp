@@ -83,6 +83,9 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
     if (term.kind->info->name == "position_stiffness")
       fastest = std::max(fastest, std::sqrt(std::abs(p[0]) / parameters.mass));
   }
+  has_motor_terms_ = !motors_.empty() || !motor_curves_.empty();
+  has_force_terms_ =
+      !forces_.empty() || !force_curves_.empty() || !damping_curves_.empty() || !bristles_.empty();
   // A history of 256 steps must cover the delays.
   const double oldest = static_cast<double>(Past::size - 8) * longest_step;
   delay_ = std::min(delay_, oldest);
@@ -132,12 +135,14 @@ double AxisPlant::variable(int code, const AxisPoint& at) const noexcept {
   }
 }
 
-inline double AxisPlant::pushed(const AxisPoint& at) const noexcept {
+double AxisPlant::motor_besides(const AxisPoint& at) const noexcept {
   double motor = 1.0;
   for (const auto& effect : motors_) motor += effect.function(at, effect.parameters);
   for (const auto& [term, code] : motor_curves_) motor += term->curve(variable(code, at));
-  double force = parameters_.motor_constant * at.current * motor - parameters_.viscous_damping * at.velocity +
-                 outside_force_;
+  return motor;
+}
+
+double AxisPlant::with_terms(double force, const AxisPoint& at) const noexcept {
   for (const auto& effect : forces_) force += effect.function(at, effect.parameters);
   for (const auto& [term, code] : force_curves_) force += term->curve(variable(code, at));
   for (const auto& [term, code] : damping_curves_) force -= term->curve(variable(code, at)) * at.velocity;
@@ -147,6 +152,13 @@ inline double AxisPlant::pushed(const AxisPoint& at) const noexcept {
         PreslidingFriction::deflection(bristle_[i], at.position - bristle_from_, p), at.velocity, p);
   }
   return force;
+}
+
+inline double AxisPlant::pushed(const AxisPoint& at) const noexcept {
+  double force = parameters_.motor_constant * at.current;
+  if (has_motor_terms_) force *= motor_besides(at);
+  force = force - parameters_.viscous_damping * at.velocity + outside_force_;
+  return has_force_terms_ ? with_terms(force, at) : force;
 }
 
 inline double AxisPlant::held(const AxisPoint& at, double speed) const noexcept {

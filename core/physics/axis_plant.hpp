@@ -112,7 +112,9 @@ class AxisPlant {
   [[nodiscard]] double variable(int code, const AxisPoint& at) const noexcept;
   [[nodiscard]] double push(const AxisPoint& at) const noexcept;  // all forces but dry friction and swing
   [[nodiscard]] double hold(const AxisPoint& at, double speed) const noexcept;  // dry friction
-  [[nodiscard]] double pushed(const AxisPoint& at) const noexcept;  // the same two for the innermost loop
+  [[nodiscard]] double motor_besides(const AxisPoint& at) const noexcept;       // of its nominal force
+  [[nodiscard]] double with_terms(double force, const AxisPoint& at) const noexcept;
+  [[nodiscard]] double pushed(const AxisPoint& at) const noexcept;  // push and hold for the innermost loop
   [[nodiscard]] double held(const AxisPoint& at, double speed) const noexcept;
   [[nodiscard]] Slope slope(const State& s, double time, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced(const State& s, double h, double direction, bool stuck) const noexcept;
@@ -129,6 +131,7 @@ class AxisPlant {
   std::vector<const AxisTerm*> commands_, bristles_;
   std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_,
       motor_curves_, reading_curves_;
+  bool has_motor_terms_ = false, has_force_terms_ = false;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;
   Mode mode_{};

@@ -72,36 +72,57 @@ class ClosedLoop final : public Simulation {
   }
 
   void run(const Model& model, Outputs& outputs) const override {
-    auto plant = make_axis(model, period_);
-    AxisController controller{*model.controller};
-    plant.rest_at(start_position_, start_time_);
-    if (std::isfinite(start_current_)) {  // a loop that has run before: its sum holds what the error does not
-      AxisController fresh{*model.controller};
-      (void)controller.shift(start_current_ - (forward_.empty() ? 0.0 : forward_.front()) -
-                             fresh.step(reference_.front(), plant.reading()));
+    std::vector<Outputs> all;
+    run_all({&model}, all);
+    outputs = std::move(all.front());
+  }
+
+  /// Tick by tick side by side: a processor works on one loop while it waits for another.
+  void run_all(const std::vector<const Model*>& models, std::vector<Outputs>& outputs) const override {
+    std::vector<Loop> loops;
+    loops.reserve(models.size());
+    outputs.resize(models.size());
+    for (std::size_t i = 0; i < models.size(); ++i) {
+      loops.push_back(begun(*models[i]));
+      outputs[i].assign(2, std::vector<double>(tick_of_row_.size(), 0.0));
     }
-    outputs.resize(2);
-    outputs[0].assign(tick_of_row_.size(), 0.0);
-    outputs[1].assign(tick_of_row_.size(), 0.0);
     std::size_t row = 0;
     for (std::size_t tick = 0; tick < reference_.size(); ++tick) {
-      const double shown = plant.reading();
-      double command = controller.step(reference_[tick], shown);
-      if (!forward_.empty()) {
-        command += forward_[tick];
-        if (limit_ > 0.0) command = std::clamp(command, -limit_, limit_);
+      std::size_t next = row;
+      while (next < tick_of_row_.size() && tick_of_row_[next] <= tick) ++next;
+      for (std::size_t i = 0; i < loops.size(); ++i) {
+        auto& [plant, controller] = loops[i];
+        const double shown = plant.reading();
+        double command = controller.step(reference_[tick], shown);
+        if (!forward_.empty()) {
+          command += forward_[tick];
+          if (limit_ > 0.0) command = std::clamp(command, -limit_, limit_);
+        }
+        for (std::size_t r = row; r < next; ++r) outputs[i][0][r] = shown, outputs[i][1][r] = command;
+        if (!temperature_.empty()) plant.set_temperature(temperature_[tick]);
+        plant.step(command, period_);
       }
-      while (row < tick_of_row_.size() && tick_of_row_[row] <= tick) {
-        outputs[0][row] = shown;
-        outputs[1][row] = command;
-        ++row;
-      }
-      if (!temperature_.empty()) plant.set_temperature(temperature_[tick]);
-      plant.step(command, period_);
+      row = next;
     }
   }
 
  private:
+  struct Loop {
+    AxisPlant plant;
+    AxisController controller;
+  };
+
+  [[nodiscard]] Loop begun(const Model& model) const {
+    Loop loop{make_axis(model, period_), AxisController{*model.controller}};
+    loop.plant.rest_at(start_position_, start_time_);
+    if (std::isfinite(start_current_)) {  // a loop that has run before: its sum holds what the error does not
+      AxisController fresh{*model.controller};
+      (void)loop.controller.shift(start_current_ - (forward_.empty() ? 0.0 : forward_.front()) -
+                                  fresh.step(reference_.front(), loop.plant.reading()));
+    }
+    return loop;
+  }
+
   double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0, start_current_ = 0.0, limit_ = 0.0;
   std::vector<double> reference_, temperature_, forward_;  // a tick
   std::vector<std::size_t> tick_of_row_;

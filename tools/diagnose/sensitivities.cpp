@@ -15,7 +15,11 @@ Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& model
   for (const auto& recording : data.recordings)
     rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
   Eigen::MatrixXd columns(rows, static_cast<Eigen::Index>(models.size()));
-  const std::size_t together = data.model.plant == physics::Plant::equations ? 8 : 1;
+  const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t together = data.model.plant == physics::Plant::equations ? 8
+                               : data.model.plant == physics::Plant::axis
+                                   ? std::clamp<std::size_t>((models.size() + threads - 1) / threads, 1, 4)
+                                   : 1;
   in_parallel((models.size() + together - 1) / together, [&](std::size_t group) {
     if (data.stopped && data.stopped()) throw Stopped{};
     const std::size_t begin = group * together, end = std::min(models.size(), begin + together);

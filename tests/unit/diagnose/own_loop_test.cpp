@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/model/record_file.hpp"
 #include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
@@ -60,6 +61,28 @@ TEST(OwnLoop, AForceIsExplainedThoughTheNoiseGoesRound) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
   EXPECT_NEAR(d.findings[0].term.values[0], 0.08, 0.004);
+}
+
+TEST(OwnLoop, WhatTheControllerDecidesNeedNotBeListedAmongTheInputs) {
+  const std::string
+      listed = "inputs: {r: to, u: u}",
+      rest =
+          "\nstates:\n  v: {derivative: 'u - v', initial: {value: 0, unit: m, sigma: 0}}\n"
+          "outputs: {y: {column: y, expression: v}}\ncontroller: {output: u, expression: '9*(r - v)'}\n",
+      head = "invar_model: 1\nplant: equations\ncolumns: {time: t}\n";
+  recording::Table table;
+  std::vector<double> time, target;
+  for (int i = 0; i < 50; ++i) time.push_back(0.01 * i), target.push_back(i < 10 ? 0.0 : 1.0);
+  table.add("t", "s", time);
+  table.add("to", "m", target);
+  const auto run = [&](const std::string& inputs) {
+    const auto model = test::model_of(head + inputs + rest);
+    physics::Outputs outputs;
+    physics::prepare(model, model::to_record(table, model, false).record)->run(model, outputs);
+    return outputs;
+  };
+  EXPECT_EQ(run("inputs: {r: to}"), run(listed));
+  EXPECT_GT(run(listed)[0].back(), 0.8);
 }
 
 TEST(OwnLoop, WhatTheControllerDecidesMayArriveLate) {

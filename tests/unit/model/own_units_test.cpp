@@ -180,6 +180,9 @@ TEST(OwnExpressions, AnExpressionGivesOneValueAndALoopDoesNotFollowItself) {
               HasSubstr("follows from itself"));
   EXPECT_THAT(fault_of("u - x", "", "controller: {output: w, expression: 2*x}\n"),
               HasSubstr("no input of this model"));
+  EXPECT_THAT(fault_of("u - x", "", "controller: {output: x, expression: 2*u}\n"),
+              HasSubstr("`x` is a state already"));
+  EXPECT_EQ(fault_of("w - x", "", "controller: {output: w, expression: 2*u - x}\n"), "none");
   EXPECT_EQ(fault_of("u - x", "", "controller: {output: u, expression: 2 - x}\n"), "none");
 }
 
