@@ -94,7 +94,10 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const bool named = d.best.model.terms.size() > given;
   const double margin = 2.0 * claim_margin_of(d.weighing);
   auto beside = best_curve(data, d.best, beside_best);
-  if (named) {
+  // What a curve in place of the names explains beyond them it would explain beside them too.
+  const bool leaves_more = std::any_of(beside_best.courses.begin(), beside_best.courses.end(),
+                                       [&](const Screened& s) { return s.gain > margin; });
+  if (named && leaves_more) {
     auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
     if (instead.gain > margin) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
