@@ -74,6 +74,13 @@ constexpr Machine turntable{
     "parameters: {b: {value: 1.5, unit: 1/s, sigma: 0.2}}\n",
     0.02, 1e-4, 2000, levels<57, -10, 16>};
 
+constexpr Machine valve{
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states: {x: {derivative: '(u - x)/tau', initial: {value: 0.5, unit: 1, sigma: 0.05}}}\n"
+    "outputs: {opening: {column: y, expression: x}}\n"
+    "parameters: {tau: {value: 3, unit: s, sigma: 0.2}}\n",
+    0.5, 0.005, 600, levels<29, 20, 90>};
+
 class Equations : public ::testing::Test {
  protected:
   Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed) {
@@ -118,6 +125,12 @@ TEST_F(Equations, NamesASpringThatHardens) {
 
 TEST_F(Equations, NamesDryFriction) {
   expect(diagnose(motor, {term("dry_friction", "w", {4.0})}, 3), "dry_friction", "w", 4.0, 0.3);
+}
+
+TEST_F(Equations, NamesFrictionOfWhatNeverTurnsItsSign) {
+  const auto d = diagnose(valve, {term("dry_friction", "x", {0.006}, "x")}, 6);
+  expect(d, "dry_friction", "x", 0.006, 0.001);
+  EXPECT_EQ(d.findings[0].term.with, "x");
 }
 
 TEST_F(Equations, NamesTeethOfWhichManyPass) {
@@ -198,6 +211,24 @@ TEST(SimulateEquations, DryFrictionStopsAMassWhereTheClosedFormSays) {
     physics::Outputs out;
     physics::prepare(model, inputs)->run(model, out);
     EXPECT_NEAR(out[0].back(), 3.0 * 3.0 / (2.0 * 1.7), 1e-9) << step;
+  }
+}
+
+/// A valve that sticks follows x' = u - x - level sign(x'), and stays where u - x is no more than the level.
+TEST(SimulateEquations, FrictionAgainstTheRateLeavesAValveShortOfWhereItShouldBe) {
+  auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+      "states:\n  x: {derivative: '5 - x', initial: {value: 2, unit: 1}}\n"
+      "  y: {derivative: '5 - y', initial: {value: 4.8, unit: 1}}\n"
+      "outputs: {x: {column: x, expression: x}, y: {column: y, expression: y}}\n");
+  model.terms = {term("dry_friction", "x", {0.5}, "x"), term("dry_friction", "y", {0.5}, "y")};
+  physics::Record inputs;
+  for (int i = 0; i <= 100; ++i) inputs.time.push_back(0.02 * i);
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  for (std::size_t i = 0; i < out[0].size(); ++i) {
+    EXPECT_NEAR(out[0][i], 4.5 - 2.5 * std::exp(-inputs.time[i]), 1e-7);
+    EXPECT_DOUBLE_EQ(out[1][i], 4.8);
   }
 }
 
