@@ -85,6 +85,10 @@ std::string place_of_output(const Equations& equations, const std::string& outpu
   return is_state ? "output." + output : output;
 }
 
+bool sticks(const Term& term) {
+  return equations_kind(*term.info)->memory == EquationsMemory::dry_friction && term.with == term.on;
+}
+
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns) {
   const auto place = [&](const std::string& name) {

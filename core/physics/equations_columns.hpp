@@ -12,6 +12,10 @@ namespace invar::physics {
 /// What a term at an output is `on`: its name, or `output.NAME` where a state has that name too.
 std::string place_of_output(const Equations& equations, const std::string& output);
 
+/// Dry friction that names its own state under `with` acts against the rate of it, not against its sign: what is no speed
+/// sticks until its rate would pass the level, as a valve does, and then goes by so much slower.
+bool sticks(const Term& term);
+
 /// What passes a limit of one column goes, in part, to another. `names` are those of the columns.
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns);

@@ -111,6 +111,10 @@ class EquationsMachine {
         double& rate = d[rub.use.on][l];
         rate = rub.stuck[l] ? 0.0 : rate - rub.direction[l] * rub.use.p[l][0];
       }
+      for (const auto& term : sticking_) {
+        double& rate = d[term.on][l];
+        rate -= std::clamp(rate, -term.p[l][0], term.p[l][0]);
+      }
       for (const auto& term : overflows_) {
         double& rate = d[term.on][l];
         if (!(s[term.on][l] >= term.p[l][0] && rate > 0.0)) continue;
@@ -457,7 +461,10 @@ class EquationsMachine {
     if (kind->rate != nullptr) rate_terms_.push_back(use);
     switch (kind->memory) {
       case EquationsMemory::dry_friction:
-        frictions_.push_back({use});
+        if (sticks(term))
+          sticking_.push_back(use);
+        else
+          frictions_.push_back({use});
         break;
       case EquationsMemory::upper_limit:
         uppers_.push_back(use);
@@ -492,7 +499,7 @@ class EquationsMachine {
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
   std::vector<Courses> courses_;
-  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_;
+  std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_, sticking_;
   double shortest_ = 0.0;
   double step_ = 0.0;  // [s] that is being taken; 0: none
   double turned_ = 0.0;

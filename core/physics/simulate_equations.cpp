@@ -53,7 +53,7 @@ class OwnEquations final : public Simulation {
   /// Reversals under dry friction come at a time of their own in each model.
   static bool has_reversals(const Model& model) {
     return std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) {
-      return equations_kind(*t.info)->memory == EquationsMemory::dry_friction;
+      return equations_kind(*t.info)->memory == EquationsMemory::dry_friction && !sticks(t);
     });
   }
   /// Do they differ in numbers alone?

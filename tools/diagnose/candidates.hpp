@@ -36,6 +36,8 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// How far apart the middle four fifths of its rows lie.
 double inner_span_of(const Case& data, const physics::Model& model, const std::string& name);
+/// Does it go both ways, up and down?
+bool turns(const Case& data, const physics::Model& model, const std::string& name);
 /// Two terms that bend the same rate over the same variable: one law has room for one of them.
 bool same_law(const physics::Term& one, const physics::Term& other);
 /// The starts of one term: every value of its first shape (its own where none is given), the first value of further ones.

@@ -62,6 +62,7 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   if (term.info->name == "periodic")
     return inner_span_of(data, model, term.with.empty() ? term.on : term.with) >= 2.0 * term.values[1];
   // Friction that never turned is a constant.
+  if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
   if (term.info->name == "dry_friction") return low < -0.03 * size && high > 0.03 * size;
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
   // A limit that one or two rows touch is an outlier.

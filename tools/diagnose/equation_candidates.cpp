@@ -20,10 +20,12 @@ using physics::Term;
 /// Where a variable goes in the fitted model, and how fast.
 struct Span {
   double low = 0.0, high = 0.0;
-  double rate = 0.0;   // [1/s] times the variable: the largest change a row
-  double inner = 0.0;  // how far apart the middle four fifths of the rows lie
+  double rate = 0.0;                // [1/s] times the variable: the largest change a row
+  double falls = 0.0, rises = 0.0;  // the same, each way: down below zero, up above it
+  double inner = 0.0;               // how far apart the middle four fifths of the rows lie
   [[nodiscard]] double size() const { return std::max({std::abs(low), std::abs(high), 1e-12}); }
   [[nodiscard]] double width() const { return high - low; }
+  [[nodiscard]] bool turns() const { return std::min(-falls, rises) > 0.03 * rate; }
 };
 
 /// What goes over the fitted model: states that nobody measures too.
@@ -79,8 +81,10 @@ class Spans {
       span.low = first ? values[i] : std::min(span.low, values[i]);
       span.high = first ? values[i] : std::max(span.high, values[i]);
       first = false;
-      if (i > 0 && std::isfinite(values[i - 1]) && time[i] > time[i - 1])
-        span.rate = std::max(span.rate, std::abs(values[i] - values[i - 1]) / (time[i] - time[i - 1]));
+      if (!(i > 0 && std::isfinite(values[i - 1]) && time[i] > time[i - 1])) continue;
+      const double rate = (values[i] - values[i - 1]) / (time[i] - time[i - 1]);
+      span.falls = std::min(span.falls, rate), span.rises = std::max(span.rises, rate);
+      span.rate = std::max(span.rate, std::abs(rate));
     }
   }
   std::map<std::string, Span> spans_;
@@ -122,6 +126,12 @@ std::vector<double> residual_periods(const Case& data, const physics::Model& fit
 bool is_kinematic(const physics::Equations& equations, const physics::Equations::State& state) {
   return std::any_of(equations.states.begin(), equations.states.end(),
                      [&](const auto& other) { return state.derivative == other.name; });
+}
+
+/// A state that is the rate of another (x' = v): friction acts against its sign.
+bool is_speed(const physics::Equations& equations, const std::string& state) {
+  return std::any_of(equations.states.begin(), equations.states.end(),
+                     [&](const auto& other) { return other.derivative == state; });
 }
 
 /// Does the model look at this input? Else nothing at it can matter but what leads it elsewhere.
@@ -215,6 +225,7 @@ class Candidates {
       add("coupling", state, input.symbol, rate / spans_.of(input.symbol).size());
     add("constant", state, "", rate);
     if (own.low < 0.0 && own.high > 0.0) add("dry_friction", state, "", rate);  // else it is a constant
+    if (!is_speed(equations_, state) && own.turns()) add("dry_friction", state, state, rate);
     add("periodic", state, "t", rate, residual_periods(data_, model_, 6));
   }
 
@@ -318,6 +329,10 @@ std::pair<double, double> span_of(const Case& data, const physics::Model& model,
 
 double inner_span_of(const Case& data, const physics::Model& model, const std::string& name) {
   return Spans{data, model}.of(name).inner;
+}
+
+bool turns(const Case& data, const physics::Model& model, const std::string& name) {
+  return Spans{data, model}.of(name).turns();
 }
 
 bool same_law(const Term& one, const Term& other) {

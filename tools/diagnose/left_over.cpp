@@ -310,6 +310,25 @@ std::vector<double> far_share(const Case& data, const Fit& fit, double times) {
   return shares;
 }
 
+std::vector<double> excess_over_noise(const Case& data, const Fit& fit) {
+  constexpr double by_chance = 0.1;
+  std::vector<double> all(data.outputs.size(), 0.0);
+  if (!data.is_time_series) return all;
+  const auto simulated = simulate(data, fit.model);
+  const auto weighing = weigh(data, simulated);
+  for (std::size_t o = 0; o < all.size(); ++o) {
+    if (!std::isfinite(data.given_noise[o])) continue;
+    double sum = 0.0, rows = 0.0;
+    for (const auto& one : left_of(data, simulated, o))
+      for (double v : one)
+        if (std::isfinite(v)) sum += v * v, rows += 1.0;
+    const double noise = std::max(data.given_noise[o], weighing.filters[o].sigma);
+    if (const double beyond = sum / rows / (noise * noise) - 1.0; rows > enough / 2 && beyond > by_chance)
+      all[o] = beyond;
+  }
+  return all;
+}
+
 bool is_above_noise(const Case& data, const Fit& fit) {
   const auto simulated = simulate(data, fit.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {

@@ -22,6 +22,10 @@ bool is_louder_in_motion(const Case& data, const Fit& fit);
 /// Is it more than twice the noise that the user gave, and related from row to row?
 bool is_above_noise(const Case& data, const Fit& fit);
 
+/// By output, how many times the power of the noise is left beyond it: beyond what the user gave and beyond what cannot be
+/// told from the row before. 0: no more than the colour of noise may do in a recording, or he gave none.
+std::vector<double> excess_over_noise(const Case& data, const Fit& fit);
+
 /// Noise that wanders does not know what was recorded: does `with` take most of what in the residual of `without` goes with
 /// that, beyond what a residual turned round against the recording would? Never in a loop, which moves with its own noise.
 bool goes_with_recording(const Case& data, const Fit& with, const Fit& without);

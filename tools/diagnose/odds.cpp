@@ -85,15 +85,24 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative) {
   return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
 }
 
-void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, Finding& finding) {
+double rest_beside(const std::vector<double>& won, const std::vector<double>& excess) {
+  double all = 0.0, most = 0.0;
+  for (const double one : won) all += std::max(0.0, one);
+  for (std::size_t o = 0; o < won.size(); ++o)
+    if (won[o] > 0.1 * all) most = std::max(most, excess[o] / (excess[o] + won[o]));
+  return most;
+}
+
+void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)
     if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);
-    finding.other_cause = odds_of_another_cause(finding.gain, d.still_follows, finding.other_shape,
-                                                d.findings.size() > 1 ? finding.share : 1.0);
+    finding.other_cause =
+        odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
+                              d.findings.size() > 1 ? finding.share : 1.0);
     sum += finding.relatives + finding.other_cause;
   }
   finding.probability = std::min(0.995, 1.0 / sum);

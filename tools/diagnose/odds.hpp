@@ -9,6 +9,9 @@ namespace invar::diagnose {
 /// With more than these another cause is so much likelier that a name is right in three cases of ten at most.
 inline constexpr double unlikely_odds = 7.0 / 3.0;
 
+/// A name that leaves more than this share of what there was to explain beyond the noise is unlikely by that alone.
+inline constexpr double plain_rest = 0.08;
+
 /// Odds of "some other cause" against a claimed name: they fall with the log evidence by which the name wins (a small
 /// effect looks like many things; the evidence is counted in independent rows), rise with the share of the mismatch that
 /// the name leaves and that still follows the recording, with what a freer shape of the name explains better beyond
@@ -26,7 +29,12 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
 /// that runs alike is the same name for the same cause.
 bool is_another_cause(const Finding& finding, const Alternative& alternative);
 
-/// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known.
-void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, Finding& finding);
+/// Of what the outputs that a name explains left beyond the noise without it (`won` and `excess`, by output, in the power of
+/// the noise), the share that they still leave: of the worst of those with at least a tenth of all that it explains.
+double rest_beside(const std::vector<double>& won, const std::vector<double>& excess);
+
+/// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known, and
+/// the `rest` beside it, a share.
+void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding);
 
 }  // namespace invar::diagnose

@@ -51,6 +51,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
     if (!nearest || finding.gain > nearest->gain) nearest = finding;
   }
   if (!nearest) return false;
+  if (nearest->stand_in != nullptr) nearest->term.info = nearest->stand_in;
   const auto plain = weigh(data, simulate(data, d.best.model), false);
   const Fit base = fit(data, plain, model, data.model, 6);
   // The curves must do better than the name: drops move in two directions, and heat in several nodes.
@@ -81,9 +82,11 @@ bool set_aside(const Case& data, Diagnosis& d) {
   return true;
 }
 
-void leave_unsaid(Diagnosis& d) {
-  for (auto& finding : d.findings) {
-    if (!finding.term.curve.knots.empty() || finding.probability >= 0.1) continue;
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests) {
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    auto& finding = d.findings[i];
+    if (!finding.term.curve.knots.empty() || finding.probability >= (rests[i] > plain_rest ? 0.3 : 0.1))
+      continue;
     finding.stand_in = finding.term.info;
     finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
     finding.probability = 1.0 - finding.probability;

@@ -1,6 +1,7 @@
 // Names that are not sure. One rule: a name is said as long as the odds of another cause (odds.hpp) leave it three chances in
 // ten; then free courses take its place where they do better, and it stays as the nearest that has a name. Where none does
-// better it stays, said with its probability, down to one chance in ten; below, what was fitted stays without its name.
+// better it stays, said with its probability, down to one chance in ten; below, what was fitted stays without its name. Where the
+// noise is known and the name plainly leaves more, that is three chances in ten.
 #pragma once
 
 #include <optional>
@@ -17,7 +18,8 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside);
 /// False: nothing changed.
 bool set_aside(const Case& data, Diagnosis& d);
 
-/// Leaves the name of what is nine times as likely another cause away.
-void leave_unsaid(Diagnosis& d);
+/// Leaves the name of what is nine times as likely another cause away, and of what by the rest beside it (a share, by
+/// finding) is unlikely: residuals far from the noise that the user gave show that it is not the whole truth.
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests);
 
 }  // namespace invar::diagnose

@@ -151,6 +151,15 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
 
 namespace {
 
+/// The share that a name leaves of what was there to explain beyond the noise; `rival`: the model without it, fitted anew.
+double rest_left_by(const Case& data, const Fit& best, const Fit& rival, const std::vector<double>& excess) {
+  const auto with = squares_left(data, best.model), without = squares_left(data, rival.model);
+  std::vector<double> won(excess.size(), 0.0);
+  for (std::size_t o = 0; o < won.size(); ++o)
+    if (with[o] > 0.0) won[o] = (without[o] / with[o] - 1.0) * (1.0 + excess[o]);
+  return rest_beside(won, excess);
+}
+
 /// How much of the mismatch still follows what was recorded, beside what the best model explains of it: 0 to 1.
 double share_left(const Case& data, const Diagnosis& d, const std::vector<double>& followed) {
   const auto after = squares_left(data, d.best.model), before = squares_left(data, d.retuned.model);
@@ -173,6 +182,11 @@ void conclude(const Case& data, Diagnosis& d) {
   const double most_followed = *std::max_element(followed.begin(), followed.end());
   d.still_follows = share_left(data, d, followed);
   if (most_followed > 0.5) d.unexplained_over = {"history"};
+  // A user who writes down his equations and his noise has said what a model that is whole leaves.
+  const auto excess = data.model.plant == physics::Plant::equations
+                          ? excess_over_noise(data, d.best)
+                          : std::vector<double>(data.outputs.size(), 0.0);
+  std::vector<double> rests;
   const std::size_t given = data.model.terms.size();
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
@@ -191,7 +205,9 @@ void conclude(const Case& data, Diagnosis& d) {
     finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
     const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
-    weigh_name(data, d, place, finding);
+    const double rest = rest_left_by(data, d.best, rival, excess);
+    rests.push_back(rest);
+    weigh_name(data, d, place, rest, finding);
   }
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];
@@ -202,7 +218,7 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  leave_unsaid(d);
+  leave_unsaid(d, rests);
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
                                          [](const Finding& f) { return f.stand_in != nullptr; });
@@ -221,7 +237,10 @@ void conclude(const Case& data, Diagnosis& d) {
   else if (ambiguous)
     d.verdict = Verdict::ambiguous;
   else
-    d.verdict = d.has_rest || d.still_follows > 0.05 ? Verdict::partly_explained : Verdict::explained;
+    d.verdict = d.has_rest || d.still_follows > 0.05 ||
+                        std::any_of(rests.begin(), rests.end(), [](double rest) { return rest > 0.05; })
+                    ? Verdict::partly_explained
+                    : Verdict::explained;
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);
   double sum = 0.0;
   for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;

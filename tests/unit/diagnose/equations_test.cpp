@@ -74,12 +74,31 @@ constexpr Machine turntable{
     "parameters: {b: {value: 1.5, unit: 1/s, sigma: 0.2}}\n",
     0.02, 1e-4, 2000, levels<57, -10, 16>};
 
+constexpr Machine valve{
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states: {x: {derivative: '(u - x)/tau', initial: {value: 0.5, unit: 1, sigma: 0.05}}}\n"
+    "outputs: {opening: {column: y, expression: x}}\n"
+    "parameters: {tau: {value: 3, unit: s, sigma: 0.2}}\n",
+    0.5, 0.005, 600, levels<29, 20, 90>};
+
+constexpr Machine spring{
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states:\n  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0}}\n"
+    "  v: {derivative: '(12*u - k*x - c*v)/m', initial: {value: 0, unit: m/s, sigma: 0}}\n"
+    "outputs: {way: {column: y, expression: x}}\n"
+    "parameters:\n  m: {value: 1.6, unit: kg, sigma: 0.03}\n  k: {value: 240, unit: N/m, sigma: 7}\n"
+    "  c: {value: 3.2, unit: N s/m, sigma: 0.26}\nnoise: {way: 0.002}\n",
+    0.005, 0.002, 1000, levels<61, -100, 100>};
+
 class Equations : public ::testing::Test {
  protected:
-  Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed) {
+  /// `rate`: of the last state, where the machine obeys another law than any term.
+  Diagnosis diagnose(const Machine& machine, const std::vector<physics::Term>& hidden, unsigned seed,
+                     const char* rate = nullptr) {
     const auto model = test::model_of(machine.yaml);
     auto truth = model;
     truth.terms = hidden;
+    if (rate != nullptr) truth.equations.states.back().derivative = rate;
     std::mt19937 random{seed};
     physics::Record inputs;
     auto& drive = inputs.signals[model.equations.inputs.front().signal];
@@ -118,6 +137,12 @@ TEST_F(Equations, NamesASpringThatHardens) {
 
 TEST_F(Equations, NamesDryFriction) {
   expect(diagnose(motor, {term("dry_friction", "w", {4.0})}, 3), "dry_friction", "w", 4.0, 0.3);
+}
+
+TEST_F(Equations, NamesFrictionOfWhatNeverTurnsItsSign) {
+  const auto d = diagnose(valve, {term("dry_friction", "x", {0.006}, "x")}, 6);
+  expect(d, "dry_friction", "x", 0.006, 0.001);
+  EXPECT_EQ(d.findings[0].term.with, "x");
 }
 
 TEST_F(Equations, NamesTeethOfWhichManyPass) {
@@ -179,6 +204,15 @@ TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
   expect(d, "coupling", "Tw", 1.7e-7, 1e-8);
 }
 
+/// A damper in the middle of the way (x^2 v) is none of the table; what comes nearest leaves a third more than the noise.
+TEST_F(Equations, NoNameStandsThatLeavesFarMoreThanTheNoise) {
+  for (const unsigned seed : {1U, 2U}) {
+    const auto d = diagnose(spring, {}, seed, "(12*u - k*x - c*v)/m - 900*x*x*v");
+    EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+    for (const auto& finding : d.findings) EXPECT_EQ(finding.term.info->name, "unmodelled") << seed;
+  }
+}
+
 TEST_F(Equations, ClaimsNothingWhereNothingIsHidden) {
   for (const Machine* machine : {&oscillator, &tanks, &motor})
     EXPECT_TRUE(diagnose(*machine, {}, 11).findings.empty()) << machine->yaml;
@@ -198,6 +232,24 @@ TEST(SimulateEquations, DryFrictionStopsAMassWhereTheClosedFormSays) {
     physics::Outputs out;
     physics::prepare(model, inputs)->run(model, out);
     EXPECT_NEAR(out[0].back(), 3.0 * 3.0 / (2.0 * 1.7), 1e-9) << step;
+  }
+}
+
+/// A valve that sticks follows x' = u - x - level sign(x'), and stays where u - x is no more than the level.
+TEST(SimulateEquations, FrictionAgainstTheRateLeavesAValveShortOfWhereItShouldBe) {
+  auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+      "states:\n  x: {derivative: '5 - x', initial: {value: 2, unit: 1}}\n"
+      "  y: {derivative: '5 - y', initial: {value: 4.8, unit: 1}}\n"
+      "outputs: {x: {column: x, expression: x}, y: {column: y, expression: y}}\n");
+  model.terms = {term("dry_friction", "x", {0.5}, "x"), term("dry_friction", "y", {0.5}, "y")};
+  physics::Record inputs;
+  for (int i = 0; i <= 100; ++i) inputs.time.push_back(0.02 * i);
+  physics::Outputs out;
+  physics::prepare(model, inputs)->run(model, out);
+  for (std::size_t i = 0; i < out[0].size(); ++i) {
+    EXPECT_NEAR(out[0][i], 4.5 - 2.5 * std::exp(-inputs.time[i]), 1e-7);
+    EXPECT_DOUBLE_EQ(out[1][i], 4.8);
   }
 }
 

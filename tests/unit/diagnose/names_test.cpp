@@ -109,6 +109,14 @@ TEST(Names, ASmallShareBesideOthersIsDoubted) {
   EXPECT_GT(odds_of_another_cause(20.0, 0.0, 0.0, 1.0), odds_of_another_cause(1000.0, 0.0, 0.0, 1.0));
 }
 
+TEST(Names, WhatLeavesMuchBeyondTheNoiseIsDoubtedWhereItActsItself) {
+  // The noise has power 1. A half of what there was is left; nothing is; the rest is at an output that it does not move.
+  EXPECT_DOUBLE_EQ(rest_beside({0.4}, {0.4}), 0.5);
+  EXPECT_DOUBLE_EQ(rest_beside({50.0}, {0.0}), 0.0);
+  EXPECT_DOUBLE_EQ(rest_beside({50.0, 0.1}, {0.0, 0.9}), 0.0);
+  EXPECT_GT(odds_of_another_cause(50.0, plain_rest, 0.0, 1.0), unlikely_odds);
+}
+
 TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {
   const Case data;
   const auto term = [](const char* name, const char* with) {
@@ -123,7 +131,7 @@ TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {
     finding.term = term("quadratic", "x");
     finding.gain = 1000.0, finding.share = 1.0;
     finding.alternatives.push_back({other, 0.0});
-    weigh_name(data, d, 0, finding);
+    weigh_name(data, d, 0, 0.0, finding);
     return finding.probability;
   };
   EXPECT_GT(probability_beside(term("quadratic", "y")), 0.9);

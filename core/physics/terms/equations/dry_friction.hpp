@@ -1,4 +1,4 @@
-// Dry friction: a rate of constant size against the state.
+// Dry friction: a rate of constant size against the state, or against the state's own rate.
 #pragma once
 
 #include <cmath>
@@ -16,7 +16,9 @@ struct DryFriction {
       .depends_on = {"direction"},
       .parameters = {{{"level", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "size of the rate"}}},
       .description = "Coulomb friction: constant size, against the motion, and it holds at rest.",
-      .source = "-level sign(s); at s = 0 whatever holds it there, up to the level"};
+      .source =
+          "-level sign(s), or -level sign(ds/dt) with the state itself; at rest whatever holds it, up to the "
+          "level"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dry_friction};
 };
 
