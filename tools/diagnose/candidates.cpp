@@ -382,6 +382,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "velocity", 12},
                  {"force", "time", 12},
                  {"force", "temperature", 6},
+                 {"force", "temperature", 6, "direction"},  // what greases it
+                 {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
                  {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});

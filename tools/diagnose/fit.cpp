@@ -390,8 +390,8 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   best.evidence = -best.cost - complexity;
   Eigen::MatrixXd regular = hessian;
   for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;
-  const Eigen::MatrixXd covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  best.sigma = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  best.covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
+  best.sigma = best.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   return best;
 }
 

@@ -61,6 +61,7 @@ struct Fit {
   physics::Model model;
   std::vector<Freedom> free;
   Eigen::VectorXd sigma;     // of each freedom, from the curvature
+  Eigen::MatrixXd covariance;
   double cost = 0.0;         // half the sum of squares, priors included, tempered
   double data_cost = 0.0;    // without the priors
   double evidence = 0.0;     // log, up to a constant common to all models of one weighing: BIC

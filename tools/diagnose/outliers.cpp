@@ -171,8 +171,7 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
       const auto plant = data.model.plant;
       const bool is_row_by_row = is_static(plant), is_swept = is_row_by_row && data.is_time_series;
-      if ((are_too_many() &&
-           (plant == physics::Plant::equations || (lone && plant == physics::Plant::axis))) ||
+      if ((are_too_many() && (plant == physics::Plant::equations || plant == physics::Plant::axis)) ||
           (!lone && is_swept)) {
         off = off_lines(residual);
         lone = far_from(off, robust_sigma(off), true);

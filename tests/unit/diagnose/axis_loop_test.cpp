@@ -31,6 +31,9 @@ struct Axis {
   double reach = 0.02;                                                       // of the moves [m]
   std::function<double(double place)> rub = [](double) { return 0.0; };      // dry friction there [N]
   std::function<double(double place)> grease = [](double) { return 0.0; };   // damping there [N s/m]
+  std::function<double(double place)> pull = [](double) { return 0.0; };     // there [N]
+  std::function<double(double time)> warmth;                                 // degC; none: not recorded
+  double thins = 0.0;   // by so much is the damping less for every degree above 20 [N s/(m K)]
   double dead = 0.0;    // current that moves nothing, to either side [A]
   double far = 0.0;     // place to which the third move goes [m]; 0: as the others
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
@@ -43,7 +46,7 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
   std::normal_distribution<double> noise{0.0, axis.noise};
   std::uniform_real_distribution<double> places{-axis.reach, axis.reach};
   const double share = 1.0 - std::exp(-2.0 * std::numbers::pi * filter * period);
-  std::vector<double> time, reference, position, current;
+  std::vector<double> time, reference, position, current, temperature;
   double bend = 0.0, x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
   int moves = 0;
   for (int k = 0; k < 11000; ++k) {
@@ -63,15 +66,17 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     const double u = kp * e + ki * sum * period + kd * slope;
     const double felt = std::copysign(std::max(0.0, std::abs(u) - axis.dead), u);
     time.push_back(now), reference.push_back(r), position.push_back(y), current.push_back(u);
+    temperature.push_back(axis.warmth ? axis.warmth(now) : 20.0);
+    const double thinner = axis.thins * (temperature.back() - 20.0);
     constexpr int parts = 40;
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
-      double given = motor * felt + axis.push(now + part * h);
+      double given = motor * felt + axis.push(now + part * h) + axis.pull(x);
       if (axis.bristles > 0.0) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
       }
-      const double dry = axis.friction + axis.rub(x), damps = damping + axis.grease(x);
+      const double dry = axis.friction + axis.rub(x), damps = damping + axis.grease(x) - thinner;
       if (v == 0.0 && std::abs(given) <= dry + axis.excess) continue;
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
       const auto slows = [&](double speed) {
@@ -88,10 +93,13 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
   table.add("r", "m", reference);
   table.add("y", "m", position);
   table.add("u", "A", current);
+  if (axis.warmth) table.add("T", "degC", temperature);
   return make_case(
       test::model_of(
-          "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u}\n"
-          "controller: {kind: pid, rate: 1000, kp: 26000, ki: 470000, kd: 210, velocity_filter_hz: 380, "
+          std::string{
+              "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u"} +
+          (axis.warmth ? ", temperature: T" : "") +
+          "}\ncontroller: {kind: pid, rate: 1000, kp: 26000, ki: 470000, kd: 210, velocity_filter_hz: 380, "
           "limit: 50}\nparameters:\n  mass: {value: 20.1, unit: kg, sigma: 0.25}\n  motor_constant: {value: "
           "23, unit: N/A, sigma: 0.1}\n  viscous_damping: {value: 18, unit: N s/m, sigma: 2.5}\n"),
       {table});
@@ -265,6 +273,32 @@ TEST(AxisLoop, DampingInOneStretchIsFoundThereAndNowhereElse) {
   EXPECT_EQ(term.curve.over, "position");
   EXPECT_NEAR(term.curve(0.005) - term.curve(-0.005), 20.0, 5.0);
   EXPECT_NEAR(term.curve(0.015) - term.curve(-0.005), 0.0, 4.0);
+}
+
+TEST(AxisLoop, GreaseThatThinsAsItWarmsIsDampingOverTheTemperature) {
+  Axis axis;
+  axis.warmth = [](double t) { return 22.0 + 3.0 * std::sin(0.9 * t); };
+  axis.thins = 2.0;
+  const auto d = searched(recorded(axis, 0.05, 7));
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(term.with, "velocity");
+  EXPECT_EQ(term.curve.over, "temperature");
+  EXPECT_NEAR(term.curve(20.0) - term.curve(24.0), 8.0, 2.0);
+}
+
+TEST(AxisLoop, WhatPullsAtOnePlaceStandsThoughOneFoldAloneCameThere) {
+  Axis axis;  // the third move goes by and the fourth comes back, both within one stretch of the eighteen
+  axis.far = 0.1;
+  axis.pull = [](double x) { return 1.5 * std::exp(-0.5 * std::pow((x - 0.09) / 0.003, 2)); };
+  const auto d = searched(recorded(axis, 0.25, 6));
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.findings[0].term.curve;
+  EXPECT_EQ(d.findings[0].term.info->site, "force");
+  EXPECT_EQ(curve.over, "position");
+  EXPECT_NEAR(curve(0.09) - curve(0.0), 1.5, 0.4);
 }
 
 /// The model with a term more.

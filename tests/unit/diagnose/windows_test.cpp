@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <random>
 
 #include "tests/support/model_of.hpp"
@@ -115,7 +116,8 @@ TEST(Windows, WhatForgetsHasNone) {
 /// An axis that a loop the model does not know leads to and fro: exact between rows, for the force is constant there but for
 /// the friction, which turns or holds where the speed passes zero.
 /// Of the rows from `lost` on, fifty were not recorded; 0: all were.
-Case led_axis(double friction, int lost = 0) {
+/// `slips` [m], by row, of the instrument.
+Case led_axis(double friction, int lost = 0, const std::map<int, double>& slips = {}) {
   std::mt19937 random{11};
   std::normal_distribution<double> normal;
   constexpr double moved = 3.2, motor = 20.0, h = 1e-3;
@@ -128,7 +130,8 @@ Case led_axis(double friction, int lost = 0) {
                  reading = x + 1e-6 * normal(random);
     const double u = std::clamp(1500.0 * (to - reading) - 40.0 * v, -8.0, 8.0);
     if (lost == 0 || i < lost || i >= lost + 50)
-      time.push_back(t), current.push_back(u), position.push_back(reading);
+      time.push_back(t), current.push_back(u),
+          position.push_back(reading + (slips.contains(i) ? slips.at(i) : 0.0));
     for (double left = h; left > 0.0;) {
       const double push = motor * u;
       if (v == 0.0 && std::abs(push) <= friction) break;  // holds
@@ -164,6 +167,17 @@ TEST(Windows, AnAxisThatTheModelKnowsLacksNothing) {
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
+}
+
+TEST(Windows, SlipsAreSeenWhereAWrongModelRunsAwaySmoothly) {
+  auto data = led_axis(0.0, 0, {{501, 2e-4}, {1402, -1e-3}, {2203, 5e-5}, {3304, 4e-3}});
+  for (auto& parameter : data.model.parameters)
+    if (parameter.name == "motor_constant") parameter.value = 12.0;
+  cut_into_windows(data);
+  drop_outliers(data, simulate(data, data.model));
+  const auto& position = data.recordings[0].measured[0];
+  for (const std::size_t row : {501U, 1402U, 2203U, 3304U}) EXPECT_TRUE(std::isnan(position[row])) << row;
+  EXPECT_LE(data.count.outliers, 8U);
 }
 
 TEST(Windows, WhatTheCurrentDidInAGapIsNotKnown) {
