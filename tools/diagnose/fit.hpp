@@ -60,7 +60,7 @@ Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs
 struct Fit {
   physics::Model model;
   std::vector<Freedom> free;
-  Eigen::VectorXd sigma;     // of each freedom, from the curvature
+  Eigen::VectorXd sigma;  // of each freedom, from the curvature
   Eigen::MatrixXd covariance;
   double cost = 0.0;         // half the sum of squares, priors included, tempered
   double data_cost = 0.0;    // without the priors
