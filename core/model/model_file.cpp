@@ -209,9 +209,7 @@ void add_own(Model& model, std::string name, const Node& node) {
 /// What the controller decides is an input that needs no column, whether the user lists it or not.
 void add_decided_input(const Node& root, Model& model) {
   const auto& decided = model.equations.controlled_input;
-  if (decided.empty() || root["inputs"].has(decided) || root["states"].has(decided) ||
-      root["parameters"].has(decided))
-    return;
+  if (decided.empty() || root["inputs"].has(decided)) return;
   model.equations.inputs.push_back({decided, decided, false});
   model.signals.push_back({decided, decided, "", false});
 }

@@ -118,26 +118,24 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
   }
   for (const auto& node : root["inputs"].children()) names.take(node, "an input");
   for (const auto& node : root["parameters"].children()) names.take(node, "a parameter");
+  if (const auto& decided = model.equations.controlled_input;
+      !decided.empty() && !root["inputs"].has(decided))
+    names.take(root["controller"]["output"], decided, "an input");
   for (const auto& node : root["outputs"].children()) {
     formulas.push_back(node["expression"]);
     if (const auto at = names.all().find(node.key()); at != names.all().end() && at->second == "an input")
       node.fault("`" + node.key() + "` is an input already", "give the output another name");
   }
-  if (root.has("controller")) {
-    const auto controller = root["controller"];
-    if (const auto& output = model.equations.controlled_input; !output.empty() && !root["inputs"].has(output))
-      names.take(controller["output"], output, "an input");
-    formulas.push_back(controller["expression"]);
-  }
+  if (root.has("controller")) formulas.push_back(root["controller"]["expression"]);
   for (const auto& node : formulas)
     if (is_one_value(node) && names.are_good()) check_formula(node, model);
   if (model.equations.states.empty())
     root["states"].fault("names no state", "add one, with derivative and initial");
   if (model.equations.outputs.empty())
     root["outputs"].fault("names no output", "add one, with column and expression");
-  if (!root.has("controller") || model.equations.controlled_input.empty()) return;
-  const auto controller = root["controller"];
   const auto& output = model.equations.controlled_input;
+  if (output.empty()) return;
+  const auto controller = root["controller"];
   const auto drives = [&](const Node& node) { return node.exists() && mentions(node.as_text(), output); };
   if (!root["inputs"].has(output) && std::none_of(formulas.begin(), formulas.end() - 1, drives))
     controller["output"].fault("`" + output + "` is no input of this model and drives none of its states",

@@ -166,6 +166,24 @@ std::vector<Series> left_of(const Case& data, const std::vector<physics::Outputs
   return left;
 }
 
+struct MeanSquare {
+  double square = 0.0, rows = 0.0;
+};
+
+MeanSquare mean_square(const std::vector<Series>& all) {
+  MeanSquare mean;
+  for (const auto& one : all)
+    for (double v : one)
+      if (std::isfinite(v)) mean.square += v * v, mean.rows += 1.0;
+  mean.square /= mean.rows;
+  return mean;
+}
+
+/// What the user gave, or what cannot be told from the row before, whichever is more.
+double noise_of(const Case& data, const Weighing& weighing, std::size_t output) {
+  return std::fmax(data.given_noise[output], weighing.filters[output].sigma);
+}
+
 /// A share of the power that something explains, beyond what it explains of the same series shifted against the
 /// recording; each recording is turned round by the share of itself that `share_at` is given. 0: no more than chance.
 template <class ShareAt>
@@ -302,9 +320,7 @@ std::vector<double> far_share(const Case& data, const Fit& fit, double times) {
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     std::vector<Series> measured;
     for (const auto& recording : data.recordings) measured.push_back(recording.measured[o]);
-    const double given = data.given_noise[o], left = spread(left_of(data, simulated, o));
-    const double noise =
-        std::isfinite(given) ? std::max(given, weighing.filters[o].sigma) : weighing.filters[o].sigma;
+    const double left = spread(left_of(data, simulated, o)), noise = noise_of(data, weighing, o);
     if (left > times * noise && left > trifle * spread(measured)) shares[o] = 1.0 - std::pow(noise / left, 2);
   }
   return shares;
@@ -318,12 +334,9 @@ std::vector<double> excess_over_noise(const Case& data, const Fit& fit) {
   const auto weighing = weigh(data, simulated);
   for (std::size_t o = 0; o < all.size(); ++o) {
     if (!std::isfinite(data.given_noise[o])) continue;
-    double sum = 0.0, rows = 0.0;
-    for (const auto& one : left_of(data, simulated, o))
-      for (double v : one)
-        if (std::isfinite(v)) sum += v * v, rows += 1.0;
-    const double noise = std::max(data.given_noise[o], weighing.filters[o].sigma);
-    if (const double beyond = sum / rows / (noise * noise) - 1.0; rows > enough / 2 && beyond > by_chance)
+    const auto [square, rows] = mean_square(left_of(data, simulated, o));
+    const double noise = noise_of(data, weighing, o);
+    if (const double beyond = square / (noise * noise) - 1.0; rows > enough / 2 && beyond > by_chance)
       all[o] = beyond;
   }
   return all;
@@ -333,13 +346,10 @@ bool is_above_noise(const Case& data, const Fit& fit) {
   const auto simulated = simulate(data, fit.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto left = left_of(data, simulated, o);
-    double sum = 0.0, rows = 0.0;
-    for (const auto& one : left)
-      for (double v : one)
-        if (std::isfinite(v)) sum += v * v, rows += 1.0;
+    const auto [square, rows] = mean_square(left);
     // A loop repeats the noise of its reading, at some frequencies more than once; and what is white may be a worse
     // instrument than believed.
-    if (data.is_time_series && rows > enough && std::sqrt(sum / rows) > 2.0 * data.given_noise[o] &&
+    if (data.is_time_series && rows > enough && std::sqrt(square) > 2.0 * data.given_noise[o] &&
         independent_share(left) < 0.3)
       return true;
   }

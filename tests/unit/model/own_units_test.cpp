@@ -182,6 +182,10 @@ TEST(OwnExpressions, AnExpressionGivesOneValueAndALoopDoesNotFollowItself) {
               HasSubstr("no input of this model"));
   EXPECT_THAT(fault_of("u - x", "", "controller: {output: x, expression: 2*u}\n"),
               HasSubstr("`x` is a state already"));
+  EXPECT_THAT(fault_of("u - x", "k: {value: 1}", "controller: {output: k, expression: 2*u}\n"),
+              HasSubstr("`k` is a parameter already"));
+  EXPECT_THAT(fault_of("y - x", "", "controller: {output: y, expression: 2*u}\n"),
+              HasSubstr("`y` is an input already"));  // of an output that bears its name
   EXPECT_EQ(fault_of("w - x", "", "controller: {output: w, expression: 2*u - x}\n"), "none");
   EXPECT_EQ(fault_of("u - x", "", "controller: {output: u, expression: 2 - x}\n"), "none");
 }
