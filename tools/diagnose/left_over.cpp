@@ -329,7 +329,7 @@ std::vector<double> far_share(const Case& data, const Fit& fit, double times) {
 std::vector<double> excess_over_noise(const Case& data, const Fit& fit) {
   constexpr double by_chance = 0.1;
   std::vector<double> all(data.outputs.size(), 0.0);
-  if (!data.is_time_series) return all;
+  if (!data.is_time_series || !data.model.equations.controlled_input.empty()) return all;
   const auto simulated = simulate(data, fit.model);
   const auto weighing = weigh(data, simulated);
   for (std::size_t o = 0; o < all.size(); ++o) {

@@ -23,7 +23,8 @@ bool is_louder_in_motion(const Case& data, const Fit& fit);
 bool is_above_noise(const Case& data, const Fit& fit);
 
 /// By output, how many times the power of the noise is left beyond it: beyond what the user gave and beyond what cannot be
-/// told from the row before. 0: no more than the colour of noise may do in a recording, or he gave none.
+/// told from the row before. 0: no more than the colour of noise may do in a recording, he gave none, or a loop leads the noise
+/// of one reading to the others.
 std::vector<double> excess_over_noise(const Case& data, const Fit& fit);
 
 /// Noise that wanders does not know what was recorded: does `with` take most of what in the residual of `without` goes with

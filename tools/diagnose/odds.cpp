@@ -85,6 +85,11 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative) {
   return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
 }
 
+bool is_elsewhere_in_chain(const Term& one, const Term& other) {
+  return one.info == other.info && one.info->plant == Plant::equations &&
+         (comes_late(one) || one.info->name == "hidden_state");
+}
+
 double rest_beside(const std::vector<double>& won, const std::vector<double>& excess) {
   double all = 0.0, most = 0.0;
   for (const double one : won) all += std::max(0.0, one);

@@ -73,6 +73,16 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     for (std::size_t k = 0; k < term.info->parameter_count(); ++k)
       parameters[std::string{term.info->parameters[k].name}] = {
           {"value", term.values[k]}, {"unit", unit_of(data, term, k)}, {"sigma", finding.sigmas[k]}};
+    // The user's equations know a wave by its period, be it in time or in a state; all others have the name of which it is.
+    if (const auto k = term.info->index_of("period");
+        k < physics::most_parameters && term.info->plant == physics::Plant::equations) {
+      const double period = term.values[k], sigma = finding.sigmas[k];
+      if (term.with == "t")
+        parameters["frequency"] = {
+            {"value", 1.0 / period}, {"unit", "Hz"}, {"sigma", sigma / (period * period)}};
+      else
+        parameters["pitch"] = parameters["period"];
+    }
     json alternatives = json::array();
     for (const auto& a : finding.alternatives) {
       const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/physics/equations_columns.hpp"
+#include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/windows.hpp"
@@ -273,6 +274,20 @@ std::string beside_the_verdict(const Diagnosis& d) {
   return text.empty() ? text : "Mind: " + text + ".";
 }
 
+namespace {
+
+/// Where else in the chain a finding may act as well.
+std::string elsewhere(const Case& data, const Diagnosis& d) {
+  std::string places;
+  for (const auto& f : d.findings)
+    for (const auto& a : f.alternatives)
+      if (a.log_odds > -ambiguous_margin && is_elsewhere_in_chain(f.term, a.term))
+        places += (places.empty() ? ", or the same at the " : " or the ") + place_of(data, a.term);
+  return places;
+}
+
+}  // namespace
+
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   if (d.is_partial) {
     if (d.findings.empty())
@@ -295,9 +310,9 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
     case Verdict::parameters_only:
       return "Only parameters are off, no physics is missing: " + moved_parameters(d) + ".";
     case Verdict::explained:
-      return "Explained: the model leaves out " + names + ".";
+      return "Explained: the model leaves out " + names + elsewhere(data, d) + ".";
     case Verdict::partly_explained:
-      return "Partly explained: the model leaves out " + names + ", and something more.";
+      return "Partly explained: the model leaves out " + names + elsewhere(data, d) + ", and something more.";
     case Verdict::ambiguous: {
       std::string also;
       for (const auto& f : d.findings)

@@ -87,10 +87,18 @@ Fit refitted(const Case& data, const Weighing& weights, std::size_t fold, const 
 }
 
 /// A free course knows nothing of a place that the rows of a fold never came to, and whoever asks it there gets whatever the
-/// last rows beside it leave open. Rows that a fit leaves more open than their noise is are not asked for.
-void ask_what_is_known(const Case& data, const Fit& fold_fit, Weighing& test) {
-  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns);
-  const Eigen::VectorXd open = (known * fold_fit.covariance).cwiseProduct(known).rowwise().sum();
+/// last rows beside it leave open; so does a state of what it began at, once the rows that would say so are kept back. Rows
+/// that a fit leaves more open than their noise is are not asked for.
+void ask_what_is_known(const Case& data, const Fit& fold_fit, bool is_curved, Weighing& test) {
+  std::vector<Eigen::Index> asked;
+  for (std::size_t k = 0; k < fold_fit.free.size(); ++k)
+    if (const auto& f = fold_fit.free[k];
+        is_curved || (f.where == Freedom::Where::parameter && is_initial(fold_fit.model.parameters[f.index])))
+      asked.push_back(static_cast<Eigen::Index>(k));
+  if (asked.empty()) return;
+  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns(Eigen::all, asked));
+  const Eigen::VectorXd open =
+      (known * fold_fit.covariance(asked, asked)).cwiseProduct(known).rowwise().sum();
   Eigen::Index at = 0;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(data.recordings[r].inputs.rows());
@@ -125,12 +133,15 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
   double gain = 0.0;  // of what was not seen, in whitened residuals
   for (std::size_t k = 0; k < folds; ++k) {
     auto fold = fold_of(data, d.weighing, k);
-    const auto retuned = simulate(data, refitted(data, for_retuned, k, d.retuned, iterations).model);
+    const auto fitted = refitted(data, for_retuned, k, d.retuned, iterations);
+    const auto retuned = simulate(data, fitted.model);
     auto after = retuned;
     if (any) {
       const auto best = refitted(data, for_best, k, d.best, iterations);
-      if (d.is_unnamed || d.has_rest) ask_what_is_known(data, best, fold.test);
+      ask_what_is_known(data, best, d.is_unnamed || d.has_rest, fold.test);
       after = simulate(data, best.model);
+    } else {
+      ask_what_is_known(data, fitted, false, fold.test);
     }
     const auto rival = differs ? simulate(data, refitted(data, for_rival, k, d.retuned, 3).model) : retuned;
     for (const bool test : {true, false}) {
@@ -249,7 +260,8 @@ void conclude(const Case& data, Diagnosis& d) {
   bool ambiguous = false;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      ambiguous = ambiguous || (a.log_odds > -ambiguous_margin && is_another_cause(finding, a));
+      ambiguous = ambiguous || (a.log_odds > -ambiguous_margin && is_another_cause(finding, a) &&
+                                !is_elsewhere_in_chain(finding.term, a.term));
   if (d.findings.empty())
     // What follows the recording is no noise, even where no curve and no name describes it.
     d.verdict = most_followed > 0.5 || is_above_noise(data, d.best) || is_louder_in_motion(data, d.best)

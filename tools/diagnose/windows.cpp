@@ -28,6 +28,9 @@ using physics::Model;
 constexpr std::size_t fewest_rows = 60, most_starts = 100;
 /// A window is at most as long as a disturbance of its first state takes to grow so much.
 constexpr double most_growth = 30.0;
+/// As many windows where a disturbance grows no faster than the sum of a sum does.
+constexpr std::size_t long_windows = 6;
+constexpr double sum_growth = 6.0;
 /// What integrates goes on by this factor from the middle to the end of a recording.
 constexpr double still_going = 1.6;
 
@@ -244,6 +247,10 @@ bool is_start(const physics::Parameter& parameter) {
   return parameter.name.find(".start") != std::string::npos;
 }
 
+bool is_initial(const physics::Parameter& parameter) {
+  return is_start(parameter) || parameter.name.ends_with(".initial");
+}
+
 void cut_into_windows(Case& data) {
   const auto states = physics::states_of(data.model).size();
   const bool is_axis = data.model.plant == physics::Plant::axis;
@@ -265,10 +272,18 @@ void cut_into_windows(Case& data) {
     estimate_starts(data);
     return;
   }
-  std::size_t window = std::max(fewest_rows, rows * states / most_starts);
+  const std::size_t shortest = std::max(fewest_rows, rows * states / most_starts);
+  // What only adds up stays near in long windows, and what is slow shows in these alone.
+  std::size_t window = is_axis ? shortest : std::max(shortest, rows / long_windows);
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
   double growth = growth_over_windows(cut);
+  while (growth > sum_growth && window > shortest) {
+    window = std::max(shortest, window / 2);
+    cut = in_windows(data, window, anew);
+    estimate_starts(cut);
+    growth = growth_over_windows(cut);
+  }
   while (growth > most_growth && window > fewest_rows / 4 &&
          2 * cut.windows.count * states <= 2 * most_starts) {
     window /= 2;

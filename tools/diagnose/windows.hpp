@@ -18,6 +18,9 @@ physics::Model showing_states(const physics::Model& model);
 /// Is it a state at the beginning of a window?
 bool is_start(const physics::Parameter& parameter);
 
+/// Is it a state at the beginning of a window or of the recording?
+bool is_initial(const physics::Parameter& parameter);
+
 /// "judged over 12 windows of 5 s, each from states of its own, because the model integrates", and what begins anew behind
 /// gaps; empty where there is nothing of it.
 std::string how_windowed(const Case& data);
