@@ -31,7 +31,7 @@ Eigen::MatrixXd OwnRows::normal(const Eigen::MatrixXd& columns) const {
   const Eigen::MatrixXd full = columns(Eigen::all, full_);
   const auto n = static_cast<Eigen::Index>(full_.size());
   Eigen::MatrixXd common = Eigen::MatrixXd::Zero(n, n);
-  common.selfadjointView<Eigen::Lower>().rankUpdate(full.transpose());
+  if (n > 0) common.selfadjointView<Eigen::Lower>().rankUpdate(full.transpose());
   common = Eigen::MatrixXd{common.selfadjointView<Eigen::Lower>()};
   product(full_, full_) = common;
   const auto add = [&](Eigen::Index a, Eigen::Index b, double value) {

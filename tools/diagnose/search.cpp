@@ -548,11 +548,35 @@ Diagnosis Search::run() {
 
 }  // namespace
 
+namespace {
+
+/// How much a verdict says of what is missing.
+int named_by(const Diagnosis& d) {
+  return d.verdict == Verdict::explained                                             ? 2
+         : d.verdict == Verdict::partly_explained || d.verdict == Verdict::ambiguous ? 1
+                                                                                     : 0;
+}
+
+}  // namespace
+
 Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
                  const Options& options) {
-  const Case as_read = data;
+  Case as_read = data;
   auto d = Search{data, progress, options}.run();
   if (!options.refuses) return d;
+  if ((named_by(d) < 2 || d.findings.size() > 1) && !d.is_partial && has_longer_windows(data)) {
+    Case longer = as_read;
+    longer.windows.few = true;
+    longer.remembered = std::make_shared<Remembered>();
+    auto in_long = Search{longer, progress, options}.run();
+    // The same with fewer names is what more evidence makes of it.
+    if (named_by(in_long) > named_by(d) ||
+        (named_by(in_long) == 2 && in_long.findings.size() < d.findings.size())) {
+      as_read.windows.few = true;
+      data = std::move(longer);
+      d = std::move(in_long);
+    }
+  }
   if (auto quiet = with_quiet_inputs(as_read, data, d)) {
     data = std::move(*quiet);
     d = Search{data, progress, options}.run();

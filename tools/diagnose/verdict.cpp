@@ -88,17 +88,21 @@ Fit refitted(const Case& data, const Weighing& weights, std::size_t fold, const 
 
 /// A free course knows nothing of a place that the rows of a fold never came to, and whoever asks it there gets whatever the
 /// last rows beside it leave open; so does a state of what it began at, once the rows that would say so are kept back. Rows
-/// that a fit leaves more open than their noise is are not asked for.
+/// that a fit leaves more open than their noise is, by its courses or by its beginnings, are not asked for.
 void ask_what_is_known(const Case& data, const Fit& fold_fit, bool is_curved, Weighing& test) {
-  std::vector<Eigen::Index> asked;
+  std::vector<Eigen::Index> beginnings;
   for (std::size_t k = 0; k < fold_fit.free.size(); ++k)
     if (const auto& f = fold_fit.free[k];
-        is_curved || (f.where == Freedom::Where::parameter && is_initial(fold_fit.model.parameters[f.index])))
-      asked.push_back(static_cast<Eigen::Index>(k));
-  if (asked.empty()) return;
-  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns(Eigen::all, asked));
-  const Eigen::VectorXd open =
-      (known * fold_fit.covariance(asked, asked)).cwiseProduct(known).rowwise().sum();
+        f.where == Freedom::Where::parameter && is_initial(fold_fit.model.parameters[f.index]))
+      beginnings.push_back(static_cast<Eigen::Index>(k));
+  if (!is_curved && beginnings.empty()) return;
+  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns);
+  Eigen::VectorXd open = (known * fold_fit.covariance).cwiseProduct(known).rowwise().sum();
+  if (!is_curved) {
+    const Eigen::MatrixXd begun = known(Eigen::all, beginnings);
+    open = open.cwiseMin(
+        (begun * fold_fit.covariance(beginnings, beginnings)).cwiseProduct(begun).rowwise().sum());
+  }
   Eigen::Index at = 0;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(data.recordings[r].inputs.rows());

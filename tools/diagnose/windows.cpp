@@ -273,8 +273,7 @@ void cut_into_windows(Case& data) {
     return;
   }
   const std::size_t shortest = std::max(fewest_rows, rows * states / most_starts);
-  // What only adds up stays near in long windows, and what is slow shows in these alone.
-  std::size_t window = is_axis ? shortest : std::max(shortest, rows / long_windows);
+  std::size_t window = data.windows.few ? std::max(shortest, rows / long_windows) : shortest;
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
   double growth = growth_over_windows(cut);
@@ -293,6 +292,11 @@ void cut_into_windows(Case& data) {
     cut.windows.grows = true;
   }
   data = std::move(cut);
+}
+
+bool has_longer_windows(const Case& data) {
+  return data.model.plant == physics::Plant::equations && !data.windows.grows && !data.windows.few &&
+         data.windows.count >= 2 * long_windows * data.recordings.size();
 }
 
 std::string how_windowed(const Case& data) {

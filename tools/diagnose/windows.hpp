@@ -12,6 +12,10 @@ namespace invar::diagnose {
 /// (anew.hpp).
 void cut_into_windows(Case& data);
 
+/// Are there longer windows in which the model stays near (`Case::Windows::few`)? Short ones keep a wrong model near the
+/// machine, but begin anew before anything slow shows.
+bool has_longer_windows(const Case& data);
+
 /// The model with its states as its outputs.
 physics::Model showing_states(const physics::Model& model);
 

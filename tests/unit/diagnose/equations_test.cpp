@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <random>
 
@@ -11,6 +12,7 @@
 #include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
 
 namespace invar::diagnose {
@@ -115,7 +117,7 @@ class Equations : public ::testing::Test {
     table.add("drive", "", drive);
     table.add("y", "", out[0]);
     table.write(folder / "recording.csv");
-    auto data = load_case(model, {folder / "recording.csv"});
+    data = load_case(model, {folder / "recording.csv"});
     std::cout << "seed " << seed << '\n';
     return search(data, [](double, const std::string&) {});
   }
@@ -129,6 +131,7 @@ class Equations : public ::testing::Test {
   }
 
   invar::testing::TemporaryFolder folder;
+  Case data;
 };
 
 TEST_F(Equations, NamesASpringThatHardens) {
@@ -152,10 +155,34 @@ TEST_F(Equations, NamesTeethOfWhichManyPass) {
   EXPECT_EQ(d.findings[0].term.with, "th");
   EXPECT_NEAR(d.findings[0].term.values[0], 0.15, 0.015);
   EXPECT_NEAR(d.findings[0].term.values[1], 0.2618, 2e-4);
+  const auto report = nlohmann::json::parse(report_json(data, d));
+  EXPECT_NEAR(report["findings"][0]["parameters"]["pitch"]["value"], 0.2618, 2e-4);
+}
+
+TEST_F(Equations, AWaveInTimeHasAFrequency) {
+  const auto d = diagnose(motor, {term("periodic", "w", {3.0, 0.9, 0.7}, "t")}, 8);
+  const auto report = nlohmann::json::parse(report_json(data, d));
+  ASSERT_EQ(report["findings"].size(), 1U);
+  EXPECT_NEAR(report["findings"][0]["parameters"]["frequency"]["value"], 1.0 / 0.9, 0.005);
+  EXPECT_EQ(report["findings"][0]["parameters"]["frequency"]["unit"], "Hz");
 }
 
 TEST_F(Equations, NamesALateInput) {
   expect(diagnose(motor, {term("delay", "u", {0.07})}, 4), "delay", "u", 0.07, 0.01);
+}
+
+/// Before or behind a model in one piece: no motion tells where, but that it is there is explained.
+TEST_F(Equations, AStoreWhosePlaceInTheChainIsOpenIsExplained) {
+  auto from_rest = motor;  // else what the lag begins at tells where it is
+  from_rest.drive = [](std::size_t row, std::mt19937& random) {
+    return row < 29 ? 0.0 : levels<29, -100, 100>(row, random);
+  };
+  const auto d = diagnose(from_rest, {term("lag", "u", {0.08})}, 7);
+  expect(d, "lag", d.findings.empty() ? "" : d.findings[0].term.on.c_str(), 0.08, 0.02);
+  ASSERT_FALSE(d.findings[0].alternatives.empty());
+  EXPECT_EQ(d.findings[0].alternatives[0].term.info->name, "lag");
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_THAT(summary(data, d), ::testing::HasSubstr("or the same at the"));
 }
 
 /// A room and its walls, which nobody measures. The numbers of the room answer for what the walls get of the sun until none
@@ -199,7 +226,7 @@ TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
   table.add("radiator", "", inputs.signals["Q"]);
   table.add("room", "", out[0]);
   table.write(folder / "recording.csv");
-  auto data = load_case(model, {folder / "recording.csv"});
+  data = load_case(model, {folder / "recording.csv"});
   const auto d = search(data, [](double, const std::string&) {});
   expect(d, "coupling", "Tw", 1.7e-7, 1e-8);
 }

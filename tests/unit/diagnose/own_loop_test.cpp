@@ -13,17 +13,19 @@
 namespace invar::diagnose {
 namespace {
 
-/// A cart that is pushed as its controller reads it, exact between rows; what is commanded may arrive late.
-Case cart(double push, double lag) {
+/// A cart that is pushed as its controller reads it, exact between rows; what is commanded may arrive late. Its speed may be
+/// read too, by an instrument that is far quieter than what the other's noise makes of the speed.
+Case cart(double push, double lag, bool reads_speed = false) {
   std::mt19937 random{5};
   std::normal_distribution<double> normal;
   constexpr double h = 0.02;
-  std::vector<double> time, target, command, reading;
+  std::vector<double> time, target, command, reading, speed;
   double x = 0.0, v = 0.0, felt = 0.0, to = 0.0;
   for (int i = 0; i < 2000; ++i) {
     if (i % 150 == 149) to = std::uniform_real_distribution<double>{-0.3, 0.3}(random);
     const double read = x + 2e-3 * normal(random), u = 9.0 * (to - read) - 4.0 * v;
     time.push_back(h * i), target.push_back(to), command.push_back(u), reading.push_back(read);
+    if (reads_speed) speed.push_back(v + 1e-4 * normal(random));
     for (int part = 0; part < 40; ++part) {
       const double s = h / 40.0, kept = lag > 0.0 ? std::exp(-s / lag) : 0.0;
       felt = u + (felt - u) * kept;
@@ -37,11 +39,17 @@ Case cart(double push, double lag) {
   table.add("to", "m", target);
   table.add("u", "", command);
   table.add("y", "m", reading);
+  if (reads_speed) table.add("w", "m/s", speed);
+  const std::string outputs =
+      reads_speed
+          ? "{y: {column: y, expression: x}, w: {column: w, expression: v}}\nnoise: {y: 0.002, w: 1e-4}\n"
+          : "{y: {column: y, expression: x}}\nnoise: {y: 0.002}\n";
   return make_case(
       test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {r: to, u: u}\nstates:\n"
                      "  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0.01}}\n"
                      "  v: {derivative: 'k*u - c*v', initial: {value: 0, unit: m/s, sigma: 0.01}}\n"
-                     "outputs: {y: {column: y, expression: x}}\nnoise: {y: 0.002}\n"
+                     "outputs: " +
+                     outputs +
                      "controller: {output: u, expression: '9*(r - x) - 4*v'}\n"
                      "parameters:\n  k: {value: 1.08, unit: 1/kg, sigma: 0.03}\n"
                      "  c: {value: 0.32, unit: 1/s, sigma: 0.05}\n"),
@@ -61,6 +69,14 @@ TEST(OwnLoop, AForceIsExplainedThoughTheNoiseGoesRound) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
   EXPECT_NEAR(d.findings[0].term.values[0], 0.08, 0.004);
+}
+
+TEST(OwnLoop, ANoisyReadingMakesTheOtherOutputsLouderAndNoNameWorse) {
+  auto data = cart(0.08, 0.0, true);
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "constant");
+  EXPECT_GT(d.findings[0].probability, 0.8);
 }
 
 TEST(OwnLoop, WhatTheControllerDecidesNeedNotBeListedAmongTheInputs) {

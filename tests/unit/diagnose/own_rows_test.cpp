@@ -27,6 +27,13 @@ TEST(OwnRows, ProductsAreThoseOfTheFullMatrices) {
   EXPECT_LT((rows.times(columns, by) - columns.transpose() * by).norm(), 1e-10);
 }
 
+TEST(OwnRows, StatesAloneHaveNoFullColumn) {
+  const Eigen::MatrixXd columns = columns_of_windows().rightCols(8);
+  const OwnRows rows{columns, std::vector<bool>(8, true)};
+  ASSERT_TRUE(rows.any());
+  EXPECT_LT((rows.normal(columns) - columns.transpose() * columns).norm(), 1e-10);
+}
+
 TEST(OwnRows, AnUpdateGivesTheChangeThatWasSeenAndLeavesZeros) {
   auto columns = columns_of_windows();
   const auto before = columns;

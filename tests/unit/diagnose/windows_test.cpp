@@ -75,6 +75,33 @@ TEST(Windows, TheAirsDragIsNamedWhereTheFreeRunDrifts) {
   EXPECT_LT(d.heldout[0].after, 0.2 * d.heldout[0].retuned);
 }
 
+/// A cell that loses 0.7 % of its charge an hour by itself: less than a window of some rows shows.
+TEST(Windows, ASlowLeakOfWhatAddsUpIsNamed) {
+  std::mt19937 random{4};
+  std::normal_distribution<double> normal;
+  constexpr double h = 10.0, leak = 2e-6, capacity = 72e3, resistance = 0.01;
+  Recorded r;
+  double charge = 0.8, current = 0.0;
+  for (int i = 0; i < 2400; ++i) {
+    if (i % 60 == 0) current = std::uniform_real_distribution<double>{-5.0, 6.5}(random);
+    r.time.push_back(h * i);
+    r.drive.push_back(current);
+    r.way.push_back(3.2 + 0.9 * charge - resistance * current + 2e-3 * normal(random));
+    const double gone = 1.0 - std::exp(-leak * h);
+    charge -= gone * (charge + current / capacity / leak);
+  }
+  auto data =
+      r.with(model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {i: drive}\n"
+                      "states: {soc: {derivative: '-i/Q', initial: {value: 0.8, unit: 1, sigma: 0.05}}}\n"
+                      "outputs: {v: {column: y, expression: '3.2 + 0.9*soc - R*i'}}\nnoise: {v: 0.002}\n"
+                      "parameters: {Q: {value: 71000, unit: A s, sigma: 3000}, R: {value: 0.01, unit: ohm, "
+                      "sigma: 0.001}}\n"));
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "linear") << summary(data, d);
+  EXPECT_NEAR(d.findings[0].term.values[0], -leak, 0.3e-6);
+}
+
 /// What grows e-fold in half a second, held by a law that the model does not know: its input was recorded alone.
 TEST(Windows, WhatRunsAwayIsFollowedOverShortOnes) {
   std::mt19937 random{3};
