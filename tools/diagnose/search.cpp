@@ -546,10 +546,6 @@ Diagnosis Search::run() {
   return d_;
 }
 
-}  // namespace
-
-namespace {
-
 /// How much a verdict says of what is missing.
 int named_by(const Diagnosis& d) {
   return d.verdict == Verdict::explained                                             ? 2
@@ -570,8 +566,8 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
     longer.remembered = std::make_shared<Remembered>();
     auto in_long = Search{longer, progress, options}.run();
     // The same with fewer names is what more evidence makes of it.
-    if (named_by(in_long) > named_by(d) ||
-        (named_by(in_long) == 2 && in_long.findings.size() < d.findings.size())) {
+    if (!in_long.is_partial && (named_by(in_long) > named_by(d) ||
+                                (named_by(in_long) == 2 && in_long.findings.size() < d.findings.size()))) {
       as_read.windows.few = true;
       data = std::move(longer);
       d = std::move(in_long);
