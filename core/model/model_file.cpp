@@ -270,16 +270,16 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
     node.accept_all();
     return false;
   }
-  if (const auto& over = term.curve.over; !over.empty() && over != "t") {
-    std::vector<std::string> symbols;
-    for (const auto& state : model.equations.states) symbols.push_back(state.name);
-    for (const auto& input : model.equations.inputs) symbols.push_back(input.symbol);
-    if (std::find(symbols.begin(), symbols.end(), over) == symbols.end()) {
-      node["over"].fault("`" + over + "` is no state, no input and not t", "name one of them");
-      return false;
-    }
-  }
-  return true;
+  if (term.curve.over.empty()) return true;
+  std::vector<std::string> symbols{"t"};
+  for (const auto& state : model.equations.states) symbols.push_back(state.name);
+  for (const auto& input : model.equations.inputs) symbols.push_back(input.symbol);
+  const auto is_known = [&](const char* key, const std::string& symbol) {
+    if (std::find(symbols.begin(), symbols.end(), symbol) != symbols.end()) return true;
+    node[key].fault("`" + symbol + "` is no state, no input and not t", "name one of them");
+    return false;
+  };
+  return is_known("over", term.curve.over) && (term.with.empty() || is_known("with", term.with));
 }
 
 std::optional<Term> read_term(const Node& node, const Model& model) {

@@ -70,6 +70,9 @@ OwnState state_of(const physics::Signal& signal, const physics::Model& model) {
   return {};
 }
 
+/// What a header may say of it: the state's unit, where it is one.
+std::string known_unit(const OwnState& state) { return parse_unit(state.unit) ? state.unit : std::string{}; }
+
 /// Throws where a column says that it measures something else than the state that it is compared with.
 void check_own_unit(const recording::Column& column, const OwnState& state, const std::string& where) {
   if (state.unit.empty() || column.unit == state.unit) return;
@@ -174,7 +177,7 @@ recording::Table to_table(const physics::Model& model, const RecordFile& inputs,
                           const physics::Outputs& outputs) {
   recording::Table table;
   const auto add = [&](const physics::Signal& signal, std::vector<double> values) {
-    ColumnUnit unit{signal.unit, 1.0, 0.0};
+    ColumnUnit unit{signal.unit.empty() ? known_unit(state_of(signal, model)) : signal.unit, 1.0, 0.0};
     if (const auto at = inputs.units.find(signal.name); at != inputs.units.end()) unit = at->second;
     for (double& value : values) value = (value - unit.offset) / unit.factor;
     table.add(signal.column, unit.unit, std::move(values));

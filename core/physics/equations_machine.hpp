@@ -216,8 +216,10 @@ class EquationsMachine {
     std::array<const double*, lanes> p;
   };
   struct Course {
-    std::size_t on, with;
+    std::size_t on, over;
     std::array<const Curve*, lanes> curve;
+    std::optional<std::size_t>
+        with;  // what the curve is of is in proportion to this; nothing: a rate by itself
   };
   struct Courses {
     std::array<InputCourse, lanes> of{};
@@ -262,8 +264,9 @@ class EquationsMachine {
     for (std::size_t i = 0; i < states_; ++i) std::copy_n(slot(compiled_.rates[i]), lanes, d[i].begin());
     for (const auto& term : rate_terms_)
       for (std::size_t l = 0; l < lanes; ++l) d[term.on][l] += term.kind->rate(slot(term.with)[l], term.p[l]);
-    for (const auto& [on, with, curve] : curves_)
-      for (std::size_t l = 0; l < lanes; ++l) d[on][l] += (*curve[l])(slot(with)[l]);
+    for (const auto& [on, over, curve, with] : curves_)
+      for (std::size_t l = 0; l < lanes; ++l)
+        d[on][l] += (*curve[l])(slot(over)[l]) * (with ? slot(*with)[l] : 1.0);
     for (std::size_t h = 0; h < hidden_.size(); ++h) {
       const auto& term = hidden_[h];
       for (std::size_t l = 0; l < lanes; ++l) {
@@ -451,7 +454,8 @@ class EquationsMachine {
                                       compiled_.variables() - 1);
     if (on >= states_) return;  // at an input or output: the simulation bends those
     if (!term.curve.knots.empty()) {
-      Course course{on, std::min(compiled_.place(term.curve.over), compiled_.variables() - 1), {}};
+      Course course{on, std::min(compiled_.place(term.curve.over), compiled_.variables() - 1), {}, {}};
+      if (!term.with.empty()) course.with = with;
       for (std::size_t l = 0; l < lanes; ++l) course.curve[l] = &models[l]->terms[t].curve;
       curves_.push_back(course);
       return;

@@ -30,8 +30,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
 
 /// Those of a model in the user's own equations.
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted);
-/// Curves of each rate over each state, input and the time.
-std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted);
+/// Curves of each rate over each state, input and the time; `products`: of what it has in proportion to another of them, as a
+/// number of the user's that changes, or two states that act together.
+std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products = false);
 /// From where to where a state, input, output or the time goes in a model of equations.
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// How far apart the middle four fifths of its rows lie.

@@ -11,6 +11,7 @@
 #include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
+#include "tools/report/page.hpp"
 
 namespace invar::diagnose {
 
@@ -258,11 +259,16 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   auto content = model::to_record(table, model, true);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
-  for (auto& signal : data.model.signals)  // the user's own expressions are in the units of his columns
-    if (const auto unit = content.units.find(signal.name);
-        unit != content.units.end() && signal.unit.empty() && unit->second.factor == 1.0 &&
-        unit->second.offset == 0.0)
-      signal.unit = unit->second.unit;
+  for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
+    const auto unit = content.units.find(signal.name);
+    if (unit == content.units.end() || !signal.unit.empty()) continue;
+    if (unit->second.factor == 1.0 && unit->second.offset == 0.0) signal.unit = unit->second.unit;
+    if (unit->second.factor == 1.0) continue;
+    const auto note = "`" + signal.column + "` in " + unit->second.unit + " is taken in SI, times " +
+                      report::number(unit->second.factor, 4);
+    if (std::find(data.taken_in_si.begin(), data.taken_in_si.end(), note) == data.taken_in_si.end())
+      data.taken_in_si.push_back(note);
+  }
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
     if (const auto noise = model.noise.find(name); noise != model.noise.end())

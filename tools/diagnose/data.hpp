@@ -40,6 +40,8 @@ struct Case {
   std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
   double resolution = 0.0;  // of an encoder, SI, as the user believes; the model itself does not round
   DataCount count;
+  std::vector<std::string>
+      taken_in_si;  // "`base` in mL/s is taken times 1e-06": columns of the user's own equations
   struct Windows {
     std::size_t count = 0;  // 0: each recording is simulated from its first row to its last
     double length = 0.0;    // of one, in the unit of time

@@ -1,6 +1,5 @@
 // Candidates for a model in the user's own equations: which terms, on which state, input or output, from which sizes.
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <map>
 #include <numbers>
@@ -9,6 +8,7 @@
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/fine_periods.hpp"
+#include "tools/diagnose/what_looks_at_what.hpp"
 
 namespace invar::diagnose {
 
@@ -122,47 +122,18 @@ std::vector<double> residual_periods(const Case& data, const physics::Model& fit
   return periods;
 }
 
-/// A state whose rate is only another state (x' = v): nothing can be missing there.
-bool is_kinematic(const physics::Equations& equations, const physics::Equations::State& state) {
-  return std::any_of(equations.states.begin(), equations.states.end(),
-                     [&](const auto& other) { return state.derivative == other.name; });
-}
-
-/// A state that is the rate of another (x' = v): friction acts against its sign.
-bool is_speed(const physics::Equations& equations, const std::string& state) {
-  return std::any_of(equations.states.begin(), equations.states.end(),
-                     [&](const auto& other) { return other.derivative == state; });
-}
-
-/// Does the model look at this input? Else nothing at it can matter but what leads it elsewhere.
-bool is_used(const physics::Equations& equations, const std::string& symbol) {
-  const auto names = [&](const std::string& formula) {
-    const auto part_of_name = [](char c) {
-      return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
-    };
-    for (auto at = formula.find(symbol); at != std::string::npos; at = formula.find(symbol, at + 1)) {
-      const std::size_t end = at + symbol.size();
-      if ((at == 0 || !part_of_name(formula[at - 1])) &&
-          (end == formula.size() || !part_of_name(formula[end])))
-        return true;
-    }
-    return false;
-  };
-  return symbol == equations.controlled_input || names(equations.control_law) ||
-         std::any_of(equations.states.begin(), equations.states.end(),
-                     [&](const auto& state) { return names(state.derivative); }) ||
-         std::any_of(equations.outputs.begin(), equations.outputs.end(),
-                     [&](const auto& output) { return names(output.expression); });
-}
-
 class Candidates {
  public:
   Candidates(const Case& data, const physics::Model& fitted)
-      : data_{data}, model_{fitted}, equations_{data.model.equations}, spans_{data, fitted} {}
+      : data_{data},
+        model_{fitted},
+        equations_{data.model.equations},
+        states_{states_of_machine(equations_)},
+        spans_{data, fitted} {}
 
   std::vector<Start> all() {
     const double step = spans_.duration / static_cast<double>(spans_.rows);
-    for (const auto& state : equations_.states) {
+    for (const auto& state : states_) {
       add_felt(state.name, step);
       if (is_kinematic(equations_, state)) continue;
       add_rates(state.name);
@@ -210,7 +181,7 @@ class Candidates {
     const auto& own = spans_.of(state);
     const double rate = 1e-3 * std::max(own.rate, own.size() / spans_.duration);
     const auto asked = rate_asked_for(data_, model_, state, rate);
-    for (const auto& other : equations_.states) {
+    for (const auto& other : states_) {
       const bool itself = other.name == state;
       const double s = spans_.of(other.name).size();
       const std::string with = itself ? "" : other.name;
@@ -245,7 +216,7 @@ class Candidates {
     add_limits(state, span);
     for (const double share :
          {0.97, 0.9, 0.8, 0.7, 0.55})  // what runs over to nowhere is held by an upper limit
-      for (const auto& other : equations_.states)
+      for (const auto& other : states_)
         if (other.name != state) add("overflow", state, other.name, 0.0, {span.low + share * span.width()});
   }
 
@@ -284,40 +255,47 @@ class Candidates {
   const Case& data_;
   const physics::Model& model_;
   const physics::Equations& equations_;
+  const std::vector<physics::Equations::State> states_;
   Spans spans_;
   std::vector<Start> starts_;
 };
 
 }  // namespace
 
-std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted) {
+std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products) {
   const Spans spans{data, fitted};
-  const std::size_t knots = std::clamp<std::size_t>(spans.rows / 20, 4, 8);
+  const std::size_t most = products ? 6 : 8, knots = std::clamp<std::size_t>(spans.rows / 20, 4, most);
   const auto& equations = data.model.equations;
+  const auto states = states_of_machine(equations);
   std::vector<std::string> symbols;
-  for (const auto& state : equations.states) symbols.push_back(state.name);
+  for (const auto& state : states) symbols.push_back(state.name);
   for (const auto& input : equations.inputs) symbols.push_back(input.symbol);
+  const auto factors = products ? symbols : std::vector<std::string>{""};
   symbols.emplace_back("t");
   std::vector<Start> starts;
-  for (const auto& state : equations.states) {
+  for (const auto& state : states) {
     if (is_kinematic(equations, state)) continue;
     const auto& own = spans.of(state.name);
-    for (const auto& symbol : symbols) {
-      const auto& span = spans.of(symbol);
-      if (!(span.width() > 1e-9 * span.size())) continue;
-      Start start;
-      start.term.info = physics::unmodelled(Plant::equations, "state");
-      start.term.on = state.name;
-      start.term.curve.over = symbol;
-      start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration);
-      for (std::size_t k = 0; k < knots; ++k) {
-        start.term.curve.knots.push_back(span.low + span.width() * static_cast<double>(k) /
-                                                        static_cast<double>(knots - 1));
-        start.term.curve.values.push_back(0.0);
-        start.directions.push_back({physics::most_parameters, k, false});
+    for (const auto& symbol : symbols)
+      for (const auto& factor : factors) {
+        const auto& span = spans.of(symbol);
+        // What goes with itself is a curve of its own shape.
+        if (!(span.width() > 1e-9 * span.size()) || symbol == factor) continue;
+        Start start;
+        start.term.info = physics::unmodelled(Plant::equations, "state");
+        start.term.on = state.name;
+        start.term.with = factor;
+        start.term.curve.over = symbol;
+        start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration);
+        if (products) start.step /= spans.of(factor).size();
+        for (std::size_t k = 0; k < knots; ++k) {
+          start.term.curve.knots.push_back(span.low + span.width() * static_cast<double>(k) /
+                                                          static_cast<double>(knots - 1));
+          start.term.curve.values.push_back(0.0);
+          start.directions.push_back({physics::most_parameters, k, false});
+        }
+        starts.push_back(std::move(start));
       }
-      starts.push_back(std::move(start));
-    }
   }
   return starts;
 }

@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -112,8 +113,16 @@ Surface surface(const Case& data, const std::vector<physics::Outputs>& simulated
   return made;
 }
 
-/// What each named term does to an output, were its strength or its place to change with time or with a cause: a law has
-/// the same numbers everywhere, and a name that is not the right one needs others here than there.
+/// Has this number one value everywhere, if the model is right? A term's, and one of the user's own equations; not where a
+/// state began.
+bool is_of_a_law(const Case& data, const Fit& fit, const Freedom& f) {
+  if (f.where == Freedom::Where::term) return f.term >= data.model.terms.size();
+  return f.where == Freedom::Where::parameter && data.is_time_series &&
+         !is_initial(fit.model.parameters[f.index]);
+}
+
+/// What each number of a law does to an output, were it to change with time or with a cause: a law has the same numbers
+/// everywhere, and one that is not the right one needs others here than there.
 std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, std::size_t output,
                                               const std::vector<Eigen::VectorXd>& causes) {
   Eigen::Index rows = 0;
@@ -121,7 +130,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
   std::vector<Eigen::VectorXd> all;
   for (std::size_t k = 0; k < fit.free.size() && fit.columns.rows() > 0; ++k) {
     const auto& f = fit.free[k];
-    if (f.where != Freedom::Where::term || f.term < data.model.terms.size()) continue;
+    if (!is_of_a_law(data, fit, f)) continue;
     Eigen::VectorXd effect(rows);
     Eigen::Index from = 0, to = 0;
     for (const auto& recording : data.recordings) {
@@ -343,13 +352,17 @@ std::vector<double> excess_over_noise(const Case& data, const Fit& fit) {
 }
 
 bool is_above_noise(const Case& data, const Fit& fit) {
+  // Who writes down his equations and his noise has said what a model that is whole leaves.
+  const bool is_own =
+      data.model.plant == physics::Plant::equations && data.model.equations.controlled_input.empty();
+  const double most = is_own ? 1.25 : 2.0;
   const auto simulated = simulate(data, fit.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto left = left_of(data, simulated, o);
     const auto [square, rows] = mean_square(left);
     // A loop repeats the noise of its reading, at some frequencies more than once; and what is white may be a worse
     // instrument than believed.
-    if (data.is_time_series && rows > enough && std::sqrt(square) > 2.0 * data.given_noise[o] &&
+    if (data.is_time_series && rows > enough && std::sqrt(square) > most * data.given_noise[o] &&
         independent_share(left) < 0.3)
       return true;
   }

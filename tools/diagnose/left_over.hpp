@@ -19,7 +19,8 @@ std::vector<double> far_share(const Case& data, const Fit& fit, double times);
 /// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
 bool is_louder_in_motion(const Case& data, const Fit& fit);
 
-/// Is it more than twice the noise that the user gave, and related from row to row?
+/// Is it more than twice the noise that the user gave, or a quarter more where he wrote the equations down himself, and
+/// related from row to row?
 bool is_above_noise(const Case& data, const Fit& fit);
 
 /// By output, how many times the power of the noise is left beyond it: beyond what the user gave and beyond what cannot be

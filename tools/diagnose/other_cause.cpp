@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
@@ -72,13 +73,27 @@ double lost_share(const Case& data, const Fit& base, const Fit& named, const Fit
 
 }  // namespace
 
-Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
+namespace {
+
+Beside beside(const Case& data, const Fit& best,
+              const std::function<std::vector<Start>(const Fit& under_plain)>& starts) {
   Beside one;
   one.plain = weigh(data, simulate(data, best.model), false);
   one.fit = fit(data, one.plain, best.model, data.model, 4, &best);
-  const auto starts = unmodelled_starts(data, spanned != nullptr ? *spanned : one.fit);
-  one.courses = screen(data, one.plain, one.fit, starts, 3);
+  one.courses = screen(data, one.plain, one.fit, starts(one.fit), 3);
   return one;
+}
+
+}  // namespace
+
+Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
+  return beside(data, best, [&](const Fit& under_plain) {
+    return unmodelled_starts(data, spanned != nullptr ? *spanned : under_plain);
+  });
+}
+
+Beside products_beside(const Case& data, const Fit& best) {
+  return beside(data, best, [&](const Fit&) { return equation_curves(data, best.model, true); });
 }
 
 std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, std::size_t term) {

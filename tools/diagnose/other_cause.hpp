@@ -34,6 +34,8 @@ struct Beside {
 };
 /// The courses go from where to where the variables go with `spanned`; the fit itself where it is not given.
 Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned = nullptr);
+/// The same of courses that go in proportion to something else as well, in the user's own equations.
+Beside products_beside(const Case& data, const Fit& best);
 
 struct OtherCause {
   Fit fit;

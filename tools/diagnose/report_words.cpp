@@ -32,9 +32,8 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
-    const bool goes_with =
-        data.model.plant == physics::Plant::sensor || data.model.plant == physics::Plant::axis;
-    if (goes_with && !term.with.empty()) names.push_back(term.with);
+    const bool is_place = data.model.plant == physics::Plant::thermal;  // a node beside another
+    if (!is_place && !term.with.empty()) names.push_back(term.with);
     if (term.with == "direction") names.emplace_back("velocity");  // whose sign it is
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
@@ -185,7 +184,10 @@ std::string sizes_of(const Case& data, const Finding& finding) {
   if (!finding.term.curve.knots.empty()) {
     double top = 0.0;
     for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
-    text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over + ", up to " +
+    const bool is_product =
+        finding.term.info->plant == physics::Plant::equations && !finding.term.with.empty();
+    text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over +
+            (is_product ? " in proportion to " + finding.term.with : "") + ", up to " +
             report::si(top, unit_of_curve(data, finding.term));
     if (const double period = finding.term.curve.period; period > 0.0)
       text +=
@@ -220,6 +222,7 @@ std::string what_was_looked_at(const Case& data) {
         (cut.empty() ? "" : "; ") +
         std::string{"the inputs as recorded carry noise that the machine did not feel: their median over "} +
         std::to_string(data.quiet_rows) + " rows stands in their place";
+  for (const auto& column : data.taken_in_si) cut += (cut.empty() ? "" : "; ") + column;
   if (data.count.left_to_chance > 0)
     cut += (cut.empty() ? "in " : "; in ") + std::to_string(data.count.left_to_chance) +
            " rows noise decides when the carriage sticks and slips: they are not judged";
@@ -346,7 +349,11 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       }
       return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
              " (" + site_of(data, d.findings.front().term) + ") that goes with " +
-             d.findings.front().term.curve.over + ", and no known term describes it.";
+             d.findings.front().term.curve.over +
+             (data.model.plant == physics::Plant::equations && !d.findings.front().term.with.empty()
+                  ? " and " + d.findings.front().term.with
+                  : "") +
+             ", and no known term describes it.";
   }
   return "";
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
@@ -10,11 +9,11 @@
 #include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/detectable.hpp"
-#include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/loop_noise.hpp"
+#include "tools/diagnose/one_name.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/quiet_inputs.hpp"
@@ -46,6 +45,26 @@ bool settled(const Model& before, const Model& now) {
   return true;
 }
 
+/// Does a run stay far from the machine for long, by far more than what comes anew from row to row (second differences: a
+/// motion at a steady rate is none)?
+bool goes_another_way(const Case& data, const Fit& fit) {
+  constexpr double far = 20.0;
+  const auto simulated = simulate(data, fit.model);
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<double> left, anew;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& y = data.recordings[r].measured[o];
+      for (std::size_t i = 0; i < y.size(); ++i) {
+        left.push_back(y[i] - simulated[r][o][i]);
+        if (i > 1) anew.push_back((y[i] - 2.0 * y[i - 1] + y[i - 2]) / std::sqrt(6.0));
+      }
+    }
+    for (auto* all : {&left, &anew}) std::erase_if(*all, [](double e) { return !std::isfinite(e); });
+    if (robust_sigma(left) > far * robust_sigma(anew)) return true;
+  }
+  return false;
+}
+
 /// By how many of the user's sigmas his numbers moved at most.
 double excursion_of(const Fit& fit) {
   double most = 0.0;
@@ -55,6 +74,9 @@ double excursion_of(const Fit& fit) {
   return most;
 }
 
+/// So many of his sigmas no engineer is wrong: another cause may leave them where he says.
+constexpr double far_astray = 10.0;
+
 class Search {
  public:
   Search(Case& data, const std::function<void(double, const std::string&)>& progress, const Options& options)
@@ -63,10 +85,28 @@ class Search {
   Diagnosis run();
 
  private:
+  /// The model fitted to the readings without those that stand far from their neighbours.
+  void begin();
   void prepare();
-  /// Candidates fitted on top of `base`, best first.
-  std::vector<Fit> shortlisted(const Weighing& weighing, const Fit& base, double share);
+  /// From where a name is sought: the best model under the filters of its residual, with every row alike, or, where what is
+  /// missing led the user's numbers astray, from what he believes.
+  enum class From { coloured, plain, believed };
+  struct Sought {
+    Fit base;
+    std::vector<Fit> fits;  // the short list
+    std::optional<OneName> best;
+  };
+  Sought seek(From from, double share);
+  /// Why a name that pays is not claimed beside others.
+  std::optional<std::string> why_not(const OneName& name);
   bool add_named(double round);
+  void claim(Sought sought);
+  /// In a window of its own friction looks like a motor without force, and from numbers that went far astray what is missing
+  /// may look like its own opposite: from there no name is found.
+  [[nodiscard]] bool may_lead_astray(const Fit& fit) const {
+    return (data_.model.plant == physics::Plant::axis && data_.windows.count > 0) ||
+           (data_.model.plant == physics::Plant::error_map && excursion_of(fit) > 5.0);
+  }
   /// Two terms at once, where neither does anything alone. `rival`: what the search one by one came to.
   bool add_pair(const Fit* rival = nullptr);
   /// Claims friction, play or a dead zone that the noise shakes loose, where it explains more than what leads without noise
@@ -106,6 +146,7 @@ class Search {
   }
   [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
   [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
+  [[nodiscard]] bool is_equations() const { return data_.model.plant == physics::Plant::equations; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
 
   Case& data_;
@@ -119,14 +160,31 @@ class Search {
   std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
 
-void Search::prepare() {
-  cut_into_windows(data_);
+void Search::begin() {
   progress_(0.02, "simulating the nominal model");
-  auto simulated = simulate(data_, data_.model);
-  const Case as_read = data_;
+  const auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
   d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
   d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
+}
+
+void Search::prepare() {
+  const Case as_given = data_;
+  cut_into_windows(data_);
+  Case as_read = data_;
+  begin();
+  if (goes_another_way(data_, d_.retuned))
+    if (const auto near = begun_in_windows(data_)) {
+      const auto found = fit(data_, d_.weighing, *near, data_.model, 8);
+      if (least_ratio(data_, found, d_.retuned) < 0.5) d_.retuned = found;
+      // What is thrown here and there by the least disturbance has no one run.
+      if (goes_another_way(data_, d_.retuned)) {
+        data_ = as_given;
+        cut_into_windows(data_, *near);
+        as_read = data_;
+        begin();
+      }
+    }
   drop_outliers_anew(data_, as_read, simulate(data_, d_.retuned.model));
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
     d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
@@ -139,9 +197,8 @@ void Search::prepare() {
       d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
       d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
     }
-  simulated = simulate(data_, d_.retuned.model);
   noise_.emplace(data_);
-  d_.weighing = weigh(data_, simulated);
+  d_.weighing = weigh(data_, simulate(data_, d_.retuned.model));
   // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
   auto coloured = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
   d_.retuned = least_ratio(data_, d_.retuned, coloured) < 0.9
@@ -150,179 +207,88 @@ void Search::prepare() {
   d_.best = d_.retuned;
 }
 
-std::vector<Fit> Search::shortlisted(const Weighing& weighing, const Fit& base, double share) {
+Search::Sought Search::seek(From from, double share) {
+  // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
+  // every row counts alike. Either way a claim is judged under the filters of its own residual.
+  const bool coloured = from == From::coloured;
+  Sought sought;
+  const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
+  sought.base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
   progress_(share, "screening candidates");
-  auto screened = screen(data_, weighing, base, named_starts(data_, weighing, base, options_.without), 0);
-  std::vector<const Screened*> shortlist;
-  std::map<std::string, int> seen;
-  for (const auto& s : screened) {
-    if (s.impossible) {
-      if (s.merit > 3.0) d_.reject(std::string{s.start.term.info->name}, why_impossible(s.start), s.merit);
-      continue;
-    }
-    // What first order cannot tell apart goes on together.
-    if (s.merit < -3.0 || (shortlist.size() >= 9 && s.merit < shortlist.back()->merit - 0.5)) break;
-    if (seen[label(s.start.term)]++ < 2) shortlist.push_back(&s);
-  }
-  progress_(share + 0.04, "fitting the short list");
-  // A few steps each; those that lag far behind the leader are not driven further.
-  std::vector<Fit> fits(shortlist.size());
-  const auto some = excerpt(data_, weighing, base, 40 * fits.size());
-  in_parallel(fits.size(), [&](std::size_t i) {
-    fits[i] = some ? on_all(data_, weighing, base,
-                            fit_with(some->data, some->weighing, some->base, *shortlist[i], 3))
-                   : fit_with(data_, weighing, base, *shortlist[i], 3);
-  });
-  double leader = -1e300;
-  for (const auto& f : fits) leader = std::max(leader, f.evidence);
-  for (auto& f : fits) {
-    if (stopped()) break;
-    const double gained = std::max(1.0, leader - base.evidence);
-    if (f.evidence > leader - std::max(15.0, 0.5 * gained))
-      f = fit(data_, weighing, f.model, data_.model, 8, &f);
-    leader = std::max(leader, f.evidence);
-  }
-  const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
-  if (data_.model.plant == physics::Plant::equations && !fits.empty()) {
-    const auto best = std::min_element(fits.begin(), fits.end(), by_evidence);
-    const std::size_t place = best->model.terms.size() - 1;
-    for (auto& other : fits_of_other_laws(data_, weighing, *best, place, options_.without))
-      fits.push_back(std::move(other));
-  }
-  if (base.model.terms.size() == given())
-    for (const auto& model : alone_) fits.push_back(fit(data_, weighing, model, data_.model, 8));
-  if (options_.refuses)
-    std::erase_if(fits, [this](const Fit& f) { return !stands(data_, f, f.model.terms.size() - 1); });
-  std::sort(fits.begin(), fits.end(), by_evidence);
-  last_screen_ = std::move(screened);
-  return fits;
+  const Naming naming{data_, *noise_, options_, rivals_.empty(), margin()};
+  const bool is_first = d_.best.model.terms.size() == given();
+  auto list = shortlisted(
+      naming, weighing,
+      from == From::believed ? fit(data_, weighing, data_.model, data_.model, 0) : sought.base,
+      is_first ? alone_ : std::vector<Model>{}, [&] { progress_(share + 0.04, "fitting the short list"); });
+  for (const auto& r : list.impossible) d_.reject(r.term, r.why, r.gain);
+  last_screen_ = std::move(list.screened);
+  sought.fits = std::move(list.fits);
+  sought.best = leader(naming, sought.base, sought.fits);
+  return sought;
+}
+
+std::optional<std::string> Search::why_not(const OneName& name) {
+  if (rivals_.empty() || !options_.refuses) return std::nullopt;
+  const auto &with = name.with, &without = name.without;
+  if (!noise_->shows(with.model, without.model, 0.95) &&
+      noise_->gain(with.model, without.model, name.weighing) < plainly * margin())
+    return "in the noise of this loop its effect would not show";
+  if (is_trifle(data_, d_.retuned, without, with))
+    return "less than what the idealised form of the others may leave";
+  // What the wrong form of an earlier term leaves over is no further physics.
+  if (const auto other = other_form(data_, name.weighing, without, with))
+    return "another course of " + std::string{without.model.terms[other->term].info->name} +
+           " over its own variable explains the same";
+  return std::nullopt;
 }
 
 /// Adds the term that explains most, if one stands under the filters that its own residual asks for.
 bool Search::add_named(double round) {
-  enum class From { coloured, plain, believed };
+  const bool is_first = d_.best.model.terms.size() == given();
   for (const auto from : {From::coloured, From::plain, From::believed}) {
-    const bool coloured = from == From::coloured;
-    // In a window of its own friction looks like a motor without force: from there no name is found.
-    // Where what is missing led the user's numbers far astray, it may look from there like its own opposite.
-    const bool is_axis = data_.model.plant == physics::Plant::axis && data_.windows.count > 0;
-    const bool is_astray = data_.model.plant == physics::Plant::error_map && excursion_of(d_.best) > 5.0;
-    if (from == From::believed && (!(is_axis || is_astray) || d_.best.model.terms.size() > given())) break;
-    // Filters fitted to a residual that is not noise yet take much of the effect away; where they leave nothing to see,
-    // every row counts alike. Either way a claim is judged under the filters of its own residual.
-    const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
-    const Fit base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
-    auto fits = shortlisted(weighing,
-                            from == From::believed ? fit(data_, weighing, data_.model, data_.model, 0) : base,
-                            0.1 + 0.2 * round + (coloured ? 0.0 : 0.1));
-    std::vector<std::size_t> leaders;
-    std::set<std::string> tried;
-    for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {
-      if (fits[i].evidence < base.evidence + 2.0) break;
-      if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
-      if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
-      leaders.push_back(i);
-    }
-    struct Settled {
-      Weighing weighing;
-      Fit with, without;
-      double gain = -1e300, rank = -1e300;
-    };
-    std::vector<Settled> settled_fits(leaders.size());
-    in_parallel(leaders.size(), [&](std::size_t k) {
-      const std::size_t i = leaders[k];
-      // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
-      Weighing plain = weigh(data_, simulate(data_, fits[i].model), false);
-      auto settled = fit(data_, plain, fits[i].model, data_.model, 6, &fits[i]);
-      for (int again = 0; again < 3; ++again) {  // the nearer the fit, the finer its scale
-        plain = weigh(data_, simulate(data_, settled.model), false);
-        auto nearer = fit(data_, plain, settled.model, data_.model, 5, &settled);
-        const bool arrived = least_ratio(data_, nearer, settled) > 0.97;
-        settled = std::move(nearer);
-        if (arrived) break;
-      }
-      const Weighing own = weigh(data_, simulate(data_, settled.model));
-
-      auto with_term = fit(data_, own, settled.model, data_.model, 6, &settled);
-      // As in `prepare`: weights that follow the colour of what is still missing may lead away.
-      if (least_ratio(data_, settled, with_term) < 0.9)
-        with_term = fit(data_, own, settled.model, data_.model, 0, &settled);
-      auto without = fit(data_, own, base.model, data_.model, 4, &base);
-      const double evidence = advantage(data_, own, with_term, without);
-      double gain =
-          std::min(evidence, noise_->is_fed_back() ? noise_->beyond(with_term.model, without.model, own)
-                                                   : advantage_over_wander(data_, own, with_term, without));
-      if (const double counted = std::min(evidence, lead(data_, with_term, without));
-          options_.refuses && gain < 2.0 * margin() && counted > 2.0 * margin() &&
-          goes_with_recording(data_, with_term, without))
-        gain = counted;
-      // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
-      // not, where the noise is loud at other frequencies, if it pays when counted in independent rows.
-      const double ratio = !options_.refuses ? 1.0 : rivals_.empty() ? 0.995 : 0.95;
-      const bool shows =
-          least_ratio(data_, with_term, without) < ratio ||
-          (rivals_.empty() ? lead(data_, with_term, without) > claim_margin : gain > plainly * margin());
-      if (shows && (!options_.refuses || stands(data_, with_term, with_term.model.terms.size() - 1)))
-        settled_fits[k] = {own, std::move(with_term), std::move(without), gain, gain};
-      // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.
-      if (auto& one = settled_fits[k]; one.gain >= margin() && leaders.size() > 1 && noise_->is_fed_back())
-        one.rank = evidence + noise_->gain(one.with.model, one.without.model, own) -
-                   (one.without.data_cost - one.with.data_cost);
-    });
-    double best_gain = -1e300, best_rank = -1e300;
-    std::size_t winner = 0;
-    Weighing own_weighing;
-    Fit own_fit, own_base;
-    for (std::size_t k = 0; k < leaders.size(); ++k)
-      if (auto& one = settled_fits[k]; one.rank > best_rank) {
-        best_gain = one.gain, best_rank = one.rank, winner = leaders[k];
-        own_weighing = std::move(one.weighing), own_fit = std::move(one.with),
-        own_base = std::move(one.without);
-      }
-    if (coloured && take_shaken(base, best_gain < margin() ? nullptr : &own_fit)) return true;
-    if (best_gain < margin()) {
-      for (const auto& f : fits)
+    if (from == From::believed && !(is_first && may_lead_astray(d_.best))) break;
+    const double share = 0.1 + 0.2 * round + (from == From::coloured ? 0.0 : 0.1);
+    auto sought = seek(from, share);
+    const bool pays = sought.best && sought.best->gain >= margin();
+    if (from == From::coloured && take_shaken(sought.base, pays ? &sought.best->with : nullptr)) return true;
+    if (!pays) {
+      for (const auto& f : sought.fits)
         d_.reject(std::string{f.model.terms.back().info->name},
-                  "what it explains is no more than chance would", f.evidence - base.evidence);
+                  "what it explains is no more than chance would", f.evidence - sought.base.evidence);
       continue;
     }
-    if (!rivals_.empty() && options_.refuses && !noise_->shows(own_fit.model, own_base.model, 0.95) &&
-        noise_->gain(own_fit.model, own_base.model, own_weighing) < plainly * margin()) {
-      d_.reject(std::string{own_fit.model.terms.back().info->name},
-                "in the noise of this loop its effect would not show", best_gain);
+    if (from != From::believed && is_first && is_equations() && excursion_of(sought.best->with) > far_astray)
+      if (auto other = seek(From::believed, share); other.best && other.best->gain >= margin() &&
+                                                    lead(data_, other.best->with, sought.best->with) > 0.0)
+        sought = std::move(other);
+    const auto& best = *sought.best;
+    if (const auto why = why_not(best)) {
+      d_.reject(std::string{best.with.model.terms.back().info->name}, *why, best.gain);
       continue;
     }
-    if (!rivals_.empty() && options_.refuses && is_trifle(data_, d_.retuned, own_base, own_fit)) {
-      d_.reject(std::string{own_fit.model.terms.back().info->name},
-                "less than what the idealised form of the others may leave", best_gain);
-      continue;
-    }
-    // What the wrong form of an earlier term leaves over is no further physics.
-    if (!rivals_.empty() && options_.refuses)
-      if (const auto other = other_form(data_, own_weighing, own_base, own_fit)) {
-        d_.reject(std::string{fits[winner].model.terms.back().info->name},
-                  "another course of " + std::string{own_base.model.terms[other->term].info->name} +
-                      " over its own variable explains the same",
-                  best_gain);
-        continue;
-      }
-    std::vector<Term> rivals;
-    std::set<std::string> named{label(fits[winner].model.terms.back())};
-    for (const auto& f : fits) {
-      if (!named.insert(label(f.model.terms.back())).second) continue;
-      if (f.evidence > base.evidence + 0.3 * (fits[winner].evidence - base.evidence) && rivals.size() < 4)
-        rivals.push_back(f.model.terms.back());
-      else
-        d_.reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
-                  f.evidence - base.evidence);
-    }
-    d_.weighing = std::move(own_weighing);
-    d_.best = std::move(own_fit);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
-    rivals_.push_back(std::move(rivals));
+    claim(std::move(sought));
     return true;
   }
   return false;
+}
+
+void Search::claim(Sought sought) {
+  auto& [base, fits, best] = sought;
+  std::vector<Term> rivals;
+  std::set<std::string> named{label(best->with.model.terms.back())};
+  for (const auto& f : fits) {
+    if (!named.insert(label(f.model.terms.back())).second) continue;
+    if (f.evidence > base.evidence + 0.3 * (fits[best->place].evidence - base.evidence) && rivals.size() < 4)
+      rivals.push_back(f.model.terms.back());
+    else
+      d_.reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
+                f.evidence - base.evidence);
+  }
+  d_.weighing = std::move(best->weighing);
+  d_.best = std::move(best->with);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  rivals_.push_back(std::move(rivals));
 }
 
 bool Search::take_shaken(const Fit& base, Fit* otherwise) {
@@ -519,7 +485,7 @@ Diagnosis Search::run() {
     return d_;
   }
   const Diagnosis begun = d_;
-  const bool in_equations = data_.model.plant == physics::Plant::equations;
+  const bool in_equations = is_equations();
   const bool paired = in_equations && take([&] { return add_pair(); });
   name(paired ? 2 : 0);
   finish();

@@ -50,6 +50,12 @@ void sharpen(const Case& data, Curved& found) {
   weighing = own;
 }
 
+/// Would an engineer see it in the residual, or does it pay when counted in independent rows?
+bool shows(const Case& data, const Fit& with, const Fit& without) {
+  const double ratio = least_ratio(data, with, without);
+  return ratio < 0.7 || (ratio < 0.9 && lead(data, with, without) > 2.0 * claim_margin);
+}
+
 }  // namespace
 
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
@@ -69,14 +75,16 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     const auto without = fit(data, own, base.model, data.model, 4, &base);
     const double evidence = curved.evidence - without.evidence;
     double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
-    const auto& over = s.start.term.curve.over;
+    const auto& term = s.start.term;
+    // Noise that wanders has a course over time too, but none in proportion to what the machine does.
+    const bool may_wander = term.with.empty() && (term.curve.over == "time" || term.curve.over == "t");
     if (const double counted = lead(data, rough, under_plain);
-        gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && over != "time" && over != "t") {
+        gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
       if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
     }
-    // Noise that wanders has a course over time too: one that takes little of the residual away must pay when counted in
-    // independent rows, and one that hardly takes any is what that noise does.
-    if (over == "time" || over == "t") {
+    // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
+    // takes any is what such noise does.
+    if (may_wander) {
       const double left = least_ratio(data, rough, under_plain);
       if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
     }
@@ -120,6 +128,14 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     d.weighing = std::move(beside.weighing);
     (named ? d.has_rest : d.is_unnamed) = true;
   }
+  // What goes with two things at once is a course of neither.
+  if (!named && !d.is_unnamed && data.model.plant == physics::Plant::equations)
+    if (auto product = best_curve(data, d.best, products_beside(data, d.best));
+        product.gain > margin && shows(data, product.fit, d.best)) {
+      d.best = std::move(product.fit);
+      d.weighing = std::move(product.weighing);
+      d.is_unnamed = true;
+    }
   if (!d.is_unnamed && !d.has_rest) return;
   const auto find_last = [&d] { d.findings.emplace_back().term = d.best.model.terms.back(); };
   find_last();

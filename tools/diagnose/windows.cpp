@@ -45,8 +45,7 @@ double reach(const std::vector<double>& values, double begin, double end) {
 /// How much farther a small steady push on any state has carried an output by the end of a recording than by its middle. A
 /// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves, or it forgets the push once that
 /// is over: then it goes farther for another reason, as a vessel does whose flow has ebbed.
-double goes_on(const Case& data, const Recording& recording) {
-  const auto& model = data.model;
+double goes_on(const Model& model, const Recording& recording) {
   physics::Outputs at;
   recording.simulation->run(model, at);
   double most = 0.0;
@@ -133,6 +132,21 @@ double guess_of(const Case& data, const Recording& recording, const physics::Out
   return std::isfinite(value) && std::abs(value) < 1e6
              ? value
              : data.model.value(equations.states[state].name + ".initial");
+}
+
+/// Does a spring that the model has already bring an axis back within a small part of the recording?
+bool is_held(const Case& data) {
+  const auto& terms = data.model.terms;
+  const auto spring = std::find_if(terms.begin(), terms.end(), [](const physics::Term& term) {
+    return term.info->name == "position_stiffness" && term.values[term.info->index_of("stiffness")] > 0.0;
+  });
+  if (spring == terms.end()) return false;
+  constexpr double soon = 0.05;
+  const double mass = data.model.value("mass"), damping = data.model.value("viscous_damping"),
+               stiffness = spring->values[spring->info->index_of("stiffness")];
+  const double half = 0.5 * damping / mass, square = half * half - stiffness / mass;
+  const double slowest = half - std::sqrt(std::max(0.0, square));  // [1/s], of m s^2 + c s + k = 0
+  return slowest * soon * longest(data) > 1.0;
 }
 
 using Rows = std::vector<std::vector<std::size_t>>;  // by recording
@@ -251,7 +265,9 @@ bool is_initial(const physics::Parameter& parameter) {
   return is_start(parameter) || parameter.name.ends_with(".initial");
 }
 
-void cut_into_windows(Case& data) {
+void cut_into_windows(Case& data) { cut_into_windows(data, data.model); }
+
+void cut_into_windows(Case& data, const Model& near) {
   const auto states = physics::states_of(data.model).size();
   const bool is_axis = data.model.plant == physics::Plant::axis;
   if (data.model.plant != physics::Plant::equations && !(is_axis && states > 0)) return;
@@ -264,10 +280,11 @@ void cut_into_windows(Case& data) {
     data.windows.anew += is_axis ? 0 : anew[r].size();
     rows = is_axis ? rows + recording.inputs.rows() : std::max(rows, recording.inputs.rows());
     if (recording.inputs.rows() >= 4 * fewest_rows && data.model.equations.controlled_input.empty())
-      goes = goes || is_axis || goes_on(data, recording) > still_going;
+      goes = goes || (is_axis ? !is_held(data) : goes_on(near, recording) > still_going);
   }
   if (!goes) {
-    if (data.windows.anew == 0) return;
+    if (std::all_of(anew.begin(), anew.end(), [](const auto& rows_anew) { return rows_anew.empty(); }))
+      return;
     data = with_starts(data, anew, true);
     estimate_starts(data);
     return;
@@ -292,6 +309,22 @@ void cut_into_windows(Case& data) {
     cut.windows.grows = true;
   }
   data = std::move(cut);
+}
+
+std::optional<Model> begun_in_windows(const Case& data) {
+  const auto states = states_of(data.model).size();
+  if (data.model.plant != physics::Plant::equations || data.windows.count > 0 || data.windows.anew > 0)
+    return std::nullopt;
+  std::size_t rows = 0;
+  for (const auto& recording : data.recordings) rows = std::max(rows, recording.inputs.rows());
+  const std::size_t window = std::max(fewest_rows, rows * states / most_starts);
+  if (rows < 4 * window) return std::nullopt;
+  auto cut = in_windows(data, window, Rows(data.recordings.size()));
+  estimate_starts(cut);
+  const auto plain = weigh(cut, simulate(cut, cut.model), false);
+  auto near = fit(cut, plain, cut.model, cut.model, 12).model;
+  std::erase_if(near.parameters, is_start);
+  return near;
 }
 
 bool has_longer_windows(const Case& data) {

@@ -1,6 +1,8 @@
 // Windows: a model that integrates, or runs away, is compared from states set anew, never by one drifting run.
 #pragma once
 
+#include <optional>
+
 #include "tools/diagnose/fit.hpp"
 
 namespace invar::diagnose {
@@ -11,6 +13,13 @@ namespace invar::diagnose {
 /// loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
 /// (anew.hpp).
 void cut_into_windows(Case& data);
+/// The same where `near` lies nearer to the machine than what the user believes: does that forget?
+void cut_into_windows(Case& data, const physics::Model& near);
+
+/// The model with the numbers that fit it to short windows, whose states are known from what was measured: where one run from
+/// the first row goes another way than the machine (over the top, into another basin), no small step leads back. For a model
+/// in the user's own equations that is not cut into windows; nothing for others and for short recordings.
+std::optional<physics::Model> begun_in_windows(const Case& data);
 
 /// Are there longer windows in which the model stays near (`Case::Windows::few`)? Short ones keep a wrong model near the
 /// machine, but begin anew before anything slow shows.

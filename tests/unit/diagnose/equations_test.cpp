@@ -356,6 +356,25 @@ TEST(SimulateEquations, ACurveOverAStateIsTheRateThatItDraws) {
     EXPECT_NEAR(out[i], std::exp(-3.5 * 0.01 * static_cast<double>(i)), 1e-7) << i;
 }
 
+/// One that stays the same, in proportion to the state, is a coefficient too: x' = -2 x - 1.5 x; in proportion to the time
+/// x' = -2 x + 3 t.
+TEST(SimulateEquations, ACurveInProportionToAVariableIsItsCoefficient) {
+  physics::Term curve;
+  curve.info = physics::unmodelled(physics::Plant::equations, "state");
+  curve.on = curve.with = "x";
+  curve.curve = {"t", {0.0, 1.0, 2.0}, {-1.5, -1.5, -1.5}};
+  const auto out = falling(curve, 0.01, 200);
+  for (std::size_t i = 0; i < out.size(); i += 20)
+    EXPECT_NEAR(out[i], std::exp(-3.5 * 0.01 * static_cast<double>(i)), 1e-7) << i;
+  curve.with = "t";
+  curve.curve.values.assign(3, 3.0);
+  const auto pushed = falling(curve, 0.01, 200);
+  for (std::size_t i = 0; i < out.size(); i += 20) {
+    const double t = 0.01 * static_cast<double>(i);
+    EXPECT_NEAR(pushed[i], 1.75 * std::exp(-2.0 * t) + 1.5 * t - 0.75, 1e-7) << i;
+  }
+}
+
 /// A thousand times faster than its rows, and across a gap of days: at its balance, not run away.
 TEST(SimulateEquations, WhatIsFarFasterThanTheRowsIsAtItsBalance) {
   const auto model = test::model_of(
@@ -417,6 +436,9 @@ TEST(EquationsModel, SaysWhereATermCannotAct) {
               ::testing::HasSubstr("`w` is no state, no input and not t"));
   EXPECT_EQ(fault_of("terms: [{term: unmodelled, on: level, over: u, knots: [0, 1], values: [0, 1]}]\n"),
             "none");
+  EXPECT_THAT(
+      fault_of("terms: [{term: unmodelled, on: level, over: u, with: w, knots: [0, 1], values: [0, 1]}]\n"),
+      ::testing::HasSubstr("with: `w` is no state, no input and not t"));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
+#include "tools/diagnose/what_looks_at_what.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -54,6 +55,26 @@ Case cart(double push, double lag, bool reads_speed = false) {
                      "parameters:\n  k: {value: 1.08, unit: 1/kg, sigma: 0.03}\n"
                      "  c: {value: 0.32, unit: 1/s, sigma: 0.05}\n"),
       {table});
+}
+
+TEST(OwnLoop, WhatOnlyTheControllerLooksAtIsNoStateOfTheMachine) {
+  physics::Equations loop;
+  loop.states = {{"x", "v"},
+                 {"v", "k*felt - c*v"},
+                 {"felt", "(u - felt)/tau"},
+                 {"xf", "(x - xf)/tf"},
+                 {"sum", "r - xf"}};
+  loop.inputs = {{"r", "r"}, {"u", "u"}};
+  loop.outputs = {{"y", "x + 0.1*felt", {}}};
+  loop.controlled_input = "u";
+  loop.control_law = "kp*(r - x) - kd*(x - xf)/tf + ki*sum";
+  std::string names;
+  for (const auto& state : states_of_machine(loop)) names += state.name + " ";
+  EXPECT_EQ(names, "x v felt ");
+  loop.outputs.push_back({"filtered", "xf", {}});  // which somebody recorded
+  EXPECT_EQ(states_of_machine(loop).size(), 4U);
+  loop.controlled_input.clear();
+  EXPECT_EQ(states_of_machine(loop).size(), 5U);
 }
 
 TEST(OwnLoop, TheNoiseThatGoesRoundInItIsNoPhysics) {

@@ -85,6 +85,49 @@ TEST(WithoutAName, WhatIsLeftFarAboveTheNoiseIsSeenBesideMissingValues) {
   EXPECT_GT(followed_share(data, rigid).front(), 0.05);
 }
 
+/// What `rate` makes of a motor's speed from its voltage and the time, in small steps of Euler's rule.
+recording::Table motor(unsigned seed, const std::function<double(double u, double w, double t)>& rate) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> noise{0.0, 0.05};
+  std::uniform_real_distribution<double> level{-6.0, 6.0};
+  std::vector<double> time, volt, speed;
+  double u = 0.0, w = 0.0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (i % 60 == 0) u = level(random);
+    time.push_back(step * static_cast<double>(i));
+    volt.push_back(u);
+    speed.push_back(w + noise(random));
+    for (int part = 0; part < 100; ++part) w += 0.01 * step * rate(u, w, time.back() + 0.01 * step * part);
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("volt", "V", volt);
+  table.add("speed", "rad/s", speed);
+  return table;
+}
+
+TEST(WithoutAName, ANumberThatChangesOnTheWayIsACourseInProportionToItsState) {
+  // The bearing warms: less damping from the fifth second on.
+  auto data = make_case(
+      rigid_motor(),
+      {motor(6, [](double u, double w, double t) { return 12.0 * u - (t < 5.0 ? 3.0 : 2.7) * w; })});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics) << summary(data, d);
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.curve.over, "t");
+  EXPECT_EQ(d.findings[0].term.with, "w");
+  EXPECT_LT(d.heldout[0].after, 0.7 * d.heldout[0].retuned);
+  EXPECT_THAT(summary(data, d), ::testing::HasSubstr("goes with t and w"));
+}
+
+TEST(WithoutAName, TheSameNumbersFromBeginningToEndAreNoSuchCourse) {
+  for (const unsigned seed : {7U, 8U, 9U}) {
+    auto data = make_case(rigid_motor(),
+                          {motor(seed, [](double u, double w, double) { return 12.0 * u - 3.0 * w; })});
+    EXPECT_TRUE(search(data, [](double, const std::string&) {}).findings.empty()) << seed;
+  }
+}
+
 std::string fault_of(const std::function<void(recording::Table&)>& spoil) {
   testing::TemporaryFolder folder;
   auto table = elastic_motor(5);

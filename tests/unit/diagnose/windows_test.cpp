@@ -215,6 +215,79 @@ TEST(Windows, WhatTheCurrentDidInAGapIsNotKnown) {
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
 }
 
+/// A spring that the model has brings the carriage back: it goes through in one run, and what is slow shows.
+TEST(Windows, AnAxisThatASpringHoldsHasNone) {
+  std::mt19937 random{12};
+  std::normal_distribution<double> normal;
+  constexpr double h = 1e-3, air = 300.0;
+  std::vector<double> time, current, position;
+  double x = 0.0, v = 0.0, u = 0.0;
+  for (int i = 0; i < 6000; ++i) {
+    if (i % 200 == 0) u = std::uniform_real_distribution<double>{-4.0, 4.0}(random);
+    time.push_back(h * i), current.push_back(u), position.push_back(x + 2e-5 * normal(random));
+    for (int part = 0; part < 20; ++part) {
+      const double s = h / 20.0, a = (20.0 * u - 60.0 * v - air * v * std::abs(v) - 900.0 * x) / 3.2;
+      v += s * a;
+      x += s * v;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("i", "A", current);
+  table.add("y", "m", position);
+  auto data = make_case(
+      model_of("invar_model: 1\nplant: axis\ncolumns: {time: t, position: y, current: i}\nparameters:\n"
+               "  mass: {value: 3.2, unit: kg, sigma: 0.06}\n"
+               "  motor_constant: {value: 20.1, unit: N/A, sigma: 0.2}\n"
+               "  viscous_damping: {value: 70, unit: N s/m, sigma: 20}\n"
+               "terms: [{term: position_stiffness, stiffness: {value: 900, unit: N/m, sigma: 9}, center: "
+               "{value: 0, unit: m, sigma: 0}}]\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(data.windows.count, 0U);
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "quadratic_drag");
+  EXPECT_NEAR(d.findings[0].term.values[0], air, 0.05 * air);
+}
+
+/// A pendulum that goes over the top again and again, in small steps of Verlet's rule; its angle as turns add up.
+Recorded pendulum(unsigned seed, double torque) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  Recorded r;
+  double angle = 0.0, rate = 0.0, u = 0.0;
+  for (int i = 0; i < 1200; ++i) {
+    if (i % 25 == 0) u = std::uniform_real_distribution<double>{-2.2, 2.2}(random);
+    r.time.push_back(0.02 * i), r.drive.push_back(u), r.way.push_back(angle + 0.01 * normal(random));
+    for (int part = 0; part < 200; ++part) {
+      const double h = 1e-4;
+      angle += 0.5 * h * rate;
+      rate = (rate * (1.0 - 0.45 * h) + h * (torque * u - 20.0 * std::sin(angle))) / (1.0 + 0.45 * h);
+      angle += 0.5 * h * rate;
+    }
+  }
+  return r;
+}
+
+/// What the believed torque does not carry over the top goes another way: from there no small step leads to the machine.
+TEST(Windows, WhatWentAnotherWayIsFoundFromShortOnes) {
+  for (const unsigned seed : {22U, 26U, 34U}) {
+    auto data =
+        pendulum(seed, 11.0)
+            .with(model_of(
+                "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+                "states:\n  th: {derivative: w, initial: {value: 0, unit: rad, sigma: 0}}\n"
+                "  w: {derivative: '-g*sin(th) - c*w + b*u', initial: {value: 0, unit: rad/s, sigma: 0}}\n"
+                "outputs: {way: {column: y, expression: th}}\nparameters:\n"
+                "  g: {value: 20, unit: 1/s2, sigma: 0.6}\n"
+                "  c: {value: 0.9, unit: 1/s, sigma: 0.1}\n"
+                "  b: {value: 9.2, unit: 1/(kg m2), sigma: 0.3}\n"));
+    const auto d = search(data, [](double, const std::string&) {});
+    EXPECT_EQ(d.verdict, Verdict::parameters_only) << seed << summary(data, d);
+    EXPECT_NEAR(d.best.model.value("b"), 11.0, 0.05) << seed;
+  }
+}
+
 TEST(Windows, AVesselWhoseFlowEbbsForgetsAllTheSame) {
   Recorded r;
   for (int i = 0; i < 600; ++i) {

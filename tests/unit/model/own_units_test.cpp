@@ -105,6 +105,21 @@ TEST(OwnUnits, TurnsAMinuteAreRadiansASecondWhereTheModelSpeaksOfAngles) {
   EXPECT_DOUBLE_EQ(first("rpm", read_own("rpm", "rad")), 40.0);
 }
 
+TEST(OwnUnits, WhatIsSimulatedSaysTheUnitOfTheStateThatItIs) {
+  recording::Table table;
+  table.add("t", "s", {0.0, 1.0});
+  table.add("in", "V", {1.0, 1.0});
+  const auto header = [&](const std::string& unit) {
+    const auto model = read_own(unit, "\"1\"");
+    return to_table(model, to_record(table, model, false), {{438.0, 438.0}}).columns.back().unit;
+  };
+  EXPECT_EQ(header("rad/s"), "rad/s");
+  EXPECT_EQ(header("furlong"), "");  // a name of the user's own
+  EXPECT_EQ(header("\"1\""), "");
+  table.add("out", "deg/s", {40.0, std::nan("")});
+  EXPECT_EQ(header("rad/s"), "deg/s");  // as the inputs have it
+}
+
 std::string fault_of_model(const std::string& text) {
   try {
     (void)test::model_of(text);
