@@ -1,7 +1,10 @@
 #include "tools/diagnose/diagnosis.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -58,6 +61,16 @@ double least_ratio(const Case& data, const Fit& a, const Fit& b) {
   for (std::size_t o = 0; o < sums_b.size(); ++o)
     if (sums_b[o] > 0.0) least = std::min(least, std::sqrt(sums_a[o] / sums_b[o]));
   return least;
+}
+
+double excursion_of(const Fit& fit) {
+  double most = 0.0;
+  for (const auto& f : fit.free) {
+    if (f.where == Freedom::Where::curve || f.sigma <= 0.0) continue;
+    if (f.where == Freedom::Where::parameter && is_start(fit.model.parameters[f.index])) continue;
+    most = std::max(most, std::abs(get(fit.model, f) - f.center) / f.sigma);
+  }
+  return most;
 }
 
 }  // namespace invar::diagnose

@@ -108,6 +108,9 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
     finding.other_cause =
         odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
                               d.findings.size() > 1 ? finding.share : 1.0);
+    // Of 150 right names of two authors none moved his numbers by ten of his sigmas.
+    constexpr double usual = 10.0;
+    finding.other_cause += std::max(0.0, d.parameter_excursion / usual - 1.0);
     sum += finding.relatives + finding.other_cause;
   }
   finding.probability = std::min(0.995, 1.0 / sum);

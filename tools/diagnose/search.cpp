@@ -65,15 +65,6 @@ bool goes_another_way(const Case& data, const Fit& fit) {
   return false;
 }
 
-/// By how many of the user's sigmas his numbers moved at most.
-double excursion_of(const Fit& fit) {
-  double most = 0.0;
-  for (const auto& f : fit.free)
-    if (f.where == Freedom::Where::parameter && f.sigma > 0.0)
-      most = std::max(most, std::abs(get(fit.model, f) - f.center) / f.sigma);
-  return most;
-}
-
 /// So many of his sigmas no engineer is wrong: another cause may leave them where he says.
 constexpr double far_astray = 10.0;
 
@@ -109,6 +100,8 @@ class Search {
   }
   /// Two terms at once, where neither does anything alone. `rival`: what the search one by one came to.
   bool add_pair(const Fit* rival = nullptr);
+  /// Where a pair leads the user's numbers far astray: one name that does better from what he believes, in its place.
+  bool put_one_in_place(const Diagnosis& begun);
   /// Claims friction, play or a dead zone that the noise shakes loose, where it explains more than what leads without noise
   /// (null: nothing does). Where that is the same, it gets its size under noise and is left to be claimed.
   bool take_shaken(const Fit& base, Fit* otherwise);
@@ -212,7 +205,9 @@ Search::Sought Search::seek(From from, double share) {
   // every row counts alike. Either way a claim is judged under the filters of its own residual.
   const bool coloured = from == From::coloured;
   Sought sought;
-  const Weighing weighing = coloured ? d_.weighing : weigh(data_, simulate(data_, d_.best.model), false);
+  const Weighing weighing =
+      coloured ? d_.weighing
+               : weigh(data_, simulate(data_, from == From::believed ? data_.model : d_.best.model), false);
   sought.base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
   progress_(share, "screening candidates");
   const Naming naming{data_, *noise_, options_, rivals_.empty(), margin()};
@@ -368,6 +363,20 @@ bool Search::add_pair(const Fit* rival) {
   return true;
 }
 
+bool Search::put_one_in_place(const Diagnosis& begun) {
+  if (!(excursion_of(d_.best) > far_astray)) return false;
+  auto pair = std::exchange(d_, begun);
+  auto pairs_rivals = std::exchange(rivals_, {});
+  auto sought = seek(From::believed, 0.1);
+  if (sought.best && sought.best->gain >= margin() && lead(data_, sought.best->with, pair.best) > 0.0) {
+    claim(std::move(sought));
+    return true;
+  }
+  d_ = std::move(pair);
+  rivals_ = std::move(pairs_rivals);
+  return false;
+}
+
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
     if (!take([&] { return add_named(round); }) || !take([&] {
@@ -487,7 +496,7 @@ Diagnosis Search::run() {
   const Diagnosis begun = d_;
   const bool in_equations = is_equations();
   const bool paired = in_equations && take([&] { return add_pair(); });
-  name(paired ? 2 : 0);
+  name(!paired ? 0 : take([&] { return put_one_in_place(begun); }) ? 1 : 2);
   finish();
   if (!in_equations) try_pairs(begun);
   if (options_.refuses && !d_.is_partial) {
@@ -495,7 +504,6 @@ Diagnosis Search::run() {
     if (set_aside(data_, d_)) {
       d_.heldout.clear();
       d_.train.clear();
-      d_.parameter_excursion = 0.0;
       check(true);
       if (d_.findings.empty())
         d_ = stated;  // the curve does not hold

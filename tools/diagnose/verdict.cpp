@@ -227,6 +227,7 @@ void conclude(const Case& data, Diagnosis& d) {
   const auto excess = data.model.plant == physics::Plant::equations
                           ? excess_over_noise(data, d.best)
                           : std::vector<double>(data.outputs.size(), 0.0);
+  d.parameter_excursion = excursion_of(d.best);
   std::vector<double> rests;
   const std::size_t given = data.model.terms.size();
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
@@ -249,13 +250,6 @@ void conclude(const Case& data, Diagnosis& d) {
     const double rest = rest_left_by(data, d.best, rival, excess);
     rests.push_back(rest);
     weigh_name(data, d, place, rest, finding);
-  }
-  for (std::size_t k = 0; k < d.best.free.size(); ++k) {
-    const auto& f = d.best.free[k];
-    if (f.where == Freedom::Where::curve || f.sigma <= 0.0) continue;
-    if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
-    d.parameter_excursion =
-        std::max(d.parameter_excursion, std::abs(get(d.best.model, f) - f.center) / f.sigma);
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
