@@ -253,9 +253,6 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  // In the user's own equations what follows the recording is as good a witness as a noise that he gave.
-  if (data.model.plant == physics::Plant::equations)
-    for (double& rest : rests) rest = std::max(rest, d.still_follows);
   leave_unsaid(d, rests);
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
