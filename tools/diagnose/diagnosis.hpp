@@ -19,7 +19,8 @@ struct Finding {
   std::vector<double> sigmas;  // of the term's parameters
   double gain = 0.0;           // log likelihood that is lost without it
   double probability = 1.0;
-  double share = 0.0;  // of the mismatch that goes with it
+  double share = 0.0;          // of the mismatch that goes with it
+  double share_of_rest = 0.0;  // of what the user's own numbers, retuned, leave of it
   /// The name that is more than nine times as likely wrong as right: the finding goes without it, patched.yaml has it as the
   /// nearest that there is.
   const physics::TermInfo* stand_in = nullptr;

@@ -273,6 +273,9 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
   const auto factors = products ? symbols : std::vector<std::string>{""};
   symbols.emplace_back("t");
   std::vector<Start> starts;
+  // Of a machine of many states there are too many to be tried.
+  constexpr std::size_t most_curves = 250;
+  if (states.size() * symbols.size() * factors.size() > most_curves) return starts;
   for (const auto& state : states) {
     if (is_kinematic(equations, state)) continue;
     const auto& own = spans.of(state.name);
@@ -281,6 +284,8 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
         const auto& span = spans.of(symbol);
         // What goes with itself is a curve of its own shape.
         if (!(span.width() > 1e-9 * span.size()) || symbol == factor) continue;
+        if (products && !(spans.of(factor).width() > 0.0))
+          continue;  // in proportion to what stays: the curve itself
         Start start;
         start.term.info = physics::unmodelled(Plant::equations, "state");
         start.term.on = state.name;

@@ -113,11 +113,14 @@ Surface surface(const Case& data, const std::vector<physics::Outputs>& simulated
   return made;
 }
 
-/// Has this number one value everywhere, if the model is right? A term's, and one of the user's own equations; not where a
-/// state began.
+/// Has this number one value everywhere, if the model is right? A term's does, and the user's own; not where a state began.
+/// Beside names that idealise what a machine does its own numbers seem to change, but for equations, which say it all.
 bool is_of_a_law(const Case& data, const Fit& fit, const Freedom& f) {
-  if (f.where == Freedom::Where::term) return f.term >= data.model.terms.size();
+  const std::size_t given = data.model.terms.size();
+  if (f.where == Freedom::Where::term) return f.term >= given;
+  const bool is_alone = fit.model.terms.size() == given;
   return f.where == Freedom::Where::parameter && data.is_time_series &&
+         (is_alone || data.model.plant == physics::Plant::equations) &&
          !is_initial(fit.model.parameters[f.index]);
 }
 
@@ -127,6 +130,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
                                               const std::vector<Eigen::VectorXd>& causes) {
   Eigen::Index rows = 0;
   for (const auto& recording : data.recordings) rows += static_cast<Eigen::Index>(recording.inputs.rows());
+  constexpr std::size_t most_products = 120;  // beyond, a machine of many states takes minutes
   std::vector<Eigen::VectorXd> all;
   for (std::size_t k = 0; k < fit.free.size() && fit.columns.rows() > 0; ++k) {
     const auto& f = fit.free[k];
@@ -144,6 +148,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
       from += outputs * n, to += n;
     }
     all.push_back(effect);
+    if (causes.size() * fit.free.size() > most_products) continue;
     for (const auto& cause : causes) {
       all.emplace_back(effect.cwiseProduct(cause));
       all.emplace_back(effect.cwiseProduct(cause).cwiseProduct(cause));
@@ -260,10 +265,15 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
   // A few rows of a slow course go with anything.
   if (data.is_time_series && common.rows() < enough) return std::vector<double>(data.outputs.size(), 0.0);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    const auto left = left_of(data, simulated, o);
+    if (data.is_time_series &&
+        mean_square(left).rows < enough) {  // a few readings among many rows are no more
+      shares.push_back(0.0);
+      continue;
+    }
     Eigen::MatrixXd basis = common;
     auto changing = changing_effects(data, fit, o, causes);
     append(basis, changing);
-    const auto left = left_of(data, simulated, o);
     double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
     for (const auto& order : orders)
       if (order.size() >= enough)

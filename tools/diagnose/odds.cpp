@@ -107,10 +107,11 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
     finding.relatives = odds_of_relatives(data, d.best, place, finding);
     finding.other_cause =
         odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
-                              d.findings.size() > 1 ? finding.share : 1.0);
+                              d.findings.size() > 1 ? finding.share_of_rest : 1.0);
     // Of 150 right names of two authors none moved his numbers by ten of his sigmas.
-    constexpr double usual = 10.0;
-    finding.other_cause += std::max(0.0, d.parameter_excursion / usual - 1.0);
+    // A sigma that is too small alone takes no name away.
+    constexpr double usual = 10.0, most = 3.0;
+    finding.other_cause += std::clamp(d.parameter_excursion / usual - 1.0, 0.0, most);
     sum += finding.relatives + finding.other_cause;
   }
   finding.probability = std::min(0.995, 1.0 / sum);

@@ -1,6 +1,7 @@
 #include "tools/diagnose/one_name.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -125,6 +126,7 @@ std::optional<OneName> leader(const Naming& naming, const Fit& base, const std::
   in_parallel(leaders.size(), [&](std::size_t k) {
     followed[k] = follow(naming, base, fits[leaders[k]], leaders.size() > 1);
     if (followed[k].name) followed[k].name->place = leaders[k];
+    if (!std::isfinite(followed[k].rank)) followed[k] = {};
   });
   const auto best = std::max_element(followed.begin(), followed.end(),
                                      [](const Followed& a, const Followed& b) { return a.rank < b.rank; });

@@ -68,6 +68,12 @@ bool goes_another_way(const Case& data, const Fit& fit) {
 /// So many of his sigmas no engineer is wrong: another cause may leave them where he says.
 constexpr double far_astray = 10.0;
 
+/// Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
+Verdict unless_stopped(const Diagnosis& d) {
+  const bool says_nothing = d.verdict == Verdict::no_mismatch || d.verdict == Verdict::parameters_only;
+  return d.is_partial && says_nothing ? Verdict::ambiguous : d.verdict;
+}
+
 class Search {
  public:
   Search(Case& data, const std::function<void(double, const std::string&)>& progress, const Options& options)
@@ -171,11 +177,13 @@ void Search::prepare() {
       const auto found = fit(data_, d_.weighing, *near, data_.model, 8);
       if (least_ratio(data_, found, d_.retuned) < 0.5) d_.retuned = found;
       // What is thrown here and there by the least disturbance has no one run.
-      if (goes_another_way(data_, d_.retuned)) {
-        data_ = as_given;
-        cut_into_windows(data_, *near);
-        as_read = data_;
-        begin();
+      if (auto cut = as_given; goes_another_way(data_, d_.retuned)) {
+        cut_into_windows(cut, *near);
+        if (cut.windows.count > 0) {
+          data_ = std::move(cut);
+          as_read = data_;
+          begin();
+        }
       }
     }
   drop_outliers_anew(data_, as_read, simulate(data_, d_.retuned.model));
@@ -367,6 +375,7 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
   if (!(excursion_of(d_.best) > far_astray)) return false;
   auto pair = std::exchange(d_, begun);
   auto pairs_rivals = std::exchange(rivals_, {});
+  auto screened = last_screen_;
   auto sought = seek(From::believed, 0.1);
   if (sought.best && sought.best->gain >= margin() && lead(data_, sought.best->with, pair.best) > 0.0) {
     claim(std::move(sought));
@@ -374,6 +383,7 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
   }
   d_ = std::move(pair);
   rivals_ = std::move(pairs_rivals);
+  last_screen_ = std::move(screened);
   return false;
 }
 
@@ -513,9 +523,7 @@ Diagnosis Search::run() {
   }
   data_.count.left_to_chance = noise_->left_to_chance();
   (void)noise_->put_back();
-  // Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
-  if (d_.is_partial && (d_.verdict == Verdict::no_mismatch || d_.verdict == Verdict::parameters_only))
-    d_.verdict = Verdict::ambiguous;
+  d_.verdict = unless_stopped(d_);
   progress_(1.0, "done");
   return d_;
 }
@@ -539,6 +547,10 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
     longer.windows.few = true;
     longer.remembered = std::make_shared<Remembered>();
     auto in_long = Search{longer, progress, options}.run();
+    if (in_long.is_partial) {  // stopped before all was tried
+      d.is_partial = true;
+      d.verdict = unless_stopped(d);
+    }
     // The same with fewer names is what more evidence makes of it.
     if (!in_long.is_partial && (named_by(in_long) > named_by(d) ||
                                 (named_by(in_long) == 2 && in_long.findings.size() < d.findings.size()))) {

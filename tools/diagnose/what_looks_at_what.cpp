@@ -48,6 +48,7 @@ std::vector<Equations::State> states_of_machine(const Equations& equations) {
       if (mentions(formulas[k], state.name) && seen.insert(state.name).second)
         formulas.push_back(state.derivative);
   auto states = equations.states;
+  if (seen.empty()) return states;  // what shows by the controller's output alone may be either's
   std::erase_if(states, [&](const auto& state) {
     return !seen.contains(state.name) && mentions(equations.control_law, state.name);
   });

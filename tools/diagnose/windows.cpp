@@ -313,7 +313,8 @@ void cut_into_windows(Case& data, const Model& near) {
 
 std::optional<Model> begun_in_windows(const Case& data) {
   const auto states = states_of(data.model).size();
-  if (data.model.plant != physics::Plant::equations || data.windows.count > 0 || data.windows.anew > 0)
+  if (data.model.plant != physics::Plant::equations || data.windows.count > 0 || data.windows.anew > 0 ||
+      !data.model.equations.controlled_input.empty())
     return std::nullopt;
   std::size_t rows = 0;
   for (const auto& recording : data.recordings) rows = std::max(rows, recording.inputs.rows());

@@ -73,6 +73,8 @@ TEST(OwnLoop, WhatOnlyTheControllerLooksAtIsNoStateOfTheMachine) {
   EXPECT_EQ(names, "x v felt ");
   loop.outputs.push_back({"filtered", "xf", {}});  // which somebody recorded
   EXPECT_EQ(states_of_machine(loop).size(), 4U);
+  loop.outputs = {{"command", "u", {}}};  // all that is recorded
+  EXPECT_EQ(states_of_machine(loop).size(), 5U);
   loop.controlled_input.clear();
   EXPECT_EQ(states_of_machine(loop).size(), 5U);
 }
