@@ -11,7 +11,6 @@
 #include "tools/diagnose/detectable.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
-#include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/one_name.hpp"
 #include "tools/diagnose/other_cause.hpp"
@@ -23,7 +22,6 @@
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
-#include "tools/diagnose/wander.hpp"
 #include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
