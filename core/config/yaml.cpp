@@ -249,7 +249,7 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
   Node number = *this;
   Conversion to_asked;
   Quantity result;
-  std::string written_unit;
+  std::optional<std::string> written_unit;
   if (is_map()) {
     number = required("value");
     if (const Node written = (*this)["unit"]; written.exists()) {
@@ -267,7 +267,7 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
                           (pure ? "a number without unit" : std::string{unit}),
                       pure ? "leave the unit out" : "write it in " + std::string{unit});
       }
-      if (written_unit.empty()) {  // what the number means is not known
+      if (!written_unit) {  // what the number means is not known
         (void)(*this)["sigma"];
         return {harmless, std::nullopt};
       }
@@ -290,8 +290,8 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
     return {harmless, result.sigma};
   }
   if (!range.contains(value)) {
-    const bool converted = !written_unit.empty() && written_unit != unit;
-    number.fault("`" + number.shown_scalar() + (converted ? " " + written_unit : "") + "`" +
+    const bool converted = written_unit && !written_unit->empty() && *written_unit != unit;
+    number.fault("`" + number.shown_scalar() + (converted ? " " + *written_unit : "") + "`" +
                      (converted ? " = " + shown(value) + " " + std::string{unit} : "") + " is out of range",
                  "it must be " + range_text(range, unit));
     return {harmless, result.sigma};

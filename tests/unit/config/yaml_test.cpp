@@ -28,6 +28,16 @@ TEST(Yaml, ReadsNumbersInTheUnitThatIsAsked) {
   yaml.finish();
 }
 
+TEST(Yaml, TakesAnEmptyUnitForAPureNumber) {
+  const auto yaml = Yaml::parse("gain: {value: 0.8, unit: \"\", sigma: 0.1}\n", "m.yaml");
+  for (const auto* unit : {"", "1"}) {
+    const auto gain = yaml.root().required("gain").as_quantity(unit);
+    EXPECT_EQ(gain.value, 0.8);
+    EXPECT_EQ(gain.sigma, 0.1);
+  }
+  yaml.finish();
+}
+
 TEST(Yaml, NamesFileLineKeyFaultAndMend) {
   const auto yaml = Yaml::parse("a: 1\nloop:\n  rate: 1200\n", "cell.yaml");
   (void)yaml.root()["a"];
