@@ -49,6 +49,11 @@ bool WriterConnection::write(const void* sample) {
 
 bool WriterConnection::wait_for_acknowledgments(Duration patience) { return wait_for(*writer_, patience); }
 
+void WriterConnection::forget() {
+  std::size_t removed = 0;
+  (void)writer_->clear_history(&removed);
+}
+
 ReaderConnection::ReaderConnection(Participant& participant, const std::string& topic,
                                    fdds::TopicDataType* type, const Profile& profile, Discovery& discovery,
                                    Receive receive, std::shared_ptr<CommandGate> gate)

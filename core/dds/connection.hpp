@@ -29,6 +29,7 @@ class WriterConnection final : public Connection, private fdds::DataWriterListen
   [[nodiscard]] std::uint64_t lost() const override { return refused_; }
   bool write(const void* sample) override;
   bool wait_for_acknowledgments(Duration patience) override;
+  void forget() override;
 
  private:
   void on_publication_matched(fdds::DataWriter*, const fdds::PublicationMatchedStatus& status) override {

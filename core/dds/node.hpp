@@ -71,6 +71,8 @@ class Connection {
   virtual bool write(const void* sample) = 0;
   /// Writers: waits until all reliable readers have everything; false when that took longer.
   virtual bool wait_for_acknowledgments(Duration patience) = 0;
+  /// Writers: drops what is still held for readers. For samples that are known to have served their purpose.
+  virtual void forget() {}
 };
 
 template <class T>
