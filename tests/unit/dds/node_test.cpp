@@ -98,6 +98,34 @@ TEST_P(Pair, SamplesGoFromPortToPortAcrossParticipants) {
   EXPECT_EQ(writing.lost(), 0U);
 }
 
+TEST_P(Pair, WhatAWriterForgetsNoLateReaderGets) {
+  Node writing{options("writing"), standard_profiles()};
+  Node reading{options("reading"), standard_profiles()};
+  auto writer = writing.writer<stage::AxisState>("test/kept", writing.profile("state"));
+  const auto write = [&](std::uint32_t axis) {
+    stage::AxisState state;
+    state.axis(axis);
+    EXPECT_TRUE(writer.write(state));
+  };
+  write(1);
+  writer.connection().forget();
+  write(2);
+  std::mutex mutex;
+  std::vector<std::uint32_t> got;
+  const auto reader = reading.reader<stage::AxisState>("test/kept", reading.profile("state"),
+                                                       [&](const stage::AxisState& state) {
+                                                         const std::lock_guard lock{mutex};
+                                                         got.push_back(state.axis());
+                                                       });
+  EXPECT_TRUE(eventually([&] {
+    const std::lock_guard lock{mutex};
+    return !got.empty();
+  }));
+  EXPECT_TRUE(writer.connection().wait_for_acknowledgments(Duration::milliseconds(2000)));
+  const std::lock_guard lock{mutex};
+  EXPECT_EQ(got, std::vector<std::uint32_t>{2});
+}
+
 INSTANTIATE_TEST_SUITE_P(Transports, Pair, ::testing::Bool(),
                          [](const auto& kind) { return kind.param ? "SharedMemoryAndUdp" : "UdpOnly"; });
 
