@@ -108,10 +108,8 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
     finding.other_cause =
         odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
                               d.findings.size() > 1 ? finding.share_of_rest : 1.0);
-    // Of 150 right names of two authors none moved his numbers by ten of his sigmas.
-    // A sigma that is too small alone takes no name away.
-    constexpr double usual = 10.0, most = 3.0;
-    finding.other_cause += std::clamp(d.parameter_excursion / usual - 1.0, 0.0, most);
+    constexpr double most = 3.0;  // a sigma that is too small alone takes no name away
+    finding.other_cause += std::clamp(d.parameter_excursion / far_astray - 1.0, 0.0, most);
     sum += finding.relatives + finding.other_cause;
   }
   finding.probability = std::min(0.995, 1.0 / sum);

@@ -63,9 +63,6 @@ bool goes_another_way(const Case& data, const Fit& fit) {
   return false;
 }
 
-/// So many of his sigmas no engineer is wrong: another cause may leave them where he says.
-constexpr double far_astray = 10.0;
-
 /// Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
 Verdict unless_stopped(const Diagnosis& d) {
   const bool says_nothing = d.verdict == Verdict::no_mismatch || d.verdict == Verdict::parameters_only;
@@ -502,11 +499,10 @@ Diagnosis Search::run() {
     return d_;
   }
   const Diagnosis begun = d_;
-  const bool in_equations = is_equations();
-  const bool paired = in_equations && take([&] { return add_pair(); });
+  const bool paired = is_equations() && take([&] { return add_pair(); });
   name(!paired ? 0 : take([&] { return put_one_in_place(begun); }) ? 1 : 2);
   finish();
-  if (!in_equations) try_pairs(begun);
+  if (!is_equations()) try_pairs(begun);
   if (options_.refuses && !d_.is_partial) {
     const auto stated = d_;
     if (set_aside(data_, d_)) {

@@ -233,6 +233,11 @@ void conclude(const Case& data, Diagnosis& d) {
   d.parameter_excursion = excursion_of(d.best);
   std::vector<double> rests;
   const std::size_t given = data.model.terms.size();
+  const auto beyond_best = [&](const physics::Model& model) {
+    return residual(data, d.weighing, model).squaredNorm() - d.best.residual.squaredNorm();
+  };
+  const double mismatch = d.findings.empty() ? 0.0 : beyond_best(data.model),
+               rest_of_retuned = d.findings.empty() ? 0.0 : beyond_best(d.retuned.model);
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
     const std::size_t place = given + i;
@@ -245,13 +250,10 @@ void conclude(const Case& data, Diagnosis& d) {
     }
     // What is lost without it.
     const auto without = physics::without_term(d.best.model, place);
-    const auto lost = residual(data, d.weighing, without).squaredNorm() - d.best.residual.squaredNorm();
-    const auto all = residual(data, d.weighing, data.model).squaredNorm() - d.best.residual.squaredNorm();
-    finding.share = all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0;
-    const auto rest_of_all =
-        residual(data, d.weighing, d.retuned.model).squaredNorm() - d.best.residual.squaredNorm();
-    finding.share_of_rest =
-        std::max(finding.share, rest_of_all > 0.0 ? std::clamp(lost / rest_of_all, 0.0, 1.0) : 0.0);
+    const double lost = beyond_best(without);
+    const auto share_of = [&](double all) { return all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0; };
+    finding.share = share_of(mismatch);
+    finding.share_of_rest = std::max(finding.share, share_of(rest_of_retuned));
     const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
     const double rest = rest_left_by(data, d.best, rival, excess);
