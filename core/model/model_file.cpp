@@ -214,18 +214,28 @@ void add_decided_input(const Node& root, Model& model) {
   model.signals.push_back({decided, decided, "", false});
 }
 
+/// The unit that the user's expressions count a column in, where he says so: the header's is converted to it.
+std::string counted_in(const Node& node) {
+  if (!node.has("unit")) return {};
+  const auto unit = node.text("unit");
+  if (!parse_unit(unit))
+    node["unit"].fault("`" + unit + "` is no unit that is known", "write one like `mL/s`, or leave it out");
+  return unit;
+}
+
 void read_equations(const Node& root, Model& model) {
   for (const auto& node : root["inputs"].children()) {
     physics::Equations::Input input{node.key(), node.key(), false};
-    std::string column;
+    std::string column, unit;
     if (node.is_map()) {
       column = node.text("column");
       input.linear = node.choice("hold", {"linear", "step"}, "step") == "linear";
+      unit = counted_in(node);
     } else {
       column = node.as_text();
     }
     model.equations.inputs.push_back(input);
-    model.signals.push_back({input.signal, column, "", false});
+    model.signals.push_back({input.signal, column, unit, false});
   }
   for (const auto& node : root.required("states").children()) {
     model.equations.states.push_back({node.key(), node.text("derivative")});
@@ -235,7 +245,7 @@ void read_equations(const Node& root, Model& model) {
     physics::Equations::Output output{node.key(), node.text("expression"), {}};
     if (node.has("limits")) output.limits = node["limits"].as_range("");
     model.equations.outputs.push_back(output);
-    model.signals.push_back({node.key(), node.text("column"), "", true});
+    model.signals.push_back({node.key(), node.text("column"), counted_in(node), true});
   }
   for (const auto& node : root["parameters"].children()) add_own(model, node.key(), node);
   if (root.has("controller")) {

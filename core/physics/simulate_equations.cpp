@@ -40,7 +40,7 @@ class OwnEquations final : public Simulation {
       while (begin + count < models.size() && count < most && !has_reversals(*models[begin]) &&
              are_alike(*models[begin], *models[begin + count]))
         ++count;
-      if (count < 3)
+      if (count < 2)
         run(*models[begin], outputs[begin]), begin += 1;
       else if (count <= 4)
         run_some<4>(models, outputs, begin, count), begin += count;

@@ -33,8 +33,10 @@ bool brings_energy(const physics::Model& model, const Term& term) {
                      [&](const auto& state) { return state.derivative == term.on; });
 }
 
-/// Does the term do nothing but change a number that the user knows exactly? A steady rate beside a known gravity.
+/// Does a further term do nothing but change a number that the user knows exactly? A steady rate beside a known gravity, once
+/// there is drag. The only one that explains the recording is said: what is new then is not the number.
 bool is_known_better(const Case& data, const Fit& fit, std::size_t term) {
+  if (fit.model.terms.size() == data.model.terms.size() + 1) return false;
   for (std::size_t k = 0; k < fit.free.size(); ++k) {
     if (fit.free[k].where != Freedom::Where::term || fit.free[k].term != term) continue;
     if (fit.columns.cols() != static_cast<Eigen::Index>(fit.free.size()) ||
@@ -58,9 +60,11 @@ bool is_known_better(const Case& data, const Fit& fit, std::size_t term) {
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const auto [low, high] = span_of(data, model, term.with.empty() ? term.on : term.with);
   const double size = std::max(std::abs(low), std::abs(high));
-  // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law.
+  // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.
   if (term.info->name == "periodic")
-    return inner_span_of(data, model, term.with.empty() ? term.on : term.with) >= 2.0 * term.values[1];
+    return (term.with == "t" ? high - low
+                             : inner_span_of(data, model, term.with.empty() ? term.on : term.with)) >=
+           2.0 * term.values[1];
   // Friction that never turned is a constant.
   if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
   if (term.info->name == "dry_friction") return low < -0.03 * size && high > 0.03 * size;

@@ -264,10 +264,10 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
     if (unit == content.units.end() || !signal.unit.empty()) continue;
     if (unit->second.factor == 1.0 && unit->second.offset == 0.0) signal.unit = unit->second.unit;
     if (unit->second.factor == 1.0) continue;
-    const auto note = "`" + signal.column + "` in " + unit->second.unit + " is taken in SI, times " +
-                      report::number(unit->second.factor, 4);
-    if (std::find(data.taken_in_si.begin(), data.taken_in_si.end(), note) == data.taken_in_si.end())
-      data.taken_in_si.push_back(note);
+    if (std::none_of(data.taken_in_si.begin(), data.taken_in_si.end(),
+                     [&](const TakenInSi& one) { return one.signal == signal.name; }))
+      data.taken_in_si.push_back(
+          {signal.name, signal.column, unit->second.unit, unit->second.factor, unit->second.offset});
   }
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)

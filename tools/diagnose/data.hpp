@@ -32,6 +32,12 @@ struct Recording {
 /// Thrown where a simulation is asked for after `Case::stopped` said so.
 struct Stopped {};
 
+/// A column in a unit that is none of SI's, beside equations that do not say which they count it in.
+struct TakenInSi {
+  std::string signal, column, unit;  // of the header
+  double factor = 1.0, offset = 0.0;
+};
+
 /// What the diagnosis knows of the machine.
 struct Case {
   physics::Model model;  // as the user believes
@@ -40,8 +46,7 @@ struct Case {
   std::vector<double> given_noise;   // by output, SI; NaN where the model gives none
   double resolution = 0.0;  // of an encoder, SI, as the user believes; the model itself does not round
   DataCount count;
-  std::vector<std::string>
-      taken_in_si;  // "`base` in mL/s is taken times 1e-06": columns of the user's own equations
+  std::vector<TakenInSi> taken_in_si;  // columns of the user's own equations
   struct Windows {
     std::size_t count = 0;  // 0: each recording is simulated from its first row to its last
     double length = 0.0;    // of one, in the unit of time

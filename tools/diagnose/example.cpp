@@ -70,7 +70,8 @@ parameters:
   a1: {value: 2.5, unit: 1}                   # no sigma: a start value, nothing is known beyond it
   a2: {value: 2.5, unit: 1}
 # + - * / ^ and sin cos tan exp log sqrt abs sign min max tanh, pi, t (the time in s). A column with a unit is taken in SI, or in
-# the unit as it stands where the numbers here are in it too. rpm is rad/s where they are angles.
+# the unit as it stands where the numbers here are in it too. rpm is rad/s where they are angles. `unit` beside `column` says in
+# which unit the expressions count it: {column: pump, unit: mL/s}.
 # `controller: {output: u, expression: ...}` closes a loop.
 )";
 

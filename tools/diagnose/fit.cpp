@@ -130,7 +130,25 @@ void for_neighbours(const std::vector<Freedom>& free, F f) {
       f(k);
 }
 
+double neighbour_weight(const Freedom& f) { return 1.0 / std::pow(beside * f.sigma, 2); }
+
 }  // namespace
+
+Eigen::VectorXd slope_of_priors(const Fit& fit) {
+  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.free.size()));
+  for (Eigen::Index k = 0; k < slope.size(); ++k) {
+    const auto& f = fit.free[static_cast<std::size_t>(k)];
+    const double value = get(fit.model, f);
+    if (f.sigma > 0.0) slope(k) = (value - f.center) * prior_weight(f, value);
+  }
+  for_neighbours(fit.free, [&](std::size_t at) {
+    const auto k = static_cast<Eigen::Index>(at);
+    const double pull =
+        neighbour_weight(fit.free[at]) * (get(fit.model, fit.free[at + 1]) - get(fit.model, fit.free[at]));
+    slope(k) -= pull, slope(k + 1) += pull;
+  });
+  return slope;
+}
 
 namespace {
 
@@ -278,18 +296,13 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
     }
     gradient = weighing.temper * (white_rows.any() ? white_rows.times(j, best.residual)
                                                    : Eigen::VectorXd{j.transpose() * best.residual});
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const auto& f = best.free[static_cast<std::size_t>(k)];
-      if (!(f.sigma > 0.0)) continue;
-      const double weight = prior_weight(f, get(best.model, f));
-      hessian(k, k) += weight;
-      gradient(k) += (get(best.model, f) - f.center) * weight;
-    }
+    gradient += slope_of_priors(best);
+    for (Eigen::Index k = 0; k < n; ++k)
+      if (const auto& f = best.free[static_cast<std::size_t>(k)]; f.sigma > 0.0)
+        hessian(k, k) += prior_weight(f, get(best.model, f));
     for_neighbours(best.free, [&](std::size_t at) {
       const auto k = static_cast<Eigen::Index>(at);
-      const double weight = 1.0 / std::pow(beside * best.free[at].sigma, 2);
-      const double pull = weight * (get(best.model, best.free[at + 1]) - get(best.model, best.free[at]));
-      gradient(k) -= pull, gradient(k + 1) += pull;
+      const double weight = neighbour_weight(best.free[at]);
       hessian(k, k) += weight, hessian(k + 1, k + 1) += weight;
       hessian(k, k + 1) -= weight, hessian(k + 1, k) -= weight;
     });

@@ -7,14 +7,13 @@
 
 namespace invar::diagnose {
 
-namespace {
-
-/// Over what a term in the user's equations goes; empty: over nothing.
 std::string variable_of(const physics::Term& term) {
   if (!term.curve.over.empty()) return term.curve.over;
   if (term.info->name == "constant") return "";
   return term.with.empty() ? term.on : term.with;
 }
+
+namespace {
 
 /// Do two terms act at one place over one variable? Then the one is a course of the other, and one with a name.
 bool are_kin(const physics::Term& one, const physics::Term& other) {

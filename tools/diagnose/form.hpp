@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "tools/diagnose/candidates.hpp"
 
@@ -9,6 +10,9 @@ namespace invar::diagnose {
 
 /// The same curve with fewer knots: a course that bends a little costs little.
 Start coarser(Start start, std::size_t knots);
+
+/// Over what a term in the user's equations goes; empty: over nothing.
+std::string variable_of(const physics::Term& term);
 
 /// May this curve stand for another course of the term's own effect?
 bool is_course_of(const physics::Term& curve, const physics::Term& term);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/diagnosis.hpp"
@@ -60,13 +62,18 @@ Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const Scr
   return fit(data, weighing, best, data.model, 8, &base);
 }
 
-/// The single terms that do most to first order, followed to their end.
+/// The single terms that do most to first order, each once, followed to their end.
 std::vector<Settled> singles(const Case& data, const Weighing& plain, const Fit& under,
                              const std::set<std::string, std::less<>>& without) {
+  constexpr std::size_t most = 5;
   const auto screened = screen(data, plain, under, named_starts(data, plain, under, without), 0);
-  std::vector<Settled> settled(std::min<std::size_t>(4, screened.size()));
+  std::vector<const Screened*> best;
+  std::set<std::string> seen;
+  for (const auto& s : screened)
+    if (best.size() < most && !s.impossible && seen.insert(label(s.start.term)).second) best.push_back(&s);
+  std::vector<Settled> settled(best.size());
   in_parallel(settled.size(), [&](std::size_t i) {
-    settled[i] = settle(data, fit_with(data, plain, under, screened[i], 8), 3);
+    settled[i] = settle(data, fit_with(data, plain, under, *best[i], 8), 3);
   });
   return settled;
 }

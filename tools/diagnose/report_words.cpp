@@ -222,7 +222,9 @@ std::string what_was_looked_at(const Case& data) {
         (cut.empty() ? "" : "; ") +
         std::string{"the inputs as recorded carry noise that the machine did not feel: their median over "} +
         std::to_string(data.quiet_rows) + " rows stands in their place";
-  for (const auto& column : data.taken_in_si) cut += (cut.empty() ? "" : "; ") + column;
+  for (const auto& one : data.taken_in_si)
+    cut += (cut.empty() ? "`" : "; `") + one.column + "` in " + one.unit + " is taken in SI, times " +
+           report::number(one.factor, 4);
   if (data.count.left_to_chance > 0)
     cut += (cut.empty() ? "in " : "; in ") + std::to_string(data.count.left_to_chance) +
            " rows noise decides when the carriage sticks and slips: they are not judged";

@@ -17,10 +17,12 @@ using physics::Term;
 
 constexpr auto none = physics::most_parameters;
 
-/// The base's own directions, to be taken out of every other.
+/// The base's own directions, to be taken out of every other, and how far they still have to go: a fit that ends within a
+/// fraction of its own uncertainty is not at its end for what is nearly along its numbers.
 struct Nuisance {
   Eigen::MatrixXd columns;
   Eigen::LDLT<Eigen::MatrixXd> hessian;
+  Eigen::VectorXd slope;
 };
 
 Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
@@ -36,6 +38,16 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
     h(k, k) += 1e-9 * h(k, k) + 1e-300;
   }
   n.hessian.compute(h);
+  n.slope = weighing.temper * (n.columns.transpose() * base.residual) + slope_of_priors(base);
+  for (Eigen::Index k = 0; k < n.slope.size(); ++k) {  // what a bound holds has arrived
+    const auto& f = base.free[static_cast<std::size_t>(k)];
+    const double value = get(base.model, f);
+    if ((n.slope(k) > 0.0 && value <= f.bounds.lower) || (n.slope(k) < 0.0 && value >= f.bounds.upper))
+      n.slope(k) = 0.0;
+  }
+  // Farther off, it is not this slope that holds it there: sensitivities from elsewhere, or a valley that bends.
+  constexpr double a_fraction = 1.0;
+  if (!(0.5 * n.slope.dot(n.hessian.solve(n.slope)) < a_fraction)) n.slope.setZero();
   return n;
 }
 
@@ -140,7 +152,8 @@ double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const
   Eigen::MatrixXd m = weighing.temper * (columns.transpose() * columns);
   for (Eigen::Index k = 0; k < m.rows(); ++k) m(k, k) += 1e-8 * m(k, k) + 1e-300;
   const Eigen::MatrixXd reduced = m - b.transpose() * n.hessian.solve(b);
-  const Eigen::VectorXd g = weighing.temper * (columns.transpose() * base.residual);
+  const Eigen::VectorXd g =
+      weighing.temper * (columns.transpose() * base.residual) - b.transpose() * n.hessian.solve(n.slope);
   Eigen::MatrixXd regular = reduced;
   for (Eigen::Index k = 0; k < m.rows(); ++k) regular(k, k) += 1e-6 * m(k, k);
   strength = -regular.ldlt().solve(g);
@@ -312,7 +325,8 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
   const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
   const Eigen::MatrixXd all = weighing.temper * (columns.transpose() * columns);
   const Eigen::MatrixXd gram = all - b.transpose() * n.hessian.solve(b);
-  const Eigen::VectorXd slope = weighing.temper * (columns.transpose() * base.residual);
+  const Eigen::VectorXd slope =
+      weighing.temper * (columns.transpose() * base.residual) - b.transpose() * n.hessian.solve(n.slope);
   const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
   std::vector<ScreenedPair> pairs;
   for (std::size_t i = 0; i < chosen.size(); ++i)

@@ -14,6 +14,7 @@
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/one_name.hpp"
 #include "tools/diagnose/other_cause.hpp"
+#include "tools/diagnose/own_units.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/quiet_inputs.hpp"
 #include "tools/diagnose/screen.hpp"
@@ -193,6 +194,7 @@ void Search::prepare() {
       d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
       d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
     }
+  check_own_units(data_, d_.retuned);
   noise_.emplace(data_);
   d_.weighing = weigh(data_, simulate(data_, d_.retuned.model));
   // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
@@ -256,10 +258,16 @@ bool Search::add_named(double round) {
                   "what it explains is no more than chance would", f.evidence - sought.base.evidence);
       continue;
     }
-    if (from != From::believed && is_first && is_equations() && excursion_of(sought.best->with) > far_astray)
-      if (auto other = seek(From::believed, share); other.best && other.best->gain >= margin() &&
-                                                    lead(data_, other.best->with, sought.best->with) > 0.0)
+    const auto rather = [&](From other_base) {
+      if (auto other = seek(other_base, share); other.best && other.best->gain >= margin() &&
+                                                lead(data_, other.best->with, sought.best->with) > 0.0)
         sought = std::move(other);
+    };
+    if (is_first && is_equations()) {
+      // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first.
+      if (from == From::coloured) rather(From::plain);
+      if (excursion_of(sought.best->with) > far_astray) rather(From::believed);
+    }
     const auto& best = *sought.best;
     if (const auto why = why_not(best)) {
       d_.reject(std::string{best.with.model.terms.back().info->name}, *why, best.gain);

@@ -10,13 +10,20 @@ namespace invar::diagnose {
 
 using physics::Model;
 
+namespace {
+
+/// So many of the user's own equations run side by side.
+constexpr std::size_t models_together = 8;
+
+}  // namespace
+
 Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& models) {
   Eigen::Index rows = 0;
   for (const auto& recording : data.recordings)
     rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
   Eigen::MatrixXd columns(rows, static_cast<Eigen::Index>(models.size()));
   const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
-  const std::size_t together = data.model.plant == physics::Plant::equations ? 8
+  const std::size_t together = data.model.plant == physics::Plant::equations ? models_together
                                : data.model.plant == physics::Plant::axis
                                    ? std::clamp<std::size_t>((models.size() + threads - 1) / threads, 1, 4)
                                    : 1;
@@ -66,7 +73,6 @@ std::vector<Stretch> moved_by(const Case& data, const std::string& name) {
 }  // namespace
 
 Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
-  const Eigen::VectorXd at = differences(data, simulate(data, model));
   std::vector<Model> changed;
   std::vector<std::size_t> run_of(free.size());
   Eigen::VectorXd steps(static_cast<Eigen::Index>(free.size()));
@@ -89,19 +95,32 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
     if (run_of[j] == changed.size()) changed.push_back(model);
     set(changed[run_of[j]], free[j], value + step);
   }
+  // How finely the user's own equations are run through goes with their numbers, in jumps: a small change is seen against a
+  // run beside it that takes the same steps.
+  const bool beside = model.plant == physics::Plant::equations;
+  constexpr std::size_t group = models_together - 1;
+  if (beside)
+    for (std::size_t k = (changed.size() + group - 1) / group; k-- > 0;)
+      changed.insert(changed.begin() + static_cast<std::ptrdiff_t>(k * group), model);
+  const auto place = [&](std::size_t run) {
+    return static_cast<Eigen::Index>(beside ? run + run / group + 1 : run);
+  };
   const Eigen::MatrixXd runs = differences_of(data, changed);
-  Eigen::MatrixXd columns(at.size(), static_cast<Eigen::Index>(free.size()));
+  const Eigen::VectorXd alone = beside ? Eigen::VectorXd{} : differences(data, simulate(data, model));
+  Eigen::MatrixXd columns(runs.rows(), static_cast<Eigen::Index>(free.size()));
   for (std::size_t j = 0; j < free.size(); ++j) {
-    const auto to = static_cast<Eigen::Index>(j), from = static_cast<Eigen::Index>(run_of[j]);
+    const auto to = static_cast<Eigen::Index>(j), from = place(run_of[j]);
+    const Eigen::VectorXd moved =
+        runs.col(from) - (beside ? runs.col(place(run_of[j] / group * group) - 1) : alone);
     const auto slope = [](double v) { return std::isfinite(v) ? v : 0.0; };
     if (!is_window(free[j])) {
-      columns.col(to) = ((runs.col(from) - at) / steps(to)).unaryExpr(slope);
+      columns.col(to) = (moved / steps(to)).unaryExpr(slope);
       continue;
     }
     columns.col(to).setZero();
     for (const auto& [first, last] : moved_by(data, model.parameters[free[j].index].name))
       columns.col(to).segment(first, last - first) =
-          ((runs.col(from) - at).segment(first, last - first) / steps(to)).unaryExpr(slope);
+          (moved.segment(first, last - first) / steps(to)).unaryExpr(slope);
   }
   return columns;
 }

@@ -67,14 +67,14 @@ TEST(Stands, AStoreThatFillsIsOne) {
   EXPECT_TRUE(stands(data, found, 0));
 }
 
-/// Ten turns of a wave that pushes a vessel which slowly fills, and a half: in so little of one any course is a part of it.
-TEST(Stands, WhatAMachineDoesInAPartOfAWaveIsNotThatWave) {
+/// A wave of 4 s that pushes a vessel which slowly fills, over so many rows of 0.1 s, and a fit of it.
+std::pair<Case, Fit> under_a_wave(int rows) {
   constexpr double period = 4.0, w = 2.0 * std::numbers::pi / period;
   std::mt19937 random{9};
   std::normal_distribution<double> noise{0.0, 0.002};
   std::vector<double> time, input, output;
   double x = 0.0;
-  for (int i = 0; i <= 420; ++i) {
+  for (int i = 0; i <= rows; ++i) {
     time.push_back(0.1 * i), input.push_back(0.02 * i), output.push_back(x + noise(random));
     for (int part = 0; part < 100; ++part)
       x += 1e-3 * (0.02 * i - 0.5 * x + 0.3 * std::sin(w * (0.1 * i + 1e-3 * part)));
@@ -83,7 +83,7 @@ TEST(Stands, WhatAMachineDoesInAPartOfAWaveIsNotThatWave) {
   table.add("t", "s", time);
   table.add("u", "", input);
   table.add("x", "", output);
-  const auto data =
+  auto data =
       make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
                                "states: {x: {derivative: 'u - k*x', initial: {value: 0, sigma: 0.01}}}\n"
                                "outputs: {x: {column: x, expression: x}}\n"
@@ -97,9 +97,22 @@ TEST(Stands, WhatAMachineDoesInAPartOfAWaveIsNotThatWave) {
   wave.values = {0.25, period, 0.1};
   wave.given = {true, true, true};
   model.terms.push_back(wave);
-  const auto found = fit(data, weigh(data, simulate(data, model), false), model, data.model, 20);
+  auto found = fit(data, weigh(data, simulate(data, model), false), model, data.model, 20);
+  return {std::move(data), std::move(found)};
+}
+
+/// Ten turns and a half: in so little of one as the half any course is a part of it.
+TEST(Stands, WhatAMachineDoesInAPartOfAWaveIsNotThatWave) {
+  const auto [data, found] = under_a_wave(420);
   EXPECT_NEAR(found.model.terms[0].values[0], 0.3, 0.01);
   EXPECT_TRUE(stands(data, found, 0));
+}
+
+TEST(Stands, WhatRepeatsInTimeWasSeenTwice) {
+  const auto [seen, twice] = under_a_wave(88);
+  EXPECT_TRUE(stands(seen, twice, 0));
+  const auto [hardly, once] = under_a_wave(66);
+  EXPECT_FALSE(stands(hardly, once, 0));
 }
 
 TEST(Stands, NothingIsTriedAtAnInputThatTheModelDoesNotLookAt) {
