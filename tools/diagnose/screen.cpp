@@ -38,6 +38,9 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
     h(k, k) += 1e-9 * h(k, k) + 1e-300;
   }
   n.hessian.compute(h);
+  n.slope = Eigen::VectorXd::Zero(h.rows());
+  // Elsewhere sensitivities are carried along from fit to fit and do not say so finely where the end is.
+  if (data.model.plant != physics::Plant::equations) return n;
   n.slope = weighing.temper * (n.columns.transpose() * base.residual) + slope_of_priors(base);
   for (Eigen::Index k = 0; k < n.slope.size(); ++k) {  // what a bound holds has arrived
     const auto& f = base.free[static_cast<std::size_t>(k)];
@@ -45,7 +48,7 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
     if ((n.slope(k) > 0.0 && value <= f.bounds.lower) || (n.slope(k) < 0.0 && value >= f.bounds.upper))
       n.slope(k) = 0.0;
   }
-  // Farther off, it is not this slope that holds it there: sensitivities from elsewhere, or a valley that bends.
+  // Farther off, it is not this slope that holds it there: the valley bends.
   constexpr double a_fraction = 1.0;
   if (!(0.5 * n.slope.dot(n.hessian.solve(n.slope)) < a_fraction)) n.slope.setZero();
   return n;

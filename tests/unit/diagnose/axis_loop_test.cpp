@@ -356,6 +356,30 @@ TEST(AxisLoop, NoRivalIsLedAstrayByTheStretchesThatItIsFittedTo) {
   EXPECT_LT(d.heldout[0].retuned, 1.02 * d.heldout[0].before);  // counted in every row it was 1.08
 }
 
+TEST(AxisLoop, WhoLeansOnItForAMomentIsSeenThen) {
+  Axis axis;
+  axis.push = [](double t) { return 0.5 * std::exp(-0.5 * std::pow((t - 4.2) / 0.12, 2)); };
+  const auto d = searched(recorded(axis, 0.25, 12));
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& curve = d.findings[0].term.curve;
+  EXPECT_EQ(d.findings[0].term.info->site, "force");
+  EXPECT_EQ(curve.over, "time");
+  EXPECT_GT(curve.knots.front(), 3.0);
+  EXPECT_LT(curve.knots.back(), 5.4);
+  EXPECT_NEAR(curve(4.2) - curve(3.0), 0.5, 0.15);
+  EXPECT_NEAR(curve(5.4) - curve(3.0), 0.0, 0.1);
+}
+
+TEST(AxisLoop, WhatPaysIsSaidThoughTheResidualHardlyShowsIt) {
+  Axis axis;  // two in ten thousand of it, and sixty nats
+  axis.pull = [](double x) { return -0.2 * x; };
+  const auto d = searched(recorded(axis, 0.25, 13));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "position_stiffness");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.2, 0.04);
+}
+
 TEST(AxisLoop, NoiseAloneIsNoPhysics) {
   for (const unsigned seed : {1U, 2U, 3U}) {
     const auto d = searched(recorded({}, 1.0, seed));
