@@ -93,6 +93,9 @@ class Search {
   /// Why a name that pays is not claimed beside others.
   std::optional<std::string> why_not(const OneName& name);
   bool add_named(double round);
+  /// Does a name do no more than lead the user's numbers out of a valley in which they were stuck (a pendulum that went over
+  /// the top)? Then the search goes on from there. Asked once.
+  bool leads_out(const OneName& name);
   void claim(Sought sought);
   /// In a window of its own friction looks like a motor without force, and from numbers that went far astray what is missing
   /// may look like its own opposite: from there no name is found.
@@ -152,6 +155,7 @@ class Search {
   std::vector<Screened> last_screen_;
   std::vector<Model> alone_;  // with one term, which a pair that was tried came to
   std::optional<LoopNoise> noise_;
+  bool led_out_ = false;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
 };
 
@@ -243,6 +247,18 @@ std::optional<std::string> Search::why_not(const OneName& name) {
   return std::nullopt;
 }
 
+bool Search::leads_out(const OneName& name) {
+  if (std::exchange(led_out_, true)) return false;
+  const auto model = physics::without_term(name.with.model, given());
+  auto anew = fit(data_, name.weighing, model, data_.model, 8, &name.with);
+  if (!(anew.cost < name.without.cost) || least_ratio(data_, anew, name.without) > 0.7) return false;
+  d_.weighing = weigh(data_, simulate(data_, anew.model), false);
+  anew = fit(data_, d_.weighing, anew.model, data_.model, 8, &anew);
+  d_.weighing = weigh(data_, simulate(data_, anew.model));
+  d_.best = d_.retuned = fit(data_, d_.weighing, anew.model, data_.model, 4, &anew);
+  return true;
+}
+
 /// Adds the term that explains most, if one stands under the filters that its own residual asks for.
 bool Search::add_named(double round) {
   const bool is_first = d_.best.model.terms.size() == given();
@@ -269,6 +285,7 @@ bool Search::add_named(double round) {
       if (excursion_of(sought.best->with) > far_astray) rather(From::believed);
     }
     const auto& best = *sought.best;
+    if (is_first && is_equations() && leads_out(best)) return add_named(round);
     if (const auto why = why_not(best)) {
       d_.reject(std::string{best.with.model.terms.back().info->name}, *why, best.gain);
       continue;

@@ -288,6 +288,23 @@ TEST(Windows, WhatWentAnotherWayIsFoundFromShortOnes) {
   }
 }
 
+/// A name that only leads the user's numbers out of the valley in which they were stuck is none.
+TEST(Windows, ANameThatOnlyLeadsOutOfAValleyIsNone) {
+  for (const unsigned seed : {4U, 13U}) {
+    auto data = pendulum(seed, 7.0).with(model_of(
+        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+        "states:\n  th: {derivative: w, initial: {value: 0, unit: rad, sigma: 0}}\n"
+        "  w: {derivative: '-g*sin(th) - c*w + b*u', initial: {value: 0, unit: rad/s, sigma: 0.13}}\n"
+        "outputs: {way: {column: y, expression: th}}\nparameters:\n"
+        "  g: {value: 25, unit: 1/s2, sigma: 0.75}\n"
+        "  c: {value: 0.8, unit: 1/s, sigma: 0.13}\n"
+        "  b: {value: 7, unit: 1/(kg m2), sigma: 0.35}\n"));
+    const auto d = search(data, [](double, const std::string&) {});
+    EXPECT_EQ(d.verdict, Verdict::parameters_only) << seed << summary(data, d);
+    EXPECT_NEAR(d.best.model.value("g"), 20.0, 0.1) << seed;
+  }
+}
+
 TEST(Windows, AVesselWhoseFlowEbbsForgetsAllTheSame) {
   Recorded r;
   for (int i = 0; i < 600; ++i) {
