@@ -8,7 +8,6 @@
 #include <set>
 
 #include "core/physics/library.hpp"
-#include "tools/diagnose/burst.hpp"
 #include "tools/diagnose/jump.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/wave.hpp"
@@ -461,8 +460,6 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   }
   auto jumps = jump_starts(data, fitted);
   std::move(jumps.begin(), jumps.end(), std::back_inserter(starts));
-  auto bursts = burst_starts(data, fitted);
-  std::move(bursts.begin(), bursts.end(), std::back_inserter(starts));
   auto waves = wave_starts(data, fitted);
   std::move(waves.begin(), waves.end(), std::back_inserter(starts));
   return starts;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tools/diagnose/burst.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
@@ -88,7 +89,12 @@ Beside beside(const Case& data, const Fit& best,
 
 Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
   return beside(data, best, [&](const Fit& under_plain) {
-    return unmodelled_starts(data, spanned != nullptr ? *spanned : under_plain);
+    const auto& like = spanned != nullptr ? *spanned : under_plain;
+    auto starts = unmodelled_starts(data, like);
+    // What the wrong form of a name leaves comes in bursts too, wherever the machine moves.
+    if (like.model.terms.size() == data.model.terms.size())
+      for (auto& burst : burst_starts(data, like)) starts.push_back(std::move(burst));
+    return starts;
   });
 }
 
