@@ -58,13 +58,12 @@ bool is_known_better(const Case& data, const Fit& fit, std::size_t term) {
 
 /// Did the recording let the term show what sets it apart?
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
-  const auto [low, high] = span_of(data, model, term.with.empty() ? term.on : term.with);
+  const std::string over = term.with.empty() ? term.on : term.with;
+  const auto [low, high] = span_of(data, model, over);
   const double size = std::max(std::abs(low), std::abs(high));
   // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.
   if (term.info->name == "periodic")
-    return (term.with == "t" ? high - low
-                             : inner_span_of(data, model, term.with.empty() ? term.on : term.with)) >=
-           2.0 * term.values[1];
+    return (over == "t" ? high - low : inner_span_of(data, model, over)) >= 2.0 * term.values[1];
   // Friction that never turned is a constant.
   if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
   if (term.info->name == "dry_friction") return low < -0.03 * size && high > 0.03 * size;

@@ -148,6 +148,13 @@ std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const
   return all;
 }
 
+/// The slope of the cost along the columns once the base's own numbers, which share `shared` with them, have arrived.
+Eigen::VectorXd slope_along(const Weighing& weighing, const Fit& base, const Nuisance& n,
+                            const Eigen::MatrixXd& columns, const Eigen::MatrixXd& shared) {
+  return weighing.temper * (columns.transpose() * base.residual) -
+         shared.transpose() * n.hessian.solve(n.slope);
+}
+
 /// Fills strength and gain of a set of columns with the nuisance taken out.
 double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const Eigen::MatrixXd& columns,
              Eigen::VectorXd& strength) {
@@ -155,8 +162,7 @@ double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const
   Eigen::MatrixXd m = weighing.temper * (columns.transpose() * columns);
   for (Eigen::Index k = 0; k < m.rows(); ++k) m(k, k) += 1e-8 * m(k, k) + 1e-300;
   const Eigen::MatrixXd reduced = m - b.transpose() * n.hessian.solve(b);
-  const Eigen::VectorXd g =
-      weighing.temper * (columns.transpose() * base.residual) - b.transpose() * n.hessian.solve(n.slope);
+  const Eigen::VectorXd g = slope_along(weighing, base, n, columns, b);
   Eigen::MatrixXd regular = reduced;
   for (Eigen::Index k = 0; k < m.rows(); ++k) regular(k, k) += 1e-6 * m(k, k);
   strength = -regular.ldlt().solve(g);
@@ -328,8 +334,7 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
   const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
   const Eigen::MatrixXd all = weighing.temper * (columns.transpose() * columns);
   const Eigen::MatrixXd gram = all - b.transpose() * n.hessian.solve(b);
-  const Eigen::VectorXd slope =
-      weighing.temper * (columns.transpose() * base.residual) - b.transpose() * n.hessian.solve(n.slope);
+  const Eigen::VectorXd slope = slope_along(weighing, base, n, columns, b);
   const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
   std::vector<ScreenedPair> pairs;
   for (std::size_t i = 0; i < chosen.size(); ++i)
