@@ -41,6 +41,7 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
                      : term.kind->info->site == "measurement" ? reading_curves_
                      : term.acts == CurveActs::as_friction    ? friction_curves_
                      : term.acts == CurveActs::as_damping     ? damping_curves_
+                     : term.acts == CurveActs::as_mass        ? mass_curves_
                                                               : force_curves_;
       curves.emplace_back(&term, code_of(term.curve.over));
       if (term.acts == CurveActs::as_damping)
@@ -172,13 +173,22 @@ inline double AxisPlant::held(const AxisPoint& at, double speed) const noexcept 
 double AxisPlant::push(const AxisPoint& at) const noexcept { return pushed(at); }
 double AxisPlant::hold(const AxisPoint& at, double speed) const noexcept { return held(at, speed); }
 
+inline double AxisPlant::moved_mass(const AxisPoint& at) const noexcept {
+  if (mass_curves_.empty()) return parameters_.mass;
+  double mass = parameters_.mass;
+  for (const auto& [term, code] : mass_curves_) mass += term->curve(variable(code, at));
+  constexpr double least = 0.05;  // of the carriage stays, whatever is taken off
+  return std::max(mass, least * parameters_.mass);
+}
+
 AxisPlant::Slope AxisPlant::slope(const State& s, double time, double direction, bool stuck) const noexcept {
   const AxisPoint at{time, s.position, s.velocity, current_mean_, temperature_};
   double force = push(at);
   if (direction != 0.0) force -= direction * hold(at, std::abs(s.velocity));
   const double spring =
       mode_.stiffness * s.swing + mode_.damping * s.swing_speed;  // pulls the carriage along
-  const double carriage = stuck ? 0.0 : (force + spring) / (parameters_.mass * (1.0 - mode_.share));
+  // What comes and goes lies on the carriage; the part that swings keeps its mass.
+  const double carriage = stuck ? 0.0 : (force + spring) / (moved_mass(at) - parameters_.mass * mode_.share);
   return {s.velocity, carriage, s.swing_speed, -spring / (parameters_.mass * mode_.share) - carriage};
 }
 
@@ -190,7 +200,7 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
     const AxisPoint at{time, position, velocity, current_mean_, temperature_};
     double force = pushed(at);
     if (direction != 0.0) force -= direction * held(at, std::abs(velocity));
-    return force / parameters_.mass;
+    return force / moved_mass(at);
   };
   const double half = 0.5 * h, middle = time_ + half;
   const double a = acceleration(s.position, s.velocity, time_);

@@ -15,8 +15,9 @@ struct AxisParameters {
   double viscous_damping = 0.0;  // [N s/m]
 };
 
-/// What the curve of an `unmodelled` force is: a force [N], dry friction [N] against the motion, or damping [N s/m].
-enum class CurveActs { as_force, as_friction, as_damping };
+/// What the curve of an `unmodelled` force is: a force [N], dry friction [N] against the motion, damping [N s/m], or moved
+/// mass [kg] that comes and goes.
+enum class CurveActs { as_force, as_friction, as_damping, as_mass };
 
 /// A term with its numbers, in the order of its info.
 struct AxisTerm {
@@ -120,6 +121,7 @@ class AxisPlant {
   [[nodiscard]] State advanced(const State& s, double h, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced_with_mode(const State& s, double h, double direction,
                                          bool stuck) const noexcept;
+  [[nodiscard]] double moved_mass(const AxisPoint& at) const noexcept;
   void drive(double command, double dt) noexcept;  // one held command behind the delay
   void move(double h) noexcept;                    // one sub-step with current_mean_
   [[nodiscard]] double delayed_position(double age) const noexcept;
@@ -129,7 +131,7 @@ class AxisPlant {
   std::vector<PointEffect> forces_, motors_;
   std::vector<NumberEffect> frictions_, readings_;
   std::vector<const AxisTerm*> commands_, bristles_;
-  std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_,
+  std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_, mass_curves_,
       motor_curves_, reading_curves_;
   bool has_motor_terms_ = false, has_force_terms_ = false;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;

@@ -46,9 +46,10 @@ AxisPlant make_axis(const Model& model, double longest_step) {
   INVAR_EXPECTS(model.plant == Plant::axis);
   std::vector<AxisTerm> terms;
   for (const auto& term : model.terms) {
-    const auto acts = term.with == "direction"  ? CurveActs::as_friction
-                      : term.with == "velocity" ? CurveActs::as_damping
-                                                : CurveActs::as_force;
+    const auto acts = term.with == "direction"      ? CurveActs::as_friction
+                      : term.with == "velocity"     ? CurveActs::as_damping
+                      : term.with == "acceleration" ? CurveActs::as_mass
+                                                    : CurveActs::as_force;
     terms.push_back({axis_kind(*term.info), term.values, term.curve, acts});
   }
   return {{model.value("mass", 1.0), model.value("motor_constant", 1.0), model.value("viscous_damping")},

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/physics/library.hpp"
+#include "tools/diagnose/axis_modes.hpp"
 #include "tools/diagnose/jump.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/wave.hpp"
@@ -291,8 +292,10 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
           shapes = periods.force_frequency;
         if (name == "position_stiffness") shapes = {0.0};
         // What rings, rings at one pitch: from far off it would seem to push the other way.
-        if (name == "flexible_mode")
+        if (name == "flexible_mode") {
+          shapes = mode_frequencies(data, weighing, fitted);
           for (double f = 20.0; f < 350.0; f *= 1.2) shapes.push_back(f);
+        }
         if (may_repeat && name != "flexible_mode" && shapes.empty()) continue;
       }
       if (info->name == "stage_velocity_carry") {
@@ -334,11 +337,10 @@ double rms_of(const std::vector<std::vector<double>>& series) {
   return rows > 0.0 ? std::sqrt(square / rows) : 0.0;
 }
 
-/// [m/s]
-double usual_speed(const Case& data) {
+/// RMS of a signal over all recordings.
+double usual(const Case& data, const std::string& name) {
   std::vector<std::vector<double>> all;
-  for (std::size_t r = 0; r < data.recordings.size(); ++r)
-    all.push_back(variable_values(data, r, "velocity"));
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) all.push_back(variable_values(data, r, name));
   return std::max(1e-9, rms_of(all));
 }
 
@@ -381,6 +383,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "position", 21, "velocity"},
                  {"force", "velocity", 12},
                  {"force", "time", 12},
+                 {"force", "time", 12, "acceleration"},  // what is picked up and put down
                  {"force", "temperature", 6},
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
@@ -453,8 +456,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
         start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
       if (!start.term.with.empty())
-        start.step =
-            0.1 * missing_force(data, fitted) / (start.term.with == "velocity" ? usual_speed(data) : 1.0);
+        start.step = 0.1 * missing_force(data, fitted) /
+                     (start.term.with == "direction" ? 1.0 : usual(data, start.term.with));
       starts.push_back(std::move(start));
     }
   }

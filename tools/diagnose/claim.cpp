@@ -399,6 +399,7 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
     if (p.role == Role::amplitude && p.bounds.upper < 1e100 && std::abs(values[i]) > 0.99 * p.bounds.upper)
       return false;
     if (p.role != Role::shape || p.name == "center" || p.name == "limit" || p.name == "squareness") continue;
+    if (p.name == "damping_ratio" && values[i] < 0.5) continue;  // what rings for long is a mode all the same
     if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower && values[i] < 1.3 * p.bounds.lower)
       return false;
     if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > 0.99 * p.bounds.upper) return false;

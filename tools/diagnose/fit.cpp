@@ -189,8 +189,10 @@ Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<F
 /// speed is rare where air and oil know the first and second; one that goes with another variable had many to choose from.
 double rarity(const Model& model, const physics::Term& term) {
   if (model.plant != physics::Plant::equations) return 0.0;
+  // A law bends over its own state; what another one does mostly goes straight (a coupling).
   if (!term.with.empty())
-    return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size()));
+    return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size())) +
+           (term.info->name == "quadratic" || term.info->name == "cubic" ? 3.0 : 0.0);
   const bool speed = std::any_of(model.equations.states.begin(), model.equations.states.end(),
                                  [&](const auto& state) { return state.derivative == term.on; });
   return term.info->name == "cubic" && speed ? 3.0 : 0.0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tools/diagnose/form.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/shape.hpp"
 
@@ -85,9 +86,9 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative) {
   return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
 }
 
-bool is_elsewhere_in_chain(const Term& one, const Term& other) {
-  return one.info == other.info && one.info->plant == Plant::equations &&
-         (comes_late(one) || one.info->name == "hidden_state");
+bool is_elsewhere(const Term& one, const Term& other) {
+  return one.info == other.info && one.info->plant == Plant::equations && one.on != other.on &&
+         (comes_late(one) || one.info->name == "hidden_state" || variable_of(one) == variable_of(other));
 }
 
 double rest_beside(const std::vector<double>& won, const std::vector<double>& excess) {
@@ -101,7 +102,8 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)
-    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    if (is_another_cause(finding, a) && !is_elsewhere(finding.term, a.term))
+      sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);

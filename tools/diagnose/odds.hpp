@@ -29,9 +29,9 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
 /// that runs alike is the same name for the same cause.
 bool is_another_cause(const Finding& finding, const Alternative& alternative);
 
-/// Are they one effect whose place in a chain alone is open? What comes late before a model in one piece comes late behind it
-/// as well, and no motion tells where.
-bool is_elsewhere_in_chain(const physics::Term& one, const physics::Term& other);
+/// Are they one effect whose place alone is open? What comes late before a model in one piece comes late behind it as well,
+/// and a steady rate or a drag that acts at one state acts at the next in a chain.
+bool is_elsewhere(const physics::Term& one, const physics::Term& other);
 
 /// Of what the outputs that a name explains left beyond the noise without it (`won` and `excess`, by output, in the power of
 /// the noise), the share that they still leave: of the worst of those with at least a tenth of all that it explains.

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/windows.hpp"
@@ -69,6 +70,16 @@ std::string report_json(const Case& data, const Diagnosis& d) {
          {"share", finding.share},
          {"why", "without " + std::string{term.info->name} + " there, " + text(100.0 * finding.share) +
                      " % of the excess residual comes back"}});
+    // Where the place alone is open, each of them.
+    for (const auto& a : finding.alternatives)
+      if (a.log_odds > -ambiguous_margin && is_elsewhere(term, a.term) &&
+          site_of(data, a.term) != site_of(data, term))
+        report["location"].push_back(
+            {{"site", site_of(data, a.term)},
+             {"depends_on", depends},
+             {"where", where},
+             {"share", finding.share},
+             {"why", std::string{term.info->name} + " there explains the recording as well"}});
     json parameters = json::object();
     for (std::size_t k = 0; k < term.info->parameter_count(); ++k)
       parameters[std::string{term.info->parameters[k].name}] = {

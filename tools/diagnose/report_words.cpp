@@ -82,7 +82,8 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
   using physics::Plant;
   switch (data.model.plant) {
     case Plant::axis:
-      if (term.info->site == "force") return term.with == "velocity" ? "N s/m" : "N";
+      if (term.info->site == "force")
+        return term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N";
       return term.info->site == "measurement" ? "m" : "1";
     case Plant::thermal:
       return term.info->site == "loss" ? "W/K" : "W";
@@ -167,7 +168,9 @@ std::string place_of(const Case& data, const physics::Term& term) {
     if (site == one.site) text = one.words;
   if (!term.on.empty()) text += " of " + term.on;
   if (!term.with.empty() && data.model.plant == physics::Plant::axis)
-    return term.with == "direction" ? "dry friction of the carriage" : "damping of the carriage";
+    return term.with == "direction"      ? "dry friction of the carriage"
+           : term.with == "acceleration" ? "mass of the carriage"
+                                         : "damping of the carriage";
   if (!term.with.empty()) text += " and " + term.with;
   return text;
 }
@@ -286,7 +289,7 @@ std::string elsewhere(const Case& data, const Diagnosis& d) {
   std::string places;
   for (const auto& f : d.findings)
     for (const auto& a : f.alternatives)
-      if (a.log_odds > -ambiguous_margin && is_elsewhere_in_chain(f.term, a.term))
+      if (a.log_odds > -ambiguous_margin && is_elsewhere(f.term, a.term))
         places += (places.empty() ? ", or the same at the " : " or the ") + place_of(data, a.term);
   return places;
 }

@@ -12,6 +12,7 @@
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/kin.hpp"
+#include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
 #include "tools/diagnose/verdict.hpp"
 
@@ -33,9 +34,11 @@ struct Axis {
   std::function<double(double place)> grease = [](double) { return 0.0; };   // damping there [N s/m]
   std::function<double(double place)> pull = [](double) { return 0.0; };     // there [N]
   std::function<double(double time)> warmth;                                 // degC; none: not recorded
-  double thins = 0.0;   // by so much is the damping less for every degree above 20 [N s/(m K)]
-  double dead = 0.0;    // current that moves nothing, to either side [A]
-  double far = 0.0;     // place to which the third move goes [m]; 0: as the others
+  double thins = 0.0;  // by so much is the damping less for every degree above 20 [N s/(m K)]
+  double dead = 0.0;   // current that moves nothing, to either side [A]
+  double far = 0.0;    // place to which the third move goes [m]; 0: as the others
+  std::function<double(double time)> load = [](double) { return 0.0; };  // lies on the carriage then [kg]
+  double swings = 0.0, rings = 0.0;  // share of the mass that hangs on a spring, its frequency held fast [Hz]
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
 
@@ -47,6 +50,8 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
   std::uniform_real_distribution<double> places{-axis.reach, axis.reach};
   const double share = 1.0 - std::exp(-2.0 * std::numbers::pi * filter * period);
   std::vector<double> time, reference, position, current, temperature;
+  double swing = 0.0, swing_speed = 0.0;
+  const double pull_of_part = axis.swings * mass * std::pow(2.0 * std::numbers::pi * axis.rings, 2);
   double bend = 0.0, x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
   int moves = 0;
   for (int k = 0; k < 11000; ++k) {
@@ -72,6 +77,8 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
       double given = motor * felt + axis.push(now + part * h) + axis.pull(x);
+      const double moved = (1.0 - axis.swings) * mass + axis.load(now), spring = pull_of_part * swing;
+      given += spring;
       if (axis.bristles > 0.0) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
@@ -81,9 +88,13 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
       const auto slows = [&](double speed) {
         const double held = dry + axis.excess * std::exp(-std::pow(speed / axis.fades, 2));
-        return (given - damps * speed - way * held) / mass;
+        return (given - damps * speed - way * held) / moved;
       };
       const double a = slows(v), b = slows(v + h * a), next = v + 0.5 * h * (a + b);
+      if (axis.swings > 0.0) {
+        swing_speed -= h * (spring / (axis.swings * mass) + a);
+        swing += h * swing_speed;
+      }
       x += h * (v + 0.5 * h * a);
       v = dry > 0.0 && next * way < 0.0 ? 0.0 : next;
     }
@@ -369,6 +380,39 @@ TEST(AxisLoop, WhoLeansOnItForAMomentIsSeenThen) {
   EXPECT_LT(curve.knots.back(), 5.4);
   EXPECT_NEAR(curve(4.2) - curve(3.0), 0.5, 0.15);
   EXPECT_NEAR(curve(5.4) - curve(3.0), 0.0, 0.1);
+}
+
+TEST(AxisLoop, WhatIsPickedUpIsMassFromThenOn) {
+  Axis axis;
+  axis.load = [](double t) { return t < 5.0 ? 0.0 : 0.6; };
+  auto data = recorded(axis, 0.25, 14);
+  const auto d = searched(data);
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(term.curve.over, "time");
+  EXPECT_EQ(place_of(data, term), "mass of the carriage");
+  EXPECT_EQ(unit_of_curve(data, term), "kg");
+  EXPECT_NEAR(term.curve(9.0) - term.curve(2.0), 0.6, 0.03);
+  EXPECT_NEAR(d.best.model.value("mass") + term.curve(2.0), mass, 0.1);
+}
+
+TEST(AxisLoop, APartThatRingsForLongIsAModeAllTheSame) {
+  Axis axis;
+  axis.swings = 0.01, axis.rings = 43.0;
+  const auto d = searched(recorded(axis, 0.25, 15));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "flexible_mode");
+  EXPECT_NEAR(d.findings[0].term.values[1], 43.0, 2.0);
+  EXPECT_LT(d.findings[0].term.values[2], 0.02);
+}
+
+TEST(AxisLoop, AWaveThatPaysTwiceIsSaidThoughTheResidualHardlyShowsIt) {
+  Axis axis;
+  axis.push = [](double t) { return 0.0012 * std::sin(2.0 * std::numbers::pi * 7.3 * t); };
+  const auto d = searched(recorded(axis, 0.25, 16));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_NEAR(d.findings[0].term.values[d.findings[0].term.info->index_of("frequency")], 7.3, 0.05);
 }
 
 TEST(AxisLoop, WhatPaysIsSaidThoughTheResidualHardlyShowsIt) {

@@ -87,6 +87,36 @@ TEST(Outliers, AreSeenOnceTheNumbersThatHideThemAreRight) {
   EXPECT_EQ(dropped(data), slips);
 }
 
+/// A vessel whose pump gives twice what the model says; the numbers that are wrong are far louder than the slip in row 180.
+TEST(Outliers, OfAModelThatRemembersAreSeenOnceItsNumbersAreNear) {
+  std::mt19937 random{34};
+  std::normal_distribution<double> reading{0.0, 0.01};
+  std::vector<double> time, pump, level;
+  double x = 0.0, u = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    u = std::uniform_real_distribution<double>{0.0, 2.0}(random);
+    time.push_back(0.2 * k), pump.push_back(u), level.push_back(x + reading(random));
+    x = 2.0 * u / 1.5 + (x - 2.0 * u / 1.5) * std::exp(-1.5 * 0.2);
+  }
+  level[180] += 0.4;
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("u", "", pump);
+  table.add("y", "", level);
+  auto data =
+      make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                               "states: {x: {derivative: 'b*u - k*x', initial: {value: 0, sigma: 0}}}\n"
+                               "outputs: {y: {column: y, expression: x}}\n"
+                               "parameters: {b: {value: 1, sigma: 0.2}, k: {value: 1.4, sigma: 0.2}}\n"),
+                {table});
+  auto far = data;
+  drop_outliers(far, simulate(far, far.model));
+  EXPECT_FALSE(dropped(far).contains(180));
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::parameters_only);
+  EXPECT_EQ(dropped(data), std::set<std::size_t>{180});
+}
+
 TEST(Outliers, AreNotTheFewDropsOnWhichAnEffectActs) {
   auto data = printed([](double, double velocity) { return 4e-4 * velocity; }, slips, 33);
   const auto d = search(data, [](double, const std::string&) {});

@@ -102,6 +102,59 @@ TEST(OwnLoop, ANoisyReadingMakesTheOtherOutputsLouderAndNoNameWorse) {
   EXPECT_GT(d.findings[0].probability, 0.8);
 }
 
+/// A ball on a beam whose controller reads it with noise; it rolls with friction and, the beam not being level, down it.
+Case ball(double friction, double down) {
+  std::mt19937 random{6};
+  std::normal_distribution<double> noise{0.0, 1.5e-4};
+  std::uniform_real_distribution<double> place{-0.15, 0.15};
+  constexpr double row = 0.04, g = 7.2, ta = 0.055, kp = 0.6, kd = 0.42, tf = 0.05;
+  std::vector<double> time, target, reading;
+  double x = 0.0, v = 0.0, tilt = 0.0, felt = 0.0, from = 0.0, to = 0.0;
+  for (int i = 0; i < 1200; ++i) {
+    if (i % 50 == 0) from = to, to = place(random);
+    const double ref = from + (to - from) * std::min(1.0, (i % 50) / 25.0), read = x + noise(random);
+    time.push_back(row * i), target.push_back(ref), reading.push_back(read);
+    const double u = kp * (ref - read) - kd * (read - felt) / tf;
+    constexpr int parts = 400;
+    constexpr double h = row / parts;
+    for (int part = 0; part < parts; ++part) {
+      const double pull = g * std::sin(tilt) + down, way = std::copysign(1.0, v != 0.0 ? v : pull);
+      const double next = v + h * (pull - friction * way);
+      v = (v == 0.0 && std::abs(pull) <= friction) || next * way < 0.0 ? 0.0 : next;
+      x += h * v;
+      tilt += h * (u - tilt) / ta;
+      felt += h * (x - felt) / tf;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("ref", "m", target);
+  table.add("y", "m", reading);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {ref: ref}\nstates:\n"
+                     "  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0}}\n"
+                     "  v: {derivative: 'g*sin(al)', initial: {value: 0, unit: m/s, sigma: 0}}\n"
+                     "  al: {derivative: '(u - al)/ta', initial: {value: 0, unit: rad, sigma: 0}}\n"
+                     "  xf: {derivative: '(x - xf)/tf', initial: {value: 0, unit: m, sigma: 0}}\n"
+                     "outputs: {y: {column: y, expression: x}}\n"
+                     "controller: {output: u, expression: '0.6*(ref - x) - 0.42*(x - xf)/tf'}\n"
+                     "parameters:\n  g: {value: 7.4, unit: m/s2, sigma: 0.37}\n"
+                     "  ta: {value: 0.06, unit: s, sigma: 0.009}\n  tf: {value: 0.05, unit: s, sigma: 0}\n"),
+      {table});
+}
+
+TEST(OwnLoop, ASteadyPushBesideFrictionIsFoundToo) {
+  auto data = ball(0.0021, 0.0018);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
+  ASSERT_EQ(d.findings.size(), 2U);
+  const bool is_first = d.findings[0].term.info->name == "constant";
+  const auto &steady = d.findings[is_first ? 0 : 1].term, &rubs = d.findings[is_first ? 1 : 0].term;
+  EXPECT_EQ(steady.info->name, "constant");
+  EXPECT_EQ(rubs.info->name, "dry_friction");
+  EXPECT_NEAR(rubs.values[0], 0.0021, 0.0003);
+}
+
 TEST(OwnLoop, WhatTheControllerDecidesNeedNotBeListedAmongTheInputs) {
   const std::string
       listed = "inputs: {r: to, u: u}",

@@ -2,11 +2,15 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
 
 #include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
+#include "tools/diagnose/search.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -54,6 +58,43 @@ TEST(Where, AVariableOfOwnEquationsBearsItsColumnToo) {
   // What runs over goes with the vessel that is full, wherever it arrives.
   EXPECT_THAT(dependence(data, claimed(data, "overflow", "H1", "H2", {1.5, 1.0}).findings[0]),
               ElementsAre("H1", "H2"));
+}
+
+/// Two vessels in a row of which the second is read; a steady inflow into the first shows as one into the second.
+TEST(Where, ASteadyRateThatMayActAtTwoStatesIsExplainedAndBothAreSaid) {
+  std::mt19937 random{7};
+  std::normal_distribution<double> noise{0.0, 0.002};
+  std::vector<double> time, pump, level;
+  double a = 0.5, b = 0.5, u = 0.5;
+  for (int i = 0; i < 900; ++i) {
+    if (i % 40 == 0) u = std::uniform_real_distribution<double>{0.2, 1.0}(random);
+    time.push_back(0.1 * i), pump.push_back(u), level.push_back(b + noise(random));
+    for (int part = 0; part < 100; ++part) {
+      a += 1e-3 * (u - a + 0.01);
+      b += 1e-3 * (a - b);
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("u", "", pump);
+  table.add("y", "", level);
+  auto data = make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\nstates:\n"
+                     "  a: {derivative: 'k*(u - a)', initial: {value: 0.5, sigma: 0.02}}\n"
+                     "  b: {derivative: 'k*(a - b)', initial: {value: 0.5, sigma: 0.02}}\n"
+                     "outputs: {y: {column: y, expression: b}}\nnoise: {y: 0.002}\n"
+                     "parameters: {k: {value: 1, sigma: 0.02}}\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "constant");
+  EXPECT_GT(d.findings[0].probability, 0.7);  // of the name; the place is open
+  const auto report = nlohmann::json::parse(report_json(data, d));
+  std::set<std::string> sites;
+  for (const auto& place : report["location"]) sites.insert(place["site"]);
+  EXPECT_THAT(sites, ElementsAre("equations.a", "equations.b"));
+  EXPECT_EQ(report["ambiguity"].size(), 1U);
 }
 
 TEST(Where, ALimitActsBeyondIt) {

@@ -79,6 +79,13 @@ TEST(AxisPlant, DampingInOneStretchTakesItsAreaOverTheMassOfTheSpeed) {
   }
 }
 
+TEST(AxisPlant, WhatComesUponTheCarriageIsPushedAlong) {
+  const Curve load{"time", {0.0, 0.5, 0.5 + 1e-9, 2.0}, {0.0, 0.0, 3.0, 3.0}};
+  AxisPlant axis{{2.0, 10.0, 0.0}, {course(CurveActs::as_mass, load)}};
+  for (int i = 0; i < 1000; ++i) axis.step(1.0, 1e-3);  // 10 N: 5 m/s2 for half a second, then 2 m/s2
+  EXPECT_NEAR(axis.velocity(), 0.5 * 5.0 + 0.5 * 2.0, 2e-3);
+}
+
 TEST(AxisPlant, StribeckFrictionNeedsItsStaticForceToBreakAway) {
   AxisPlant axis{{1.0, 1.0, 0.0}, {term("stribeck_friction", {1.0, 2.0, 0.01})}};
   for (int i = 0; i < 100; ++i) axis.step(1.99, 1e-3);

@@ -1,0 +1,14 @@
+// At which frequencies a part that swings on an axis's carriage would explain most of the residual.
+#pragma once
+
+#include <vector>
+
+#include "tools/diagnose/fit.hpp"
+
+namespace invar::diagnose {
+
+/// [Hz] The likeliest natural frequencies of a flexible mode, best first, to first order in its mass; mass and damping of
+/// the carriage give way. Empty where the position is no output.
+std::vector<double> mode_frequencies(const Case& data, const Weighing& weighing, const Fit& fitted);
+
+}  // namespace invar::diagnose
