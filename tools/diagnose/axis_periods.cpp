@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "tools/diagnose/axis_modes.hpp"
 #include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/carried_back.hpp"
 
@@ -202,6 +203,7 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     readings.push_back(carried_back(data, fitted, reading, r));
     for (double x : positions.back()) low = std::min(low, x), high = std::max(high, x);
   }
+  periods.mode_frequency = mode_frequencies(data, fitted, force, forces);
   const double span = high - low;
   constexpr std::size_t bins = 1U << 15U, padded = 4 * bins;
   const auto along_position = [&](const auto& weight, double least) {

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "core/physics/library.hpp"
-#include "tools/diagnose/axis_modes.hpp"
 #include "tools/diagnose/jump.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/wave.hpp"
@@ -293,7 +292,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         if (name == "position_stiffness") shapes = {0.0};
         // What rings, rings at one pitch: from far off it would seem to push the other way.
         if (name == "flexible_mode") {
-          shapes = mode_frequencies(data, weighing, fitted);
+          shapes = periods.mode_frequency;
           for (double f = 20.0; f < 350.0; f *= 1.2) shapes.push_back(f);
         }
         if (may_repeat && name != "flexible_mode" && shapes.empty()) continue;

@@ -46,7 +46,7 @@ void add_starts(std::vector<Start>& starts, physics::Term term, const std::vecto
 
 /// Pitches or frequencies at which a periodic term would explain most, best first (axis: by the adjoint of the loop).
 struct Periods {
-  std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency;
+  std::vector<double> force_pitch, motor_pitch, reading_pitch, force_frequency, mode_frequency;
   std::vector<std::pair<double, double>> squares;  // frequency, and phase at time zero
 };
 /// The waves along a variable that explain most, up to a hundred, by least squares: sums and weights of a residual in bins over
