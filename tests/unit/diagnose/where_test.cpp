@@ -89,7 +89,6 @@ TEST(Where, ASteadyRateThatMayActAtTwoStatesIsExplainedAndBothAreSaid) {
   EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
-  EXPECT_GT(d.findings[0].probability, 0.7);  // of the name; the place is open
   const auto report = nlohmann::json::parse(report_json(data, d));
   std::set<std::string> sites;
   for (const auto& place : report["location"]) sites.insert(place["site"]);
