@@ -293,7 +293,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         // What rings, rings at one pitch: from far off it would seem to push the other way.
         if (name == "flexible_mode") {
           shapes = periods.mode_frequency;
-          for (double f = 20.0; f < 350.0; f *= 1.2) shapes.push_back(f);
+          for (double f = 20.0; f < 350.0; f *= 1.45) shapes.push_back(f);
         }
         if (may_repeat && name != "flexible_mode" && shapes.empty()) continue;
       }
@@ -382,7 +382,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "position", 21, "velocity"},
                  {"force", "velocity", 12},
                  {"force", "time", 12},
-                 {"force", "time", 12, "acceleration"},  // what is picked up and put down
+                 {"force", "time", 8, "acceleration"},  // what is picked up and put down
                  {"force", "temperature", 6},
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
