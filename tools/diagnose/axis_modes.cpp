@@ -36,11 +36,7 @@ void hear(Heard& all, const std::vector<double>& time, const std::vector<double>
   }
   const auto acceleration = transform(std::move(gained), size), velocity = transform(std::move(speed), size),
              residual = transform(back, size);
-  std::vector<double> answer(size / 2, 0.0);
-  for (const auto& response : responses) {
-    const auto pulse = transform(response, size);
-    for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += std::norm(pulse[k]);
-  }
+  const auto answer = answer_power(responses, size);
   const double hertz = 1.0 / (static_cast<double>(size) * period), halves = 2.0 / static_cast<double>(size);
   for (std::size_t k = 1, until = 0; k < answer.size(); ++k) {
     const Complex a = halves * std::conj(acceleration[k]), v = halves * std::conj(velocity[k]);

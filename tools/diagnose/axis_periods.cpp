@@ -260,11 +260,7 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     const auto lines = peaks(power, 8, power.size(), 6);
     for (std::size_t k = 0; k < std::min<std::size_t>(3, lines.size()); ++k)
       periods.force_frequency.push_back(lines[k] * hertz);
-    std::vector<double> answer(power.size(), 0.0);
-    for (const auto& response : force) {
-      const auto one = transform(response, size);
-      for (std::size_t k = 0; k < answer.size(); ++k) answer[k] += std::norm(one[k]);
-    }
+    const auto answer = answer_power(force, size);
     // A slow wave is hardly narrower than its neighbourhood, and where a loop holds against it no peak stands out: the
     // frequency of the greatest likelihood stays as well.
     const double cycle =

@@ -51,6 +51,15 @@ std::vector<std::vector<double>> pulse_responses(const Case& data, const Weighin
   return responses;
 }
 
+std::vector<double> answer_power(const std::vector<std::vector<double>>& responses, std::size_t size) {
+  std::vector<double> power(size / 2, 0.0);
+  for (const auto& response : responses) {
+    const auto one = transform(response, size);
+    for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(one[k]);
+  }
+  return power;
+}
+
 std::vector<double> carried_back(const Case& data, const Fit& fitted,
                                  const std::vector<std::vector<double>>& responses, std::size_t recording) {
   Eigen::Index at = 0;

@@ -18,6 +18,8 @@ Spectrum transform(std::vector<double> values, std::size_t size);
 /// Responses of the whitened residual to a pulse of one tick at `site`, by output, over its size.
 std::vector<std::vector<double>> pulse_responses(const Case& data, const Weighing& weighing,
                                                  const physics::Model& model, const char* site, double size);
+/// Power of the answer to a push, by bin of the lower half of a spectrum of `size`.
+std::vector<double> answer_power(const std::vector<std::vector<double>>& responses, std::size_t size);
 /// The adjoint: for each row of a recording, how much a push there would take from the residual.
 std::vector<double> carried_back(const Case& data, const Fit& fitted,
                                  const std::vector<std::vector<double>>& responses, std::size_t recording);
