@@ -24,6 +24,7 @@ struct Parameter {
   double value = 0.0;
   std::optional<double> sigma;
   Range bounds;
+  double usual = 0.0;  // size of one of which nothing is known but 0; 0: not looked for
 };
 
 /// A term in a model.
@@ -31,8 +32,9 @@ struct Term {
   const TermInfo* info = nullptr;
   std::array<double, most_parameters> values{};
   std::array<std::optional<double>, most_parameters> sigmas{};
-  std::array<bool, most_parameters> given{};  // written in the file; the others stand at their defaults
-  std::string on;                             // thermal: the node; equations: the state, input or output
+  std::array<bool, most_parameters> given{};    // written in the file; the others stand at their defaults
+  std::array<double, most_parameters> usual{};  // as of a Parameter
+  std::string on;                               // thermal: the node; equations: the state, input or output
   /// Thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis: "direction" where its
   /// curve is dry friction, "velocity" where it is damping.
   std::string with;

@@ -421,7 +421,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       std::any_of(fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
                   fitted.model.terms.end(), is_friction);
   for (const auto& choice : choices) {
-    if (has_law && choice.with[0] != '\0') continue;
+    const std::string_view with = choice.with;
+    if (has_law && (with == "direction" || with == "velocity")) continue;
     std::vector<double> all;
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const auto values = variable_values(data, r, choice.over);

@@ -91,41 +91,64 @@ class Series {
 
 struct Smallest {
   const Screened* screened = nullptr;
-  Detectable effect;
+  double value = 0.0;
 };
+
+/// A wave shows at other sizes by how fine it is: the finest alone would say too much.
+struct Range {
+  Smallest least, most;
+};
+
+/// Parameter that says how fine a wave is; `most_parameters` where a term is none.
+std::size_t fineness(const physics::TermInfo& info) {
+  return std::min({info.index_of("pitch"), info.index_of("frequency"), physics::most_parameters});
+}
+
+Detectable described(const Smallest& smallest, double times) {
+  const auto& term = smallest.screened->start.term;
+  const auto& info = *term.info;
+  const auto& p = info.parameters[smallest.screened->start.directions[0].amplitude];
+  Detectable effect{std::string{info.name}, term.on, std::string{p.name}, std::string{p.unit},
+                    times * smallest.value, {}};
+  if (const auto i = fineness(info); i < physics::most_parameters)
+    effect.at =
+        Quantity{std::string{info.parameters[i].name}, std::string{info.parameters[i].unit}, term.values[i]};
+  return effect;
+}
 
 }  // namespace
 
 void smallest_effects(const Case& data, const std::vector<Screened>& screened, Diagnosis& d) {
-  std::map<std::string, Smallest> smallest;
+  std::map<std::string, Range> ranges;
   for (const auto& s : screened) {
     const auto& info = *s.start.term.info;
     if (s.start.directions.empty() || s.start.directions[0].amplitude >= physics::most_parameters ||
         !(s.gain > 0.0))
       continue;
-    const auto& p = info.parameters[s.start.directions[0].amplitude];
     // The gain goes with the square of the strength: where it would just reach the margin.
     const double value = s.strength.norm() * std::sqrt((claim_margin_of(d.weighing) + price) / s.gain);
-    auto& entry = smallest[std::string{info.name}];
-    if (entry.screened == nullptr || value < entry.effect.value)
-      entry = {&s,
-               {std::string{info.name}, s.start.term.on, std::string{p.name}, std::string{p.unit}, value}};
+    auto& [least, most] = ranges[std::string{info.name}];
+    if (least.screened == nullptr || value < least.value) least = {&s, value};
+    if (most.screened == nullptr || value > most.value) most = {&s, value};
   }
-  const auto add = [&](const Detectable& effect) { d.detectable.push_back(effect); };
+  std::vector<Smallest> smallest;
+  for (const auto& [name, range] : ranges) {
+    smallest.push_back(range.least);
+    const auto& info = *range.least.screened->start.term.info;
+    if (fineness(info) < physics::most_parameters && range.most.screened != range.least.screened)
+      smallest.push_back(range.most);
+  }
   if (!data.is_time_series || d.best.columns.cols() != static_cast<Eigen::Index>(d.best.free.size())) {
-    for (const auto& [name, entry] : smallest) add(entry.effect);
+    for (const auto& one : smallest) d.detectable.push_back(described(one, 1.0));
     return;
   }
   const Series series{data, d};
-  for (const auto& [name, entry] : smallest) {
-    const auto effect = series.effect(*entry.screened, entry.effect.value / entry.screened->strength.norm());
+  for (const auto& one : smallest) {
+    const auto effect = series.effect(*one.screened, one.value / one.screened->strength.norm());
     constexpr double finer = 1.25, most = 100.0;
     double times = 1.0;
     while (times < most && !series.shows(effect, times)) times *= finer;
-    if (times >= most) continue;  // nothing that could be told from a wander
-    auto shown = entry.effect;
-    shown.value *= times;
-    add(shown);
+    if (times < most) d.detectable.push_back(described(one, times));  // else it could be a wander at any size
   }
 }
 

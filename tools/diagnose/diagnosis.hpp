@@ -12,6 +12,9 @@ namespace invar::diagnose {
 struct Alternative {
   physics::Term term;
   double log_odds = 0.0;  // evidence against the finding's; negative: less likely
+
+  /// Too near to be told from the finding.
+  [[nodiscard]] bool explains_as_well() const { return log_odds > -3.0; }
 };
 
 struct Finding {
@@ -42,9 +45,15 @@ struct Suspect {
   std::vector<std::string> depends_on;
 };
 
+struct Quantity {
+  std::string name, unit;
+  double value = 0.0;
+};
+
 struct Detectable {
   std::string term, on, parameter, unit;
   double value = 0.0;
+  std::optional<Quantity> at;  // of a wave: the pitch or frequency for which it is said
 };
 
 struct FitRow {
@@ -98,8 +107,6 @@ inline double claim_margin_of(const Weighing& weighing) {
 }
 /// A further claim that hardly moves the size of the residual needs so many times the margin.
 inline constexpr double plainly = 3.0;
-/// Alternatives nearer than this cannot be told apart.
-inline constexpr double ambiguous_margin = 3.0;
 
 /// Of measured - simulated of one output.
 struct Squares {

@@ -97,7 +97,7 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
   std::string apart;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin)
+      if (a.explains_as_well())
         apart += (apart.empty() ? "To tell " : " To tell ") +
                  readable(name_beside(data, finding.term, a.term)) + " from " +
                  readable(name_beside(data, a.term, finding.term)) + ": " +

@@ -55,7 +55,9 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
     f.index = i;
     f.center = parameter.value;
     f.sigma = parameter.sigma.value_or(0.0);
-    f.scale = parameter.sigma ? *parameter.sigma : std::max(0.05 * std::abs(parameter.value), 1e-9);
+    f.scale = parameter.sigma         ? *parameter.sigma
+              : parameter.usual > 0.0 ? parameter.usual
+                                      : std::max(0.05 * std::abs(parameter.value), 1e-9);
     f.bounds = parameter.bounds;
     free.push_back(f);
   }
@@ -96,7 +98,10 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
         if (!sigma && !believed.terms[t].given[i]) continue;  // left out on purpose
         f.center = believed.terms[t].values[i];
         f.sigma = sigma.value_or(0.0);
-        if (sigma) f.scale = *sigma;
+        if (sigma)
+          f.scale = *sigma;
+        else if (const double size = believed.terms[t].usual[i]; size > 0.0)
+          f.scale = size;
       }
       free.push_back(f);
     }

@@ -72,8 +72,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
                      " % of the excess residual comes back"}});
     // Where the place alone is open, each of them.
     for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin && is_elsewhere(term, a.term) &&
-          site_of(data, a.term) != site_of(data, term))
+      if (a.explains_as_well() && is_elsewhere(term, a.term) && site_of(data, a.term) != site_of(data, term))
         report["location"].push_back(
             {{"site", site_of(data, a.term)},
              {"depends_on", depends},
@@ -98,7 +97,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     for (const auto& a : finding.alternatives) {
       const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
       if (p > 1e-4) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
-      if (a.log_odds > -ambiguous_margin)
+      if (a.explains_as_well())
         report["ambiguity"].push_back(
             {{"between", {name_beside(data, term, a.term), name_beside(data, a.term, term)}},
              {"experiment", separating_experiment(data, term, a.term)}});
@@ -171,10 +170,13 @@ std::string report_json(const Case& data, const Diagnosis& d) {
              "restart over the whole recording"}};
   report["unexplained"] = {{"residual_over_noise", d.unexplained}, {"depends_on", d.unexplained_over}};
   report["detectable"] = json::array();
-  for (const auto& entry : d.detectable)
-    report["detectable"].push_back({{"term", entry.term},
-                                    {"parameter", entry.parameter},
-                                    {"smallest", {{"value", entry.value}, {"unit", entry.unit}}}});
+  for (const auto& entry : d.detectable) {
+    auto& one =
+        report["detectable"].emplace_back(json{{"term", entry.term},
+                                               {"parameter", entry.parameter},
+                                               {"smallest", {{"value", entry.value}, {"unit", entry.unit}}}});
+    if (entry.at) one["at"][entry.at->name] = {{"value", entry.at->value}, {"unit", entry.at->unit}};
+  }
   report["rejected"] = json::array();
   for (const auto& r : d.rejected) report["rejected"].push_back({{"term", r.term}, {"why", r.why}});
   std::size_t used = 0;

@@ -314,11 +314,11 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
   Names considered;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      considered.push_back({readable(a.term.info->name) + " (" + place_of(data, a.term) + ")",
-                            "in place of " + readable(finding.term.info->name) +
-                                (a.log_odds > -ambiguous_margin ? ": explains the recording as well"
-                                                                : ": explains the recording worse"),
-                            report::number(a.log_odds)});
+      considered.push_back(
+          {readable(a.term.info->name) + " (" + place_of(data, a.term) + ")",
+           "in place of " + readable(finding.term.info->name) +
+               (a.explains_as_well() ? ": explains the recording as well" : ": explains the recording worse"),
+           report::number(a.log_odds)});
   for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, report::number(r.gain)});
   if (considered.empty()) {
     page.paragraph(d.is_partial ? "It was stopped before anything else was weighed."
@@ -382,8 +382,11 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
     Names smallest;
     for (const auto& entry : d.detectable)
       smallest.push_back({readable(entry.term), readable(entry.parameter),
-                          report::si(entry.value, entry.unit == "*" ? "" : entry.unit)});
-    page.table({"effect", "parameter", "smallest"}, smallest);
+                          report::si(entry.value, entry.unit == "*" ? "" : entry.unit),
+                          entry.at
+                              ? readable(entry.at->name) + " " + report::si(entry.at->value, entry.at->unit)
+                              : std::string{}});
+    page.table({"effect", "parameter", "smallest", "at"}, smallest);
     page.paragraph(
         "To first order, each by itself: more than noise, a wander of the instrument or a parameter within "
         "what was "

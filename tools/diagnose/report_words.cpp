@@ -289,7 +289,7 @@ std::string elsewhere(const Case& data, const Diagnosis& d) {
   std::string places;
   for (const auto& f : d.findings)
     for (const auto& a : f.alternatives)
-      if (a.log_odds > -ambiguous_margin && is_elsewhere(f.term, a.term))
+      if (a.explains_as_well() && is_elsewhere(f.term, a.term))
         places += (places.empty() ? ", or the same at the " : " or the ") + place_of(data, a.term);
   return places;
 }
@@ -325,7 +325,7 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       std::string also;
       for (const auto& f : d.findings)
         for (const auto& a : f.alternatives)
-          if (a.log_odds > -ambiguous_margin)
+          if (a.explains_as_well())
             also += (also.empty() ? "" : ", ") + readable(a.term.info->name) + " (" + place_of(data, a.term) +
                     ")";
       return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";

@@ -20,6 +20,7 @@
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/shaken_loose.hpp"
 #include "tools/diagnose/steps.hpp"
+#include "tools/diagnose/unknown_sizes.hpp"
 #include "tools/diagnose/unnamed.hpp"
 #include "tools/diagnose/unsure.hpp"
 #include "tools/diagnose/verdict.hpp"
@@ -168,6 +169,7 @@ void Search::begin() {
 }
 
 void Search::prepare() {
+  find_unknown_sizes(data_);
   const Case as_given = data_;
   cut_into_windows(data_);
   Case as_read = data_;

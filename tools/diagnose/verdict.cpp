@@ -269,7 +269,7 @@ void conclude(const Case& data, Diagnosis& d) {
   bool ambiguous = false;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      ambiguous = ambiguous || (a.log_odds > -ambiguous_margin && is_another_cause(finding, a) &&
+      ambiguous = ambiguous || (a.explains_as_well() && is_another_cause(finding, a) &&
                                 !is_elsewhere(finding.term, a.term));
   if (d.findings.empty())
     // What follows the recording is no noise, even where no curve and no name describes it.

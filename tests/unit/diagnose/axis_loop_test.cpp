@@ -397,6 +397,18 @@ TEST(AxisLoop, WhatIsPickedUpIsMassFromThenOn) {
   EXPECT_NEAR(d.best.model.value("mass") + term.curve(2.0), mass, 0.1);
 }
 
+TEST(AxisLoop, WhatIsPickedUpIsMassBesideALawOfFrictionToo) {
+  Axis axis;
+  axis.friction = 0.6;
+  axis.load = [](double t) { return t < 5.0 ? 0.0 : 0.6; };
+  const auto d = searched(recorded(axis, 0.25, 17));
+  ASSERT_EQ(d.findings.size(), 2U);
+  EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.6, 0.05);
+  EXPECT_EQ(d.findings[1].term.with, "acceleration");
+  EXPECT_NEAR(d.findings[1].term.curve(9.0) - d.findings[1].term.curve(2.0), 0.6, 0.1);
+}
+
 TEST(AxisLoop, APartThatRingsForLongIsAModeAllTheSame) {
   Axis axis;
   axis.swings = 0.01, axis.rings = 43.0;

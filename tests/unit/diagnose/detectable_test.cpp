@@ -39,10 +39,12 @@ TEST(Detectable, TwiceTheSmallestEffectIsSeenAndAThirdMostlyNot) {
       physics::Term term;
       term.info = physics::find_term(null.model.plant, entry.term);
       term.on = entry.on;
-      if (term.info->parameter_count() > 1) continue;  // the others' values are not told
+      const auto shapes = entry.at ? 2U : 0U;  // a wave's pitch is told, and its phase is free
+      if (term.info->parameter_count() > 1 + shapes) continue;  // the others' values are not told
+      if (entry.at) term.values[term.info->index_of(entry.at->name)] = entry.at->value;
       ++tried;
       for (const double times : {2.0, 0.3}) {
-        term.values[0] = times * entry.value;
+        term.values[term.info->index_of(entry.parameter)] = times * entry.value;
         auto data = with_effect(machine, d, term);
         const auto found = diagnose::search(data, silent);
         const bool seen = found.verdict != diagnose::Verdict::no_mismatch;

@@ -127,7 +127,7 @@ Twins twins_of(const Answer& answer) {
   EXPECT_EQ(answer.d.verdict, Verdict::ambiguous) << summary(answer.data, answer.d);
   for (const auto& finding : answer.d.findings)
     for (const auto& a : finding.alternatives)
-      if (a.log_odds > -ambiguous_margin && twins.experiment.empty())
+      if (a.explains_as_well() && twins.experiment.empty())
         twins = {finding.term, a.term, next_experiment(answer.data, answer.d)};
   if (twins.experiment.empty()) throw std::runtime_error{"there are no twins"};
   return twins;
@@ -185,7 +185,7 @@ TEST(Experiment, QuickMotionTellsADelayFromALag) {
     ASSERT_FALSE(then.d.findings.empty());
     std::set<std::string> left{std::string{then.d.findings[0].term.info->name}};
     for (const auto& a : then.d.findings[0].alternatives)
-      if (a.log_odds > -ambiguous_margin) left.emplace(a.term.info->name);
+      if (a.explains_as_well()) left.emplace(a.term.info->name);
     EXPECT_TRUE(left.contains(name)) << summary(then.data, then.d);
     EXPECT_FALSE(left.contains("amplifier_lag") && left.contains("transport_delay"));
   }

@@ -94,6 +94,12 @@ void expect_contract(const diagnose::Case& data, const diagnose::Diagnosis& d, c
   for (const auto& s : report.at("detectable")) {
     EXPECT_TRUE(s.at("term").is_string() && s.at("smallest").at("unit").is_string());
     EXPECT_GT(s.at("smallest").at("value").get<double>(), 0.0);
+    if (s.contains("at")) {
+      for (const auto& [name, at] : s.at("at").items()) {
+        EXPECT_TRUE(name == "pitch" || name == "frequency") << name;
+        EXPECT_GT(at.at("value").get<double>(), 0.0);
+      }
+    }
   }
   for (const auto& r : report.at("rejected"))
     EXPECT_TRUE(r.at("term").is_string() && !r.at("why").get<std::string>().empty());
