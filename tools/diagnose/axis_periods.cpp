@@ -233,9 +233,12 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
     return pitches;
   };
   if (span > 1e-5) {
-    periods.force_pitch = along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; }, 1e-3);
+    const double shortest =
+        std::min(1e-3, 0.03 * span);  // of what pushes: magnets and balls of a small axis are small
+    periods.force_pitch =
+        along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; }, shortest);
     periods.motor_pitch =
-        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; }, 1e-3);
+        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; }, shortest);
     periods.reading_pitch =
         along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; }, 2e-5);
     // The two ripples look alike in this light; each is also tried at the other's pitch.

@@ -128,6 +128,12 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
   return {};
 }
 
+/// Stands a law of friction in the model that the user did not write?
+bool has_found_friction(const Case& data, const physics::Model& model) {
+  return std::any_of(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
+                     model.terms.end(), is_friction);
+}
+
 }  // namespace
 
 void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes) {
@@ -201,8 +207,11 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   }
   Periods periods;
   if (data.model.plant == Plant::axis) periods = axis_periods(data, weighing, fitted);
+  const bool rubs = has_found_friction(data, model);
   for (const auto* info : physics::terms_of(data.model.plant)) {
     if (without.contains(info->name) || !may_show(data, model, *info)) continue;
+    // Two laws of one friction fit what neither is: a course over the velocity says it without a name.
+    if (rubs && info->name.ends_with("_friction")) continue;
     const bool may_repeat = info->index_of("pitch") != none || info->index_of("frequency") != none;
     for (const auto& on : places(data, *info)) {
       const bool used = std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
@@ -302,24 +311,26 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         shapes = {v, 0.6 * v, 1.7 * v};
       }
       if (info->name == "periodic_error" && shapes.empty()) continue;
-      add_starts(starts, term, shapes);
-      if (info->name == "additive_disturbance") {  // and as a square wave
+      const auto add = [&] {
+        add_starts(starts, term, shapes);
+        if (info->name != "additive_disturbance") return;
+        auto wave = term;  // and as a square wave
         const auto square = info->index_of("squareness"), phase = info->index_of("phase");
-        term.values[square] = 1.0;
-        term.given[square] = true;
+        wave.values[square] = 1.0;
+        wave.given[square] = true;
         for (const auto& [frequency, at] : periods.squares) {
           // Two square waves a quarter apart make none between them, as sines do: each begins with a phase.
-          add_starts(starts, term, {frequency});
+          add_starts(starts, wave, {frequency});
           starts.back().term.values[phase] = at;
           starts.back().directions.resize(1);
         }
-      }
-      if (info->name == "periodic_disturbance")  // from a later recording on
+      };
+      add();
+      if (const auto onset = info->index_of("onset"); onset != none)  // from a later recording on
         for (std::size_t r = 1; r < data.recordings.size(); ++r) {
-          const auto onset = info->index_of("onset");
           term.values[onset] = data.recordings[r].inputs.time.front();
           term.given[onset] = true;
-          add_starts(starts, term, shapes);
+          add();
         }
     }
   }
@@ -387,6 +398,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
+                 {"actuator", "time", 8},
+                 {"actuator", "position", 12},
+                 {"actuator", "velocity", 9},
                  {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
@@ -417,9 +431,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   }
   std::vector<Start> starts;
   // Beside a law of friction that was found, a course along the way would only take over what the law does.
-  const bool has_law =
-      std::any_of(fitted.model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
-                  fitted.model.terms.end(), is_friction);
+  const bool has_law = has_found_friction(data, fitted.model);
   for (const auto& choice : choices) {
     const std::string_view with = choice.with;
     if (has_law && (with == "direction" || with == "velocity")) continue;

@@ -17,10 +17,12 @@ struct AdditiveDisturbance {
       .parameters = {{{"amplitude", "A", {0.0, 10.0}, Role::amplitude, {0.01}, "size"},
                       {"frequency", "Hz", {0.02, 500.0}, Role::shape, {50.0}, "repetitions per second"},
                       {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at time zero"},
-                      {"squareness", "1", {0.0, 1.0}, Role::shape, {0.0}, "0: a sine, 1: a square wave"}}},
+                      {"squareness", "1", {0.0, 1.0}, Role::shape, {0.0}, "0: a sine, 1: a square wave"},
+                      {"onset", "s", {-1e12, 1e12}, Role::reference, {-1e9}, "when it begins"}}},
       .description = "Hum or switching noise is picked up on the way from the controller to the motor.",
       .source = "u + amplitude sin(2 pi frequency t + phase), or the sign of that"};
   static double command(double u, double time, const double* p) {
+    if (time < p[4]) return u;
     const double s = std::sin(2.0 * std::numbers::pi * p[1] * time + p[2]);
     return u + p[0] * ((1.0 - p[3]) * s + p[3] * (s >= 0.0 ? 1.0 : -1.0));
   }

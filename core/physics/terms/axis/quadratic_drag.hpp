@@ -15,7 +15,7 @@ struct QuadraticDrag {
       .site = "force",
       .depends_on = {"velocity", "speed"},
       .parameters =
-          {{{"coefficient", "N s2/m2", {0.0, 1e4}, Role::amplitude, {2.0}, "force per speed squared"}}},
+          {{{"coefficient", "N s2/m2", {0.0, 1e6}, Role::amplitude, {2.0}, "force per speed squared"}}},
       .description = "Air or liquid that is pushed aside, for instance in a narrow gap under the carriage.",
       .source = "F = -coefficient v |v|"};
   static double force(const AxisPoint& at, const double* p) {
