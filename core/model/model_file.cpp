@@ -315,9 +315,11 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
   term.with = node.text("with", "");
   if (model.plant == Plant::axis && !term.with.empty() &&
       (name != "unmodelled" || term.info->site != "force" ||
-       (term.with != "direction" && term.with != "velocity")))
-    node["with"].fault("only an unmodelled force goes with something, `direction` or `velocity`",
-                       "`direction`: its curve is dry friction; `velocity`: damping; leave it out: a force");
+       (term.with != "direction" && term.with != "velocity" && term.with != "acceleration")))
+    node["with"].fault(
+        "only an unmodelled force goes with something, `direction`, `velocity` or `acceleration`",
+        "`direction`: its curve is dry friction; `velocity`: damping; `acceleration`: mass; leave it "
+        "out: a force");
   if (node.has("between")) {
     const auto pair = node["between"].as_texts();
     if (pair.size() == 2) term.on = pair[0], term.with = pair[1];

@@ -128,6 +128,41 @@ std::vector<double> own_shapes(const Case& data, const Fit& fitted, const TermIn
   return {};
 }
 
+double rms_of(const std::vector<std::vector<double>>& series) {
+  double square = 0.0, rows = 0.0;
+  for (const auto& one : series)
+    for (const double v : one)
+      if (std::isfinite(v)) square += v * v, rows += 1.0;
+  return rows > 0.0 ? std::sqrt(square / rows) : 0.0;
+}
+
+/// RMS of a signal over all recordings.
+double usual(const Case& data, const std::string& name) {
+  std::vector<std::vector<double>> all;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) all.push_back(variable_values(data, r, name));
+  return std::max(1e-9, rms_of(all));
+}
+
+/// A small part of what the motor of an axis gives [A], [N].
+double small_current(const Case& data) { return 0.03 * usual(data, "current"); }
+double small_force(const Case& data, const physics::Model& model) {
+  return small_current(data) * model.value("motor_constant", 1.0);
+}
+
+/// Half a newton is all that moves a small axis, and more: first order is taken from less.
+void take_to_size(const Case& data, const physics::Model& model, std::vector<Start>& starts) {
+  const double current = small_current(data), force = small_force(data, model);
+  for (auto& start : starts) {
+    const auto& info = *start.term.info;
+    for (std::size_t i = 0; i < info.parameter_count(); ++i)
+      if (info.parameters[i].role == Role::amplitude) {
+        auto& value = start.term.values[i];
+        if (info.parameters[i].unit == "N") value = std::min(value, force);
+        if (info.parameters[i].unit == "A") value = std::min(value, current);
+      }
+  }
+}
+
 /// Stands a law of friction in the model that the user did not write?
 bool has_found_friction(const Case& data, const physics::Model& model) {
   return std::any_of(model.terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()),
@@ -334,25 +369,11 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         }
     }
   }
+  if (data.model.plant == Plant::axis) take_to_size(data, model, starts);
   return starts;
 }
 
 namespace {
-
-double rms_of(const std::vector<std::vector<double>>& series) {
-  double square = 0.0, rows = 0.0;
-  for (const auto& one : series)
-    for (const double v : one)
-      if (std::isfinite(v)) square += v * v, rows += 1.0;
-  return rows > 0.0 ? std::sqrt(square / rows) : 0.0;
-}
-
-/// RMS of a signal over all recordings.
-double usual(const Case& data, const std::string& name) {
-  std::vector<std::vector<double>> all;
-  for (std::size_t r = 0; r < data.recordings.size(); ++r) all.push_back(variable_values(data, r, name));
-  return std::max(1e-9, rms_of(all));
-}
 
 /// How much force the motor of an axis gives beyond what the model asks for [N]; without controller a hundredth of all.
 double missing_force(const Case& data, const Fit& fitted) {
@@ -467,6 +488,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
       if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
         start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
+      if (start.term.curve.usual > 0.0) start.step = start.term.curve.usual;
+      if (data.model.plant == Plant::axis && start.term.info->site == "force")
+        start.step = std::min(0.05, small_force(data, fitted.model));
       if (!start.term.with.empty())
         start.step = 0.1 * missing_force(data, fitted) /
                      (start.term.with == "direction" ? 1.0 : usual(data, start.term.with));

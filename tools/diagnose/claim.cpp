@@ -81,7 +81,8 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   return rows >= 5;
 }
 
-/// Was what repeats seen to repeat? Less than two waves are any bent course.
+/// Was what repeats seen to repeat? Less than two waves are any bent course. Of an axis one and a half will do: there a free
+/// course over the position is tried in its place.
 bool repeats(const Case& data, const Term& term) {
   const auto pitch = term.info->index_of("pitch"), frequency = term.info->index_of("frequency");
   if (term.info->index_of("phase") == physics::most_parameters) return true;
@@ -98,7 +99,8 @@ bool repeats(const Case& data, const Term& term) {
   if (all.empty()) return true;
   std::sort(all.begin(), all.end());
   const double span = all[all.size() - 1 - all.size() / 200] - all[all.size() / 200];
-  return span * (in_place ? 1.0 / term.values[pitch] : term.values[frequency]) >= 2.0;
+  const double least = in_place && data.model.plant == physics::Plant::axis ? 1.5 : 2.0;
+  return span * (in_place ? 1.0 / term.values[pitch] : term.values[frequency]) >= least;
 }
 
 /// The frequency of a term that is a wave in time [Hz]; 0: it is none.

@@ -404,10 +404,10 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
     if (const auto& term = best.model.terms[t];
         term.info->name == "additive_disturbance" && term.values[term.info->index_of("squareness")] < 0.5)
-      complexity += price_of_current(term.values[term.info->index_of("frequency")]);
+      best.unlikely += price_of_current(term.values[term.info->index_of("frequency")]);
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    complexity += rarity(best.model, best.model.terms[t]);
-  best.evidence = -best.cost - complexity;
+    best.unlikely += rarity(best.model, best.model.terms[t]);
+  best.evidence = -best.cost - complexity - best.unlikely;
   Eigen::MatrixXd regular = hessian;
   for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;
   best.covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(n, n));

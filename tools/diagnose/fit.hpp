@@ -65,6 +65,7 @@ struct Fit {
   double cost = 0.0;         // half the sum of squares, priors included, tempered
   double data_cost = 0.0;    // without the priors
   double evidence = 0.0;     // log, up to a constant common to all models of one weighing: BIC
+  double unlikely = 0.0;     // log, in the evidence too: how rare its terms are, whatever the recording says
   Eigen::VectorXd residual;  // whitened
   Eigen::MatrixXd columns;   // sensitivities at or near the solution, not whitened
 };

@@ -55,7 +55,7 @@ double advantage(const Case& data, const Weighing& weighing, const Fit& one, con
       !data.is_time_series || std::any_of(weighing.filters.begin(), weighing.filters.end(),
                                           [](const Whitening& filter) { return !filter.a.empty(); });
   if (whitened) return evidence;
-  const double counted = lead(data, one, other);
+  const double counted = lead(data, one, other) + other.unlikely - one.unlikely;
   return std::abs(counted) < std::abs(evidence) ? counted : evidence;
 }
 

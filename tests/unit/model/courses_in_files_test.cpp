@@ -24,7 +24,7 @@ physics::Model read_all(const config::Yaml& yaml) {
 }
 
 TEST(CoursesInFiles, WhatAForceGoesWithComesBack) {
-  for (const char* with : {"", "direction", "velocity"}) {
+  for (const char* with : {"", "direction", "velocity", "acceleration"}) {
     const auto empty = axis("[]");
     auto model = read_all(empty);
     auto& term = model.terms.emplace_back();
@@ -45,7 +45,7 @@ TEST(CoursesInFiles, OnlyAForceGoesWithTheMotion) {
   };
   EXPECT_THAT(
       fault("{term: unmodelled, site: force, with: speed, over: position, knots: [0, 1], values: [1, 2]}"),
-      HasSubstr("`direction` or `velocity`"));
+      HasSubstr("`direction`, `velocity` or `acceleration`"));
   EXPECT_THAT(fault("{term: unmodelled, site: actuator, with: velocity, over: position, knots: [0, 1], "
                     "values: [1, 2]}"),
               HasSubstr("only an unmodelled force"));
