@@ -261,8 +261,11 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   for (const auto& state : model.equations.states) places.push_back(state.name);
   const bool on_state = std::find(places.begin(), places.end(), term.on) != places.end();
   for (const auto& input : model.equations.inputs) places.push_back(input.symbol);
+  std::vector<std::string> outputs;
   for (const auto& output : model.equations.outputs)
-    places.push_back(physics::place_of_output(model.equations, output.name));
+    outputs.push_back(physics::place_of_output(model.equations, output.name));
+  const bool on_output = std::find(outputs.begin(), outputs.end(), term.on) != outputs.end();
+  places.insert(places.end(), outputs.begin(), outputs.end());
   const std::string name{term.info->name};
   if (std::find(places.begin(), places.end(), term.on) == places.end()) {
     const auto meant = config::nearest(term.on, places);
@@ -275,11 +278,24 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   const bool is_rate =
       kind != nullptr && (kind->rate != nullptr || kind->memory == physics::EquationsMemory::dry_friction ||
                           !term.curve.knots.empty());
-  if (is_rate && !on_state) {
-    node.fault("`" + name + "` changes a rate, and `" + term.on + "` is no state", "name a state under `on`");
+  const bool misreads = !term.curve.knots.empty() && term.info->site == "output";
+  if (is_rate && !(misreads ? on_output : on_state)) {
+    if (misreads)
+      node.fault("a course of site `output` acts on `" + term.on + "`, which is none",
+                 "name an output under `on`");
+    else
+      node.fault("`" + name + "` changes a rate, and `" + term.on + "` is no state",
+                 "name a state under `on`");
     node.accept_all();
     return false;
   }
+  if (misreads && (!term.with.empty() || (term.curve.over != "t" && term.curve.over != term.on))) {
+    node.fault("what an output reads wrong goes over `t` or over `" + term.on + "` alone",
+               "write one of them under `over`, and no `with`");
+    node.accept_all();
+    return false;
+  }
+  if (misreads) return true;
   if (term.curve.over.empty()) return true;
   std::vector<std::string> symbols{"t"};
   for (const auto& state : model.equations.states) symbols.push_back(state.name);

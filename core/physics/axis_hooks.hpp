@@ -32,7 +32,8 @@ struct AxisTermKind {
   const TermInfo* info = nullptr;
   double (*force)(const AxisPoint&, const double*) = nullptr;  // [N] on the carriage, towards +x
   double (*motor)(const AxisPoint&, const double*) = nullptr;  // [1] change of the motor's force, relative
-  double (*command)(double current, double time, const double*) = nullptr;  // [A] what the motor gets of it
+  /// [A] what the motor gets of it, in the mean over the `step` [s] from `time` [s] on.
+  double (*command)(double current, double time, double step, const double*) = nullptr;
   double (*friction)(double speed,
                      const double*) = nullptr;  // [N] against the motion; at 0 what breaks it away
   double (*reading)(double position, const double*) = nullptr;  // [m] added to what the encoder shows

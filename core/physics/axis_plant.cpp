@@ -306,7 +306,8 @@ void AxisPlant::drive(double command, double dt) noexcept {
 }
 
 void AxisPlant::step(double command, double dt) noexcept {
-  for (const auto* term : commands_) command = term->kind->command(command, time_, term->parameters.data());
+  for (const auto* term : commands_)
+    command = term->kind->command(command, time_, dt, term->parameters.data());
   const double begin = time_, end = time_ + dt;
   if (delay_ > 0.0) {
     commands_past_.push(begin, command, 0.0);

@@ -9,6 +9,8 @@ namespace invar::physics {
 
 Bending::Bending(const Term& term, bool held, bool has_changes)
     : kind_{equations_kind(*term.info)->memory},
+      course_{term.curve.knots.empty() ? nullptr : &term.curve},
+      goes_with_time_{term.curve.over == "t"},
       first_{term.values[0]},
       second_{term.values[1]},
       held_{held},
@@ -42,6 +44,7 @@ double Bending::late(double now, double value) {
 }
 
 double Bending::operator()(double now, double step, double value) {
+  if (course_ != nullptr) return value + (*course_)(goes_with_time_ ? now : value);
   double bent = value;
   switch (kind_) {
     case EquationsMemory::upper_limit:

@@ -56,6 +56,8 @@ class Bending {
   double late(double now, double value);
 
   EquationsMemory kind_;
+  const Curve* course_;  // added to the value, over itself or over t; null: none
+  bool goes_with_time_;
   double first_, second_;
   bool held_, has_changes_, at_rows_ = false, begun_ = false;
   double store_ = 0.0, last_ = 0.0;

@@ -60,6 +60,7 @@ constexpr std::array unmodelled_infos{
     unnamed(Plant::droplet, "camera"),
     unnamed(Plant::sensor, "measurement"),
     unnamed(Plant::equations, "state"),
+    unnamed(Plant::equations, "output"),
 };
 
 constexpr TermInfo axis_unmodelled_reading_info = unnamed(Plant::axis, "measurement");

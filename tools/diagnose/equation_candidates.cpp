@@ -260,6 +260,15 @@ class Candidates {
   std::vector<Start> starts_;
 };
 
+void lay_knots(Start& start, const Span& span, std::size_t count) {
+  for (std::size_t k = 0; k < count; ++k) {
+    start.term.curve.knots.push_back(span.low +
+                                     span.width() * static_cast<double>(k) / static_cast<double>(count - 1));
+    start.term.curve.values.push_back(0.0);
+    start.directions.push_back({physics::most_parameters, k, false});
+  }
+}
+
 }  // namespace
 
 std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products) {
@@ -293,14 +302,24 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
         start.term.curve.over = symbol;
         start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration);
         if (products) start.step /= spans.of(factor).size();
-        for (std::size_t k = 0; k < knots; ++k) {
-          start.term.curve.knots.push_back(span.low + span.width() * static_cast<double>(k) /
-                                                          static_cast<double>(knots - 1));
-          start.term.curve.values.push_back(0.0);
-          start.directions.push_back({physics::most_parameters, k, false});
-        }
+        lay_knots(start, span, knots);
         starts.push_back(std::move(start));
       }
+  }
+  if (products) return starts;
+  // What an instrument reads wrong: more and more, or by what it reads.
+  for (const auto& output : data.outputs) {
+    const auto place = physics::place_of_output(equations, output);
+    for (const auto& symbol : {std::string{"t"}, place}) {
+      const auto& span = spans.of(symbol);
+      if (!(span.width() > 1e-9 * span.size())) continue;
+      auto& start = starts.emplace_back();
+      start.term.info = physics::unmodelled(Plant::equations, "output");
+      start.term.on = place;
+      start.term.curve.over = symbol;
+      start.step = 1e-3 * std::max(spans.of(place).width(), 1e-12);
+      lay_knots(start, span, knots);
+    }
   }
   return starts;
 }

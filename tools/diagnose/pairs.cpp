@@ -78,6 +78,18 @@ std::vector<Settled> singles(const Case& data, const Weighing& plain, const Fit&
   return settled;
 }
 
+/// Does a course over time, of the machine or of an instrument that drifts, do better than a pair?
+bool drifts_alone(const Case& data, const Weighing& plain, const Fit& under, const Settled& pair) {
+  constexpr std::size_t most = 2;
+  auto starts = equation_curves(data, under.model);
+  std::erase_if(starts, [](const Start& start) { return start.term.curve.over != "t"; });
+  const auto screened = screen(data, plain, under, starts, most);
+  for (std::size_t i = 0; i < std::min(most, screened.size()); ++i)
+    if (lead(data, pair.fit, settle(data, fit_with(data, plain, under, screened[i], 8), 3).fit) < 0.0)
+      return true;
+  return false;
+}
+
 /// Does one of them do as well as a pair?
 bool is_done_by_one(const Case& data, const std::vector<Settled>& all, const Settled& pair) {
   return std::any_of(all.begin(), all.end(), [&](const Settled& one) {
@@ -136,6 +148,7 @@ Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, 
     if (!needed) continue;
     // Two of the late outputs of a machine are one late input.
     if (rival == nullptr && is_done_by_one(data, singles(data, plain, under, without), best)) return found;
+    if (own && rival == nullptr && drifts_alone(data, plain, under, best)) return found;
     JointClaim claim;
     claim.weighing = weigh(data, simulate(data, best.fit.model));
     claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);

@@ -78,6 +78,17 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
 }
 
+namespace {
+
+/// The output that a place names: `level`, `output.level`.
+std::string output_at(const Case& data, const std::string& place) {
+  for (const auto& output : data.model.equations.outputs)
+    if (physics::place_of_output(data.model.equations, output.name) == place) return output.name;
+  return place;
+}
+
+}  // namespace
+
 std::string unit_of_curve(const Case& data, const physics::Term& term) {
   using physics::Plant;
   switch (data.model.plant) {
@@ -91,8 +102,10 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
     case Plant::droplet:
       return "m";
     default: {
+      if (data.model.plant == Plant::equations)  // a state's rate counts in the user's own unit
+        return term.info->site == "output" ? unit_of_variable(data, output_at(data, term.on)) : "";
       const auto* signal = data.model.signal(term.on);
-      return data.model.plant == Plant::sensor && signal != nullptr ? signal->unit : "";
+      return signal != nullptr ? signal->unit : "";
     }
   }
 }

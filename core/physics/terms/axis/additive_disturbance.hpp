@@ -21,10 +21,16 @@ struct AdditiveDisturbance {
                       {"onset", "s", {-1e12, 1e12}, Role::reference, {-1e9}, "when it begins"}}},
       .description = "Hum or switching noise is picked up on the way from the controller to the motor.",
       .source = "u + amplitude sin(2 pi frequency t + phase), or the sign of that"};
-  static double command(double u, double time, const double* p) {
+  /// The integral of a square wave over its angle: up for half a turn and down again.
+  static double triangle(double angle) { return std::abs(std::remainder(angle, 2.0 * std::numbers::pi)); }
+  static double command(double u, double time, double step, const double* p) {
     if (time < p[4]) return u;
-    const double s = std::sin(2.0 * std::numbers::pi * p[1] * time + p[2]);
-    return u + p[0] * ((1.0 - p[3]) * s + p[3] * (s >= 0.0 ? 1.0 : -1.0));
+    const double half = std::numbers::pi * p[1] * step,
+                 middle = 2.0 * std::numbers::pi * p[1] * (time + 0.5 * step) + p[2];
+    const double sine = std::sin(middle) * (half > 0.0 ? std::sin(half) / half : 1.0);
+    const double square = half > 0.0 ? (triangle(middle + half) - triangle(middle - half)) / (2.0 * half)
+                                     : std::copysign(1.0, std::sin(middle));
+    return u + p[0] * ((1.0 - p[3]) * sine + p[3] * square);
   }
   static constexpr AxisTermKind kind{.info = &info, .command = command};
 };

@@ -20,7 +20,7 @@ struct DeadZone {
           "Cross-over of the output stage: commands smaller than the width give nothing, larger ones lose "
           "it.",
       .source = "u - width sign(u) where |u| > width, else 0"};
-  static double command(double u, double /*time*/, const double* p) {
+  static double command(double u, double /*time*/, double /*step*/, const double* p) {
     return u > p[0] ? u - p[0] : (u < -p[0] ? u + p[0] : 0.0);
   }
   static constexpr AxisTermKind kind{.info = &info, .command = command};
