@@ -143,6 +143,19 @@ double usual(const Case& data, const std::string& name) {
   return std::max(1e-9, rms_of(all));
 }
 
+/// Stiffnesses of bristles that reach their level after micrometres, as balls do, or after a share of the way, as seals and
+/// cables do [N/m].
+std::vector<double> bristles_for(const Case& data, const TermInfo& info) {
+  const auto level = info.parameters[info.index_of("level")].starts[0];
+  const auto& own = info.parameters[info.index_of("stiffness")].starts;
+  std::vector<double> stiffnesses{own[0], own[1], own[2]};
+  if (const auto way = covered(data, "reference"))
+    for (const double share : {0.003, 0.03})
+      if (const double bend = share * (way->upper - way->lower); bend > 0.0)
+        stiffnesses.push_back(level / bend);
+  return stiffnesses;
+}
+
 /// A small part of what the motor of an axis gives [A], [N].
 double small_current(const Case& data) { return 0.03 * usual(data, "current"); }
 double small_force(const Case& data, const physics::Model& model) {
@@ -157,7 +170,11 @@ void take_to_size(const Case& data, const physics::Model& model, std::vector<Sta
     for (std::size_t i = 0; i < info.parameter_count(); ++i)
       if (info.parameters[i].role == Role::amplitude) {
         auto& value = start.term.values[i];
+        const double as_written = value;
         if (info.parameters[i].unit == "N") value = std::min(value, force);
+        if (info.name == "presliding_friction" &&
+            info.parameters[i].name == "level")  // they bend as far as before
+          start.term.values[info.index_of("stiffness")] *= value / as_written;
         if (info.parameters[i].unit == "A") value = std::min(value, current);
       }
   }
@@ -334,6 +351,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         if (name == "periodic_disturbance" || name == "additive_disturbance")
           shapes = periods.force_frequency;
         if (name == "position_stiffness") shapes = {0.0};
+        if (name == "presliding_friction") shapes = bristles_for(data, *info);
         // What rings, rings at one pitch: from far off it would seem to push the other way.
         if (name == "flexible_mode") {
           shapes = periods.mode_frequency;

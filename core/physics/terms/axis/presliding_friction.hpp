@@ -18,7 +18,7 @@ struct PreslidingFriction {
           {{{"level", "N", {0.0, 500.0}, Role::amplitude, {0.5}, "friction force once sliding"},
             {"stiffness",
              "N/m",
-             {30.0, 1e7},
+             {0.01, 1e7},
              Role::shape,
              {5e4, 1e4, 3e5},
              "slope of the force just after a reversal"},
