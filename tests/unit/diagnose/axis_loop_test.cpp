@@ -39,8 +39,17 @@ struct Axis {
   double far = 0.0;    // place to which the third move goes [m]; 0: as the others
   std::function<double(double time)> load = [](double) { return 0.0; };  // lies on the carriage then [kg]
   double swings = 0.0, rings = 0.0;  // share of the mass that hangs on a spring, its frequency held fast [Hz]
+  double size = 1.0;                 // of its mass, damping and motor
+  std::function<double(double time)> weaker = [](double) {
+    return 0.0;
+  };                    // share that the motor has lost then
   double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
+
+std::string belief(const char* name, double value, const char* unit, double sigma) {
+  return std::string{"  "} + name + ": {value: " + std::to_string(value) + ", unit: " + unit +
+         ", sigma: " + std::to_string(sigma) + "}\n";
+}
 
 /// Moves and rests under the contract's PID; forty steps of Heun's rule a cycle, stuck where friction holds.
 Case recorded(const Axis& axis, double rest, unsigned seed) {
@@ -51,7 +60,8 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
   const double share = 1.0 - std::exp(-2.0 * std::numbers::pi * filter * period);
   std::vector<double> time, reference, position, current, temperature;
   double swing = 0.0, swing_speed = 0.0;
-  const double pull_of_part = axis.swings * mass * std::pow(2.0 * std::numbers::pi * axis.rings, 2);
+  const double heavy = axis.size * mass,
+               pull_of_part = axis.swings * heavy * std::pow(2.0 * std::numbers::pi * axis.rings, 2);
   double bend = 0.0, x = 0.0, v = 0.0, sum = 0.0, slope = 0.0, last = 0.0, from = 0.0, to = 0.0, begun = 0.0;
   int moves = 0;
   for (int k = 0; k < 11000; ++k) {
@@ -76,14 +86,15 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     constexpr int parts = 40;
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
-      double given = motor * felt + axis.push(now + part * h) + axis.pull(x);
-      const double moved = (1.0 - axis.swings) * mass + axis.load(now), spring = pull_of_part * swing;
+      double given =
+          axis.size * motor * (1.0 - axis.weaker(now)) * felt + axis.push(now + part * h) + axis.pull(x);
+      const double moved = (1.0 - axis.swings) * heavy + axis.load(now), spring = pull_of_part * swing;
       given += spring;
       if (axis.bristles > 0.0) {
         bend += h * v * (1.0 - std::copysign(1.0, v) * axis.stiffness / axis.bristles * bend);
         given -= axis.stiffness * bend;
       }
-      const double dry = axis.friction + axis.rub(x), damps = damping + axis.grease(x) - thinner;
+      const double dry = axis.friction + axis.rub(x), damps = axis.size * damping + axis.grease(x) - thinner;
       if (v == 0.0 && std::abs(given) <= dry + axis.excess) continue;
       const double way = v != 0.0 ? std::copysign(1.0, v) : std::copysign(1.0, given);
       const auto slows = [&](double speed) {
@@ -92,7 +103,7 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
       };
       const double a = slows(v), b = slows(v + h * a), next = v + 0.5 * h * (a + b);
       if (axis.swings > 0.0) {
-        swing_speed -= h * (spring / (axis.swings * mass) + a);
+        swing_speed -= h * (spring / (axis.swings * heavy) + a);
         swing += h * swing_speed;
       }
       x += h * (v + 0.5 * h * a);
@@ -111,8 +122,10 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
               "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u"} +
           (axis.warmth ? ", temperature: T" : "") +
           "}\ncontroller: {kind: pid, rate: 1000, kp: 26000, ki: 470000, kd: 210, velocity_filter_hz: 380, "
-          "limit: 50}\nparameters:\n  mass: {value: 20.1, unit: kg, sigma: 0.25}\n  motor_constant: {value: "
-          "23, unit: N/A, sigma: 0.1}\n  viscous_damping: {value: 18, unit: N s/m, sigma: 2.5}\n"),
+          "limit: 50}\nparameters:\n" +
+          belief("mass", axis.size * 20.1, "kg", axis.size * 0.25) +
+          belief("motor_constant", axis.size * 23.0, "N/A", axis.size * 0.1) +
+          belief("viscous_damping", axis.size * 18.0, "N s/m", axis.size * 2.5)),
       {table});
 }
 
@@ -407,6 +420,49 @@ TEST(AxisLoop, WhatIsPickedUpIsMassBesideALawOfFrictionToo) {
   EXPECT_NEAR(d.findings[0].term.values[0], 0.6, 0.05);
   EXPECT_EQ(d.findings[1].term.with, "acceleration");
   EXPECT_NEAR(d.findings[1].term.curve(9.0) - d.findings[1].term.curve(2.0), 0.6, 0.1);
+}
+
+TEST(AxisLoop, OfASmallAxisSmallForcesAreFound) {
+  Axis axis;  // 20 g, and a loop as stiff as 600 N/m: of half a newton first order would tell nothing
+  axis.size = 1e-3;
+  axis.pull = [](double x) { return 2e-5 * std::sin(2.0 * std::numbers::pi * x / 1.3e-3 + 0.4); };
+  const auto d = searched(recorded(axis, 0.25, 18));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "force_ripple");
+  EXPECT_NEAR(d.findings[0].term.values[0], 2e-5, 3e-6);
+  EXPECT_NEAR(d.findings[0].term.values[1], 1.3e-3, 1e-6);
+}
+
+TEST(AxisLoop, SoftBristlesBendOverAGoodPartOfTheWay) {
+  Axis axis;
+  axis.bristles = 0.6, axis.stiffness = 150.0;  // 4 mm of 40
+  const auto d = searched(recorded(axis, 0.25, 19));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "presliding_friction");
+  EXPECT_NEAR(d.findings[0].term.values[0], 0.6, 0.06);
+  EXPECT_NEAR(d.findings[0].term.values[1], 150.0, 40.0);
+}
+
+TEST(AxisLoop, AMotorThatFadesDoesSoOverTheTime) {
+  Axis axis;
+  axis.weaker = [](double t) { return 0.03 * (1.0 - std::exp(-t / 4.0)); };
+  auto data = recorded(axis, 0.25, 20);
+  const auto d = searched(data);
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(term.info->site, "actuator");
+  EXPECT_EQ(term.curve.over, "time");
+  EXPECT_NEAR(term.curve(9.0) - term.curve(1.0), -0.03 * (std::exp(-0.25) - std::exp(-2.25)), 0.004);
+}
+
+TEST(AxisLoop, AWaveThatComesOnceAndAHalfIsOne) {
+  Axis axis;
+  axis.pull = [](double x) { return 0.4 * std::sin(2.0 * std::numbers::pi * x / 0.024 + 0.4); };
+  const auto d = searched(recorded(axis, 0.25, 21));
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "force_ripple");
+  EXPECT_NEAR(d.findings[0].term.values[1], 0.024, 0.0005);
 }
 
 TEST(AxisLoop, APartThatRingsForLongIsAModeAllTheSame) {

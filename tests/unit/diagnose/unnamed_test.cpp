@@ -156,5 +156,50 @@ TEST(Recording, ThatSaysNothingIsRefused) {
               HasSubstr("goes back at most of its rows"));
 }
 
+/// Two tanks in a row, exactly solved where the pump is held; the instrument at the second one drifts.
+Case drifting(double drift) {
+  std::mt19937 random{6};
+  std::normal_distribution<double> noise{0.0, 0.004};
+  recording::Table table;
+  std::vector<double> t, u, first, second;
+  constexpr double apart = 0.1, a = 0.5, b = 0.2;
+  double x = 0.0, z = 0.0;
+  for (int k = 0; k < 1200; ++k) {
+    t.push_back(apart * k), u.push_back((k / 170) % 2 == 0 ? 1.0 : 0.3);
+    first.push_back(x + noise(random)), second.push_back(z + drift * t.back() + noise(random));
+    const double aim = u.back() / a, fall = x - aim, kept_x = std::exp(-a * apart),
+                 kept_z = std::exp(-b * apart);
+    // z' = a x - b z with x = aim + fall exp(-a t)
+    const double steady = a * aim / b, passing = a * fall / (b - a);
+    z = steady + passing * kept_x + (z - steady - passing) * kept_z;
+    x = aim + fall * kept_x;
+  }
+  table.add("t", "s", t);
+  table.add("u", "1", u);
+  table.add("h1", "m", first);
+  table.add("h2", "m", second);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                     "states:\n  x: {derivative: 'u - a*x', initial: {value: 0, unit: m, sigma: 0}}\n"
+                     "  z: {derivative: 'a*x - b*z', initial: {value: 0, unit: m, sigma: 0}}\n"
+                     "outputs: {upper: {column: h1, expression: x}, lower: {column: h2, expression: z}}\n"
+                     "parameters: {a: {value: 0.51, sigma: 0.02}, b: {value: 0.205, sigma: 0.01}}\n"),
+      {table});
+}
+
+TEST(Unnamed, AnInstrumentThatDriftsIsNoPhysicsOfTheMachine) {
+  auto data = drifting(0.002);
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::unknown_physics);
+  ASSERT_EQ(d.findings.size(), 1U);
+  const auto& term = d.findings[0].term;
+  EXPECT_EQ(site_of(data, term), "equations.output");
+  EXPECT_EQ(place_of(data, term), "output lower");
+  EXPECT_EQ(unit_of_curve(data, term), "m");
+  EXPECT_EQ(term.curve.over, "t");
+  EXPECT_NEAR(term.curve(100.0) - term.curve(20.0), 0.16, 0.01);
+  EXPECT_NEAR(d.best.model.value("b"), 0.2, 0.002);
+}
+
 }  // namespace
 }  // namespace invar::diagnose

@@ -53,5 +53,44 @@ TEST(CoursesInFiles, OnlyAForceGoesWithTheMotion) {
               HasSubstr("only an unmodelled force"));
 }
 
+config::Yaml tank(const std::string& term) {
+  return config::Yaml::parse(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: 'u - x', initial: {value: 0, unit: m, sigma: 0}}}\n"
+      "outputs: {level: {column: h, expression: x}}\nparameters: {}\nterms: [" +
+          term + "]\n",
+      "model.yaml");
+}
+
+TEST(CoursesInFiles, WhatAnOutputReadsWrongComesBack) {
+  const auto empty = tank("");
+  auto model = read_all(empty);
+  auto& term = model.terms.emplace_back();
+  term.info = physics::unmodelled(physics::Plant::equations, "output");
+  term.on = "level";
+  term.curve = {"t", {0.0, 10.0}, {0.0, 2.0}};
+  const auto again = read_all(config::Yaml::parse(patched(empty, model), "patched.yaml"));
+  ASSERT_EQ(again.terms.size(), 1U);
+  EXPECT_EQ(again.terms[0].info, term.info);
+  EXPECT_EQ(again.terms[0].on, "level");
+  EXPECT_EQ(again.terms[0].curve.over, "t");
+}
+
+TEST(CoursesInFiles, AnOutputReadsWrongOverTimeOrOverWhatItReadsAlone) {
+  using ::testing::HasSubstr;
+  const auto fault = [](const std::string& term) {
+    return testing::fault_of([&] { (void)read_all(tank(term)); });
+  };
+  const std::string numbers = ", knots: [0, 1], values: [1, 2]}";
+  EXPECT_THAT(fault("{term: unmodelled, site: output, on: level, over: x" + numbers),
+              HasSubstr("`t` or over `level`"));
+  EXPECT_THAT(fault("{term: unmodelled, site: output, on: level, over: t, with: x" + numbers),
+              HasSubstr("no `with`"));
+  EXPECT_THAT(fault("{term: unmodelled, site: output, on: x, over: t" + numbers),
+              HasSubstr("name an output"));
+  EXPECT_THAT(fault("{term: unmodelled, site: state, on: level, over: t" + numbers),
+              HasSubstr("name a state"));
+}
+
 }  // namespace
 }  // namespace invar::model

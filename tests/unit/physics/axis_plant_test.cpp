@@ -40,6 +40,26 @@ TEST(AxisPlant, ApproachesItsTerminalSpeedLikeAFirstOrderLag) {
   EXPECT_NEAR(axis.position(), v * (t - tau * (1.0 - std::exp(-t / tau))), 1e-10);
 }
 
+TEST(AxisPlant, AWaveInTheCurrentCountsBetweenTheCyclesOfItsController) {
+  constexpr double frequency = 63.7, amplitude = 0.3, phase = 0.9, onset = 0.1, mass = 2.0, motor = 10.0;
+  const double turns = 2.0 * std::numbers::pi * frequency;
+  for (const double squareness : {0.0, 1.0}) {
+    AxisPlant axis{{mass, motor, 0.0},
+                   {term("additive_disturbance", {amplitude, frequency, phase, squareness, onset})}};
+    const auto integral = [&](double t) {  // of the wave since its onset
+      const auto up_to = [&](double angle) {
+        return squareness > 0.5 ? std::acos(std::cos(angle)) : -std::cos(angle);  // a triangle
+      };
+      return (up_to(turns * t + phase) - up_to(turns * onset + phase)) / turns;
+    };
+    for (int i = 1; i <= 700; ++i) {
+      axis.step(0.0, 1e-3);
+      const double expected = i <= 100 ? 0.0 : motor * amplitude / mass * integral(i * 1e-3);
+      ASSERT_NEAR(axis.velocity(), expected, 1e-9) << i << " squareness " << squareness;
+    }
+  }
+}
+
 TEST(AxisPlant, DryFrictionStopsAMassAfterTheWayOfItsEnergyAndHoldsIt) {
   AxisPlant axis{{2.0, 10.0, 0.0}, {term("coulomb_friction", {3.0})}};
   axis.set_velocity(0.2);

@@ -246,6 +246,22 @@ TEST(Equations, WhatIsHeldChangesLateBetweenTheRows) {
   }
 }
 
+TEST(Equations, WhatAnInstrumentReadsWrongIsAddedToItsOutputAlone) {
+  const std::string text =
+      "plant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: \"u\", initial: {value: 0, unit: m, sigma: 0}}}\n"
+      "outputs: {y: {column: y, expression: \"x\"}}\nparameters: {}\n"
+      "terms:\n  - {term: unmodelled, site: output, on: y, over: t, knots: [0, 4], values: [0, 2]}\n"
+      "  - {term: unmodelled, site: output, on: y, over: y, knots: [0, 10], values: [0, -1]}\n";
+  std::vector<double> time, u;
+  for (int i = 0; i < 30; ++i) time.push_back(0.1 * i), u.push_back(1.5);
+  const auto y = simulated(text, time, {{"u", u}});
+  for (std::size_t i = 0; i < time.size(); ++i) {
+    const double drifted = 1.5 * time[i] + 0.5 * time[i];
+    EXPECT_NEAR(y[i], drifted - 0.1 * drifted, 1e-9) << time[i];
+  }
+}
+
 /// x' = a (u - x) where u goes straight from row to row: x = u - r / a beside what dies away, r the slope.
 TEST(Equations, WhatIsHeldLinearlyActsStraightFromRowToRow) {
   constexpr double a = 3.0, row = 0.08;

@@ -62,7 +62,8 @@ TEST(EveryTerm, SaysItsNameSiteUnitBoundsAndSource) {
       EXPECT_FALSE(info->site.empty() || info->description.empty() || info->source.empty()) << info->name;
       for (std::size_t i = 0; i < info->parameter_count(); ++i) {
         const auto& p = info->parameters[i];
-        EXPECT_TRUE(p.unit == "*" || parse_unit(p.unit).has_value()) << info->name << '.' << p.name << " [" << p.unit << ']';
+        EXPECT_TRUE(p.unit == "*" || parse_unit(p.unit).has_value())
+            << info->name << '.' << p.name << " [" << p.unit << ']';
         EXPECT_LT(p.bounds.lower, p.bounds.upper) << info->name << '.' << p.name;
         EXPECT_TRUE(p.bounds.contains(p.starts[0])) << info->name << '.' << p.name;
         EXPECT_TRUE(p.role != Role::amplitude || p.bounds.contains(0.0)) << info->name << '.' << p.name;
