@@ -156,13 +156,13 @@ std::vector<double> bristles_for(const Case& data, const TermInfo& info) {
   return stiffnesses;
 }
 
-/// A small part of what the motor of an axis gives [A], [N].
-double small_current(const Case& data) { return 0.03 * usual(data, "current"); }
+/// A part of what the motor of an axis gives [A], [N].
+double small_current(const Case& data) { return 0.3 * usual(data, "current"); }
 double small_force(const Case& data, const physics::Model& model) {
   return small_current(data) * model.value("motor_constant", 1.0);
 }
 
-/// Half a newton is all that moves a small axis, and more: first order is taken from less.
+/// Half a newton is all that moves a small axis, and more: first order is taken from a part of that.
 void take_to_size(const Case& data, const physics::Model& model, std::vector<Start>& starts) {
   const double current = small_current(data), force = small_force(data, model);
   for (auto& start : starts) {
@@ -437,9 +437,6 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
-                 {"actuator", "time", 8},
-                 {"actuator", "position", 12},
-                 {"actuator", "velocity", 9},
                  {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/physics/library.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/other_cause.hpp"
@@ -50,6 +51,19 @@ void sharpen(const Case& data, Curved& found) {
   weighing = own;
 }
 
+/// A motor that fades is nearly a load that grows: of the two, what explains more.
+Fit load_or_motor(const Case& data, const Weighing& weighing, Fit load) {
+  const auto& found = load.model.terms.back();
+  if (found.info->plant != physics::Plant::axis || found.with != "acceleration") return load;
+  auto model = load.model;
+  auto& motor = model.terms.back();
+  motor.info = physics::unmodelled(physics::Plant::axis, "actuator");
+  motor.with.clear();
+  for (double& value : motor.curve.values) value /= -model.value("mass", 1.0);
+  auto faded = fit(data, weighing, model, data.model, 5);
+  return faded.evidence > load.evidence ? faded : load;
+}
+
 /// Would an engineer see it in the residual, or does it pay when counted in independent rows?
 bool shows(const Case& data, const Fit& with, const Fit& without) {
   const double ratio = least_ratio(data, with, without);
@@ -67,7 +81,7 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     if (tried++ >= 3 || s.merit < claim_margin) break;
     const Fit near = with_columns(data, under_plain, s);
     if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) continue;
-    auto rough = fit(data, plain, near.model, data.model, 2, &near);
+    auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, 2, &near));
     const Weighing own = weigh(data, simulate(data, rough.model));
     auto curved = fit(data, own, rough.model, data.model, 3, &rough);
     // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
