@@ -241,6 +241,9 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
         along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; }, shortest);
     periods.reading_pitch =
         along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; }, 2e-5);
+    // A loop follows what its encoder reads wrong: of a coarse pitch the force shows more than the reading.
+    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.force_pitch.size()); ++i)
+      periods.reading_pitch.push_back(periods.force_pitch[i]);
     // The two ripples look alike in this light; each is also tried at the other's pitch.
     for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.motor_pitch.size()); ++i)
       periods.force_pitch.push_back(periods.motor_pitch[i]);
