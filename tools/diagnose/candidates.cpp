@@ -157,7 +157,7 @@ std::vector<double> bristles_for(const Case& data, const TermInfo& info) {
 }
 
 /// A part of what the motor of an axis gives [A], [N].
-double small_current(const Case& data) { return 0.3 * usual(data, "current"); }
+double small_current(const Case& data) { return 0.1 * usual(data, "current"); }
 double small_force(const Case& data, const physics::Model& model) {
   return small_current(data) * model.value("motor_constant", 1.0);
 }

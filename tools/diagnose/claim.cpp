@@ -198,6 +198,39 @@ bool acts_at_its_frequency(const Case& data, const physics::Model& model, std::s
   return own >= 0.5 * all;
 }
 
+/// Does a wave in time explain something all along? One that begins throws a slow loop off at once, and would explain whatever
+/// the start leaves.
+bool lasts(const Case& data, const physics::Model& model, std::size_t term) {
+  const auto& info = *model.terms[term].info;
+  const auto onset = info.index_of("onset");
+  if (onset == physics::most_parameters) return true;
+  const double from = model.terms[term].values[onset];
+  constexpr std::size_t count = 8;
+  std::array<double, count> gain{};
+  const auto with = simulate(data, model), without = simulate(data, physics::without_term(model, term));
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::array<double, count> gained{};
+    double squares = 0.0, rows = 0.0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& time = data.recordings[r].inputs.time;
+      const double lasted = time.back() - time.front();
+      for (std::size_t i = 0; i < time.size(); ++i) {
+        const double y = data.recordings[r].measured[o][i];
+        if (!std::isfinite(y) || time[i] < from) continue;
+        const double left = y - with[r][o][i], was = y - without[r][o][i];
+        gained[std::min(count - 1, static_cast<std::size_t>(static_cast<double>(count) *
+                                                            (time[i] - time.front()) / lasted))] +=
+            was * was - left * left;
+        squares += left * left, rows += 1.0;
+      }
+    }
+    for (std::size_t b = 0; b < count && squares > 0.0; ++b) gain[b] += gained[b] * rows / squares;
+  }
+  double all = 0.0;
+  for (const double one : gain) all += one;
+  return *std::max_element(gain.begin(), gain.end()) < 0.6 * all;
+}
+
 /// Is what a sine explains a line, with one phase from beginning to end? A hum of the noise has a band, and what coarse
 /// steps make of a motion has another phase in every pass, however much evidence a sine in it gathers. Against the scatter
 /// of its amplitude from block to block (Fisher's F), strictly where that is more than rows without memory would make.
@@ -411,8 +444,8 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
        is_known_better(data, fit, term) || !acts(data, fit.model, fit.model.terms[term])))
     return false;
   if (!repeats(data, fit.model.terms[term]) || !is_line(data, fit.model, term) ||
-      is_its_own(data, fit.model, term) || is_rounding(data, fit.model, term) ||
-      !turns_with_direction(data, fit.model, term))
+      !lasts(data, fit.model, term) || is_its_own(data, fit.model, term) ||
+      is_rounding(data, fit.model, term) || !turns_with_direction(data, fit.model, term))
     return false;
   if (is_lag(fit, term) || never_fills(data, fit, term)) return false;
   if (info.name == "overflow" && values[1] < 0.05)
