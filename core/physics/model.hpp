@@ -36,7 +36,7 @@ struct Term {
   std::array<double, most_parameters> usual{};  // as of a Parameter
   std::string on;                               // thermal: the node; equations: the state, input or output
   /// Thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis: "direction" where its
-  /// curve is dry friction, "velocity" where it is damping.
+  /// curve is dry friction, "velocity" where it is damping, "acceleration" where it is mass.
   std::string with;
   Curve curve;  // `unmodelled` alone
 };
