@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "tools/diagnose/axis_modes.hpp"
@@ -190,102 +191,138 @@ std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
   return pitches;
 }
 
-Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted) {
-  Periods periods;
-  const auto force = pulse_responses(data, weighing, fitted.model, "force", 1e-2);
-  const auto reading = pulse_responses(data, weighing, fitted.model, "measurement", 1e-7);
-  double low = 1e300, high = -1e300;
-  std::vector<std::vector<double>> positions, forces, readings, currents;
-  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-    positions.push_back(variable_values(data, r, "position"));
-    currents.push_back(variable_values(data, r, "current"));
-    forces.push_back(carried_back(data, fitted, force, r));
-    readings.push_back(carried_back(data, fitted, reading, r));
-    for (double x : positions.back()) low = std::min(low, x), high = std::max(high, x);
-  }
-  periods.mode_frequency = mode_frequencies(data, fitted, force, forces);
-  const double span = high - low;
+namespace {
+
+/// Pitches of what goes with the place, `weights[r][i]` at `positions[r][i]`.
+std::vector<double> pitches_along(const std::vector<std::vector<double>>& positions,
+                                  const std::vector<std::vector<double>>& weights, double low, double span,
+                                  double least) {
   constexpr std::size_t bins = 1U << 15U, padded = 4 * bins;
-  const auto along_position = [&](const auto& weight, double least) {
-    std::vector<double> grid(bins, 0.0);
-    for (std::size_t r = 0; r < positions.size(); ++r)
-      for (std::size_t i = 0; i < positions[r].size(); ++i) {
-        const auto bin = static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1));
-        grid[std::min(bin, bins - 1)] += weight(r, i);
-      }
-    const auto spectrum = transform(std::move(grid), padded);
-    std::vector<double> power(bins);
-    for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
-    std::vector<double> pitches;
-    // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
-    const double finest = std::max(least, span / 6000.0);
-    const auto last = std::min(bins - 1, static_cast<std::size_t>(4.0 * span / finest));
-    for (double k : peaks(power, 4, last, 4)) pitches.push_back(4.0 * span / k);
-    // A carriage that is pushed at a few places alone smears a wave over its neighbours: the highest of all stays.
-    if (last > 4) {
-      const auto highest =
-          std::max_element(power.begin() + 4, power.begin() + static_cast<std::ptrdiff_t>(last));
-      const double pitch = 4.0 * span / static_cast<double>(highest - power.begin());
-      if (std::none_of(pitches.begin(), pitches.end(),
-                       [&](double p) { return std::abs(span / p - span / pitch) < 0.5; }))
-        pitches.push_back(pitch);
+  std::vector<double> grid(bins, 0.0);
+  for (std::size_t r = 0; r < positions.size(); ++r)
+    for (std::size_t i = 0; i < positions[r].size(); ++i) {
+      const auto bin = static_cast<std::size_t>((positions[r][i] - low) / span * (bins - 1));
+      grid[std::min(bin, bins - 1)] += weights[r][i];
     }
-    return pitches;
-  };
+  const auto spectrum = transform(std::move(grid), padded);
+  std::vector<double> power(bins);
+  for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+  std::vector<double> pitches;
+  // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
+  const double finest = std::max(least, span / 6000.0);
+  const auto last = std::min(bins - 1, static_cast<std::size_t>(4.0 * span / finest));
+  for (double k : peaks(power, 4, last, 4)) pitches.push_back(4.0 * span / k);
+  // A carriage that is pushed at a few places alone smears a wave over its neighbours: the highest of all stays.
+  if (last > 4) {
+    const auto highest =
+        std::max_element(power.begin() + 4, power.begin() + static_cast<std::ptrdiff_t>(last));
+    const double pitch = 4.0 * span / static_cast<double>(highest - power.begin());
+    if (std::none_of(pitches.begin(), pitches.end(),
+                     [&](double p) { return std::abs(span / p - span / pitch) < 0.5; }))
+      pitches.push_back(pitch);
+  }
+  return pitches;
+}
+
+struct Lines {
+  std::vector<double> frequency;                   // [Hz]
+  std::vector<std::pair<double, double>> squares;  // frequency [Hz] and phase at time zero [rad]
+};
+
+/// Of a force over time, and the loop's answer to it.
+Lines lines_of(const std::vector<double>& time, std::vector<double> force,
+               const std::vector<std::vector<double>>& responses) {
+  Lines found;
+  const std::size_t rows = force.size(), size = power_of_two(4 * rows);
+  const double period = (time.back() - time.front()) / static_cast<double>(rows - 1);
+  // Tapered: what a strong line leaks must not be the level that others, or itself, are held against.
+  for (std::size_t i = 0; i < rows; ++i)
+    force[i] *=
+        1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rows));
+  const auto spectrum = transform(std::move(force), size);
+  std::vector<double> power(size / 2);
+  for (std::size_t k = 0; k < power.size(); ++k) power[k] = std::norm(spectrum[k]);
+  const double hertz = 1.0 / (static_cast<double>(size) * period);
+  const auto lines = peaks(power, 8, power.size(), 6);
+  for (std::size_t k = 0; k < std::min<std::size_t>(3, lines.size()); ++k)
+    found.frequency.push_back(lines[k] * hertz);
+  const auto answer = answer_power(responses, size);
+  // A slow wave is hardly narrower than its neighbourhood, and where a loop holds against it no peak stands out: the
+  // frequency of the greatest likelihood stays as well.
+  const double cycle = static_cast<double>(size) / static_cast<double>(rows);  // bins of one in the recording
+  double likeliest = 0.0, place = 0.0;
+  for (auto k = static_cast<std::size_t>(2.0 * cycle); k < power.size(); ++k)
+    if (answer[k] > 0.0 && power[k] > likeliest * answer[k])
+      likeliest = power[k] / answer[k], place = static_cast<double>(k);
+  if (place > 0.0 &&
+      std::none_of(lines.begin(), lines.begin() + std::min<std::ptrdiff_t>(3, std::ssize(lines)),
+                   [&](double line) { return std::abs(line - place) < 0.5 * cycle; }))
+    found.frequency.push_back(place * hertz);
+  for (const auto& square : squares(spectrum, answer, levels(power, 8, power.size() - 1), lines)) {
+    const double turns = square.place * hertz * time.front();
+    found.squares.emplace_back(
+        square.place * hertz,
+        std::remainder(square.phase - 2.0 * std::numbers::pi * turns, 2.0 * std::numbers::pi));
+  }
+  return found;
+}
+
+/// Jobs that do not wait for each other.
+void at_once(const std::vector<std::function<void()>>& jobs) {
+  in_parallel(jobs.size(), [&](std::size_t k) { jobs[k](); });
+}
+
+}  // namespace
+
+Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted) {
+  std::vector<std::vector<double>> force, reading;  // answers to a pulse of each
+  at_once({[&] { force = pulse_responses(data, weighing, fitted.model, "force", 1e-2); },
+           [&] { reading = pulse_responses(data, weighing, fitted.model, "measurement", 1e-7); }});
+  const std::size_t recordings = data.recordings.size();
+  std::vector<std::vector<double>> positions(recordings), forces(recordings), readings(recordings),
+      currents(recordings), motors(recordings);
+  in_parallel(2 * recordings, [&](std::size_t k) {
+    const std::size_t r = k / 2;
+    (k % 2 == 0 ? forces : readings)[r] = carried_back(data, fitted, k % 2 == 0 ? force : reading, r);
+  });
+  double low = 1e300, high = -1e300;
+  for (std::size_t r = 0; r < recordings; ++r) {
+    positions[r] = variable_values(data, r, "position");
+    currents[r] = variable_values(data, r, "current");
+    for (double x : positions[r]) low = std::min(low, x), high = std::max(high, x);
+    for (std::size_t i = 0; i < forces[r].size(); ++i) motors[r].push_back(forces[r][i] * currents[r][i]);
+  }
+  Periods periods;
+  std::vector<Lines> lines(recordings);
+  std::vector<std::function<void()>> jobs{
+      [&] { periods.mode_frequency = mode_frequencies(data, fitted, force, forces); }};
+  for (std::size_t r = 0; r < recordings; ++r)
+    jobs.emplace_back([&, r] { lines[r] = lines_of(data.recordings[r].inputs.time, forces[r], force); });
+  const double span = high - low;
   if (span > 1e-5) {
     const double shortest =
         std::min(1e-3, 0.03 * span);  // of what pushes: magnets and balls of a small axis are small
-    periods.force_pitch =
-        along_position([&](std::size_t r, std::size_t i) { return forces[r][i]; }, shortest);
-    periods.motor_pitch =
-        along_position([&](std::size_t r, std::size_t i) { return forces[r][i] * currents[r][i]; }, shortest);
-    periods.reading_pitch =
-        along_position([&](std::size_t r, std::size_t i) { return readings[r][i]; }, 2e-5);
-    // A loop follows what its encoder reads wrong: of a coarse pitch the force shows more than the reading.
-    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.force_pitch.size()); ++i)
-      periods.reading_pitch.push_back(periods.force_pitch[i]);
-    // The two ripples look alike in this light; each is also tried at the other's pitch.
-    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.motor_pitch.size()); ++i)
-      periods.force_pitch.push_back(periods.motor_pitch[i]);
-    for (std::size_t i = 0; i < std::min<std::size_t>(2, periods.force_pitch.size()); ++i)
-      periods.motor_pitch.push_back(periods.force_pitch[i]);
+    const auto along = [&, low, span](std::vector<double>& pitches, const auto& weights, double least) {
+      jobs.emplace_back(
+          [&, low, span, least] { pitches = pitches_along(positions, weights, low, span, least); });
+    };
+    along(periods.force_pitch, forces, shortest);
+    along(periods.motor_pitch, motors, shortest);
+    along(periods.reading_pitch, readings, 2e-5);
   }
-  for (std::size_t r = 0; r < forces.size(); ++r) {
-    const std::size_t rows = forces[r].size(), size = power_of_two(4 * rows);
-    const double period = (data.recordings[r].inputs.time.back() - data.recordings[r].inputs.time.front()) /
-                          static_cast<double>(rows - 1);
-    // Tapered: what a strong line leaks must not be the level that others, or itself, are held against.
-    auto tapered = forces[r];
-    for (std::size_t i = 0; i < rows; ++i)
-      tapered[i] *=
-          1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rows));
-    const auto spectrum = transform(std::move(tapered), size);
-    std::vector<double> power(size / 2);
-    for (std::size_t k = 0; k < power.size(); ++k) power[k] = std::norm(spectrum[k]);
-    const double hertz = 1.0 / (static_cast<double>(size) * period);
-    const auto lines = peaks(power, 8, power.size(), 6);
-    for (std::size_t k = 0; k < std::min<std::size_t>(3, lines.size()); ++k)
-      periods.force_frequency.push_back(lines[k] * hertz);
-    const auto answer = answer_power(force, size);
-    // A slow wave is hardly narrower than its neighbourhood, and where a loop holds against it no peak stands out: the
-    // frequency of the greatest likelihood stays as well.
-    const double cycle =
-        static_cast<double>(size) / static_cast<double>(rows);  // bins of one in the recording
-    double likeliest = 0.0, place = 0.0;
-    for (auto k = static_cast<std::size_t>(2.0 * cycle); k < power.size(); ++k)
-      if (answer[k] > 0.0 && power[k] > likeliest * answer[k])
-        likeliest = power[k] / answer[k], place = static_cast<double>(k);
-    if (place > 0.0 &&
-        std::none_of(lines.begin(), lines.begin() + std::min<std::ptrdiff_t>(3, std::ssize(lines)),
-                     [&](double line) { return std::abs(line - place) < 0.5 * cycle; }))
-      periods.force_frequency.push_back(place * hertz);
-    const double begin = data.recordings[r].inputs.time.front();
-    for (const auto& square : squares(spectrum, answer, levels(power, 8, power.size() - 1), lines)) {
-      const double turns = square.place * hertz * begin;
-      periods.squares.emplace_back(
-          square.place * hertz,
-          std::remainder(square.phase - 2.0 * std::numbers::pi * turns, 2.0 * std::numbers::pi));
-    }
+  at_once(jobs);
+  const auto also = [](std::vector<double>& pitches, const std::vector<double>& others) {
+    pitches.insert(pitches.end(), others.begin(),
+                   others.begin() + std::min<std::ptrdiff_t>(2, std::ssize(others)));
+  };
+  // A loop follows what its encoder reads wrong: of a coarse pitch the force shows more than the reading.
+  also(periods.reading_pitch, periods.force_pitch);
+  // The two ripples look alike in this light; each is also tried at the other's pitch.
+  also(periods.force_pitch, periods.motor_pitch);
+  also(periods.motor_pitch, periods.force_pitch);
+  for (const auto& one : lines) {
+    periods.force_frequency.insert(periods.force_frequency.end(), one.frequency.begin(), one.frequency.end());
+    periods.squares.insert(periods.squares.end(), one.squares.begin(), one.squares.end());
   }
   return periods;
 }

@@ -16,9 +16,10 @@ std::size_t power_of_two(std::size_t n) {
 
 Spectrum transform(std::vector<double> values, std::size_t size) {
   values.resize(size, 0.0);
-  std::vector<Complex> in(values.begin(), values.end()), out;
+  Spectrum out;
   Eigen::FFT<double> fft;
-  fft.fwd(out, in);
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  fft.fwd(out, values);
   return out;
 }
 
@@ -67,19 +68,19 @@ std::vector<double> carried_back(const Case& data, const Fit& fitted,
     at += static_cast<Eigen::Index>(data.recordings[r].inputs.rows() * data.outputs.size());
   const std::size_t rows = data.recordings[recording].inputs.rows();
   const std::size_t size = power_of_two(2 * std::max(rows, responses.front().size()));
-  Spectrum sum(size, Complex{});
+  Spectrum sum(size / 2 + 1, Complex{});
   for (std::size_t o = 0; o < data.outputs.size(); ++o, at += static_cast<Eigen::Index>(rows)) {
     std::vector<double> w(fitted.residual.data() + at,
                           fitted.residual.data() + at + static_cast<Eigen::Index>(rows));
     const auto residual = transform(std::move(w), size), response = transform(responses[o], size);
-    for (std::size_t k = 0; k < size; ++k) sum[k] += std::conj(response[k]) * residual[k];
+    for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += std::conj(response[k]) * residual[k];
   }
   Eigen::FFT<double> fft;
-  std::vector<Complex> back;
-  fft.inv(back, sum);
-  std::vector<double> out(rows);
-  for (std::size_t i = 0; i < rows; ++i) out[i] = back[i].real();
-  return out;
+  fft.SetFlag(Eigen::FFT<double>::HalfSpectrum);
+  std::vector<double> back;
+  fft.inv(back, sum, static_cast<Eigen::Index>(size));
+  back.resize(rows);
+  return back;
 }
 
 }  // namespace invar::diagnose

@@ -12,7 +12,7 @@ using Complex = std::complex<double>;
 using Spectrum = std::vector<Complex>;
 
 std::size_t power_of_two(std::size_t n);
-/// Of values followed by zeros up to `size`.
+/// The lower half, its middle included, of the spectrum of values followed by zeros up to `size`.
 Spectrum transform(std::vector<double> values, std::size_t size);
 
 /// Responses of the whitened residual to a pulse of one tick at `site`, by output, over its size.

@@ -143,13 +143,16 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
     return;
   }
   const Series series{data, d};
-  for (const auto& one : smallest) {
+  constexpr double finer = 1.25, most = 100.0;
+  std::vector<double> times(smallest.size(), 1.0);
+  in_parallel(smallest.size(), [&](std::size_t i) {
+    const auto& one = smallest[i];
     const auto effect = series.effect(*one.screened, one.value / one.screened->strength.norm());
-    constexpr double finer = 1.25, most = 100.0;
-    double times = 1.0;
-    while (times < most && !series.shows(effect, times)) times *= finer;
-    if (times < most) d.detectable.push_back(described(one, times));  // else it could be a wander at any size
-  }
+    while (times[i] < most && !series.shows(effect, times[i])) times[i] *= finer;
+  });
+  for (std::size_t i = 0; i < smallest.size(); ++i)
+    if (times[i] < most)  // else it could be a wander at any size
+      d.detectable.push_back(described(smallest[i], times[i]));
 }
 
 }  // namespace invar::diagnose

@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -203,13 +204,16 @@ double noise_of(const Case& data, const Weighing& weighing, std::size_t output) 
 template <class ShareAt>
 double beyond_chance(ShareAt share_at) {
   constexpr int shifts = 30;
+  std::array<double, shifts + 1> shares{};  // as it stands first
+  in_parallel(shares.size(), [&](std::size_t k) {
+    shares[k] = share_at(k == 0 ? 0.0 : 0.1 + 0.8 * (static_cast<double>(k) - 0.5) / shifts);
+  });
   double mean = 0.0, square = 0.0, largest = 0.0;
-  for (int k = 0; k < shifts; ++k) {
-    const double by_chance = share_at(0.1 + 0.8 * (k + 0.5) / shifts);
-    mean += by_chance / shifts, square += by_chance * by_chance / shifts;
-    largest = std::max(largest, by_chance);
+  for (std::size_t k = 1; k < shares.size(); ++k) {
+    mean += shares[k] / shifts, square += shares[k] * shares[k] / shifts;
+    largest = std::max(largest, shares[k]);
   }
-  const double spread = std::sqrt(std::max(0.0, square - mean * mean)), now = share_at(0.0);
+  const double spread = std::sqrt(std::max(0.0, square - mean * mean)), now = shares[0];
   return now > std::max(largest, mean + 4.0 * spread) && mean < 1.0 ? (now - mean) / (1.0 - mean) : 0.0;
 }
 

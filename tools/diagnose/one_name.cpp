@@ -42,15 +42,18 @@ Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit&
         some ? on_all(data, weighing, base, fit_with(some->data, some->weighing, some->base, *tried[i], 3))
              : fit_with(data, weighing, base, *tried[i], 3);
   });
-  double best = -1e300;
-  for (const auto& f : fits) best = std::max(best, f.evidence);
-  for (auto& f : fits) {
-    if (options.stopped && options.stopped()) break;
-    const double gained = std::max(1.0, best - base.evidence);
-    if (f.evidence > best - std::max(15.0, 0.5 * gained)) f = fit(data, weighing, f.model, data.model, 8, &f);
-    best = std::max(best, f.evidence);
-  }
   const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
+  const auto go_on = [&](Fit& f) {
+    if (!options.stopped || !options.stopped()) f = fit(data, weighing, f.model, data.model, 8, &f);
+  };
+  if (const auto best = std::min_element(fits.begin(), fits.end(), by_evidence); best != fits.end()) {
+    go_on(*best);
+    const double gained = std::max(1.0, best->evidence - base.evidence);
+    std::vector<Fit*> near;
+    for (auto& f : fits)
+      if (&f != &*best && f.evidence > best->evidence - std::max(15.0, 0.5 * gained)) near.push_back(&f);
+    in_parallel(near.size(), [&](std::size_t i) { go_on(*near[i]); });
+  }
   if (data.model.plant == physics::Plant::equations && !fits.empty()) {
     const auto first = std::min_element(fits.begin(), fits.end(), by_evidence);
     const std::size_t place = first->model.terms.size() - 1;

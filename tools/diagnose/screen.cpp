@@ -94,17 +94,24 @@ Eigen::MatrixXd shares_of(const Start& start, const Start& finer) {
   return shares;
 }
 
-/// Of all directions of all starts, one after another: terms of one kind at one place run together. A curve of few knots is
+/// Of all directions of all starts: terms of one kind at one place run together. A curve of few knots is
 /// the sum of one of many that has them too.
 std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at,
                                         const std::vector<Start>& starts) {
   std::vector<physics::Model> models;
-  std::vector<double> steps;
+  struct Place {
+    std::size_t start;
+    Eigen::Index direction;
+    double step;
+  };
+  std::vector<Place> places;  // of each model
   std::vector<std::size_t> source;
   for (std::size_t i = 0; i < starts.size(); ++i) source.push_back(finer_than(starts, i));
+  std::vector<Eigen::MatrixXd> all(starts.size());
   for (std::size_t s = 0; s < starts.size(); ++s) {
     if (source[s] != s) continue;
     const auto& start = starts[s];
+    all[s].resize(at.size(), static_cast<Eigen::Index>(start.directions.size()));
     for (const auto& direction : start.directions) {
       auto& model = models.emplace_back(base.model);
       Term term = start.term;
@@ -127,22 +134,14 @@ std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const
         by = term.values[direction.amplitude];
       }
       model.terms.push_back(std::move(term));
-      steps.push_back(by);
+      places.push_back({s, &direction - start.directions.data(), by});
     }
   }
-  const Eigen::MatrixXd differences = differences_of(data, models);
-  std::vector<Eigen::MatrixXd> all(starts.size());
-  Eigen::Index next = 0;
-  for (std::size_t i = 0; i < starts.size(); ++i) {
-    if (source[i] != i) continue;
-    auto& columns = all[i];
-    columns.resize(at.size(), static_cast<Eigen::Index>(starts[i].directions.size()));
-    for (Eigen::Index d = 0; d < columns.cols(); ++d, ++next)
-      columns.col(d) =
-          ((differences.col(next) - at) / steps[static_cast<std::size_t>(next)]).unaryExpr([](double v) {
-            return std::isfinite(v) ? v : 0.0;
-          });
-  }
+  for_differences_of(data, models, [&](std::size_t k, const Eigen::VectorXd& left) {
+    const auto& [start, direction, step] = places[k];
+    all[start].col(direction) =
+        ((left - at) / step).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+  });
   for (std::size_t i = 0; i < starts.size(); ++i)
     if (source[i] != i) all[i] = all[source[i]] * shares_of(starts[i], starts[source[i]]);
   return all;

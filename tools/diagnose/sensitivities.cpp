@@ -17,11 +17,8 @@ constexpr std::size_t models_together = 8;
 
 }  // namespace
 
-Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& models) {
-  Eigen::Index rows = 0;
-  for (const auto& recording : data.recordings)
-    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
-  Eigen::MatrixXd columns(rows, static_cast<Eigen::Index>(models.size()));
+void for_differences_of(const Case& data, const std::vector<Model>& models,
+                        const std::function<void(std::size_t, const Eigen::VectorXd&)>& take) {
   const std::size_t threads = std::max(1U, std::thread::hardware_concurrency());
   const std::size_t together = data.model.plant == physics::Plant::equations ? models_together
                                : data.model.plant == physics::Plant::axis
@@ -39,10 +36,8 @@ Eigen::MatrixXd differences_of(const Case& data, const std::vector<Model>& model
       data.recordings[r].simulation->run_all(some, outputs);
       for (std::size_t k = 0; k < some.size(); ++k) all[k][r] = std::move(outputs[k]);
     }
-    for (std::size_t k = begin; k < end; ++k)
-      columns.col(static_cast<Eigen::Index>(k)) = differences(data, all[k - begin]);
+    for (std::size_t k = begin; k < end; ++k) take(k, differences(data, all[k - begin]));
   });
-  return columns;
 }
 
 namespace {
@@ -105,8 +100,14 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
   const auto place = [&](std::size_t run) {
     return static_cast<Eigen::Index>(beside ? run + run / group + 1 : run);
   };
-  const Eigen::MatrixXd runs = differences_of(data, changed);
   const Eigen::VectorXd alone = beside ? Eigen::VectorXd{} : differences(data, simulate(data, model));
+  Eigen::Index rows = 0;
+  for (const auto& recording : data.recordings)
+    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
+  Eigen::MatrixXd runs(rows, static_cast<Eigen::Index>(changed.size()));
+  for_differences_of(data, changed, [&](std::size_t k, const Eigen::VectorXd& left) {
+    runs.col(static_cast<Eigen::Index>(k)) = left;
+  });
   Eigen::MatrixXd columns(runs.rows(), static_cast<Eigen::Index>(free.size()));
   for (std::size_t j = 0; j < free.size(); ++j) {
     const auto to = static_cast<Eigen::Index>(j), from = place(run_of[j]);

@@ -1,7 +1,9 @@
 #include "tools/diagnose/statistics.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/numerics/robust.hpp"
@@ -80,19 +82,47 @@ Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::siz
 
 void whiten(const Whitening& filter, const std::vector<double>& r, const std::vector<bool>& present,
             double* out) {
-  const std::size_t order = filter.a.size();
+  const auto order = static_cast<std::ptrdiff_t>(filter.a.size()), rows = std::ssize(r);
   std::vector<double> filled(r.size());
-  std::size_t zeros = order;  // that many before this row: of zeros only zeros come
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    if (zeros >= order && (r[i] == 0.0 || !present[i])) {
-      out[i] = 0.0;
+  for (std::ptrdiff_t begin = 0, end = 0; begin < rows; begin = end) {
+    const bool is_present = present[static_cast<std::size_t>(begin)];
+    end = std::find(present.begin() + begin, present.begin() + rows, !is_present) - present.begin();
+    const auto from = filled.begin() + begin;
+    if (!is_present) {  // as the rows before foretell
+      for (std::ptrdiff_t i = begin; i < end; ++i) {
+        out[i] = 0.0;
+        for (std::ptrdiff_t j = 0; j < std::min(order, i); ++j)
+          filled[static_cast<std::size_t>(i)] +=
+              filter.a[static_cast<std::size_t>(j)] * filled[static_cast<std::size_t>(i - 1 - j)];
+      }
       continue;
     }
-    double predicted = 0.0;
-    for (std::size_t j = 0; j < order && j < i; ++j) predicted += filter.a[j] * filled[i - 1 - j];
-    filled[i] = present[i] ? r[i] : predicted;
-    out[i] = present[i] ? (r[i] - predicted) / filter.sigma : 0.0;
-    zeros = filled[i] == 0.0 ? zeros + 1 : 0;
+    std::copy(r.begin() + begin, r.begin() + end, from);
+    std::copy(r.begin() + begin, r.begin() + end, out + begin);
+    // Of zeros only zeros come: a column that acts in one window is looked at there.
+    const auto is_zero = [](double v) { return v == 0.0; };
+    const auto acts = std::find_if_not(filled.begin() + std::max<std::ptrdiff_t>(0, begin - order),
+                                       filled.begin() + end, is_zero) -
+                      filled.begin();
+    const auto last = std::find_if_not(std::reverse_iterator{filled.begin() + end},
+                                       std::reverse_iterator{filled.begin() + acts}, is_zero)
+                          .base() -
+                      filled.begin();
+    // A sum of shifted copies, piece by piece while they are at hand, so that several rows are added at a time.
+    constexpr std::ptrdiff_t piece = 512;
+    const auto until = std::min(end, last + order);
+    for (auto a = std::max(begin, acts); a < until; a += piece) {
+      const auto b = std::min(until, a + piece);
+      Eigen::Map<Eigen::ArrayXd> white{out, rows};
+      const Eigen::Map<const Eigen::ArrayXd> known{filled.data(), rows};
+      for (std::ptrdiff_t j = 0; j < order; ++j) {
+        const auto first = std::max(a, j + 1);
+        if (first < b)
+          white.segment(first, b - first) -=
+              filter.a[static_cast<std::size_t>(j)] * known.segment(first - 1 - j, b - first);
+      }
+      white.segment(a, b - a) /= filter.sigma;
+    }
   }
 }
 

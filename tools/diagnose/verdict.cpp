@@ -1,6 +1,7 @@
 #include "tools/diagnose/verdict.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "core/physics/library.hpp"
@@ -134,12 +135,16 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     Squares before, retuned, after;
   };
   std::vector<Sums> tested(data.outputs.size()), trained(data.outputs.size());
-  double gain = 0.0;  // of what was not seen, in whitened residuals
-  for (std::size_t k = 0; k < folds; ++k) {
-    auto fold = fold_of(data, d.weighing, k);
+  struct Runs {
+    Fold fold;
+    std::vector<physics::Outputs> retuned, after, rival;
+  };
+  std::array<Runs, folds> runs;
+  in_parallel(folds, [&](std::size_t k) {
+    auto& [fold, retuned, after, rival] = runs[k];
+    fold = fold_of(data, d.weighing, k);
     const auto fitted = refitted(data, for_retuned, k, d.retuned, iterations);
-    const auto retuned = simulate(data, fitted.model);
-    auto after = retuned;
+    after = retuned = simulate(data, fitted.model);
     if (any) {
       const auto best = refitted(data, for_best, k, d.best, iterations);
       ask_what_is_known(data, best, d.is_unnamed || d.has_rest, fold.test);
@@ -147,7 +152,10 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     } else {
       ask_what_is_known(data, fitted, false, fold.test);
     }
-    const auto rival = differs ? simulate(data, refitted(data, for_rival, k, d.retuned, 3).model) : retuned;
+    rival = differs ? simulate(data, refitted(data, for_rival, k, d.retuned, 3).model) : retuned;
+  });
+  double gain = 0.0;  // of what was not seen, in whitened residuals
+  for (const auto& [fold, retuned, after, rival] : runs) {
     for (const bool test : {true, false}) {
       const auto& on = test ? fold.test : fold.train;
       auto& sums = test ? tested : trained;
