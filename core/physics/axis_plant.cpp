@@ -84,6 +84,8 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
     if (term.kind->info->name == "position_stiffness")
       fastest = std::max(fastest, std::sqrt(std::abs(p[0]) / parameters.mass));
   }
+  per_carriage_mass_ = 1.0 / (parameters.mass * (1.0 - mode_.share));
+  if (mode_.share > 0.0) per_swinging_mass_ = 1.0 / (parameters.mass * mode_.share);
   has_motor_terms_ = !motors_.empty() || !motor_curves_.empty();
   has_force_terms_ =
       !forces_.empty() || !force_curves_.empty() || !damping_curves_.empty() || !bristles_.empty();
@@ -173,23 +175,24 @@ inline double AxisPlant::held(const AxisPoint& at, double speed) const noexcept 
 double AxisPlant::push(const AxisPoint& at) const noexcept { return pushed(at); }
 double AxisPlant::hold(const AxisPoint& at, double speed) const noexcept { return held(at, speed); }
 
-inline double AxisPlant::moved_mass(const AxisPoint& at) const noexcept {
-  if (mass_curves_.empty()) return parameters_.mass;
+inline double AxisPlant::per_mass(const AxisPoint& at) const noexcept {
+  if (mass_curves_.empty()) return per_carriage_mass_;
   double mass = parameters_.mass;
   for (const auto& [term, code] : mass_curves_) mass += term->curve(variable(code, at));
   constexpr double least = 0.05;  // of the carriage stays, whatever is taken off
-  return std::max(mass, least * parameters_.mass);
+  // What comes and goes lies on the carriage; the part that swings keeps its mass.
+  return 1.0 / (std::max(mass, least * parameters_.mass) - parameters_.mass * mode_.share);
 }
 
-AxisPlant::Slope AxisPlant::slope(const State& s, double time, double direction, bool stuck) const noexcept {
+inline AxisPlant::Slope AxisPlant::slope(const State& s, double time, double direction,
+                                         bool stuck) const noexcept {
   const AxisPoint at{time, s.position, s.velocity, current_mean_, temperature_};
-  double force = push(at);
-  if (direction != 0.0) force -= direction * hold(at, std::abs(s.velocity));
+  double force = pushed(at);
+  if (direction != 0.0) force -= direction * held(at, std::abs(s.velocity));
   const double spring =
       mode_.stiffness * s.swing + mode_.damping * s.swing_speed;  // pulls the carriage along
-  // What comes and goes lies on the carriage; the part that swings keeps its mass.
-  const double carriage = stuck ? 0.0 : (force + spring) / (moved_mass(at) - parameters_.mass * mode_.share);
-  return {s.velocity, carriage, s.swing_speed, -spring / (parameters_.mass * mode_.share) - carriage};
+  const double carriage = stuck ? 0.0 : (force + spring) * per_mass(at);
+  return {s.velocity, carriage, s.swing_speed, -spring * per_swinging_mass_ - carriage};
 }
 
 /// The same step, number for number, of a carriage on which nothing swings: that is nearly always, and half the work.
@@ -200,7 +203,7 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
     const AxisPoint at{time, position, velocity, current_mean_, temperature_};
     double force = pushed(at);
     if (direction != 0.0) force -= direction * held(at, std::abs(velocity));
-    return force / moved_mass(at);
+    return force * per_mass(at);
   };
   const double half = 0.5 * h, middle = time_ + half;
   const double a = acceleration(s.position, s.velocity, time_);
@@ -210,8 +213,9 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
   const double c = acceleration(s.position + half * vb, vc, middle);
   const double vd = s.velocity + h * c;
   const double d = acceleration(s.position + h * vc, vd, time_ + h);
-  return {s.position + h * ((s.velocity + 2.0 * (vb + vc) + vd) / 6.0),
-          s.velocity + h * ((a + 2.0 * (b + c) + d) / 6.0), s.swing, s.swing_speed};
+  constexpr double sixth = 1.0 / 6.0;
+  return {s.position + h * ((s.velocity + 2.0 * (vb + vc) + vd) * sixth),
+          s.velocity + h * ((a + 2.0 * (b + c) + d) * sixth), s.swing, s.swing_speed};
 }
 
 AxisPlant::State AxisPlant::advanced_with_mode(const State& s, double h, double direction,
@@ -224,7 +228,9 @@ AxisPlant::State AxisPlant::advanced_with_mode(const State& s, double h, double 
   const auto b = slope(moved(a, 0.5 * h), time_ + 0.5 * h, direction, stuck);
   const auto c = slope(moved(b, 0.5 * h), time_ + 0.5 * h, direction, stuck);
   const auto d = slope(moved(c, h), time_ + h, direction, stuck);
-  const auto mean = [](double p, double q, double r, double w) { return (p + 2.0 * (q + r) + w) / 6.0; };
+  const auto mean = [](double p, double q, double r, double w) {
+    return (p + 2.0 * (q + r) + w) * (1.0 / 6.0);
+  };
   return moved({mean(a.velocity, b.velocity, c.velocity, d.velocity),
                 mean(a.acceleration, b.acceleration, c.acceleration, d.acceleration),
                 mean(a.swing_speed, b.swing_speed, c.swing_speed, d.swing_speed),

@@ -121,9 +121,9 @@ class AxisPlant {
   [[nodiscard]] State advanced(const State& s, double h, double direction, bool stuck) const noexcept;
   [[nodiscard]] State advanced_with_mode(const State& s, double h, double direction,
                                          bool stuck) const noexcept;
-  [[nodiscard]] double moved_mass(const AxisPoint& at) const noexcept;
-  void drive(double command, double dt) noexcept;  // one held command behind the delay
-  void move(double h) noexcept;                    // one sub-step with current_mean_
+  [[nodiscard]] double per_mass(const AxisPoint& at) const noexcept;  // acceleration of the carriage by force
+  void drive(double command, double dt) noexcept;                     // one held command behind the delay
+  void move(double h) noexcept;                                       // one sub-step with current_mean_
   [[nodiscard]] double delayed_position(double age) const noexcept;
 
   AxisParameters parameters_;
@@ -133,6 +133,7 @@ class AxisPlant {
   std::vector<const AxisTerm*> commands_, bristles_;
   std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_, mass_curves_,
       motor_curves_, reading_curves_;
+  double per_carriage_mass_ = 0.0, per_swinging_mass_ = 0.0;  // [1/kg]
   bool has_motor_terms_ = false, has_force_terms_ = false;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;
   const AxisTerm* play_ = nullptr;
