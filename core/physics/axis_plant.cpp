@@ -13,6 +13,8 @@ namespace invar::physics {
 
 namespace {
 
+constexpr double sixth = 1.0 / 6.0;  // of Runge and Kutta's mean
+
 enum Variable { position, velocity, time, current, temperature, acceleration };
 
 int code_of(const std::string& name) {
@@ -213,7 +215,6 @@ AxisPlant::State AxisPlant::advanced(const State& s, double h, double direction,
   const double c = acceleration(s.position + half * vb, vc, middle);
   const double vd = s.velocity + h * c;
   const double d = acceleration(s.position + h * vc, vd, time_ + h);
-  constexpr double sixth = 1.0 / 6.0;
   return {s.position + h * ((s.velocity + 2.0 * (vb + vc) + vd) * sixth),
           s.velocity + h * ((a + 2.0 * (b + c) + d) * sixth), s.swing, s.swing_speed};
 }
@@ -228,9 +229,7 @@ AxisPlant::State AxisPlant::advanced_with_mode(const State& s, double h, double 
   const auto b = slope(moved(a, 0.5 * h), time_ + 0.5 * h, direction, stuck);
   const auto c = slope(moved(b, 0.5 * h), time_ + 0.5 * h, direction, stuck);
   const auto d = slope(moved(c, h), time_ + h, direction, stuck);
-  const auto mean = [](double p, double q, double r, double w) {
-    return (p + 2.0 * (q + r) + w) * (1.0 / 6.0);
-  };
+  const auto mean = [](double p, double q, double r, double w) { return (p + 2.0 * (q + r) + w) * sixth; };
   return moved({mean(a.velocity, b.velocity, c.velocity, d.velocity),
                 mean(a.acceleration, b.acceleration, c.acceleration, d.acceleration),
                 mean(a.swing_speed, b.swing_speed, c.swing_speed, d.swing_speed),

@@ -15,6 +15,12 @@ namespace invar::diagnose {
 
 namespace {
 
+std::vector<double> power_of(const Spectrum& spectrum, std::size_t bins) {
+  std::vector<double> power(bins);
+  for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+  return power;
+}
+
 /// The level of a power spectrum about each bin of from..to - 1, whatever peaks stand there.
 std::vector<double> levels(const std::vector<double>& power, std::size_t from, std::size_t to) {
   std::vector<double> level(power.size(), 0.0);
@@ -182,8 +188,8 @@ std::vector<double> sensor_pitches(const Case& data, const Fit& fitted) {
     }
   const auto slow = long_pitches(grid, count, span);
   const auto spectrum = transform(std::move(grid), padded);
-  std::vector<double> power(bins), pitches;
-  for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+  const auto power = power_of(spectrum, bins);
+  std::vector<double> pitches;
   for (double k :
        peaks(power, 4, std::min<std::size_t>(bins - 2, static_cast<std::size_t>(4.0 * span / 1e-5)), 6))
     pitches.push_back(4.0 * span / k);
@@ -205,8 +211,7 @@ std::vector<double> pitches_along(const std::vector<std::vector<double>>& positi
       grid[std::min(bin, bins - 1)] += weights[r][i];
     }
   const auto spectrum = transform(std::move(grid), padded);
-  std::vector<double> power(bins);
-  for (std::size_t k = 0; k < bins; ++k) power[k] = std::norm(spectrum[k]);
+  const auto power = power_of(spectrum, bins);
   std::vector<double> pitches;
   // Bin k is k/4 periods over the travel; finer than a 400th of it or 20 um is no pitch.
   const double finest = std::max(least, span / 6000.0);
@@ -240,8 +245,7 @@ Lines lines_of(const std::vector<double>& time, std::vector<double> force,
     force[i] *=
         1.0 - std::cos(2.0 * std::numbers::pi * (static_cast<double>(i) + 0.5) / static_cast<double>(rows));
   const auto spectrum = transform(std::move(force), size);
-  std::vector<double> power(size / 2);
-  for (std::size_t k = 0; k < power.size(); ++k) power[k] = std::norm(spectrum[k]);
+  const auto power = power_of(spectrum, size / 2);
   const double hertz = 1.0 / (static_cast<double>(size) * period);
   const auto lines = peaks(power, 8, power.size(), 6);
   for (std::size_t k = 0; k < std::min<std::size_t>(3, lines.size()); ++k)
@@ -280,7 +284,7 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
            [&] { reading = pulse_responses(data, weighing, fitted.model, "measurement", 1e-7); }});
   const std::size_t recordings = data.recordings.size();
   std::vector<std::vector<double>> positions(recordings), forces(recordings), readings(recordings),
-      currents(recordings), motors(recordings);
+      motors(recordings);  // forces times currents
   in_parallel(2 * recordings, [&](std::size_t k) {
     const std::size_t r = k / 2;
     (k % 2 == 0 ? forces : readings)[r] = carried_back(data, fitted, k % 2 == 0 ? force : reading, r);
@@ -288,9 +292,9 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
   double low = 1e300, high = -1e300;
   for (std::size_t r = 0; r < recordings; ++r) {
     positions[r] = variable_values(data, r, "position");
-    currents[r] = variable_values(data, r, "current");
+    const auto current = variable_values(data, r, "current");
     for (double x : positions[r]) low = std::min(low, x), high = std::max(high, x);
-    for (std::size_t i = 0; i < forces[r].size(); ++i) motors[r].push_back(forces[r][i] * currents[r][i]);
+    for (std::size_t i = 0; i < forces[r].size(); ++i) motors[r].push_back(forces[r][i] * current[i]);
   }
   Periods periods;
   std::vector<Lines> lines(recordings);
@@ -302,9 +306,8 @@ Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitt
   if (span > 1e-5) {
     const double shortest =
         std::min(1e-3, 0.03 * span);  // of what pushes: magnets and balls of a small axis are small
-    const auto along = [&, low, span](std::vector<double>& pitches, const auto& weights, double least) {
-      jobs.emplace_back(
-          [&, low, span, least] { pitches = pitches_along(positions, weights, low, span, least); });
+    const auto along = [&](std::vector<double>& pitches, const auto& weights, double least) {
+      jobs.emplace_back([&, least] { pitches = pitches_along(positions, weights, low, span, least); });
     };
     along(periods.force_pitch, forces, shortest);
     along(periods.motor_pitch, motors, shortest);

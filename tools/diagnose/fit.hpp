@@ -54,6 +54,8 @@ Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
 Eigen::VectorXd filtered(const Case& data, const Weighing& weighing, const Eigen::VectorXd& differences);
 /// Each column through the filters of the weighing.
 Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns);
+/// Of all outputs of all recordings, one behind the other.
+Eigen::Index rows_of(const Case& data);
 /// measured - simulated of all recordings and outputs below one another; NaN where nothing was measured.
 Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated);
 

@@ -101,10 +101,7 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
     return static_cast<Eigen::Index>(beside ? run + run / group + 1 : run);
   };
   const Eigen::VectorXd alone = beside ? Eigen::VectorXd{} : differences(data, simulate(data, model));
-  Eigen::Index rows = 0;
-  for (const auto& recording : data.recordings)
-    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
-  Eigen::MatrixXd runs(rows, static_cast<Eigen::Index>(changed.size()));
+  Eigen::MatrixXd runs(rows_of(data), static_cast<Eigen::Index>(changed.size()));
   for_differences_of(data, changed, [&](std::size_t k, const Eigen::VectorXd& left) {
     runs.col(static_cast<Eigen::Index>(k)) = left;
   });

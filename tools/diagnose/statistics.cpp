@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 
 #include "core/numerics/robust.hpp"
@@ -82,46 +81,34 @@ Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::siz
 
 void whiten(const Whitening& filter, const std::vector<double>& r, const std::vector<bool>& present,
             double* out) {
-  const auto order = static_cast<std::ptrdiff_t>(filter.a.size()), rows = std::ssize(r);
-  std::vector<double> filled(r.size());
+  const auto order = std::ssize(filter.a), rows = std::ssize(r);
+  const Eigen::Map<const Eigen::ArrayXd> a{filter.a.data(), order}, read{r.data(), rows};
+  Eigen::Map<Eigen::ArrayXd> white{out, rows};
+  Eigen::ArrayXd known = Eigen::ArrayXd::Zero(rows);
+  white.setZero();
   for (std::ptrdiff_t begin = 0, end = 0; begin < rows; begin = end) {
     const bool is_present = present[static_cast<std::size_t>(begin)];
     end = std::find(present.begin() + begin, present.begin() + rows, !is_present) - present.begin();
-    const auto from = filled.begin() + begin;
     if (!is_present) {  // as the rows before foretell
-      for (std::ptrdiff_t i = begin; i < end; ++i) {
-        out[i] = 0.0;
-        for (std::ptrdiff_t j = 0; j < std::min(order, i); ++j)
-          filled[static_cast<std::size_t>(i)] +=
-              filter.a[static_cast<std::size_t>(j)] * filled[static_cast<std::size_t>(i - 1 - j)];
-      }
+      for (std::ptrdiff_t i = begin; i < end; ++i)
+        for (std::ptrdiff_t j = 0; j < std::min(order, i); ++j) known(i) += a(j) * known(i - 1 - j);
       continue;
     }
-    std::copy(r.begin() + begin, r.begin() + end, from);
-    std::copy(r.begin() + begin, r.begin() + end, out + begin);
+    known.segment(begin, end - begin) = white.segment(begin, end - begin) = read.segment(begin, end - begin);
     // Of zeros only zeros come: a column that acts in one window is looked at there.
-    const auto is_zero = [](double v) { return v == 0.0; };
-    const auto acts = std::find_if_not(filled.begin() + std::max<std::ptrdiff_t>(0, begin - order),
-                                       filled.begin() + end, is_zero) -
-                      filled.begin();
-    const auto last = std::find_if_not(std::reverse_iterator{filled.begin() + end},
-                                       std::reverse_iterator{filled.begin() + acts}, is_zero)
-                          .base() -
-                      filled.begin();
+    const auto acts = [&](std::ptrdiff_t i) { return known(i) != 0.0; };
+    std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, begin - order), last = end;
+    while (first < end && !acts(first)) ++first;
+    while (last > first && !acts(last - 1)) --last;
     // A sum of shifted copies, piece by piece while they are at hand, so that several rows are added at a time.
     constexpr std::ptrdiff_t piece = 512;
     const auto until = std::min(end, last + order);
-    for (auto a = std::max(begin, acts); a < until; a += piece) {
-      const auto b = std::min(until, a + piece);
-      Eigen::Map<Eigen::ArrayXd> white{out, rows};
-      const Eigen::Map<const Eigen::ArrayXd> known{filled.data(), rows};
-      for (std::ptrdiff_t j = 0; j < order; ++j) {
-        const auto first = std::max(a, j + 1);
-        if (first < b)
-          white.segment(first, b - first) -=
-              filter.a[static_cast<std::size_t>(j)] * known.segment(first - 1 - j, b - first);
-      }
-      white.segment(a, b - a) /= filter.sigma;
+    for (auto from = std::max(begin, first); from < until; from += piece) {
+      const auto to = std::min(until, from + piece);
+      for (std::ptrdiff_t j = 0; j < order; ++j)
+        if (const auto at = std::max(from, j + 1); at < to)
+          white.segment(at, to - at) -= a(j) * known.segment(at - 1 - j, to - at);
+      white.segment(from, to - from) /= filter.sigma;
     }
   }
 }

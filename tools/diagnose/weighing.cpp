@@ -55,11 +55,15 @@ Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated,
   return weighing;
 }
 
-Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated) {
+Eigen::Index rows_of(const Case& data) {
   Eigen::Index rows = 0;
   for (const auto& recording : data.recordings)
     rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
-  Eigen::VectorXd out(rows);
+  return rows;
+}
+
+Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated) {
+  Eigen::VectorXd out(rows_of(data));
   Eigen::Index at = 0;
   for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
     for (std::size_t o = 0; o < data.outputs.size(); ++o)

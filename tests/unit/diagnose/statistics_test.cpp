@@ -92,7 +92,6 @@ TEST(IndependentShare, IsThatOfAFirstOrderMemory) {
   }
 }
 
-}  // namespace
 // Gaps at the beginning, short and long, zeros before and behind, and more rows than are taken at a time.
 TEST(Whitening, IsTheRecursionWhateverIsMissing) {
   const Whitening filter{{0.5, -0.3, 0.2, 0.1}, 0.7};
@@ -112,4 +111,5 @@ TEST(Whitening, IsTheRecursionWhateverIsMissing) {
   }
 }
 
+}  // namespace
 }  // namespace invar::diagnose
