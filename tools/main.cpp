@@ -8,7 +8,9 @@
 #include "tools/live/commands.hpp"
 #include "tools/wrong_call.hpp"
 
-int main(int argc, char** argv) {
+namespace {
+
+int run(int argc, char** argv) {
   CLI::App program{
       "Invar: a component framework for industrial cells that must place things to the micrometre.", "invar"};
   program.require_subcommand(1);
@@ -61,4 +63,14 @@ int main(int argc, char** argv) {
     return 1;
   }
   return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const int status = run(argc, argv);
+  if (std::cout.flush()) return status;
+  // A full disk or a closed pipe: who reads the output must not take nothing for an answer.
+  std::cerr << "invar: standard output cannot be written; look for a full disk or a closed pipe\n";
+  return status == 0 ? 1 : status;
 }

@@ -27,7 +27,8 @@ struct RecordFile {
 RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed);
 
 /// Throws InputError where a time is missing or goes back: a simulation takes rows in order.
-void check_order(const physics::Record& record, const std::filesystem::path& file);
+void check_order(const physics::Model& model, const physics::Record& record,
+                 const std::filesystem::path& file);
 
 /// Time and outputs under the recording's column names, in the units that the inputs had, otherwise in SI.
 recording::Table to_table(const physics::Model& model, const RecordFile& inputs,

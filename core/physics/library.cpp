@@ -63,6 +63,8 @@ constexpr std::array unmodelled_infos{
     unnamed(Plant::equations, "output"),
 };
 
+constexpr TermInfo thermal_unmodelled_storage_info = unnamed(Plant::thermal, "storage");
+constexpr ThermalTermKind thermal_unmodelled_storage{.info = &thermal_unmodelled_storage_info};
 constexpr TermInfo axis_unmodelled_reading_info = unnamed(Plant::axis, "measurement");
 constexpr AxisTermKind axis_unmodelled_reading{.info = &axis_unmodelled_reading_info};
 constexpr AxisTermKind axis_unmodelled_force{.info = &unmodelled_infos[0]};
@@ -117,7 +119,8 @@ const TermInfo* find_term(Plant plant, std::string_view name) {
 }
 
 const TermInfo* unmodelled(Plant plant, std::string_view site) {
-  if (plant == Plant::axis && site == axis_unmodelled_reading_info.site) return &axis_unmodelled_reading_info;
+  for (const auto* info : {&axis_unmodelled_reading_info, &thermal_unmodelled_storage_info})
+    if (plant == info->plant && site == info->site) return info;
   const TermInfo* any = nullptr;
   for (const auto& info : unmodelled_infos) {
     if (info.plant != plant) continue;
@@ -138,6 +141,7 @@ const AxisTermKind* axis_kind(const TermInfo& info) {
 
 const ThermalTermKind* thermal_kind(const TermInfo& info) {
   if (&info == thermal_unmodelled_loss.info) return &thermal_unmodelled_loss;
+  if (&info == thermal_unmodelled_storage.info) return &thermal_unmodelled_storage;
   if (&info == thermal_unmodelled_source.info) return &thermal_unmodelled_source;
   for (const auto* kind : thermal_terms)
     if (kind->info == &info) return kind;

@@ -77,6 +77,7 @@ ThermalPlant::State ThermalPlant::slope(const State& state, double time,
                                         const ThermalInputs& inputs) const noexcept {
   State heat{};
   State received{};  // from heaters alone, for terms that go over the power
+  State stored{};    // [J/K] beside the nodes' own
   double ambient = inputs.ambient;
   for (const auto& term : terms_)
     if (term.kind->ambient != nullptr) ambient += term.kind->ambient(time, term.parameters.data());
@@ -105,7 +106,10 @@ ThermalPlant::State ThermalPlant::slope(const State& state, double time,
     }
     if (!term.curve.knots.empty()) {
       const double value = term.curve(variable(term.curve, at, received[term.node]));
-      heat[term.node] += term.kind->info->site == "loss" ? -value * (at.temperature - ambient) : value;
+      if (term.kind->info->site == "storage")
+        stored[term.node] += value;
+      else
+        heat[term.node] += term.kind->info->site == "loss" ? -value * (at.temperature - ambient) : value;
     }
   }
   State change{};
@@ -115,7 +119,9 @@ ThermalPlant::State ThermalPlant::slope(const State& state, double time,
     heat[hidden_[h]->node] -= flow;
     change[nodes_.size() + h] = flow / p[1];
   }
-  for (std::size_t i = 0; i < nodes_.size(); ++i) change[i] = heat[i] / nodes_[i].capacity;
+  constexpr double least = 0.1;  // of its capacity a node keeps, whatever is taken off
+  for (std::size_t i = 0; i < nodes_.size(); ++i)
+    change[i] = heat[i] / std::max(nodes_[i].capacity + stored[i], least * nodes_[i].capacity);
   return change;
 }
 

@@ -43,8 +43,8 @@ struct ThermalInputs {
 };
 
 /// The truth side of heater, slide and base: `world` steps one, `simulate` one for each recording. A term
-/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, elsewhere a heat [W]. Classical
-/// Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
+/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, at `storage` a capacity [J/K], elsewhere a heat
+/// [W]. Classical Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
 /// Repeatable bit for bit.
 class ThermalPlant {
  public:

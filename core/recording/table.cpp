@@ -106,7 +106,8 @@ std::optional<double> number(std::string_view cell) {
   if (error == std::errc{} && end == cell.data() + cell.size()) return value;
   std::string lower{cell};
   std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-  if (lower == "nan" || lower == "na" || lower == "null") return missing;
+  for (const std::string_view none : {"nan", "na", "n/a", "#n/a", "null", "1.#qnan", "1.#ind", "-1.#ind"})
+    if (lower == none) return missing;
   return std::nullopt;
 }
 

@@ -106,6 +106,25 @@ class Diagnose(unittest.TestCase):
         self.assertGreater(error[0], 0.1)
         self.assertLess(error[1], 0.013)
 
+    def test_no_file_that_is_read_is_written_over(self):
+        before = (self.folder / "run.csv").read_bytes()
+        (self.folder / "d").mkdir()
+        (self.folder / "d/patched.yaml").write_bytes((self.folder / "model.yaml").read_bytes())
+        for words, said in ((["simulate", "--model", "model.yaml", "--inputs", "run.csv", "--output", "./run.csv"], "--output: ./run.csv is a file that is read here"),
+                            (["diagnose", "--model", "d/patched.yaml", "--recording", "run.csv", "--out", "d"], "--out: d/patched.yaml is a file that is read here")):
+            done = call(self.folder, *words)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertEqual(len(done.stderr.splitlines()), 1, done.stderr)
+            self.assertIn(said, done.stderr)
+        self.assertEqual((self.folder / "run.csv").read_bytes(), before)
+        self.assertEqual([f.name for f in (self.folder / "d").iterdir()], ["patched.yaml"])
+
+    def test_what_nobody_can_read_is_no_success(self):
+        with open("/dev/full", "wb") as full:
+            done = subprocess.run([INVAR, "diagnose", "--example", "thermal"], cwd=self.folder, stdout=full, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("standard output cannot be written", done.stderr)
+
     def test_a_check_that_cannot_be_used_is_said_in_one_line_before_the_search(self):
         tank(self.folder / "other.csv", 60, 3, split=self.folder / "outputs.csv")
         (self.folder / "short.csv").write_text("t [s],warmth [V]\n0,1\n1,2\n")

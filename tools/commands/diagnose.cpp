@@ -21,6 +21,7 @@
 #include "tools/diagnose/report_folder.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/patience.hpp"
+#include "tools/other_file.hpp"
 
 namespace invar::tools {
 
@@ -84,6 +85,8 @@ int run(const Options& options) {
                          std::to_string(options.checks.size()),
                      "give one file of outputs for each --check, in the same order"};
   check_are_others(options);
+  for (const auto* name : {"patched.yaml", "retuned.yaml"})
+    expect_other_file("--out", options.out / name, {options.model});
   const auto yaml = config::Yaml::load(options.model);
   const auto model = model::read(yaml);
   yaml.finish();

@@ -6,6 +6,7 @@
 #include "core/model/record_file.hpp"
 #include "core/model/recording_file.hpp"
 #include "tools/command.hpp"
+#include "tools/other_file.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -35,11 +36,12 @@ void expect_numbers(const physics::Model& model, const physics::Record& inputs,
 }
 
 void simulate(const Options& options) {
+  expect_other_file("--output", options.output, {options.model, options.inputs});
   const auto model = model::load(options.model);
   const auto table = model::read_recording(options.inputs, model).front();
   auto inputs = model::to_record(table, model, false);
   inputs.record.turn = 0.06;  // one run may take its time
-  model::check_order(inputs.record, options.inputs);
+  model::check_order(model, inputs.record, options.inputs);
   physics::Outputs outputs;
   physics::prepare(model, inputs.record)->run(model, outputs);
   expect_numbers(model, inputs.record, outputs, options);

@@ -29,10 +29,12 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
     for (std::size_t t = given; t < without.model.terms.size(); ++t)
       possible = possible && (stands(data, without, t) || !stands(data, d.best, t < place ? t : t + 1));
     if (!possible) continue;
-    const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing);
+    const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing),
+                 counted = lead(data, d.best, without);
     // What makes the readings themselves lie farther off pleases the filters only.
-    if (gain > margin && lead(data, d.best, without) > 0.0 &&
-        (least_ratio(data, d.best, without) < 0.95 || gain > plainly * margin))
+    if (gain > margin && counted > 0.0 &&
+        (least_ratio(data, d.best, without) < 0.95 ||
+         gain > margins_of_a_further(data, gain, counted) * margin))
       continue;
     d.reject(std::string{removed.info->name}, "the others explain it without",
              d.best.evidence - without.evidence);
@@ -78,7 +80,8 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool ref
         Model model = d.best.model;
         model.terms[place] = rival;
         auto f = fit(data, d.weighing, model, data.model, 8, &d.best);
-        const double odds = advantage(data, d.weighing, f, d.best);
+        double odds = advantage(data, d.weighing, f, d.best);
+        if (odds > 0.0) odds = std::min(odds, lead(data, f, d.best));  // not what pleases the filters only
         if (odds > 0.5 && stands(data, f, place)) {  // better after all, beside the other terms
           kept.push_back(d.best.model.terms[place]);
           finding.alternatives.push_back({d.best.model.terms[place], -odds});

@@ -220,7 +220,8 @@ void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>
   }
 }
 
-std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name) {
+std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name,
+                                    const std::string& node) {
   const auto& r = data.recordings[recording];
   if (name == "time") return r.inputs.time;
   if (const auto* values = r.inputs.find(name);
@@ -231,7 +232,8 @@ std::vector<double> variable_values(const Case& data, std::size_t recording, con
       if (data.outputs[o] == signal) return physics::bridged(r.inputs.time, r.measured[o]);
     return std::vector<double>{};
   };
-  if (data.model.plant == Plant::thermal && name == "temperature") return measured(data.outputs.front());
+  if (data.model.plant == Plant::thermal && name == "temperature")
+    return measured(node.empty() ? data.outputs.front() : node);
   if (name == "velocity" || name == "acceleration") {
     auto values =
         data.model.plant == Plant::sensor ? physics::bridged(r.inputs.time, *r.inputs.find("true_position"))
@@ -411,6 +413,22 @@ double missing_force(const Case& data, const Fit& fitted) {
 
 }  // namespace
 
+namespace {
+
+/// Between which values a signal goes, without its rarest; the same twice where nothing is known of it.
+std::pair<double, double> span_of(const Case& data, const std::string& name, const std::string& node) {
+  std::vector<double> all;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto values = variable_values(data, r, name, node);
+    all.insert(all.end(), values.begin(), values.end());
+  }
+  if (all.empty()) return {0.0, 0.0};
+  std::sort(all.begin(), all.end());
+  return {all[all.size() / 500], all[all.size() - 1 - all.size() / 500]};
+}
+
+}  // namespace
+
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   if (data.model.plant == Plant::equations) return equation_curves(data, fitted.model);
   struct Choice {
@@ -433,16 +451,24 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "velocity", 12},
                  {"force", "time", 12},
                  {"force", "time", 8, "acceleration"},  // what is picked up and put down
+                 {"force", "time", 8, "direction"},     // what wears or runs dry
+                 {"force", "time", 8, "velocity"},
                  {"force", "temperature", 6},
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
+                 {"actuator", "velocity", 9},
+                 {"actuator", "position", 11},
+                 {"actuator", "time", 8},
                  {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:
-      choices = {{"loss", "temperature", 6}, {"loss", "time", 12},   {"source", "time", 12},
-                 {"loss", "speed", 5},       {"source", "power", 6}, {"source", "motor_current", 5}};
+      choices = {{"loss", "temperature", 6},     {"loss", "ambient", 5},
+                 {"storage", "temperature", 12},  // what melts takes heat at one temperature
+                 {"loss", "time", 12},           {"source", "time", 12},
+                 {"loss", "speed", 5},           {"source", "power", 6},
+                 {"source", "motor_current", 5}};
       break;
     case Plant::error_map:
       choices = {{"kinematic", "position", 12},  {"kinematic", "time", 14},
@@ -471,20 +497,13 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   for (const auto& choice : choices) {
     const std::string_view with = choice.with;
     if (has_law && (with == "direction" || with == "velocity")) continue;
-    std::vector<double> all;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      const auto values = variable_values(data, r, choice.over);
-      all.insert(all.end(), values.begin(), values.end());
-    }
-    if (all.empty()) continue;
-    std::sort(all.begin(), all.end());
-    const double low = all[all.size() / 500], high = all[all.size() - 1 - all.size() / 500];
-    if (!(high - low > 1e-9 * (std::abs(high) + std::abs(low)))) continue;
     std::vector<std::string> on{""};
     if (data.model.plant == Plant::thermal) on = data.model.thermal.nodes;
     if (data.model.plant == Plant::droplet || data.model.plant == Plant::sensor) on = data.outputs;
     const bool beside_rest = data.model.plant == Plant::sensor && std::string_view{choice.over} == "velocity";
     for (const auto& place : on) {
+      const auto [low, high] = span_of(data, choice.over, data.model.plant == Plant::thermal ? place : "");
+      if (!(high - low > 1e-9 * (std::abs(high) + std::abs(low)))) continue;
       Start start;
       start.term.info = physics::unmodelled(data.model.plant, choice.site);
       start.term.on = place;
@@ -506,6 +525,8 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       if (start.term.curve.usual > 0.0) start.step = start.term.curve.usual;
       if (data.model.plant == Plant::axis && start.term.info->site == "force")
         start.step = std::min(0.05, small_force(data, fitted.model));
+      if (start.term.info->site == "storage")
+        start.step = 1e-3 * fitted.model.value(place + ".capacity", 1.0);
       if (!start.term.with.empty())
         start.step = 0.1 * missing_force(data, fitted) /
                      (start.term.with == "direction" ? 1.0 : usual(data, start.term.with));

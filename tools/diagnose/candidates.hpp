@@ -57,7 +57,9 @@ std::vector<double> long_pitches(const std::vector<double>& sums, const std::vec
 std::vector<double> sensor_pitches(const Case& data, const Fit& fitted);
 Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted);
 
-/// Rows of one signal over all recordings, as the model sees them (positions measured, velocities differentiated).
-std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name);
+/// Rows of one signal, as the model sees them (positions measured, velocities differentiated). `node`: whose temperature;
+/// empty: of the first.
+std::vector<double> variable_values(const Case& data, std::size_t recording, const std::string& name,
+                                    const std::string& node = "");
 
 }  // namespace invar::diagnose

@@ -9,6 +9,7 @@
 #include "core/model/recording_file.hpp"
 #include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
+#include "tools/diagnose/lone_inputs.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
 #include "tools/report/page.hpp"
@@ -86,6 +87,28 @@ void give_start_of_sum(const Case& data, Recording& recording) {
   inputs.signals["current"].front() = current[0];
 }
 
+/// Heat is slow: the straight line through the first rows (Theil and Sen's: one slip among them moves it little), at the first
+/// of them, and what of the noise of one row is left in it. Nothing where too few were read.
+std::optional<std::pair<double, double>> line_at_first(const std::vector<double>& time,
+                                                       const std::vector<double>& values) {
+  constexpr std::size_t most = 8, enough = 5;
+  std::vector<std::pair<double, double>> rows;
+  for (std::size_t i = 0; i < std::min(most, values.size()); ++i)
+    if (std::isfinite(values[i])) rows.emplace_back(time[i] - time[0], values[i]);
+  if (rows.size() < enough) return std::nullopt;
+  std::vector<double> slopes, levels;
+  double t = 0.0, tt = 0.0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    t += rows[i].first, tt += rows[i].first * rows[i].first;
+    for (std::size_t k = 0; k < i; ++k)
+      slopes.push_back((rows[i].second - rows[k].second) / (rows[i].first - rows[k].first));
+  }
+  const double slope = median(slopes);
+  for (const auto& [after, value] : rows) levels.push_back(value - slope * after);
+  const double n = static_cast<double>(rows.size());
+  return std::pair{median(levels), std::sqrt(tt / (n * tt - t * t))};
+}
+
 /// The initial state, where the first rows contradict the one that the model starts from.
 void give_start(Case& data, Recording& recording) {
   using physics::Plant;
@@ -96,13 +119,17 @@ void give_start(Case& data, Recording& recording) {
     double begin = nothing;
     for (std::size_t i = 0; i < std::min<std::size_t>(2, inputs.rows()) && !std::isfinite(begin); ++i)
       begin = recording.measured[o][i];
-    const double spread = 1.5 * spread_of_differences(recording.measured[o]);
+    double spread = 1.5 * spread_of_differences(recording.measured[o]);
     double expected = nothing, doubt = 0.0;
     if (data.model.plant == Plant::thermal) {
       const auto* ambient = inputs.find("ambient");
       expected = ambient != nullptr ? ambient->front() : data.model.value("ambient", 20.0);
       if (ambient == nullptr && data.model.find("ambient")->sigma) doubt = *data.model.find("ambient")->sigma;
-      doubt += 0.1;
+      if (ambient != nullptr) doubt = 1.5 * spread_of_differences(*ambient);
+      if (const auto line = line_at_first(inputs.time, recording.measured[o])) {
+        begin = line->first;
+        spread *= line->second;
+      }
     } else if (data.model.plant == Plant::axis && name == "position") {
       const auto* reference = inputs.find("reference");
       expected = data.model.controller && reference != nullptr ? reference->front() : 0.0;
@@ -271,7 +298,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   }
   data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
-    if (const auto noise = model.noise.find(name); noise != model.noise.end())
+    if (const auto noise = model.noise.find(name); noise != model.noise.end() && noise->second > 0.0)
       data.given_noise[static_cast<std::size_t>(&name - data.outputs.data())] =
           noise->second * content.units.at(name).factor;
   auto record = std::move(content.record);
@@ -291,6 +318,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
   check_ticks(model, record.time, table.file);
+  data.count.lone_inputs += drop_lone_inputs(model, record);
   const std::size_t ordered = record.rows();
   std::size_t looked_at = 0;
   auto parts = without_pauses(model, std::move(record));

@@ -16,6 +16,7 @@ namespace invar::diagnose {
 
 struct DataCount {
   std::size_t rows = 0, used = 0, missing = 0, outliers = 0, duplicates = 0, out_of_order = 0, gaps = 0;
+  std::size_t lone_inputs = 0;     // numbers of inputs that the machine did not feel
   std::size_t shortened = 0;       // rows of long recordings that are not run through
   std::size_t left_to_chance = 0;  // rows in which noise decides when a carriage sticks and slips
   std::size_t before_standstill = 0, behind_rest = 0;  // rows of a cell's recording that were not taken

@@ -75,9 +75,6 @@ struct Followed {
   double rank = -1e300;
 };
 
-/// Of the evidence under the filters, what counts in independent rows where no noise that wanders is left.
-constexpr double white = 0.7;
-
 /// A wave was looked for at many frequencies.
 bool is_sought(const physics::Term& term) { return term.info->index_of("phase") < physics::most_parameters; }
 
@@ -104,7 +101,7 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   const double counted = lead(data, with, without);
   if (const double least = std::min(evidence, counted);
       options.refuses && gain < 2.0 * margin && least > 2.0 * margin &&
-      (counted > white * evidence || goes_with_recording(data, with, without)))
+      (is_white(evidence, counted) || goes_with_recording(data, with, without)))
     gain = least;
   // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
   // not, where the noise is loud at other frequencies, if it pays when counted in independent rows; nor in a loop, where
@@ -112,7 +109,7 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   const double ratio = !options.refuses ? 1.0 : is_first ? 0.995 : 0.95;
   const double beyond = is_sought(with.model.terms.back()) ? 2.0 : 1.1;
   const bool pays = is_first ? counted > claim_margin || (noise.is_fed_back() && gain > beyond * margin)
-                             : gain > plainly * margin;
+                             : gain > margins_of_a_further(data, evidence, counted) * margin;
   const bool shows = pays || least_ratio(data, with, without) < ratio;
   if (!shows || (options.refuses && !stands(data, with, with.model.terms.size() - 1))) return {};
   // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.

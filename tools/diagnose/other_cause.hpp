@@ -26,6 +26,11 @@ double lead(const Case& data, const Fit& one, const Fit& other);
 /// more of it than independent rows give.
 double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
 
+/// Of the evidence under the filters most counts in independent rows too: no noise that wanders is left.
+inline bool is_white(double evidence, double counted) { return counted > 0.7 * evidence; }
+/// So many times the margin a further claim must gain that hardly moves the size of the residual.
+double margins_of_a_further(const Case& data, double evidence, double counted);
+
 /// A model with every row counted alike, and what free courses would gain beside it, best first; three carry their columns.
 struct Beside {
   Weighing plain;

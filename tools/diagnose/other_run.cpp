@@ -81,7 +81,7 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
   const bool has_own = !files.outputs.empty();
   const auto table = model::read_recording(files.inputs, model).front();
   run.inputs = model::to_record(table, model, !has_own).record;
-  model::check_order(run.inputs, files.inputs);
+  model::check_order(model, run.inputs, files.inputs);
   auto compared = table;
   if (has_own) {
     const auto own = recording::Table::read(files.outputs);

@@ -183,17 +183,18 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   for (const auto& recording : data.recordings)
     for (std::size_t i = 0; i < recording.inputs.rows(); ++i)
       used += std::isfinite(recording.measured.front()[i]) ? 1U : 0U;
-  report["data"] = {
-      {"rows", data.count.rows},
-      {"used", used},
-      {"dropped",
-       {{"nan", data.count.missing}, {"outlier", data.count.outliers}, {"duplicate", data.count.duplicates}}},
-      {"reordered", data.count.out_of_order},
-      {"gaps", data.count.gaps},
-      {"before_standstill", data.count.before_standstill},
-      {"behind_rest", data.count.behind_rest},
-      {"not_run_through", data.count.shortened},
-      {"left_to_chance", data.count.left_to_chance}};
+  report["data"] = {{"rows", data.count.rows},
+                    {"used", used},
+                    {"dropped",
+                     {{"nan", data.count.missing},
+                      {"outlier", data.count.outliers + data.count.lone_inputs},
+                      {"duplicate", data.count.duplicates}}},
+                    {"reordered", data.count.out_of_order},
+                    {"gaps", data.count.gaps},
+                    {"before_standstill", data.count.before_standstill},
+                    {"behind_rest", data.count.behind_rest},
+                    {"not_run_through", data.count.shortened},
+                    {"left_to_chance", data.count.left_to_chance}};
   if (const auto part = what_was_looked_at(data); !part.empty()) report["data"]["looked_at"] = part;
   report["patched_model"] = "patched.yaml";
   return report.dump(2, ' ', false, json::error_handler_t::replace);

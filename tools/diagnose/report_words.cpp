@@ -97,7 +97,7 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
         return term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N";
       return term.info->site == "measurement" ? "m" : "1";
     case Plant::thermal:
-      return term.info->site == "loss" ? "W/K" : "W";
+      return term.info->site == "loss" ? "W/K" : term.info->site == "storage" ? "J/K" : "W";
     case Plant::error_map:
     case Plant::droplet:
       return "m";
@@ -162,11 +162,11 @@ std::string place_of(const Case& data, const physics::Term& term) {
                                     Words{"thermal.source", "heat source"},
                                     Words{"error_map.kinematic", "guideway and scale"},
                                     Words{"error_map.thermal", "thermal growth"},
-                                    Words{"error_map.measurement", "the instrument that measured the error"},
+                                    Words{"error_map.measurement", "instrument that measured the error"},
                                     Words{"droplet.flight", "flight of the droplet"},
                                     Words{"droplet.valve", "valve"},
                                     Words{"droplet.camera", "camera"},
-                                    Words{"sensor.measurement", "the instrument"}};
+                                    Words{"sensor.measurement", "instrument"}};
   const auto site = site_of(data, term);
   if (data.model.plant == physics::Plant::equations) {
     for (const auto& input : data.model.equations.inputs)
@@ -238,6 +238,11 @@ std::string what_was_looked_at(const Case& data) {
         (cut.empty() ? "" : "; ") +
         std::string{"the inputs as recorded carry noise that the machine did not feel: their median over "} +
         std::to_string(data.quiet_rows) + " rows stands in their place";
+  if (const auto lone = data.count.lone_inputs; lone > 0)
+    cut += (cut.empty() ? "" : "; ") +
+           (lone == 1 ? std::string{"one number"} : std::to_string(lone) + " numbers") +
+           " of the inputs far beyond all others, which the machine did not feel, " +
+           (lone == 1 ? "is" : "are") + " left out";
   for (const auto& one : data.taken_in_si)
     cut += (cut.empty() ? "`" : "; `") + one.column + "` in " + one.unit + " is taken in SI, times " +
            report::number(one.factor, 4);

@@ -67,8 +67,7 @@ bool goes_another_way(const Case& data, const Fit& fit) {
 
 /// Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
 Verdict unless_stopped(const Diagnosis& d) {
-  const bool says_nothing = d.verdict == Verdict::no_mismatch || d.verdict == Verdict::parameters_only;
-  return d.is_partial && says_nothing ? Verdict::ambiguous : d.verdict;
+  return d.is_partial && d.findings.empty() ? Verdict::ambiguous : d.verdict;
 }
 
 class Search {
@@ -117,6 +116,11 @@ class Search {
   void finish();
   /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
   void try_pairs(const Diagnosis& begun);
+  /// Where names lead the user's numbers far astray: begins anew with one that is sought from what he believes.
+  void try_believed(const Diagnosis& begun);
+  /// Begins anew with what `start` claims, goes on from round `next` and keeps what is `better` than before.
+  template <class Start, class Better>
+  void begin_anew(const Diagnosis& begun, int next, Start start, Better better);
   /// What is said where the machine's controller is another than the model's: nothing of what lies behind it.
   void stop_at_the_law();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew. The share of rows that it leaves to
@@ -281,11 +285,10 @@ bool Search::add_named(double round) {
                                                 lead(data_, other.best->with, sought.best->with) > 0.0)
         sought = std::move(other);
     };
-    if (is_first && is_equations()) {
-      // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first.
-      if (from == From::coloured) rather(From::plain);
-      if (excursion_of(sought.best->with) > far_astray) rather(From::believed);
-    }
+    // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first.
+    if (is_first && data_.is_time_series && !noise_->is_fed_back() && from == From::coloured)
+      rather(From::plain);
+    if (is_first && is_equations() && excursion_of(sought.best->with) > far_astray) rather(From::believed);
     const auto& best = *sought.best;
     if (is_first && is_equations() && leads_out(best)) return add_named(round);
     if (const auto why = why_not(best)) {
@@ -463,36 +466,61 @@ void Search::finish() {
   conclude(data_, d_);
 }
 
-void Search::try_pairs(const Diagnosis& begun) {
-  const bool has_rest = d_.verdict == Verdict::unknown_physics || d_.verdict == Verdict::partly_explained ||
-                        (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
-  if (!has_rest || !options_.refuses || stopped()) return;
-  auto single = std::exchange(d_, begun);
+template <class Start, class Better>
+void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better better) {
+  auto before = std::exchange(d_, begun);
   auto readings = noise_->put_back();
   const auto screened = std::exchange(last_screen_, {});
   rivals_.clear();
   beside_.reset();
   data_.stopped = options_.stopped;
-  if (take([&] { return add_pair(&single.best); })) {
-    name(2);
+  if (take([&] { return start(before); })) {
+    name(next);
     finish();
   }
   data_.stopped = {};
-  auto of_pair = noise_->put_back();
-  if (d_.findings.size() < 2 || d_.is_unnamed || lead(data_, d_.best, single.best) < claim_margin) {
-    single.is_partial = single.is_partial || stopped();
-    d_ = std::move(single);
+  auto anew = noise_->put_back();
+  if (!better(before)) {
+    before.is_partial = before.is_partial || stopped();
+    d_ = std::move(before);
     noise_->put(std::move(readings));
     return;
   }
-  noise_->put(std::move(of_pair));
-  for (const auto& r : single.rejected) d_.reject(r.term, r.why, r.gain);
+  noise_->put(std::move(anew));
+  for (const auto& r : before.rejected) d_.reject(r.term, r.why, r.gain);
   std::erase_if(d_.rejected, [&](const Rejection& r) {
     return std::any_of(d_.findings.begin(), d_.findings.end(),
                        [&](const Finding& f) { return f.term.info->name == r.term; });
   });
   d_.detectable.clear();
   smallest_effects(data_, screened, d_);
+}
+
+void Search::try_pairs(const Diagnosis& begun) {
+  const bool has_rest = d_.verdict == Verdict::unknown_physics || d_.verdict == Verdict::partly_explained ||
+                        (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
+  if (!has_rest || !options_.refuses || stopped()) return;
+  begin_anew(
+      begun, 2, [&](const Diagnosis& single) { return add_pair(&single.best); },
+      [&](const Diagnosis& single) {
+        return d_.findings.size() >= 2 && !d_.is_unnamed && lead(data_, d_.best, single.best) >= claim_margin;
+      });
+}
+
+void Search::try_believed(const Diagnosis& begun) {
+  if (!(d_.parameter_excursion > far_astray) || !options_.refuses || stopped()) return;
+  begin_anew(
+      begun, 1,
+      [&](const Diagnosis&) {
+        auto sought = seek(From::believed, 0.9);
+        if (!sought.best || sought.best->gain < margin()) return false;
+        claim(std::move(sought));
+        return true;
+      },
+      [&](const Diagnosis& astray) {
+        return !d_.findings.empty() && !(d_.parameter_excursion > far_astray) &&
+               lead(data_, d_.best, astray.best) > -claim_margin;
+      });
 }
 
 void Search::stop_at_the_law() {
@@ -529,7 +557,7 @@ Diagnosis Search::run() {
   const bool paired = is_equations() && take([&] { return add_pair(); });
   name(!paired ? 0 : take([&] { return put_one_in_place(begun); }) ? 1 : 2);
   finish();
-  if (!is_equations()) try_pairs(begun);
+  is_equations() ? try_believed(begun) : try_pairs(begun);
   if (options_.refuses && !d_.is_partial) {
     const auto stated = d_;
     if (set_aside(data_, d_)) {

@@ -30,7 +30,8 @@ void sharpen(const Case& data, Curved& found) {
     if (std::abs(curve.values[k] - level) > 0.3 * top) first = std::min(first, k), last = k;
   if (first > last || (last - first + 3) * 2 > curve.knots.size()) return;
   const double spacing = curve.knots[1] - curve.knots[0];
-  const double low = curve.knots[first] - 1.2 * spacing, high = curve.knots[last] + 1.2 * spacing;
+  const double low = std::max(curve.knots.front(), curve.knots[first] - 1.2 * spacing),
+               high = std::min(curve.knots.back(), curve.knots[last] + 1.2 * spacing);
   Model model = curved.model;
   auto& fine = model.terms.back().curve;
   fine.knots.clear(), fine.values.clear();
@@ -62,6 +63,15 @@ Fit load_or_motor(const Case& data, const Weighing& weighing, Fit load) {
   for (double& value : motor.curve.values) value /= -model.value("mass", 1.0);
   auto faded = fit(data, weighing, model, data.model, 5);
   return faded.evidence > load.evidence ? faded : load;
+}
+
+/// Does every output lie within the noise that the user gave?
+bool is_within_noise(const Case& data, const Fit& fit) {
+  const auto left =
+      squares_left(data, simulate(data, fit.model), weigh(data, simulate(data, fit.model), false));
+  for (std::size_t o = 0; o < left.size(); ++o)
+    if (!(left[o].rms() <= data.given_noise[o])) return false;
+  return true;
 }
 
 /// Would an engineer see it in the residual, or does it pay when counted in independent rows?
@@ -99,6 +109,7 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
     // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
     // takes any is what such noise does.
     if (may_wander) {
+      if (is_within_noise(data, under_plain)) continue;
       const double left = least_ratio(data, rough, under_plain);
       if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
     }

@@ -82,11 +82,14 @@ bool set_aside(const Case& data, Diagnosis& d) {
   return true;
 }
 
-void leave_unsaid(Diagnosis& d, const std::vector<double>& rests) {
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
-    if (!finding.term.curve.knots.empty() || finding.probability >= (rests[i] > plain_rest ? 0.3 : 0.1))
-      continue;
+    // Of the user's own equations a number may be far off: what he left out there is often a part of it.
+    const bool is_astray =
+        d.parameter_excursion > far_astray && finding.term.info->plant != physics::Plant::equations;
+    const double least = is_far || is_astray || rests[i] > plain_rest ? 0.3 : 0.1;
+    if (!finding.term.curve.knots.empty() || finding.probability >= least) continue;
     finding.stand_in = finding.term.info;
     finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
     finding.probability = 1.0 - finding.probability;

@@ -18,8 +18,9 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside);
 /// False: nothing changed.
 bool set_aside(const Case& data, Diagnosis& d);
 
-/// Leaves the name of what is nine times as likely another cause away, and of what by the rest beside it (a share, by
-/// finding) is unlikely: residuals far from the noise that the user gave show that it is not the whole truth.
-void leave_unsaid(Diagnosis& d, const std::vector<double>& rests);
+/// Leaves the name of what is nine times as likely another cause away. What is so in seven cases of ten goes as well where
+/// residuals far from the noise show that it is not the whole truth (`rests`, a share by finding; `is_far`,
+/// of the outputs), or where the names lead the numbers of a built-in plant far astray.
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far);
 
 }  // namespace invar::diagnose

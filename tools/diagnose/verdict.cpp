@@ -270,7 +270,14 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  leave_unsaid(d, rests);
+  double sum = 0.0;
+  for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
+  d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
+  constexpr double far_above = 0.5;  // of the power of the noise that the user gave
+  constexpr double times_the_noise = 3.0;
+  leave_unsaid(d, rests,
+               *std::max_element(excess.begin(), excess.end()) > far_above ||
+                   (data.model.plant == physics::Plant::equations && d.unexplained > times_the_noise));
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
                                          [](const Finding& f) { return f.stand_in != nullptr; });
@@ -296,9 +303,6 @@ void conclude(const Case& data, Diagnosis& d) {
                     ? Verdict::partly_explained
                     : Verdict::explained;
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);
-  double sum = 0.0;
-  for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
-  d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
   // An equation, or a window of an axis, that says the right thing leaves noise. Many times that, and with what was
   // recorded, is more physics, however much was found.
   if ((data.model.plant == physics::Plant::equations || data.windows.count > 0) &&

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <random>
 
+#include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
+#include "tools/diagnose/unsure.hpp"
 
 namespace invar::diagnose {
 namespace {
@@ -84,6 +86,81 @@ TEST(Astray, ALateRoadIsFoundThoughTheRetunedCarHasNoSpringLeft) {
     EXPECT_LT(d.parameter_excursion, 3.0) << seed;
     EXPECT_LT(d.retuned.model.value("ks"), 14000.0) << seed;  // astray indeed
   }
+}
+
+/// A pendulum that a torque drives which comes late, with dry friction in its bearing; small steps of Verlet's rule.
+Case late_pendulum(unsigned seed, double lag, double dry) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> even{-1.0, 1.0};
+  std::vector<double> time, torque, angle;
+  std::array<double, 3> phase{};
+  for (double& p : phase) p = 3.0 * even(random);
+  double th = 0.0, om = 0.0, felt = 0.0;
+  for (int k = 0; k < 3000; ++k) {
+    const double t = 0.03 * k, level = 0.5 * std::sin(0.37 * t + phase[0]) +
+                                       0.45 * std::sin(1.05 * t + phase[1]) +
+                                       0.35 * std::sin(2.6 * t + phase[2]);
+    time.push_back(t), torque.push_back(level), angle.push_back(th + 0.003 * normal(random));
+    for (int part = 0; part < 60; ++part) {
+      constexpr double h = 0.03 / 60.0;
+      felt += -std::expm1(-h / lag) * (level - felt);
+      th += 0.5 * h * om;
+      const double pull = 4.8 * felt - 15.2 * std::sin(th), freely = (om + h * pull) / (1.0 + 0.93 * h);
+      om = std::copysign(std::max(0.0, std::abs(freely) - h * dry), freely);
+      th += 0.5 * h * om;
+    }
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("torque", "1", torque);
+  table.add("angle", "rad", angle);
+  return make_case(
+      test::model_of(
+          "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: torque}\nstates:\n"
+          "  th: {derivative: om, initial: {value: 0, unit: rad, sigma: 0}}\n"
+          "  om: {derivative: 'ku*u - g*sin(th) - d*om', initial: {value: 0, unit: rad/s, sigma: 0}}\n"
+          "outputs: {angle: {column: angle, expression: th}}\nparameters:\n"
+          "  g: {value: 15.2, unit: 1/s2, sigma: 0.3}\n  d: {value: 0.93, unit: 1/s, sigma: 0.15}\n"
+          "  ku: {value: 4.8, unit: 1/s2, sigma: 0.1}\nnoise: {angle: 0.003}\n"),
+      {table});
+}
+
+/// Alone a lag of the speed, with another length and eight times the damping, does better than a late torque.
+TEST(Astray, ALateTorqueBesideFrictionIsFoundFromWhatIsBelieved) {
+  for (const auto& [lag, dry] : {std::pair{0.8, 0.17}, {0.4, 0.4}}) {
+    auto data = late_pendulum(1, lag, dry);
+    const auto d = search(data, [](double, const std::string&) {});
+    EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
+    ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
+    for (const auto& finding : d.findings) {
+      const bool is_lag = finding.term.info->name == "lag";
+      EXPECT_TRUE(is_lag || finding.term.info->name == "dry_friction");
+      EXPECT_NEAR(finding.term.values[0], is_lag ? lag : dry, 0.02 * (is_lag ? lag : dry));
+    }
+    EXPECT_LT(d.parameter_excursion, 3.0);
+  }
+}
+
+TEST(Astray, ANameThatIsUnlikelyIsNotSaidWhereTheNumbersWentFar) {
+  const auto told = [](physics::Plant plant, const char* name, double probability, double excursion,
+                       double rest, bool is_far) {
+    Diagnosis d;
+    auto& finding = d.findings.emplace_back();
+    finding.term.info = physics::find_term(plant, name);
+    finding.probability = probability;
+    d.parameter_excursion = excursion;
+    leave_unsaid(d, {rest}, is_far);
+    return d.findings[0].term.info->name != "unmodelled";
+  };
+  using physics::Plant;
+  EXPECT_TRUE(told(Plant::equations, "coupling", 0.2, 2.0, 0.0, false));
+  EXPECT_FALSE(told(Plant::equations, "coupling", 0.05, 2.0, 0.0, false));
+  EXPECT_TRUE(told(Plant::equations, "coupling", 0.2, 20.0, 0.0, false));
+  EXPECT_FALSE(told(Plant::equations, "coupling", 0.2, 2.0, 0.2, false));
+  EXPECT_FALSE(told(Plant::equations, "coupling", 0.2, 2.0, 0.0, true));
+  EXPECT_FALSE(told(Plant::error_map, "thermal_expansion", 0.2, 20.0, 0.0, false));
+  EXPECT_TRUE(told(Plant::error_map, "thermal_expansion", 0.4, 20.0, 0.2, true));
 }
 
 }  // namespace

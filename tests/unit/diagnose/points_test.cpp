@@ -225,6 +225,35 @@ TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
   EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
 }
 
+TEST(Instruments, ABiasBesideADroopAreTwoNames) {
+  // The droop alone hardly shows beside the bias: the gain may take most of it.
+  std::mt19937 random{24};
+  std::normal_distribution<double> reading{0.0, 9e-4};
+  std::vector<double> time, position, velocity;
+  for (int k = 0; k < 5300; ++k) {
+    const double t = 2e-3 * k, v = 0.0225 * std::sin(3.1 * t) * std::cos(0.7 * t);
+    time.push_back(t);
+    position.push_back(position.empty() ? 0.0 : position.back() + 2e-3 * v);
+    velocity.push_back(v / (1.0 + 2.5 * std::abs(v)) + 2.7e-4 + reading(random));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("x", "m", position);
+  table.add("v", "m/s", velocity);
+  auto data = make_case(
+      test::model_of(
+          "invar_model: 1\nplant: sensor\ncolumns: {time: t, true_position: x, velocity_sensor: v}\n"
+          "parameters: {resolution: {value: 1e-6, unit: m, sigma: 0}, gain: {value: 1, sigma: "
+          "0.005}}\nterms: []\n"),
+      {table});
+  const auto d = search(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "bias");
+  EXPECT_EQ(d.findings[1].term.info->name, "gain_droop");
+  EXPECT_NEAR(d.findings[0].term.values[0], 2.7e-4, 5e-5);
+  EXPECT_NEAR(d.findings[1].term.values[0], 2.4, 0.6);
+}
+
 /// A scale that reads in steps [m] beside a reference.
 Case scale_beside(const std::vector<double>& time, const std::vector<double>& position,
                   const std::vector<double>& shown, double step) {

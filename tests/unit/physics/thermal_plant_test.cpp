@@ -30,6 +30,17 @@ TEST(ThermalPlant, AHiddenNodeTakesItsShareOfTheHeatAndLosesNone) {
   EXPECT_NEAR(plant.temperature(0), 20.0 + 8000.0 / 800.0, 1e-6);
 }
 
+TEST(ThermalPlant, WhatIsStoredBesideTakesItsShareOnTheWay) {
+  // Without loss the heat given is the integral of all that stores: 500 J/K and 0 to 200 J/K from 20 to 40 degC.
+  ThermalTerm melts{thermal_kind(*unmodelled(Plant::thermal, "storage")), {}, 0, 0, {}};
+  melts.curve = {.over = "temperature", .knots = {20.0, 40.0}, .values = {0.0, 200.0}};
+  ThermalPlant plant{{{500.0, 0.0}}, {{0, 1.0}}, {}, {melts}};
+  const double power = 60.0;
+  for (int i = 0; i < 100; ++i) plant.step({{&power, 1}, 20.0}, 1.0);
+  const double risen = plant.temperature(0) - 20.0;
+  EXPECT_NEAR(500.0 * risen + 0.5 * 10.0 * risen * risen, 6000.0, 1e-3);
+}
+
 TEST(ThermalPlant, ASensorLagsBehindARampByItsTimeConstant) {
   ThermalPlant plant{{{100.0, 0.0}}, {{0, 1.0}}, {}, {term("sensor_lag", {5.0})}};
   const double power = 10.0;  // 0.1 K/s
