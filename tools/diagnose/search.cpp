@@ -73,7 +73,14 @@ Verdict unless_stopped(const Diagnosis& d) {
 class Search {
  public:
   Search(Case& data, const std::function<void(double, const std::string&)>& progress, const Options& options)
-      : data_{data}, progress_{progress}, options_{options} {}
+      : data_{data},
+        // What is sought again from elsewhere does not go back on the bar.
+        progress_{[this, &progress](double share, const std::string& what) {
+          progress(reached_ = std::max(reached_, share), what);
+        }},
+        options_{options} {}
+  Search(const Search&) = delete;
+  Search& operator=(const Search&) = delete;
 
   Diagnosis run();
 
@@ -153,7 +160,8 @@ class Search {
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
 
   Case& data_;
-  const std::function<void(double, const std::string&)>& progress_;
+  double reached_ = 0.0;
+  const std::function<void(double, const std::string&)> progress_;
   const Options& options_;
   Diagnosis d_;
   Rivals rivals_;
