@@ -451,15 +451,10 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "velocity", 12},
                  {"force", "time", 12},
                  {"force", "time", 8, "acceleration"},  // what is picked up and put down
-                 {"force", "time", 8, "direction"},     // what wears or runs dry
-                 {"force", "time", 8, "velocity"},
                  {"force", "temperature", 6},
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
-                 {"actuator", "velocity", 9},
-                 {"actuator", "position", 11},
-                 {"actuator", "time", 8},
                  {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;

@@ -329,9 +329,6 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
   derive();
   double damping = 1e-3;
   int failures = 0;
-  // A step that goes too far costs one run, where sensitivities cost one for every number: of an axis it is not counted. Elsewhere
-  // it made no difference that shows, but of equations that swing, which end in another valley as often better as worse.
-  const bool is_free = data.model.plant == physics::Plant::axis;
   for (int i = 0; i < iterations && n > 0; ++i) {
     const Eigen::VectorXd step = step_within(hessian, gradient, damping, best);
     if (!step.allFinite()) break;
@@ -392,7 +389,6 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
       derive();
     } else {
       damping *= 30.0;
-      if (is_free) --i;
       if (++failures > 4) break;
     }
   }

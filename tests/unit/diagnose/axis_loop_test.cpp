@@ -42,9 +42,8 @@ struct Axis {
   double size = 1.0;                 // of its mass, damping and motor
   std::function<double(double time)> weaker = [](double) {
     return 0.0;
-  };                      // share that the motor has lost then
-  double slackens = 0.0;  // share that it loses per speed [s/m]
-  double steady = 0.0;    // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
+  };                    // share that the motor has lost then
+  double steady = 0.0;  // speed of a way without a turn, from the first row on [m/s]; 0: moves and rests
 };
 
 std::string belief(const char* name, double value, const char* unit, double sigma) {
@@ -87,8 +86,8 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
     constexpr int parts = 40;
     const double h = period / parts;
     for (int part = 0; part < parts; ++part) {
-      double given = axis.size * motor * (1.0 - axis.weaker(now) - axis.slackens * std::abs(v)) * felt +
-                     axis.push(now + part * h) + axis.pull(x);
+      double given =
+          axis.size * motor * (1.0 - axis.weaker(now)) * felt + axis.push(now + part * h) + axis.pull(x);
       const double moved = (1.0 - axis.swings) * heavy + axis.load(now), spring = pull_of_part * swing;
       given += spring;
       if (axis.bristles > 0.0) {
@@ -455,20 +454,6 @@ TEST(AxisLoop, AMotorThatFadesDoesSoOverTheTime) {
   EXPECT_EQ(term.info->site, "actuator");
   EXPECT_EQ(term.curve.over, "time");
   EXPECT_NEAR(term.curve(9.0) - term.curve(1.0), -0.03 * (std::exp(-0.25) - std::exp(-2.25)), 0.004);
-}
-
-TEST(AxisLoop, AMotorThatIsWeakerWhenFastIsSoOverTheVelocity) {
-  Axis axis;
-  axis.slackens = 0.4;
-  auto data = recorded(axis, 0.25, 23);
-  const auto d = searched(data);
-  EXPECT_EQ(d.verdict, Verdict::unknown_physics) << summary(data, d);
-  ASSERT_EQ(d.findings.size(), 1U);
-  const auto& term = d.findings[0].term;
-  EXPECT_EQ(term.info->site, "actuator");
-  EXPECT_EQ(term.curve.over, "velocity");
-  EXPECT_NEAR(term.curve(0.1) - term.curve(0.0), -0.4 * 0.1, 0.008);
-  EXPECT_NEAR(term.curve(-0.1) - term.curve(0.0), -0.4 * 0.1, 0.008);
 }
 
 TEST(AxisLoop, AWaveThatComesOnceAndAHalfIsOne) {

@@ -250,42 +250,6 @@ TEST(Windows, AnAxisThatASpringHoldsHasNone) {
   EXPECT_NEAR(d.findings[0].term.values[0], air, 0.05 * air);
 }
 
-/// A seal whose bristles bend by half a millimetre, on the same spring: no friction that slides at once.
-TEST(Windows, SoftBristlesOnASpringAreFoundThoughTheirFirstStepGoesTooFar) {
-  std::mt19937 random{41};
-  std::normal_distribution<double> normal;
-  std::vector<double> time, current, position;
-  constexpr double h = 1e-3, level = 0.0125, stiffness = 27.0;
-  double x = 0.0, v = 0.0, u = 0.0, bend = 0.0;
-  for (int i = 0; i < 6000; ++i) {
-    if (i % 150 == 0) u = std::uniform_real_distribution<double>{-1.9, 1.9}(random);
-    time.push_back(h * i), current.push_back(u), position.push_back(x + 3.7e-6 * normal(random));
-    for (int part = 0; part < 20; ++part) {
-      const double s = h / 20.0;
-      bend += s * v * (1.0 - std::copysign(1.0, v) * stiffness / level * bend);
-      v += s * (10.0 * u - 65.0 * v - 3780.0 * x - stiffness * bend) / 2.5;
-      x += s * v;
-    }
-  }
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("i", "A", current);
-  table.add("y", "m", position);
-  auto data = make_case(
-      model_of("invar_model: 1\nplant: axis\ncolumns: {time: t, position: y, current: i}\nparameters:\n"
-               "  mass: {value: 2.5, unit: kg, sigma: 0.04}\n"
-               "  motor_constant: {value: 10, unit: N/A, sigma: 0.05}\n"
-               "  viscous_damping: {value: 66, unit: N s/m, sigma: 6}\n"
-               "terms: [{term: position_stiffness, stiffness: {value: 3780, unit: N/m, sigma: 30}, center: "
-               "{value: 0, unit: m, sigma: 0}}]\nnoise: {y: 3.7e-6}\n"),
-      {table});
-  const auto d = search(data, [](double, const std::string&) {});
-  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
-  EXPECT_EQ(d.findings[0].term.info->name, "presliding_friction");
-  EXPECT_NEAR(d.findings[0].term.values[0], level, 0.2 * level);
-  EXPECT_NEAR(d.findings[0].term.values[1], stiffness, 0.4 * stiffness);
-}
-
 /// A pendulum that goes over the top again and again, in small steps of Verlet's rule; its angle as turns add up.
 Recorded pendulum(unsigned seed, double torque) {
   std::mt19937 random{seed};
