@@ -81,7 +81,8 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool ref
         model.terms[place] = rival;
         auto f = fit(data, d.weighing, model, data.model, 8, &d.best);
         double odds = advantage(data, d.weighing, f, d.best);
-        if (odds > 0.0) odds = std::min(odds, lead(data, f, d.best));  // not what pleases the filters only
+        if (odds > 0.0 && !data.model.controller)  // not what pleases the filters only
+          odds = std::min(odds, lead(data, f, d.best));
         if (odds > 0.5 && stands(data, f, place)) {  // better after all, beside the other terms
           kept.push_back(d.best.model.terms[place]);
           finding.alternatives.push_back({d.best.model.terms[place], -odds});
