@@ -411,10 +411,6 @@ double missing_force(const Case& data, const Fit& fitted) {
   return std::max(1e-9, share * fitted.model.value("motor_constant", 1.0) * rms_of(all));
 }
 
-}  // namespace
-
-namespace {
-
 /// Between which values a signal goes, without its rarest; the same twice where nothing is known of it.
 std::pair<double, double> span_of(const Case& data, const std::string& name, const std::string& node) {
   std::vector<double> all;

@@ -123,13 +123,11 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
     one.fit = fit(data, plain, start.model, data.model, 4, &start);
     one.lead = lead(data, one.fit, named);
     // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
-    // Friction need not be the same everywhere to be friction, and what a motor lacks at each speed holds all of it. What a
-    // state beside it passes on comes to the same.
+    // Friction need not be the same everywhere to be friction. What a state beside it passes on comes to the same.
     const bool is_form = is_course_of(s.start.term, named.model.terms[term]) ||
                          (data.model.plant == physics::Plant::equations &&
                           variable_of(s.start.term) == variable_of(named.model.terms[term])) ||
-                         (is_friction(named.model.terms[term]) &&
-                          (s.start.term.with == "direction" || s.start.term.curve.over == "velocity"));
+                         (s.start.term.with == "direction" && is_friction(named.model.terms[term]));
     if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }

@@ -67,8 +67,8 @@ Fit load_or_motor(const Case& data, const Weighing& weighing, Fit load) {
 
 /// Does every output lie within the noise that the user gave?
 bool is_within_noise(const Case& data, const Fit& fit) {
-  const auto left =
-      squares_left(data, simulate(data, fit.model), weigh(data, simulate(data, fit.model), false));
+  const auto simulated = simulate(data, fit.model);
+  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
   for (std::size_t o = 0; o < left.size(); ++o)
     if (!(left[o].rms() <= data.given_noise[o])) return false;
   return true;
