@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 
 namespace invar {
 
@@ -181,6 +182,26 @@ std::optional<Unit> parse_unit(std::string_view text) {
   if (text == "degF" || text == "\xC2\xB0\x46")
     return Unit{{0, 0, 0, 0, 1, 0, 0, 0}, 5.0 / 9.0, -160.0 / 9.0};
   return Parser{text}.all();
+}
+
+std::string si_unit(const Unit& unit) {
+  constexpr std::array<std::string_view, 8> bases{"m", "kg", "s", "A", "degC", "rad", "px", "count"};
+  if (unit.dimension == std::array<double, 8>{}) return "";
+  for (const auto& one : table)
+    if (one.factor == 1.0 && one.name != "K" && exact(one.name)->dimension == unit.dimension)
+      return std::string{one.name};
+  std::string above, below;
+  for (std::size_t i = 0; i < bases.size(); ++i) {
+    const double power = unit.dimension[i];
+    if (std::abs(power) < 1e-9) continue;
+    std::ostringstream part;
+    part << (i == kelvin ? "K" : bases[i]);
+    if (std::abs(std::abs(power) - 1.0) > 1e-9) part << std::abs(power);
+    auto& side = power > 0.0 ? above : below;
+    side += (side.empty() ? "" : " ") + part.str();
+  }
+  const bool many = below.find(' ') != std::string::npos;
+  return (above.empty() ? "1" : above) + (below.empty() ? "" : many ? "/(" + below + ")" : "/" + below);
 }
 
 std::optional<Conversion> conversion(std::string_view from, std::string_view to) {

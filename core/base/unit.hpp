@@ -26,6 +26,9 @@ struct Unit {
 /// unit.
 std::optional<Unit> parse_unit(std::string_view text);
 
+/// The SI unit of this quantity, as parse_unit reads it: "m3/s", "N", "1/s"; of a temperature "degC", of a pure number "".
+std::string si_unit(const Unit& unit);
+
 /// The factor and offset that carry a value in `from` to `to`; nothing when one is no unit or they measure
 /// different things. Angles and pure numbers (rad, 1) are compatible.
 struct Conversion {

@@ -66,9 +66,8 @@ bool is_one_value(const Node& node) {
   return true;
 }
 
-/// Reads a formula as the simulation will, to say at its line what it is that cannot be read.
-void check_formula(const Node& node, const physics::Model& model) {
-  if (!node.exists()) return;
+/// Reads a formula as the simulation will, to say at its line what it is that cannot be read. Is it readable?
+bool check_formula(const Node& node, const physics::Model& model) {
   std::vector<std::string> variables{"t"}, constants;
   for (const auto& state : model.equations.states) variables.push_back(state.name);
   for (const auto& input : model.equations.inputs) variables.push_back(input.symbol);
@@ -78,7 +77,9 @@ void check_formula(const Node& node, const physics::Model& model) {
     (void)physics::Expressions{variables, constants}.add(physics::Expressions::rates, node.as_text(), "");
   } catch (const InputError& error) {
     node.fault(error.faults().front().what, error.faults().front().mend);
+    return false;
   }
+  return true;
 }
 
 bool mentions(const std::string& expression, const std::string& name) {
@@ -91,19 +92,44 @@ bool mentions(const std::string& expression, const std::string& name) {
   return false;
 }
 
-/// Nothing converts between the states: one whose rate is another as it stands is in that one's unit, times a second.
-void check_rate(const Node& node, const physics::Model& model) {
-  auto rate = node.text("derivative", "");
-  std::erase(rate, ' ');
-  const auto *of_state = model.find(node.key() + ".initial"), *of_rate = model.find(rate + ".initial");
-  if (of_state == nullptr || of_rate == nullptr || of_state->unit == "1" || of_rate->unit == "1") return;
-  const auto needed = parse_unit("(" + of_state->unit + ")/s"), there = parse_unit(of_rate->unit);
-  if (!needed || !there || !needed->same_quantity(*there)) return;
-  if (std::abs(needed->factor / there->factor - 1.0) < 1e-9) return;
-  node["initial"].fault(
-      "is in " + of_state->unit + ", and its rate `" + rate + "` in " + of_rate->unit +
-          ", between which nothing converts",
-      "give `" + rate + "` in " + of_state->unit + "/s, or `" + node.key() + "` to suit it");
+/// The units of a model's states and parameters, where they are known ones.
+physics::UnitsOfNames own_units(const physics::Model& model) {
+  constexpr std::string_view of_state = ".initial";
+  physics::UnitsOfNames units{{"t", {"s", *parse_unit("s")}}};
+  for (const auto& parameter : model.parameters) {
+    std::string_view name = parameter.name;
+    if (name.ends_with(of_state)) name.remove_suffix(of_state.size());
+    const auto unit = parse_unit(parameter.unit);
+    if (unit && parameter.unit != "1") units[std::string{name}] = {parameter.unit, *unit};
+  }
+  return units;
+}
+
+/// What a formula is, and where it stands in the model.
+struct Formula {
+  std::string place, text;
+  std::optional<physics::NamedUnit> result;
+};
+
+std::vector<Formula> formulas_of(const physics::Model& model, const physics::UnitsOfNames& units,
+                                 const physics::UnitsOfNames& columns) {
+  std::vector<Formula> all;
+  for (const auto& state : model.equations.states) {
+    Formula formula{"states." + state.name + ".derivative", state.derivative, {}};
+    if (const auto at = units.find(state.name); at != units.end()) {
+      formula.result = {"a rate of `" + state.name + "` [" + at->second.text + "] in a second",
+                        at->second.unit};
+      formula.result->unit.dimension[2] -= 1.0;
+    }
+    all.push_back(formula);
+  }
+  for (const auto& output : model.equations.outputs) {
+    Formula formula{"outputs." + output.name + ".expression", output.expression, {}};
+    if (const auto at = columns.find(output.name); at != columns.end())
+      formula.result = {"its column [" + at->second.text + "]", at->second.unit};
+    all.push_back(formula);
+  }
+  return all;
 }
 
 }  // namespace
@@ -114,7 +140,6 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
   for (const auto& node : root["states"].children()) {
     names.take(node, "a state");
     formulas.push_back(node["derivative"]);
-    check_rate(node, model);
   }
   for (const auto& node : root["inputs"].children()) names.take(node, "an input");
   for (const auto& node : root["parameters"].children()) names.take(node, "a parameter");
@@ -127,12 +152,16 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
       node.fault("`" + node.key() + "` is an input already", "give the output another name");
   }
   if (root.has("controller")) formulas.push_back(root["controller"]["expression"]);
+  bool are_readable = names.are_good();
   for (const auto& node : formulas)
-    if (is_one_value(node) && names.are_good()) check_formula(node, model);
+    are_readable = is_one_value(node) && names.are_good() && check_formula(node, model) && are_readable;
   if (model.equations.states.empty())
     root["states"].fault("names no state", "add one, with derivative and initial");
   if (model.equations.outputs.empty())
     root["outputs"].fault("names no output", "add one, with column and expression");
+  if (are_readable)
+    for (const auto& clash : clashes_of_units(model, {}))
+      if (clash.is_size) formulas[clash.formula].fault(clash.what, mend_of_clash);
   const auto& output = model.equations.controlled_input;
   if (output.empty()) return;
   const auto controller = root["controller"];
@@ -143,6 +172,25 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
   else if (mentions(model.equations.control_law, output))
     controller["expression"].fault("`" + output + "` follows from itself",
                                    "write it from states, other inputs and parameters");
+}
+
+std::vector<FormulaClash> clashes_of_units(const physics::Model& model,
+                                           const physics::UnitsOfNames& columns) {
+  auto units = own_units(model);
+  for (const auto& input : model.equations.inputs)
+    if (const auto at = columns.find(input.signal); at != columns.end()) units[input.symbol] = at->second;
+  std::vector<std::string> names{"t"};
+  for (const auto& state : model.equations.states) names.push_back(state.name);
+  for (const auto& input : model.equations.inputs) names.push_back(input.symbol);
+  for (const auto& parameter : model.parameters)
+    if (parameter.name.find('.') == std::string::npos) names.push_back(parameter.name);
+  std::vector<FormulaClash> clashes;
+  const auto formulas = formulas_of(model, units, columns);
+  for (std::size_t i = 0; i < formulas.size(); ++i)
+    if (const auto clash = physics::clash_of_units(formulas[i].text, units, names, formulas[i].result))
+      clashes.push_back(
+          {i, "`" + formulas[i].place + ": " + formulas[i].text + "`: " + clash->what, clash->is_size});
+  return clashes;
 }
 
 }  // namespace invar::model

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/base/unit.hpp"
+#include "core/model/own_expressions.hpp"
 
 namespace invar::model {
 
@@ -134,6 +135,22 @@ bool is_controlled(const physics::Model& model, const physics::Signal& signal) {
   });
 }
 
+/// In which units the model's expressions count the columns.
+physics::UnitsOfNames counted(const physics::Model& model, const RecordFile& file) {
+  physics::UnitsOfNames units;
+  for (const auto& signal : model.signals) {
+    const auto at = file.units.find(signal.name);
+    if (at == file.units.end()) continue;
+    const auto& text = signal.unit.empty() ? at->second.unit : signal.unit;
+    auto unit = parse_unit(text);
+    if (!unit || text.empty() || text == "1" || text == "-") continue;
+    const bool converted = signal.unit.empty() && (at->second.factor != 1.0 || at->second.offset != 0.0);
+    if (converted) unit->factor = 1.0;
+    units[signal.name] = {converted ? text + ", taken in SI" : text, *unit};
+  }
+  return units;
+}
+
 }  // namespace
 
 RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed) {
@@ -159,6 +176,13 @@ RecordFile to_record(const recording::Table& table, const physics::Model& model,
     else
       result.record.signals[signal.name] = std::move(values);
   }
+  for (const auto& clash : model.plant == physics::Plant::equations && faults.empty()
+                               ? clashes_of_units(model, counted(model, result))
+                               : std::vector<FormulaClash>{})
+    if (clash.is_size)
+      faults.push_back({table.file.string(), clash.what, mend_of_clash});
+    else
+      result.doubts.push_back(clash.what);
   if (!faults.empty()) throw InputError{faults};
   return result;
 }

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
@@ -20,6 +21,7 @@ struct ColumnUnit {
 struct RecordFile {
   physics::Record record;
   std::map<std::string, ColumnUnit, std::less<>> units;  // by signal
+  std::vector<std::string> doubts;  // own expressions that add what measures two things: a clause each
 };
 
 /// The model's signals out of a table, in SI; rows as they stand. Throws InputError where a column that the

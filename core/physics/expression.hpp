@@ -31,8 +31,6 @@ class Expressions {
   template <std::size_t lanes>
   void run(Section section, double* slots) const;
 
- private:
-  friend class FormulaRecorder;
   enum class Operation {
     add,
     subtract,
@@ -68,11 +66,15 @@ class Expressions {
     least,
     most
   };
+  /// What is written to slot `to`; what an operation does not need repeats `a`.
   struct Instruction {
     Operation operation;
     std::size_t to, a, b, c;
   };
+  [[nodiscard]] const std::vector<Instruction>& code(Section section) const { return code_[section]; }
 
+ private:
+  friend class FormulaRecorder;
   std::size_t number(double value);
   std::size_t result(Section section, Operation operation, std::size_t a, std::size_t b, std::size_t c);
 

@@ -11,7 +11,24 @@ namespace invar::diagnose {
 using physics::Model;
 using physics::Term;
 
-void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
+namespace {
+
+/// What a steady rate and the limit where it ends do together, the friction of that way does alone: the models without the
+/// limit in which it stands for the rate.
+std::vector<Model> with_friction(const Case& data, const Term& removed, const Model& model,
+                                 const std::set<std::string, std::less<>>& without) {
+  std::vector<Model> all;
+  if (!removed.info->name.ends_with("_limit")) return all;
+  for (std::size_t t = data.model.terms.size(); t < model.terms.size(); ++t)
+    if (model.terms[t].info->name == "constant" && model.terms[t].on == removed.on)
+      for (auto& other : other_laws(data, model, t, without)) all.push_back(std::move(other));
+  return all;
+}
+
+}  // namespace
+
+void prune(const Case& data, Diagnosis& d, Rivals& rivals,
+           const std::set<std::string, std::less<>>& without_names) {
   const std::size_t given = data.model.terms.size();
   for (std::size_t i = 0; given + i < d.best.model.terms.size() && d.best.model.terms.size() > given + 1;
        ++i) {
@@ -25,6 +42,9 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals) {
         if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
       }
     auto without = fit(data, d.weighing, model, data.model, 10);
+    for (const auto& other : with_friction(data, removed, model, without_names))
+      if (auto one = fit(data, d.weighing, other, data.model, 10); one.evidence > without.evidence)
+        without = std::move(one);
     bool possible = true;
     for (std::size_t t = given; t < without.model.terms.size(); ++t)
       possible = possible && (stands(data, without, t) || !stands(data, d.best, t < place ? t : t + 1));

@@ -13,7 +13,7 @@ namespace invar::diagnose {
 using Rivals = std::vector<std::vector<physics::Term>>;
 
 /// Drops terms that the others make needless.
-void prune(const Case& data, Diagnosis& d, Rivals& rivals);
+void prune(const Case& data, Diagnosis& d, Rivals& rivals, const std::set<std::string, std::less<>>& without);
 
 /// Another law of the same variable where it does better, the other claims beside it.
 void put_laws_right(const Case& data, Diagnosis& d, Rivals& rivals,

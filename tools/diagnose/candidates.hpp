@@ -39,6 +39,8 @@ std::pair<double, double> span_of(const Case& data, const physics::Model& model,
 double inner_span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// Does it go both ways, up and down?
 bool turns(const Case& data, const physics::Model& model, const std::string& name);
+/// Does it stand at zero for some rows? A steady rate would move it.
+bool rests(const Case& data, const physics::Model& model, const std::string& name);
 /// Two terms that bend the same rate over the same variable: one law has room for one of them.
 bool same_law(const physics::Term& one, const physics::Term& other);
 /// The starts of one term: every value of its first shape (its own where none is given), the first value of further ones.

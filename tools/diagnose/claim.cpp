@@ -64,9 +64,10 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.
   if (term.info->name == "periodic")
     return (over == "t" ? high - low : inner_span_of(data, model, over)) >= 2.0 * term.values[1];
-  // Friction that never turned is a constant.
+  // Friction that never turned nor held is a constant.
   if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
-  if (term.info->name == "dry_friction") return low < -0.03 * size && high > 0.03 * size;
+  if (term.info->name == "dry_friction")
+    return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, term.on);
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
   // A limit that one or two rows touch is an outlier.
   auto free = model;

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "core/base/unit.hpp"
 #include "core/model/recording_file.hpp"
 #include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
@@ -284,6 +285,7 @@ void check_filled(const physics::Model& model, const physics::Record& record,
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
+  data.doubts = content.doubts;  // of the same model and units each time
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
@@ -334,6 +336,14 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   data.count.shortened += ordered - looked_at;
 }
 
+/// What was taken in SI is reported in it.
+void name_si_units(Case& data) {
+  for (const auto& one : data.taken_in_si)
+    for (auto& signal : data.model.signals)
+      if (const auto unit = parse_unit(one.unit); unit && signal.name == one.signal)
+        signal.unit = one.unit == "rpm" && one.factor != unit->factor ? "rad/s" : si_unit(*unit);
+}
+
 }  // namespace
 
 void check_runs(const Case& data, const physics::Model& model, double most,
@@ -361,12 +371,14 @@ Case load_case(const physics::Model& model, const std::vector<std::filesystem::p
   auto data = empty_case(model);
   for (const auto& file : files)
     for (auto& table : model::read_recording(file, model)) add(data, model, std::move(table), files.size());
+  name_si_units(data);
   return data;
 }
 
 Case make_case(const physics::Model& model, const std::vector<recording::Table>& tables) {
   auto data = empty_case(model);
   for (const auto& table : tables) add(data, model, table, tables.size());
+  name_si_units(data);
   return data;
 }
 

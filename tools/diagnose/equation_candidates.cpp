@@ -23,6 +23,7 @@ struct Span {
   double rate = 0.0;                // [1/s] times the variable: the largest change a row
   double falls = 0.0, rises = 0.0;  // the same, each way: down below zero, up above it
   double inner = 0.0;               // how far apart the middle four fifths of the rows lie
+  std::size_t rests = 0;            // rows at zero after the first
   [[nodiscard]] double size() const { return std::max({std::abs(low), std::abs(high), 1e-12}); }
   [[nodiscard]] double width() const { return high - low; }
   [[nodiscard]] bool turns() const { return std::min(-falls, rises) > 0.03 * rate; }
@@ -81,6 +82,7 @@ class Spans {
       span.low = first ? values[i] : std::min(span.low, values[i]);
       span.high = first ? values[i] : std::max(span.high, values[i]);
       first = false;
+      span.rests += i > 0 && values[i] == 0.0 ? 1U : 0U;
       if (!(i > 0 && std::isfinite(values[i - 1]) && time[i] > time[i - 1])) continue;
       const double rate = (values[i] - values[i - 1]) / (time[i] - time[i - 1]);
       span.falls = std::min(span.falls, rate), span.rises = std::max(span.rises, rate);
@@ -335,6 +337,11 @@ double inner_span_of(const Case& data, const physics::Model& model, const std::s
 
 bool turns(const Case& data, const physics::Model& model, const std::string& name) {
   return Spans{data, model}.of(name).turns();
+}
+
+bool rests(const Case& data, const physics::Model& model, const std::string& name) {
+  constexpr std::size_t plainly = 5;  // rows
+  return Spans{data, model}.of(name).rests >= plainly;
 }
 
 bool same_law(const Term& one, const Term& other) {

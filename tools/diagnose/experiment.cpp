@@ -1,8 +1,11 @@
 // What to record next, so that it tells what this recording does not.
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <numbers>
 
 #include "tools/diagnose/report.hpp"
+#include "tools/report/page.hpp"
 
 namespace invar::diagnose {
 
@@ -88,7 +91,54 @@ std::string separating_experiment(const Case& data, const physics::Term& at, con
          readable(other) + " grow with it in different ways";
 }
 
+namespace {
+
+/// "1000 times what was believed, as of a prefix": by what a number is off where units are mistaken; else nothing.
+std::string like_a_slip(double ratio) {
+  constexpr double pi = std::numbers::pi;
+  struct Slip {
+    double ratio;
+    const char* of;
+  };
+  constexpr std::array slips{Slip{10.0, "cm and mm"},         Slip{100.0, "cm and m, or % and 1"},
+                             Slip{1e3, "a prefix"},           Slip{1e6, "a prefix"},
+                             Slip{60.0, "s and min"},         Slip{3600.0, "s and h"},
+                             Slip{2.0 * pi, "turns and rad"}, Slip{180.0 / pi, "rad and deg"},
+                             Slip{30.0 / pi, "rpm and rad/s"}};
+  if (std::abs(ratio + 1.0) < 0.1) return "as of a sign";
+  for (const auto& slip : slips)
+    for (const bool is_part : {false, true})
+      if (std::abs(ratio * (is_part ? slip.ratio : 1.0 / slip.ratio) - 1.0) < 0.05)
+        return std::string{"as of "} + slip.of;
+  return "";
+}
+
+/// Before anything is measured: a number far from what was believed is first of all a slip in a file.
+std::string look_at_numbers(const Diagnosis& d) {
+  std::string text;
+  for (const auto& one : moved_numbers(d, far_moved)) {
+    const auto slip = one.believed != 0.0 ? like_a_slip(one.value / one.believed) : std::string{};
+    text +=
+        (text.empty() ? "" : ", ") + one.name +
+        (slip.empty() ? "" : " (" + report::number(one.value / one.believed, 3) + " of it, " + slip + ")");
+  }
+  return text.empty()
+             ? text
+             : "First look at the value, unit, sign and sigma that the model's file gives for " + text + ". ";
+}
+
+std::string experiment_of(const Case& data, const Diagnosis& d);
+
+}  // namespace
+
 std::string next_experiment(const Case& data, const Diagnosis& d) {
+  if (d.is_partial || (d.off_law && d.off_law->is_another_law())) return experiment_of(data, d);
+  return look_at_numbers(d) + experiment_of(data, d);
+}
+
+namespace {
+
+std::string experiment_of(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
   if (d.off_law && d.off_law->is_another_law())
     return "Compare the controller block of the model's file with the drive: gains and their units, the "
@@ -130,7 +180,8 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
     default:
       return (d.other_runs.empty()
                   ? std::string{"Simulate patched.yaml on a recording that was not used here (--check)"}
-                  : std::string{"None is needed: see what patched.yaml makes of the other recording"}) +
+                  : std::string{"Where patched.yaml meets the other recording as well (above), take it "
+                                "over"}) +
              (data.model.plant == physics::Plant::axis
                   ? "; then give it to the running stage (invar job apply)."
               : data.model.plant == physics::Plant::error_map
@@ -138,5 +189,7 @@ std::string next_experiment(const Case& data, const Diagnosis& d) {
                   : ".");
   }
 }
+
+}  // namespace
 
 }  // namespace invar::diagnose

@@ -193,9 +193,16 @@ Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<F
 }
 
 /// What a term in the user's own equations costs because few machines have it: a rate that goes with the third power of a
-/// speed is rare where air and oil know the first and second; one that goes with another variable had many to choose from.
-double rarity(const Model& model, const physics::Term& term) {
+/// speed is rare where air and oil know the first and second; one that goes with another variable had many to choose from;
+/// a dead zone in which its input never was is no more than an offset.
+double rarity(const Case& data, const Model& model, const physics::Term& term) {
   if (model.plant != physics::Plant::equations) return 0.0;
+  if (term.info->name == "dead_zone") {
+    for (const auto& input : model.equations.inputs)
+      if (const auto range = covered(data, input.signal); input.symbol == term.on && range)
+        return range->lower >= term.values[0] || range->upper <= -term.values[0] ? 3.0 : 0.0;
+    return 0.0;
+  }
   // A law bends over its own state; what another one does mostly goes straight (a coupling).
   if (!term.with.empty())
     return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size())) +
@@ -408,7 +415,7 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
         term.info->name == "additive_disturbance" && term.values[term.info->index_of("squareness")] < 0.5)
       best.unlikely += price_of_current(term.values[term.info->index_of("frequency")]);
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    best.unlikely += rarity(best.model, best.model.terms[t]);
+    best.unlikely += rarity(data, best.model, best.model.terms[t]);
   best.evidence = -best.cost - complexity - best.unlikely;
   Eigen::MatrixXd regular = hessian;
   for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;

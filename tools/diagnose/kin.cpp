@@ -71,6 +71,21 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
       }
     return others;
   }
+  // A steady rate against a motion that goes one way is the friction of that way.
+  if (found.info->plant == physics::Plant::equations && name == "constant") {
+    const auto [low, high] = span_of(data, model, found.on);
+    const double back = std::min(high, -low), forth = std::max(high, -low);
+    const double level = high > -low ? -found.values[0] : found.values[0];
+    if (level > 0.0 && back < 0.2 * forth && !without.contains("dry_friction")) {
+      auto& put = others.emplace_back(model).terms[term];
+      put = {};
+      put.info = physics::find_term(physics::Plant::equations, "dry_friction");
+      put.on = found.on;
+      put.values[0] = level;
+      put.given[0] = true;
+    }
+    return others;
+  }
   const int power = found.info->plant == physics::Plant::equations ? power_of(name) : 0;
   if (power == 0) return others;
   // First harmonic of sign(s) |s|^p under s = sin: what a swing feels of each power.

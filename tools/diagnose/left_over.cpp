@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 
 #include "tools/diagnose/candidates.hpp"
@@ -255,7 +256,11 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
   for (const auto& cause : causes) {
     auto& order = orders.emplace_back(static_cast<std::size_t>(cause.size()));
     std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&c = cause](auto a, auto b) { return c(a) < c(b); });
+    // Rows of one value stand as if shuffled: neighbours in time are alike by the colour of the noise alone.
+    const auto shuffled = [](Eigen::Index i) { return static_cast<std::uint32_t>(i) * 2654435761U; };
+    std::sort(order.begin(), order.end(), [&](auto a, auto b) {
+      return cause(a) != cause(b) ? cause(a) < cause(b) : shuffled(a) < shuffled(b);
+    });
   }
   if (data.is_time_series) {
     Eigen::VectorXd time(common.rows());

@@ -41,6 +41,12 @@ bool comes_late(const Term& term) {
          name == "measurement_delay" || name == "sensor_lag";
 }
 
+/// Ends a value as it stands: on the way to a state as in it.
+bool is_bound(const Term& term) {
+  const auto name = term.info->name;
+  return name == "upper_limit" || name == "lower_limit" || name == "dead_zone";
+}
+
 /// A lag and a delay of one time T differ by (s T)^2 / 2 and more: how plainly would the recording show that?
 double odds_of_other_lateness(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
   if (!comes_late(finding.term) || is_alternative(finding, comes_late)) return 0.0;
@@ -88,7 +94,8 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative) {
 
 bool is_elsewhere(const Term& one, const Term& other) {
   return one.info == other.info && one.info->plant == Plant::equations && one.on != other.on &&
-         (comes_late(one) || one.info->name == "hidden_state" || variable_of(one) == variable_of(other));
+         (comes_late(one) || one.info->name == "hidden_state" || is_bound(one) ||
+          variable_of(one) == variable_of(other));
 }
 
 double rest_beside(const std::vector<double>& won, const std::vector<double>& excess) {
@@ -102,7 +109,8 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)
-    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    if (is_another_cause(finding, a) && !is_elsewhere(finding.term, a.term))
+      sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);

@@ -30,7 +30,7 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
 bool is_another_cause(const Finding& finding, const Alternative& alternative);
 
 /// Are they one effect whose place alone is open? What comes late before a model in one piece comes late behind it as well,
-/// and a steady rate or a drag that acts at one state acts at the next in a chain.
+/// a steady rate or a drag that acts at one state acts at the next in a chain, and so does a limit or a dead zone on the way.
 bool is_elsewhere(const physics::Term& one, const physics::Term& other);
 
 /// Of what the outputs that a name explains left beyond the noise without it (`won` and `excess`, by output, in the power of

@@ -34,15 +34,28 @@ std::string readable(std::string_view name);
 std::string place_of(const Case& data, const physics::Term& term);
 /// "amplitude 2.40 +- 0.01 N, pitch ..."
 std::string sizes_of(const Case& data, const Finding& finding);
+/// How many rows there were, and what of them was left out or put right.
+std::string rows_read(const DataCount& count);
 /// Which part of a recording the fits did not run through, and why; empty where they saw all of it.
 std::string what_was_looked_at(const Case& data);
 /// What to do next, in a sentence.
 std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
-/// What the verdict alone would hide, in a line: parameters that went far from what was believed, and much that remains;
-/// empty where there is neither.
-std::string beside_the_verdict(const Diagnosis& diagnosis);
+/// What the verdict alone would hide, in a line: parameters that went far from what was believed, much that remains, and
+/// units that do not go together; empty where there is none.
+std::string beside_the_verdict(const Case& data, const Diagnosis& diagnosis);
+
+/// A number of the user's that a fit took away from what he believed.
+struct MovedNumber {
+  std::string name, unit;
+  double value = 0.0, believed = 0.0;  // SI, or as the user's own equations count
+  double sigmas = 0.0;                 // of what was believed
+};
+/// So many sigmas: the model has become another.
+inline constexpr double far_moved = 10.0;
+/// Those that moved by more than `least` sigmas.
+std::vector<MovedNumber> moved_numbers(const Diagnosis& diagnosis, double least);
 /// The motion or recording that would tell two terms apart.
 std::string separating_experiment(const Case& data, const physics::Term& one, const physics::Term& other);
 /// A term's name, with its place where `other` is of the same name elsewhere.

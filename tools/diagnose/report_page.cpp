@@ -340,7 +340,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   const bool clear =
       (d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only) && !d.is_partial;
   page.callout(verdict_sentence(data, d), fine ? "good" : (clear ? "plain" : "warn"));
-  if (const auto beside = beside_the_verdict(d); !beside.empty()) page.callout(beside, "warn");
+  if (const auto beside = beside_the_verdict(data, d); !beside.empty()) page.callout(beside, "warn");
   in_short(page, data, d);
 
   page.heading("Error on data that no fit saw");
@@ -399,12 +399,8 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
                  " times the noise" + with + ".");
   page.callout("Next experiment: " + next_experiment(data, d),
                d.verdict == Verdict::ambiguous ? "warn" : "plain");
-  page.paragraph(std::to_string(data.count.rows) +
-                 " rows read; left out: " + std::to_string(data.count.missing) + " missing values, " +
-                 std::to_string(data.count.outliers) + " outliers, " + std::to_string(data.count.duplicates) +
-                 " repeated rows; " + std::to_string(data.count.out_of_order) + " rows put in order, " +
-                 std::to_string(data.count.gaps) + " gaps bridged" +
-                 (what_was_looked_at(data).empty() ? "." : "; " + what_was_looked_at(data) + "."));
+  const auto looked_at = what_was_looked_at(data);
+  page.paragraph(rows_read(data.count) + (looked_at.empty() ? "." : "; " + looked_at + "."));
   return page.text();
 }
 

@@ -43,7 +43,7 @@ void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& tit
 
 std::string summary(const Case& data, const Diagnosis& d) {
   std::string out = verdict_sentence(data, d) + "\n";
-  if (const auto beside = beside_the_verdict(d); !beside.empty()) out += beside + "\n";
+  if (const auto beside = beside_the_verdict(data, d); !beside.empty()) out += beside + "\n";
   std::vector<std::vector<std::string>> rows;
   if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
@@ -59,6 +59,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
   std::string considered;
   for (std::size_t i = 0; i < d.rejected.size() && i < 5; ++i)
     considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;
+  if (const auto read = rows_read(data.count); read.find(';') != std::string::npos) out += "  " + read + "\n";
   if (const auto part = what_was_looked_at(data); !part.empty()) out += "  " + part + "\n";
   if (!considered.empty()) out += "  not claimed: " + considered + "\n";
   return out + "  next: " + next_experiment(data, d) + "\n";

@@ -230,6 +230,29 @@ std::string of_a_cell(const DataCount& count) {
 
 }  // namespace
 
+std::string rows_read(const DataCount& count) {
+  struct Part {
+    std::size_t count;
+    const char* one;
+    const char* more;
+  };
+  const auto listed = [](std::initializer_list<Part> parts) {
+    std::string text;
+    for (const auto& part : parts)
+      if (part.count > 0)
+        text += (text.empty() ? "" : ", ") + std::to_string(part.count) +
+                (part.count == 1 ? part.one : part.more);
+    return text;
+  };
+  const auto left_out = listed({{count.missing, " missing value", " missing values"},
+                                {count.outliers, " outlier", " outliers"},
+                                {count.duplicates, " repeated row", " repeated rows"}});
+  const auto changed = listed({{count.out_of_order, " row put in order", " rows put in order"},
+                               {count.gaps, " gap bridged", " gaps bridged"}});
+  return std::to_string(count.rows) + " rows read" + (left_out.empty() ? "" : "; left out: " + left_out) +
+         (changed.empty() ? "" : "; " + changed);
+}
+
 std::string what_was_looked_at(const Case& data) {
   std::string cut = of_a_cell(data.count);
   if (const auto windows = how_windowed(data); !windows.empty()) cut += (cut.empty() ? "" : "; ") + windows;
@@ -262,41 +285,44 @@ std::string times(double ratio) {
   return ratio >= 10.0 && ratio < 1e6 ? std::to_string(std::lround(ratio)) : report::number(ratio, 2);
 }
 
-/// Those that left what the user believed by more than so many of his sigmas.
-std::string moved_parameters(const Diagnosis& d, double least = 3.0) {
+std::string listed(const std::vector<MovedNumber>& moved) {
   std::string text;
-  for (const auto& f : d.best.free) {
-    if (f.where == Freedom::Where::curve || !(f.sigma > 0.0)) continue;
-    if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
-    const double to = get(d.best.model, f), sigmas = std::abs(to - f.center) / f.sigma;
-    if (!(sigmas > least)) continue;
-    const bool own = f.where == Freedom::Where::parameter;
-    std::string name, unit;
-    if (own) {
-      name = d.best.model.parameters[f.index].name;
-      unit = d.best.model.parameters[f.index].unit;
-    } else {
-      const auto& info = *d.best.model.terms[f.term].info;
-      name = readable(info.name) + " " + std::string{info.parameters[f.index].name};
-      unit = info.parameters[f.index].unit;
-    }
-    text += (text.empty() ? "" : ", ") + name + " is " + report::si(to, unit, 4) + ", not " +
-            report::si(f.center, unit, 4) + " (" + times(sigmas) + " sigma of what was believed)";
-  }
+  for (const auto& one : moved)
+    text += (text.empty() ? "" : ", ") + one.name + " is " + report::si(one.value, one.unit, 4) + ", not " +
+            report::si(one.believed, one.unit, 4) + " (" + times(one.sigmas) + " sigma of what was believed)";
   return text;
 }
 
 }  // namespace
 
-std::string beside_the_verdict(const Diagnosis& d) {
-  constexpr double far = 10.0;  // sigmas of what was believed: the rest of the model has become another
+std::vector<MovedNumber> moved_numbers(const Diagnosis& d, double least) {
+  std::vector<MovedNumber> moved;
+  for (const auto& f : d.best.free) {
+    if (f.where == Freedom::Where::curve || !(f.sigma > 0.0)) continue;
+    if (f.where == Freedom::Where::parameter && is_start(d.best.model.parameters[f.index])) continue;
+    const double to = get(d.best.model, f), sigmas = std::abs(to - f.center) / f.sigma;
+    if (!(sigmas > least)) continue;
+    if (f.where == Freedom::Where::parameter) {
+      const auto& own = d.best.model.parameters[f.index];
+      moved.push_back({own.name, own.unit, to, f.center, sigmas});
+    } else {
+      const auto& info = *d.best.model.terms[f.term].info;
+      moved.push_back({readable(info.name) + " " + std::string{info.parameters[f.index].name},
+                       std::string{info.parameters[f.index].unit}, to, f.center, sigmas});
+    }
+  }
+  return moved;
+}
+
+std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
   constexpr double much = 3.0;  // times the noise
-  const auto moved = d.findings.empty() ? std::string{} : moved_parameters(d, far);
+  const auto moved = d.findings.empty() ? std::string{} : listed(moved_numbers(d, far_moved));
   std::string text;
   if (!moved.empty()) text = (d.findings.size() == 1 ? "with it " : "with them ") + moved;
   if (d.unexplained >= much)
     text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
+  for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + std::string{"units: "} + doubt;
   return text.empty() ? text : "Mind: " + text + ".";
 }
 
@@ -332,9 +358,10 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   }
   switch (d.verdict) {
     case Verdict::no_mismatch:
-      return "No mismatch: the model explains the recording to the noise.";
+      return "No mismatch: the model explains the recording to " +
+             (d.unexplained >= 1.5 ? times(d.unexplained) + " times " : std::string{}) + "the noise.";
     case Verdict::parameters_only:
-      return "Only parameters are off, no physics is missing: " + moved_parameters(d) + ".";
+      return "Only parameters are off, no physics is missing: " + listed(moved_numbers(d, 3.0)) + ".";
     case Verdict::explained:
       return "Explained: the model leaves out " + names + elsewhere(data, d) + ".";
     case Verdict::partly_explained:

@@ -428,7 +428,7 @@ void Search::name(int first_round) {
         }))
       break;
   take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
-  if (options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
+  if (options_.refuses) take([&] { return prune(data_, d_, rivals_, options_.without), true; });
   progress_(0.7, "comparing with near twins");
   if (!take([&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
     data_.stopped = {};
@@ -453,7 +453,7 @@ void Search::finish() {
   const bool curved = d_.is_unnamed || d_.has_rest;
   // What a run without noise left over may be what noise makes of the others.
   if (!curved) take([&] { return settle(), true; });
-  if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_), true; });
+  if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_, options_.without), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped
