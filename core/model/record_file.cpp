@@ -87,13 +87,15 @@ void check_own_unit(const recording::Column& column, const OwnState& state, cons
                              : "write a unit that is known, or the model's own, into the header"};
 }
 
+/// [rad/s] of a turn a minute.
+constexpr double radians_per_rpm = 2.0 * std::numbers::pi / 60.0;
+
 /// The factor of turns a minute where the model's numbers are angles; nothing where they are not.
 std::optional<double> of_turns(const OwnState& state, const physics::Model& model) {
-  constexpr double per_rpm = 2.0 * std::numbers::pi / 60.0;
   constexpr std::size_t radian = 5;
   if (const auto unit = parse_unit(state.unit); unit && !state.unit.empty())
-    return unit->dimension[radian] == 1.0 ? std::optional{per_rpm / unit->factor} : std::nullopt;
-  if (speaks_in(model, "rad") && !speaks_in(model, "Hz")) return per_rpm;
+    return unit->dimension[radian] == 1.0 ? std::optional{radians_per_rpm / unit->factor} : std::nullopt;
+  if (speaks_in(model, "rad") && !speaks_in(model, "Hz")) return radians_per_rpm;
   return std::nullopt;
 }
 
@@ -145,7 +147,9 @@ physics::UnitsOfNames counted(const physics::Model& model, const RecordFile& fil
     auto unit = parse_unit(text);
     if (!unit || text.empty() || text == "1" || text == "-") continue;
     const bool converted = signal.unit.empty() && (at->second.factor != 1.0 || at->second.offset != 0.0);
-    if (converted) unit->factor = 1.0;
+    // Turns a minute may be taken in angles.
+    const bool turns = text == "rpm" && at->second.factor != unit->factor;
+    if (converted) unit->factor = (turns ? radians_per_rpm : unit->factor) / at->second.factor;
     units[signal.name] = {converted ? text + ", taken in SI" : text, *unit};
   }
   return units;

@@ -14,10 +14,11 @@ namespace {
 
 using Operation = Expressions::Operation;
 
-/// What is known of a slot: its unit, and the names that it is made of.
+/// What is known of a slot: its unit, the names that it is made of, and its value where it is a number.
 struct Known {
   std::optional<Unit> unit;
   std::set<std::string> names;
+  std::optional<double> value;
 };
 
 bool is_known(const Known& a) { return a.unit.has_value(); }
@@ -59,7 +60,7 @@ class Reader {
   Reader(const UnitsOfNames& units, const std::vector<std::string>& names)
       : units_{units}, expressions_{{}, names} {
     for (const auto& name : names) {
-      Known known{std::nullopt, {name}};
+      Known known{std::nullopt, {name}, std::nullopt};
       if (const auto at = units.find(name); at != units.end()) known.unit = without_counts(at->second.unit);
       slots_.push_back(known);
     }
@@ -67,7 +68,8 @@ class Reader {
 
   std::optional<UnitClash> clash(const std::string& formula, const std::optional<NamedUnit>& result) {
     const auto value = expressions_.add(Expressions::rates, formula, "");
-    slots_.resize(expressions_.slots());
+    for (auto slot = slots_.size(); slot < expressions_.slots(); ++slot)
+      slots_.push_back({std::nullopt, {}, expressions_.start()[slot]});
     for (const auto& step : expressions_.code(Expressions::fixed)) {
       slots_[step.to] = of(step);
       if (clash_) return clash_;
@@ -109,7 +111,7 @@ class Reader {
 
   Known of(const Expressions::Instruction& step) {
     const Known &a = slots_[step.a], &b = slots_[step.b], &c = slots_[step.c];
-    Known made{std::nullopt, a.names};
+    Known made{std::nullopt, a.names, std::nullopt};
     made.names.insert(b.names.begin(), b.names.end());
     made.names.insert(c.names.begin(), c.names.end());
     switch (step.operation) {
@@ -118,6 +120,8 @@ class Reader {
       case Operation::least:
       case Operation::most:
         made.unit = one_of(a, b);
+        if (made.unit && !is_known(a)) made.names = b.names;  // they alone say what it counts in
+        if (made.unit && !is_known(b)) made.names = a.names;
         break;
       case Operation::choose:
         made.unit = one_of(b, c);
@@ -142,8 +146,8 @@ class Reader {
           made.unit = product(*a.unit, *b.unit, step.operation == Operation::multiply ? 1.0 : -1.0);
         break;
       case Operation::power:
-        if (b.names.empty() && is_known(a))
-          made.unit = power_of(*a.unit, expressions_.start()[step.b]);
+        if (b.value && is_known(a))
+          made.unit = power_of(*a.unit, *b.value);
         else if (!b.names.empty())
           (void)pure(b, "a pure number, as an exponent is", false);
         break;
@@ -151,6 +155,9 @@ class Reader {
         if (is_known(a)) made.unit = power_of(*a.unit, 0.5);
         break;
       case Operation::negate:
+        made.unit = a.unit;
+        if (a.value) made.value = -*a.value;
+        break;
       case Operation::absolute:
         made.unit = a.unit;
         break;

@@ -51,6 +51,21 @@ TEST(Unit, ReadsProductsPowersAndQuotients) {
   EXPECT_TRUE(conversion("1/px2", "1/px2").has_value());
 }
 
+TEST(Unit, OfSiIsNamedSoThatItIsReadAsTheSame) {
+  for (const auto& [text, si] : {std::pair{"mm", "m"},
+                                 {"deg", "rad"},
+                                 {"L/min", "m3/s"},
+                                 {"mN m", "J"},
+                                 {"rpm", "Hz"},
+                                 {"degF", "degC"},
+                                 {"W/(K cm)", "m kg/(s3 K)"},
+                                 {"%", ""}}) {
+    EXPECT_EQ(si_unit(*parse_unit(text)), si) << text;
+    EXPECT_TRUE(parse_unit(si)->same_quantity(*parse_unit(text))) << text;
+    EXPECT_EQ(parse_unit(si)->factor, 1.0) << text;
+  }
+}
+
 TEST(Unit, RefusesWhatIsNoUnitOrAnotherQuantity) {
   for (const char* text : {"furlong", "m/", "/s", "m//s", "(m", "m)", "m^"})
     EXPECT_FALSE(parse_unit(text)) << text;

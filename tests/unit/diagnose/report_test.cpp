@@ -188,20 +188,31 @@ TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
   auto data = case_of(make("thermal", "sensor_lag", 1.0, 3));
   auto d = diagnose::search(data, [](double, const std::string&) {});
   ASSERT_FALSE(d.findings.empty());
-  EXPECT_EQ(diagnose::beside_the_verdict(d), "");
+  EXPECT_EQ(diagnose::beside_the_verdict(data, d), "");
   EXPECT_EQ(diagnose::page_text(data, d, "model.yaml").find("Mind: "), std::string::npos);
   d.unexplained = 96.0;
-  EXPECT_EQ(diagnose::beside_the_verdict(d), "Mind: what remains is 96 times the noise.");
+  EXPECT_EQ(diagnose::beside_the_verdict(data, d), "Mind: what remains is 96 times the noise.");
   const auto own = std::find_if(d.best.free.begin(), d.best.free.end(), [](const auto& f) {
     return f.where == diagnose::Freedom::Where::parameter && f.sigma > 0.0;
   });
   ASSERT_NE(own, d.best.free.end());
   auto& parameter = d.best.model.parameters[own->index];
   parameter.value = own->center + 770.0 * own->sigma;
-  const auto said = diagnose::beside_the_verdict(d);
+  const auto said = diagnose::beside_the_verdict(data, d);
   EXPECT_THAT(said, StartsWith("Mind: with it " + parameter.name + " is "));
   EXPECT_THAT(said, HasSubstr("(770 sigma of what was believed); what remains is 96 times the noise."));
   EXPECT_THAT(diagnose::summary(data, d), HasSubstr(".\n" + said + "\n"));
+  EXPECT_THAT(diagnose::next_experiment(data, d),
+              StartsWith("First look at the value, unit, sign and sigma that the model's file gives for " +
+                         parameter.name + ". "));
+  parameter.value = 1000.0 * own->center;
+  EXPECT_THAT(diagnose::next_experiment(data, d),
+              HasSubstr("for " + parameter.name + " (1000 of it, as of a prefix). "));
+  parameter.value = own->center + 770.0 * own->sigma;
+  data.doubts = {"`a` [V] measures something else than `b` [N]"};
+  EXPECT_THAT(diagnose::beside_the_verdict(data, d),
+              ::testing::EndsWith("; units: `a` [V] measures something else than `b` [N]."));
+  data.doubts.clear();
   const auto page = diagnose::page_text(data, d, "model.yaml");
   EXPECT_LT(page.find(said), page.find("<table"));
 }

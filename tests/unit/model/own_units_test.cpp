@@ -45,7 +45,7 @@ TEST(OwnUnits, AColumnStandsInTheUnitOfTheModelsNumbersOrElseInSi) {
   EXPECT_EQ(first("cm", read_own("cm", "\"1\"")), 40.0);
   EXPECT_EQ(first("cm", read_own("\"1\"", "cm/V")), 40.0);
   EXPECT_DOUBLE_EQ(first("cm", read_own("m", "m/V")), 0.4);
-  EXPECT_DOUBLE_EQ(first("m", read_own("mm", "\"1\"")), 40.0);  // `mm` is another unit than `m`
+  EXPECT_EQ(first("mm", read_own("mm", "\"1\"")), 40.0);
 }
 
 TEST(OwnUnits, AColumnInPartsOfWhichTheModelsNumbersAreStandsAsTheyDo) {
@@ -149,7 +149,9 @@ std::string fault_of_mass(const std::string& place, const std::string& speed) {
 
 TEST(OwnUnits, AStateAndTheStateThatIsItsRateAreInOneUnit) {
   EXPECT_THAT(fault_of_mass("mm", "m/s"),
-              ::testing::StartsWith("model.yaml:6: states.x.initial: is in mm, and its rate `v` in m/s"));
+              ::testing::StartsWith(
+                  "model.yaml:6: states.x.derivative: `states.x.derivative: v`: `v` [m/s] counts in "
+                  "1000 of the unit of a rate of `x` [mm] in a second; give all in SI"));
   for (const auto& [place, speed] : {std::pair{"mm", "mm/s"},
                                      {"m", "m/s"},
                                      {"rad", "1/s"},
@@ -158,6 +160,52 @@ TEST(OwnUnits, AStateAndTheStateThatIsItsRateAreInOneUnit) {
                                      {"\"1\"", "m/s"},
                                      {"mm", "\"1\""}})
     EXPECT_EQ(fault_of_mass(place, speed), "none") << place << ", " << speed;
+}
+
+TEST(OwnUnits, NumbersOfAFormulaThatCountInUnitsOfTwoSizesAreRefused) {
+  using ::testing::HasSubstr;
+  const auto pendulum = [](const std::string& weight, const std::string& friction) {
+    return fault_of_model(
+        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {M: torque}\nstates:\n"
+        "  q: {derivative: w, initial: {value: 0.3, unit: rad}}\n"
+        "  w: {derivative: '(M - g*sin(q) - b*w)/J', initial: {value: 0, unit: rad/s}}\n"
+        "outputs: {y: {column: angle, expression: q}}\nparameters:\n"
+        "  J: {value: 0.02, unit: kg m2}\n  g: {value: 980, unit: " +
+        weight + "}\n  b: {value: 0.01, unit: " + friction + "}\n");
+  };
+  EXPECT_EQ(pendulum("N m", "N m s"), "none");
+  EXPECT_EQ(pendulum("N m", "N m s/rad"), "none");
+  EXPECT_EQ(pendulum("\"1\"", "N m s"), "none");
+  EXPECT_EQ(pendulum("N m", "V"),
+            "none");  // said with the diagnosis: a label may be wrong, and the number right
+  EXPECT_THAT(pendulum("mN m", "N m s"), HasSubstr("model.yaml:7: states.w.derivative: "));
+  EXPECT_THAT(
+      pendulum("mN m", "N m s"),
+      HasSubstr("what is made of `g` [mN m], `q` [rad] counts in 0.001 of the unit of what is made of "
+                "`b` [N m s], `w` [rad/s]"));
+}
+
+TEST(OwnUnits, AColumnAndTheNumbersBesideItCountInOneUnit) {
+  using ::testing::HasSubstr;
+  const auto tank = [](const std::string& level, const std::string& of_inflow) {
+    return test::model_of(
+        "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {q: {column: inflow" + of_inflow +
+        "}}\nstates: {h: {derivative: 'q/A - k*sqrt(h)', initial: {value: 18, unit: " + level +
+        "}}}\noutputs: {y: {column: level, expression: h}}\nparameters: {A: {value: 300, unit: cm2}, k: "
+        "{value: 1}}\n");
+  };
+  recording::Table table;
+  table.add("t", "s", {0.0, 1.0});
+  table.add("inflow", "L/min", {5.0, 5.0});
+  table.add("level", "cm", {18.0, 18.1});
+  EXPECT_THAT([&] { (void)to_record(table, tank("cm", ""), true); },
+              testing::ThrowsMessage<InputError>(
+                  HasSubstr("`q` [L/min, taken in SI] counts in 1e+06 of the unit of")));
+  EXPECT_THAT(to_record(table, tank("cm", ", unit: cm3/s"), true).doubts, testing::IsEmpty());
+  table.columns.pop_back();
+  const auto file = to_record(table, tank("K", ", unit: cm3/s"), false);
+  ASSERT_EQ(file.doubts.size(), 1U);
+  EXPECT_THAT(file.doubts.front(), HasSubstr("`A` [cm2], `q` [cm3/s] measures something else than a rate of `h` [K]"));
 }
 
 TEST(OwnExpressions, ANameStandsForOneThing) {
