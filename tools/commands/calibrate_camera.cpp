@@ -13,6 +13,7 @@
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"
+#include "tools/commands/calibration_result.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -127,7 +128,7 @@ void calibrate_by_ruler(const CameraOptions& options) {
   if (fit->offset_identified)
     std::cout << "outlines lie " << report::number(fit->offset, 3) << " px outside their circles\n";
   if (fit->aspect_identified) std::cout << "aspect " << report::number(camera.aspect, 7) << '\n';
-  std::cout << "wrote " << (options.out / "camera.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "camera.yaml") << '\n';
 }
 
 }  // namespace

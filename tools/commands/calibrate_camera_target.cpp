@@ -10,6 +10,7 @@
 #include "core/metrology/planar_camera.hpp"
 #include "core/recording/table.hpp"
 #include "tools/commands/calibrate_camera.hpp"
+#include "tools/commands/calibration_result.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -189,7 +190,7 @@ void calibrate_by_target(const CameraOptions& options) {
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"
               << (&r == &best ? "  <- chosen" : "") << '\n';
-  std::cout << "wrote " << (options.out / "camera.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "camera.yaml") << '\n';
 }
 
 }  // namespace invar::tools

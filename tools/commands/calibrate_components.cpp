@@ -150,7 +150,7 @@ void calibrate(const Options& options) {
   std::string missing;
   for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
   if (!missing.empty()) std::cout << "not measured, taken as zero: " << missing << '\n';
-  std::cout << "wrote " << (options.out / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
 }  // namespace

@@ -210,7 +210,7 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
             << si(fit.after_rms, "m") << " after (to expect of new droplets, their scatter included)\n";
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
-  std::cout << "wrote " << (folder / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(folder, "compensation.yaml") << '\n';
 }
 
 }  // namespace

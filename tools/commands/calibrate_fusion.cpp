@@ -309,7 +309,7 @@ void calibrate(const Options& options) {
             << " of " << fit.held_out.size() << " runs\n";
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
-  std::cout << "wrote " << (options.out / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
 }  // namespace

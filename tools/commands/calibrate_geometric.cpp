@@ -56,7 +56,7 @@ void calibrate(const Options& options) {
   compensation::write_geometric(text, result.found.model);
   write_calibration(options.out, text, report_json(result), report_page(result));
   print_summary(result, std::cout);
-  std::cout << "wrote " << (options.out / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
 }  // namespace

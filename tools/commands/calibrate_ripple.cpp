@@ -131,7 +131,7 @@ void calibrate(const Options& options) {
     std::cout << "\nforce left over on runs held out: " << si(fit.before, "N") << " RMS without it, "
               << si(fit.after, "N") << " with it\n";
   }
-  std::cout << "wrote " << (options.out / "patched.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "patched.yaml") << '\n';
 }
 
 }  // namespace

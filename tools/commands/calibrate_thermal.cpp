@@ -164,7 +164,7 @@ void calibrate(const Options& options) {
             << " after (readings left out); systematic error known to " << si(figures.sigma, "m") << '\n';
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
-  std::cout << "wrote " << (folder / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(folder, "compensation.yaml") << '\n';
 }
 
 }  // namespace

@@ -113,7 +113,7 @@ void calibrate(const Options& options) {
             << ", base_temperature: " << number(found.base_temperature, 5)
             << ", coefficient: " << number(found.coefficient_percent, 6) << "}\n";
   if (!known) std::cout << "note: two readings leave nothing to check the equation with\n";
-  std::cout << "wrote " << (options.out / "compensation.yaml").string() << ", report.json, report.html\n";
+  std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
 }  // namespace

@@ -37,6 +37,11 @@ void write_calibration(const std::filesystem::path& folder, const compensation::
   model.write(folder / "compensation.yaml");  // last: where it is, all is there
 }
 
+std::string written(const std::filesystem::path& folder, const std::string& name) {
+  return "wrote " + (folder / name).string() + ", " + (folder / "report.json").string() + ", " +
+         (folder / "report.html").string();
+}
+
 void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
                        const nlohmann::json& report, const report::Page& page) {
   write_reports(folder, report, page);

@@ -30,6 +30,9 @@ void write_calibration(const std::filesystem::path& folder, const compensation::
 void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
                        const nlohmann::json& report, const report::Page& page);
 
+/// "wrote DIR/compensation.yaml, DIR/report.json, DIR/report.html": each may be opened as it stands.
+std::string written(const std::filesystem::path& folder, const std::string& name);
+
 /// A column as a vector.
 inline Eigen::VectorXd vector_of(const std::vector<double>& values) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));

@@ -11,6 +11,7 @@
 #include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/lone_inputs.hpp"
+#include "tools/diagnose/misrecorded.hpp"
 #include "tools/diagnose/shorten.hpp"
 #include "tools/diagnose/statistics.hpp"
 #include "tools/report/page.hpp"
@@ -285,7 +286,8 @@ void check_filled(const physics::Model& model, const physics::Record& record,
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
-  data.doubts = content.doubts;  // of the same model and units each time
+  data.doubts.clear();  // they are of the same model and units each time
+  for (const auto& doubt : content.doubts) data.doubts.push_back("units: " + doubt);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
@@ -372,6 +374,7 @@ Case load_case(const physics::Model& model, const std::vector<std::filesystem::p
   for (const auto& file : files)
     for (auto& table : model::read_recording(file, model)) add(data, model, std::move(table), files.size());
   name_si_units(data);
+  leave_out_dead(data, files.front());
   return data;
 }
 

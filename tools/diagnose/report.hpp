@@ -43,7 +43,7 @@ std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
 /// What the verdict alone would hide, in a line: parameters that went far from what was believed, much that remains, and
-/// units that do not go together; empty where there is none.
+/// what in the files does not go together; empty where there is none.
 std::string beside_the_verdict(const Case& data, const Diagnosis& diagnosis);
 
 /// A number of the user's that a fit took away from what he believed.

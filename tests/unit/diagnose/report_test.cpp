@@ -209,7 +209,7 @@ TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
   EXPECT_THAT(diagnose::next_experiment(data, d),
               HasSubstr("for " + parameter.name + " (1000 of it, as of a prefix). "));
   parameter.value = own->center + 770.0 * own->sigma;
-  data.doubts = {"`a` [V] measures something else than `b` [N]"};
+  data.doubts = {"units: `a` [V] measures something else than `b` [N]"};
   EXPECT_THAT(diagnose::beside_the_verdict(data, d),
               ::testing::EndsWith("; units: `a` [V] measures something else than `b` [N]."));
   data.doubts.clear();
