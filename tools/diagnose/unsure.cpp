@@ -83,21 +83,16 @@ bool set_aside(const Case& data, Diagnosis& d) {
 }
 
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far) {
-  // Beside a curve, or far from the noise, something without a name acts: what is not sure then may be a part of it.
-  constexpr double plainly_left = 2.0;  // times the noise
-  const bool acts_nameless = d.has_rest || (d.unexplained > plainly_left && !d.findings.empty() &&
-                                            d.findings.front().term.info->plant == physics::Plant::equations);
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
     // Of the user's own equations a number may be far off: what he left out there is often a part of it.
     const bool is_astray =
         d.parameter_excursion > far_astray && finding.term.info->plant != physics::Plant::equations;
-    const double least = acts_nameless ? 0.75 : is_far || is_astray || rests[i] > plain_rest ? 0.3 : 0.1;
+    const double least = is_far || is_astray || rests[i] > plain_rest ? 0.3 : 0.1;
     if (!finding.term.curve.knots.empty() || finding.probability >= least) continue;
     finding.stand_in = finding.term.info;
     finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);
-    constexpr double sure_without = 0.7;
-    finding.probability = std::max(1.0 - finding.probability, acts_nameless ? sure_without : 0.0);
+    finding.probability = 1.0 - finding.probability;
     finding.sigmas.clear();
     finding.alternatives.clear();
   }

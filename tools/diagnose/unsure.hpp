@@ -20,8 +20,7 @@ bool set_aside(const Case& data, Diagnosis& d);
 
 /// Leaves the name of what is nine times as likely another cause away. What is so in seven cases of ten goes as well where
 /// residuals far from the noise show that it is not the whole truth (`rests`, a share by finding; `is_far`,
-/// of the outputs), or where the names lead the numbers of a built-in plant far astray; and so in one case of four beside
-/// a curve without a name, or where equations leave twice the noise: no such name of seven made machines was right.
+/// of the outputs), or where the names lead the numbers of a built-in plant far astray.
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far);
 
 }  // namespace invar::diagnose
