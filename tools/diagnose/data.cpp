@@ -382,6 +382,7 @@ Case make_case(const physics::Model& model, const std::vector<recording::Table>&
   auto data = empty_case(model);
   for (const auto& table : tables) add(data, model, table, tables.size());
   name_si_units(data);
+  leave_out_dead(data, tables.front().file);
   return data;
 }
 

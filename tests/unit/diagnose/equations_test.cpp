@@ -185,6 +185,41 @@ TEST_F(Equations, AStoreWhosePlaceInTheChainIsOpenIsExplained) {
   EXPECT_THAT(summary(data, d), ::testing::HasSubstr("or the same at the"));
 }
 
+/// What an input is held to is felt at the state behind it too: the name is sure, the place alone is open.
+TEST_F(Equations, ALimitOnTheWayToAStateIsExplainedWithBothPlaces) {
+  constexpr Machine car{
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+      "states:\n  f: {derivative: '(3800*u - f)/0.6', initial: {value: 1100, unit: N, sigma: 0}}\n"
+      "  v: {derivative: '(f - c*v - 0.53*v*abs(v))/1560', initial: {value: 24, unit: m/s, sigma: 0}}\n"
+      "outputs: {speed: {column: y, expression: v}}\nparameters: {c: {value: 33, unit: N s/m, sigma: 3}}\n",
+      0.2, 0.06, 1500, levels<61, 10, 65>};
+  const auto d = diagnose(car, {term("upper_limit", "u", {0.57})}, 2);
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "upper_limit");
+  EXPECT_EQ(d.verdict, Verdict::explained);
+  EXPECT_GT(d.findings[0].probability, 0.7);
+}
+
+/// A steady rate and a limit at zero do the same; one name is enough.
+TEST_F(Equations, FrictionOfAShaftThatGoesOneWayAndStandsIsFriction) {
+  auto one_way = motor;
+  one_way.drive = [](std::size_t row, std::mt19937& random) {
+    const double level = levels<29, 20, 100>(row, random);
+    return row / 58 % 3 == 0 ? 0.1 : level;  // less than what friction holds
+  };
+  const auto d = diagnose(one_way, {term("dry_friction", "w", {4.0})}, 3);
+  expect(d, "dry_friction", "w", 4.0, 0.3);
+}
+
+/// Beyond its dead zone an input is off by a steady value, and nothing says that there is a zone.
+TEST_F(Equations, ADeadZoneInWhichItsInputNeverWasIsAnOffset) {
+  auto one_way = motor;
+  one_way.drive = levels<29, 40, 100>;
+  const auto d = diagnose(one_way, {term("dead_zone", "u", {0.2})}, 3);
+  expect(d, "constant", "w", -4.0, 0.3);
+  EXPECT_GT(d.findings[0].probability, 0.75);
+}
+
 /// A room and its walls, which nobody measures. The numbers of the room answer for what the walls get of the sun until none
 /// is right, and from there the sun on the walls is not seen.
 TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
