@@ -120,7 +120,7 @@ std::string look_at_numbers(const Diagnosis& d) {
     const auto slip = one.believed != 0.0 ? like_a_slip(one.value / one.believed) : std::string{};
     text +=
         (text.empty() ? "" : ", ") + one.name +
-        (slip.empty() ? "" : " (" + report::number(one.value / one.believed, 3) + " of it, " + slip + ")");
+        (slip.empty() ? "" : " (" + report::number(one.value / one.believed, 4) + " of it, " + slip + ")");
   }
   return text.empty()
              ? text

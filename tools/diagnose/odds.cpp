@@ -109,8 +109,7 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)
-    if (is_another_cause(finding, a) && !is_elsewhere(finding.term, a.term))
-      sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);

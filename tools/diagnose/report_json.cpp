@@ -96,7 +96,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     json alternatives = json::array();
     for (const auto& a : finding.alternatives) {
       const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
-      if (p > 1e-4 && !is_elsewhere(term, a.term)) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
+      if (p > 1e-4) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
       if (a.explains_as_well())
         report["ambiguity"].push_back(
             {{"between", {name_beside(data, term, a.term), name_beside(data, a.term, term)}},

@@ -79,7 +79,7 @@ TEST(Names, AnotherPowerGivesAsMuchAtTheSizesThatTheVariableTakes) {
   std::vector<double> time, input, output;
   for (int i = 0; i < 3000; ++i) {
     const double t = 0.01 * i;
-    time.push_back(t), input.push_back(20.0 * std::sin(2.0 * t)), output.push_back(0.0);
+    time.push_back(t), input.push_back(20.0 * std::sin(2.0 * t)), output.push_back(0.001 * (i % 2));
   }
   recording::Table table;
   table.add("t", "s", time);

@@ -308,7 +308,7 @@ TEST(Windows, ANameThatOnlyLeadsOutOfAValleyIsNone) {
 TEST(Windows, AVesselWhoseFlowEbbsForgetsAllTheSame) {
   Recorded r;
   for (int i = 0; i < 600; ++i) {
-    r.time.push_back(0.5 * i), r.way.push_back(2.0);
+    r.time.push_back(0.5 * i), r.way.push_back(i % 2 == 0 ? 2.0 : 2.001);
     r.drive.push_back(i < 300 ? 1.0 : 0.3);  // 10 s to fill anew, then 33 s of 300 s
   }
   auto vessel =
