@@ -18,7 +18,8 @@ void ask(int) { asked = true; }
 bool install() {
   struct sigaction action {};
   action.sa_handler = ask;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  // A line that is being written to a full pipe is written to its end.
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   return true;
