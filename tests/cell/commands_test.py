@@ -4,6 +4,7 @@
 Usage: commands_test.py INVAR SOURCE_FOLDER
 The cell runs on a random DDS domain and free ports of the loopback, in a temporary folder.
 """
+import fcntl
 import json
 import math
 import os
@@ -334,6 +335,17 @@ class Acting(unittest.TestCase):
             if any(job["job"] == "long" and job["phase"] == wanted for job in json.loads(out)):
                 return
         self.fail(f"the job does not get to {wanted}: {out}")
+
+    def test_a_line_is_written_to_its_end_when_the_end_comes_while_nobody_reads(self):
+        hearer = Call("echo", CELL_FILE, "stage_x.state", "--json", "--wait", 30)
+        fcntl.fcntl(hearer.process.stdout, fcntl.F_SETPIPE_SZ, 4096)
+        time.sleep(3)  # it is full
+        hearer.process.send_signal(signal.SIGINT)
+        time.sleep(0.5)
+        status, out, err = hearer.end()
+        self.assertEqual(status, 0, err)
+        self.assertGreater(len(out), 4096)
+        self.assertTrue(all(json.loads(line) for line in out.splitlines()))
 
     def test_what_is_recorded_is_replayed_sample_by_sample(self):
         by_time = Call("record", CELL_FILE, "--out", "all.mcap", "--duration", 2, "--json", "--wait", 30)
