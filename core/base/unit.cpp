@@ -208,7 +208,14 @@ std::optional<Conversion> conversion(std::string_view from, std::string_view to)
   const auto source = parse_unit(from);
   const auto target = parse_unit(to);
   if (!source || !target || !source->same_quantity(*target)) return std::nullopt;
-  return Conversion{source->factor / target->factor, (source->offset - target->offset) / target->factor};
+  // Turns a minute are no pure numbers where the other side counts angles.
+  const auto turns = [](std::string_view text, const Unit& unit, const Unit& other) {
+    const bool counts_turns = text.find("rpm") != std::string_view::npos && unit.dimension[radian] == 0.0;
+    return counts_turns ? std::pow(2.0 * pi, other.dimension[radian]) : 1.0;
+  };
+  const double from_size = source->factor * turns(from, *source, *target),
+               to_size = target->factor * turns(to, *target, *source);
+  return Conversion{from_size / to_size, (source->offset - target->offset) / target->factor};
 }
 
 }  // namespace invar

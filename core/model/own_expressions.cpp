@@ -100,7 +100,8 @@ physics::UnitsOfNames own_units(const physics::Model& model) {
     std::string_view name = parameter.name;
     if (name.ends_with(of_state)) name.remove_suffix(of_state.size());
     const auto unit = parse_unit(parameter.unit);
-    if (unit && parameter.unit != "1") units[std::string{name}] = {parameter.unit, *unit};
+    const bool says_none = parameter.unit == "1" || parameter.unit == "-" || parameter.unit.empty();
+    if (unit && !says_none) units[std::string{name}] = {parameter.unit, *unit};
   }
   return units;
 }
@@ -129,6 +130,8 @@ std::vector<Formula> formulas_of(const physics::Model& model, const physics::Uni
       formula.result = {"its column [" + at->second.text + "]", at->second.unit};
     all.push_back(formula);
   }
+  if (!model.equations.controlled_input.empty())
+    all.push_back({"controller.expression", model.equations.control_law, {}});
   return all;
 }
 

@@ -16,7 +16,7 @@ void check_own_expressions(const config::Node& root, const physics::Model& model
 
 /// Where numbers that go together in an expression count in different units.
 struct FormulaClash {
-  std::size_t formula;   // the derivatives of the states, then the outputs
+  std::size_t formula;   // the derivatives of the states, the outputs, the control law
   std::string what;      // with the formula and its place
   bool is_size = false;  // as of physics::UnitClash
 };

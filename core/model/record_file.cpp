@@ -17,9 +17,9 @@ namespace {
 /// What SI counts in, and with it every unit that is none of its own.
 constexpr std::array own_units{"m", "kg", "s", "A", "K", "rad"};
 
-/// Does one of the model's numbers stand in this unit, alone (`cm`) or in another (`cm/s`)?
+/// Does one of the model's numbers stand in this unit, alone (`cm`) or in another (`cm/s`, `cm3`)?
 bool speaks_in(const physics::Model& model, const std::string& unit) {
-  const auto is_letter = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  const auto is_letter = [](char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; };
   return std::any_of(model.parameters.begin(), model.parameters.end(), [&](const physics::Parameter& p) {
     for (auto at = p.unit.find(unit); at != std::string::npos; at = p.unit.find(unit, at + 1)) {
       const auto end = at + unit.size();
@@ -99,13 +99,39 @@ std::optional<double> of_turns(const OwnState& state, const physics::Model& mode
   return std::nullopt;
 }
 
+/// Is a temperature of the model's states counted in this unit, `K` or `degC`?
+bool has_states_in(const physics::Model& model, const std::string& unit) {
+  const auto wanted = parse_unit(unit);
+  return std::any_of(model.equations.states.begin(), model.equations.states.end(), [&](const auto& state) {
+    const auto* initial = model.find(state.name + ".initial");
+    const auto own = initial != nullptr ? parse_unit(initial->unit) : std::nullopt;
+    return own && own->dimension == wanted->dimension && own->factor == wanted->factor &&
+           own->offset == wanted->offset;
+  });
+}
+
+/// A temperature from zero or from freezing, where all the states' count from the other; nothing where that is open.
+std::optional<ColumnUnit> to_the_states_zero(const recording::Column& column, const physics::Model& model) {
+  constexpr const char* celsius = "degC";
+  const auto unit = parse_unit(column.unit);
+  const auto to = conversion(column.unit, celsius);
+  if (!unit || !to || unit->dimension != parse_unit(celsius)->dimension) return std::nullopt;
+  const bool absolute = column.unit == "K";
+  const bool in_celsius = has_states_in(model, celsius), in_kelvin = has_states_in(model, "K");
+  if (absolute && in_celsius && !in_kelvin) return ColumnUnit{column.unit, to->factor, to->offset};
+  if (!absolute && in_kelvin && !in_celsius)
+    return ColumnUnit{column.unit, to->factor, to->offset - parse_unit("K")->offset};
+  return std::nullopt;
+}
+
 /// A model in the user's own expressions takes a column in SI, but as it stands where his numbers are in that unit too,
-/// where it is absolute (K), or where the unit is a name of his own; turns a minute in rad/s where his numbers are angles.
+/// where it is absolute (K) and no state says otherwise, or where the unit is a name of his own; turns a minute in rad/s where his numbers are angles.
 ColumnUnit unit_of_expression(const recording::Column& column, const physics::Signal& signal,
                               const physics::Model& model, const std::string& where) {
   const auto state = state_of(signal, model);
   check_own_unit(column, state, where);
   const auto unit = parse_unit(column.unit);
+  if (const auto zero = to_the_states_zero(column, model)) return *zero;
   if (!unit || column.unit == "K" || speaks_in(model, column.unit) || speaks_in_parts(model, column.unit))
     return {column.unit, 1.0, 0.0};
   if (column.unit == "rpm")

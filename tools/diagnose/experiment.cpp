@@ -100,10 +100,13 @@ std::string like_a_slip(double ratio) {
     double ratio;
     const char* of;
   };
-  constexpr std::array slips{Slip{10.0, "cm and mm"},         Slip{100.0, "cm and m, or % and 1"},
-                             Slip{1e3, "a prefix"},           Slip{1e6, "a prefix"},
-                             Slip{60.0, "s and min"},         Slip{3600.0, "s and h"},
-                             Slip{2.0 * pi, "turns and rad"}, Slip{180.0 / pi, "rad and deg"},
+  constexpr std::array slips{Slip{100.0, "cm and m, or % and 1"},
+                             Slip{1e3, "a prefix"},
+                             Slip{1e6, "a prefix"},
+                             Slip{60.0, "s and min"},
+                             Slip{3600.0, "s and h"},
+                             Slip{2.0 * pi, "turns and rad"},
+                             Slip{180.0 / pi, "rad and deg"},
                              Slip{30.0 / pi, "rpm and rad/s"}};
   if (std::abs(ratio + 1.0) < 0.1) return "as of a sign";
   for (const auto& slip : slips)
@@ -113,8 +116,12 @@ std::string like_a_slip(double ratio) {
   return "";
 }
 
-/// Before anything is measured: a number far from what was believed is first of all a slip in a file.
+/// Before anything is measured: columns that do not stand beside one another, and a number far from what was believed, are
+/// first of all slips in a file.
 std::string look_at_numbers(const Diagnosis& d) {
+  constexpr double far = 3.0;  // times the noise: what is missing moved them
+  if (!d.doubts.empty()) return "First look at how the columns were put together. ";
+  if (d.unexplained >= far) return "";
   std::string text;
   for (const auto& one : moved_numbers(d, far_moved)) {
     const auto slip = one.believed != 0.0 ? like_a_slip(one.value / one.believed) : std::string{};

@@ -52,8 +52,9 @@ void leave_out_dead(Case& data, const std::filesystem::path& file) {
     if (dead.size() == data.outputs.size())
       throw InputError{file.string() + ": column `" + column + "`", "reads one value in every row",
                        "look at its sensor, and record the machine moving"};
-    data.doubts.push_back("column `" + column +
-                          "` reads one value in every row and is left out: look at its sensor");
+    data.doubts.push_back(
+        "column `" + column +
+        "` reads one value in every row and is left out: its sensor is dead, or nothing moved");
     for (auto& recording : data.recordings) {
       auto& measured = recording.measured[o];
       const auto first =
@@ -66,16 +67,20 @@ void leave_out_dead(Case& data, const std::filesystem::path& file) {
 std::vector<std::string> misrecorded(const Case& data, const Diagnosis& d) {
   std::vector<std::string> clauses;
   if (!data.is_time_series) return clauses;
-  const auto retuned = simulate(data, d.retuned.model), best = simulate(data, d.best.model);
+  // A retuned model's numbers may have been bent to cover what comes early.
+  const auto retuned = simulate(data, d.retuned.model), best = simulate(data, d.best.model),
+             believed = simulate(data, data.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     constexpr std::size_t most = 20;
     constexpr double far_less = 0.25;  // of the squares
-    const double as_read = squares_when_later(data, retuned, o, 0, most);
+    const auto when_later = [&](std::size_t rows) {
+      return std::min(squares_when_later(data, retuned, o, rows, most),
+                      squares_when_later(data, believed, o, rows, most));
+    };
     std::size_t rows = 0;
-    double least = far_less * std::min(as_read, squares_when_later(data, best, o, 0, most));
+    double least = far_less * std::min(when_later(0), squares_when_later(data, best, o, 0, most));
     for (std::size_t later = 1; later <= most; ++later)
-      if (const double left = squares_when_later(data, retuned, o, later, most); left < least)
-        least = left, rows = later;
+      if (const double left = when_later(later); left < least) least = left, rows = later;
     if (rows == 0) continue;
     const auto& time = data.recordings.front().inputs.time;
     clauses.push_back("column `" + data.model.signal(data.outputs[o])->column + "` comes " +

@@ -13,8 +13,8 @@ namespace invar::diagnose {
 /// InputError where no output reads more. Of machines that move on from row to row.
 void leave_out_dead(Case& data, const std::filesystem::path& file);
 
-/// A clause for each output that comes too early: that the retuned model meets far better some rows later, as no physics
-/// does, and better than the best model meets it as it stands.
+/// A clause for each output that comes too early: that the retuned or the believed model meets far better some rows
+/// later, as no physics does, and better than the best model meets it as it stands.
 std::vector<std::string> misrecorded(const Case& data, const Diagnosis& d);
 
 }  // namespace invar::diagnose

@@ -307,8 +307,9 @@ std::vector<MovedNumber> moved_numbers(const Diagnosis& d, double least) {
       moved.push_back({own.name, own.unit, to, f.center, sigmas});
     } else {
       const auto& info = *d.best.model.terms[f.term].info;
-      moved.push_back({readable(info.name) + " " + std::string{info.parameters[f.index].name},
-                       std::string{info.parameters[f.index].unit}, to, f.center, sigmas});
+      const auto& p = info.parameters[f.index];
+      moved.push_back({readable(info.name) + (p.name == info.name ? "" : " " + std::string{p.name}),
+                       p.unit == "*" ? "" : std::string{p.unit}, to, f.center, sigmas});
     }
   }
   return moved;

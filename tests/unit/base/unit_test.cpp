@@ -46,6 +46,10 @@ TEST(Unit, ReadsProductsPowersAndQuotients) {
   EXPECT_DOUBLE_EQ(convert("J/K", "W s/K", 1.0), 1.0);
   EXPECT_DOUBLE_EQ(convert("1/hPa", "1/Pa", 1.0), 0.01);
   EXPECT_DOUBLE_EQ(convert("ppm/K", "1/K", 12.0), 12e-6);
+  EXPECT_DOUBLE_EQ(convert("rpm", "rad/s", 60.0), 2.0 * std::numbers::pi);
+  EXPECT_DOUBLE_EQ(convert("rad/s", "rpm", std::numbers::pi), 30.0);
+  EXPECT_DOUBLE_EQ(convert("rpm", "deg/s", 1.0), 6.0);
+  EXPECT_DOUBLE_EQ(convert("rpm", "Hz", 60.0), 1.0);
   EXPECT_TRUE(conversion("V^0.5/s", "V^0.5/s").has_value());
   EXPECT_TRUE(conversion("W/W", "1").has_value());
   EXPECT_TRUE(conversion("1/px2", "1/px2").has_value());

@@ -203,6 +203,9 @@ TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
   EXPECT_THAT(said, HasSubstr("(770 sigma of what was believed); what remains is 96 times the noise."));
   EXPECT_THAT(diagnose::summary(data, d), HasSubstr(".\n" + said + "\n"));
   EXPECT_THAT(diagnose::next_experiment(data, d),
+              ::testing::Not(HasSubstr("First look")));  // what is missing moved it
+  d.unexplained = 1.0;
+  EXPECT_THAT(diagnose::next_experiment(data, d),
               StartsWith("First look at the value, unit, sign and sigma that the model's file gives for " +
                          parameter.name + ". "));
   parameter.value = 1000.0 * own->center;
@@ -213,6 +216,7 @@ TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
   EXPECT_THAT(diagnose::beside_the_verdict(data, d),
               ::testing::EndsWith("; units: `a` [V] measures something else than `b` [N]."));
   data.doubts.clear();
+  d.unexplained = 96.0;
   const auto page = diagnose::page_text(data, d, "model.yaml");
   EXPECT_LT(page.find(said), page.find("<table"));
 }

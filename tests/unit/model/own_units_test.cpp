@@ -41,9 +41,16 @@ TEST(OwnUnits, AnAbsoluteTemperatureStaysAbsolute) {
   EXPECT_EQ(first("degC", read_own("degC", "\"1\"")), 40.0);
 }
 
+TEST(OwnUnits, ATemperatureCountsFromTheZeroOfTheStates) {
+  EXPECT_DOUBLE_EQ(first("K", read_own("degC", "\"1\"")), 40.0 - 273.15);
+  EXPECT_DOUBLE_EQ(first("degC", read_own("K", "\"1\"")), 40.0 + 273.15);
+  EXPECT_DOUBLE_EQ(first("degF", read_own("K", "\"1\"")), (40.0 - 32.0) / 1.8 + 273.15);
+}
+
 TEST(OwnUnits, AColumnStandsInTheUnitOfTheModelsNumbersOrElseInSi) {
   EXPECT_EQ(first("cm", read_own("cm", "\"1\"")), 40.0);
   EXPECT_EQ(first("cm", read_own("\"1\"", "cm/V")), 40.0);
+  EXPECT_EQ(first("cm", read_own("cm", "cm3/V")), 40.0);
   EXPECT_DOUBLE_EQ(first("cm", read_own("m", "m/V")), 0.4);
   EXPECT_EQ(first("mm", read_own("mm", "\"1\"")), 40.0);
 }
@@ -205,7 +212,8 @@ TEST(OwnUnits, AColumnAndTheNumbersBesideItCountInOneUnit) {
   table.columns.pop_back();
   const auto file = to_record(table, tank("K", ", unit: cm3/s"), false);
   ASSERT_EQ(file.doubts.size(), 1U);
-  EXPECT_THAT(file.doubts.front(), HasSubstr("`A` [cm2], `q` [cm3/s] measures something else than a rate of `h` [K]"));
+  EXPECT_THAT(file.doubts.front(),
+              HasSubstr("`A` [cm2], `q` [cm3/s] measures something else than a rate of `h` [K]"));
 }
 
 TEST(OwnExpressions, ANameStandsForOneThing) {
