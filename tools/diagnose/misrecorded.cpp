@@ -82,10 +82,12 @@ std::vector<std::string> misrecorded(const Case& data, const Diagnosis& d) {
     for (std::size_t later = 1; later <= most; ++later)
       if (const double left = when_later(later); left < least) least = left, rows = later;
     if (rows == 0) continue;
-    const auto& time = data.recordings.front().inputs.time;
+    const auto& time =
+        data.recordings.front().inputs.time;  // of 8 rows at least, and perhaps of fewer than `most`
+    const double step = (time.back() - time.front()) / static_cast<double>(time.size() - 1);
     clauses.push_back("column `" + data.model.signal(data.outputs[o])->column + "` comes " +
                       std::to_string(rows) + (rows == 1 ? " row (" : " rows (") +
-                      report::si(time[rows] - time.front(), "s", 2) +
+                      report::si(static_cast<double>(rows) * step, "s", 2) +
                       ") too early beside the others: look at how the columns were put together");
   }
   return clauses;
