@@ -66,15 +66,21 @@ bool is_one_value(const Node& node) {
   return true;
 }
 
+/// What a formula may speak of: the time, states, inputs and parameters.
+std::vector<std::string> names_in_formulas(const physics::Model& model) {
+  std::vector<std::string> names{"t"};
+  for (const auto& state : model.equations.states) names.push_back(state.name);
+  for (const auto& input : model.equations.inputs) names.push_back(input.symbol);
+  for (const auto& parameter : model.parameters)
+    if (parameter.name.find('.') == std::string::npos) names.push_back(parameter.name);
+  return names;
+}
+
 /// Reads a formula as the simulation will, to say at its line what it is that cannot be read. Is it readable?
 bool check_formula(const Node& node, const physics::Model& model) {
-  std::vector<std::string> variables{"t"}, constants;
-  for (const auto& state : model.equations.states) variables.push_back(state.name);
-  for (const auto& input : model.equations.inputs) variables.push_back(input.symbol);
-  for (const auto& parameter : model.parameters)
-    if (parameter.name.find('.') == std::string::npos) constants.push_back(parameter.name);
   try {
-    (void)physics::Expressions{variables, constants}.add(physics::Expressions::rates, node.as_text(), "");
+    (void)physics::Expressions{names_in_formulas(model), {}}.add(physics::Expressions::rates, node.as_text(),
+                                                                 "");
   } catch (const InputError& error) {
     node.fault(error.faults().front().what, error.faults().front().mend);
     return false;
@@ -182,11 +188,7 @@ std::vector<FormulaClash> clashes_of_units(const physics::Model& model,
   auto units = own_units(model);
   for (const auto& input : model.equations.inputs)
     if (const auto at = columns.find(input.signal); at != columns.end()) units[input.symbol] = at->second;
-  std::vector<std::string> names{"t"};
-  for (const auto& state : model.equations.states) names.push_back(state.name);
-  for (const auto& input : model.equations.inputs) names.push_back(input.symbol);
-  for (const auto& parameter : model.parameters)
-    if (parameter.name.find('.') == std::string::npos) names.push_back(parameter.name);
+  const auto names = names_in_formulas(model);
   std::vector<FormulaClash> clashes;
   const auto formulas = formulas_of(model, units, columns);
   for (std::size_t i = 0; i < formulas.size(); ++i)

@@ -102,11 +102,10 @@ class Reader {
   }
 
   /// What takes a pure number, or an angle in rad.
-  std::optional<Unit> pure(const Known& a, const char* taker, bool gives_pure) {
-    if (is_known(a))
-      if (const auto apart = difference(*a.unit, Unit{}))
-        clash_ = {list(a) + " " + apart->what + " " + taker, apart->is_size};
-    return gives_pure ? std::optional{Unit{}} : std::nullopt;
+  void expect_pure(const Known& a, const char* taker) {
+    if (!is_known(a)) return;
+    if (const auto apart = difference(*a.unit, Unit{}))
+      clash_ = {list(a) + " " + apart->what + " " + taker, apart->is_size};
   }
 
   Known of(const Expressions::Instruction& step) {
@@ -149,7 +148,7 @@ class Reader {
         if (b.value && is_known(a))
           made.unit = power_of(*a.unit, *b.value);
         else if (!b.names.empty())
-          (void)pure(b, "a pure number, as an exponent is", false);
+          expect_pure(b, "a pure number, as an exponent is");
         break;
       case Operation::root:
         if (is_known(a)) made.unit = power_of(*a.unit, 0.5);
@@ -164,18 +163,21 @@ class Reader {
       case Operation::sine:
       case Operation::cosine:
       case Operation::tangent:
-        made.unit = pure(a, "an angle in rad", true);
+        expect_pure(a, "an angle in rad");
+        made.unit = Unit{};
         break;
       case Operation::sinh:
       case Operation::cosh:
       case Operation::tanh:
       case Operation::exponential:
-        made.unit = pure(a, "the pure number that exp and its kin take", true);
+        expect_pure(a, "the pure number that exp and its kin take");
+        made.unit = Unit{};
         break;
       case Operation::arc_sine:
       case Operation::arc_cosine:
       case Operation::arc_tangent:
-        made.unit = pure(a, "the pure number that an angle is of", true);
+        expect_pure(a, "the pure number that an angle is of");
+        made.unit = Unit{};
         break;
       case Operation::logarithm:
       case Operation::logarithm_2:

@@ -134,17 +134,6 @@ std::string look_at_numbers(const Diagnosis& d) {
              : "First look at the value, unit, sign and sigma that the model's file gives for " + text + ". ";
 }
 
-std::string experiment_of(const Case& data, const Diagnosis& d);
-
-}  // namespace
-
-std::string next_experiment(const Case& data, const Diagnosis& d) {
-  if (d.is_partial || (d.off_law && d.off_law->is_another_law())) return experiment_of(data, d);
-  return look_at_numbers(d) + experiment_of(data, d);
-}
-
-namespace {
-
 std::string experiment_of(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
   if (d.off_law && d.off_law->is_another_law())
@@ -198,5 +187,10 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
 }
 
 }  // namespace
+
+std::string next_experiment(const Case& data, const Diagnosis& d) {
+  if (d.is_partial || (d.off_law && d.off_law->is_another_law())) return experiment_of(data, d);
+  return look_at_numbers(d) + experiment_of(data, d);
+}
 
 }  // namespace invar::diagnose
