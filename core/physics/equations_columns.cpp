@@ -16,7 +16,7 @@ Bending::Bending(const Term& term, bool held, bool has_changes)
       held_{held},
       has_changes_{has_changes} {}
 
-double Bending::through_store(double step, double value) {
+double Bending::through_store(double step, double value, double arch) {
   if (!begun_) store_ = last_ = value;
   const double kept = std::exp(-step / time_constant());
   double felt = store_;
@@ -24,26 +24,30 @@ double Bending::through_store(double step, double value) {
     if (step > 0.0 && !at_rows_) felt = value + (store_ - value) * (1.0 - kept) * time_constant() / step;
     store_ = value + (store_ - value) * kept;
   } else if (begun_ && step > 0.0) {
-    const double behind = (value - last_) / step * time_constant();
-    felt = store_ = value - behind + (store_ - last_ + behind) * kept;
+    // Of last + (rise + 4 arch) s - 4 arch s^2, with s from 0 to 1 over the step, and the store's first-order equation.
+    const double times = time_constant() / step, bow = 4.0 * arch,
+                 behind = times * (value - last_ + bow + 2.0 * times * bow);
+    felt = store_ = value - behind + 2.0 * times * bow + (store_ - last_ + behind) * kept;
   }
   last_ = value;
   return value + share() * (felt - value);
 }
 
-double Bending::late(double now, double value) {
+double Bending::late(double now, double value, double arch) {
   times_.push_back(now);
   values_.push_back(value);
+  arches_.push_back(arch);
   const double when = now - first_, rounding = has_changes_ ? 1e-12 * std::abs(now) : 0.0;
   while (place_ + 1 < times_.size() && times_[place_ + 1] <= when + rounding) ++place_;
   if (has_changes_) return values_[place_];
   const std::size_t next = std::min(place_ + 1, times_.size() - 1);
   const double h = times_[next] - times_[place_];
   const double share = h > 0.0 ? std::clamp((when - times_[place_]) / h, 0.0, 1.0) : 0.0;
-  return values_[place_] + share * (values_[next] - values_[place_]);
+  return values_[place_] + share * (values_[next] - values_[place_]) +
+         4.0 * arches_[next] * share * (1.0 - share);
 }
 
-double Bending::operator()(double now, double step, double value) {
+double Bending::operator()(double now, double step, double value, double arch) {
   if (course_ != nullptr) return value + (*course_)(goes_with_time_ ? now : value);
   double bent = value;
   switch (kind_) {
@@ -58,10 +62,10 @@ double Bending::operator()(double now, double step, double value) {
       break;
     case EquationsMemory::lag:
     case EquationsMemory::hidden_state:
-      if (time_constant() > 0.0) bent = through_store(step, value);
+      if (time_constant() > 0.0) bent = through_store(step, value, arch);
       break;
     case EquationsMemory::delay:
-      if (first_ > 0.0) bent = late(now, value);
+      if (first_ > 0.0) bent = late(now, value, arch);
       break;
     default:
       break;
@@ -110,10 +114,28 @@ void run_over(const Model& model, const std::vector<std::string>& names,
 }
 
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
-          std::vector<double>& values, bool held) {
-  for (auto& bending : bendings(model, on, held, held))
+          std::vector<double>& values, bool held, const std::vector<double>& arches) {
+  bool is_as_given = !arches.empty();
+  for (auto& bending : bendings(model, on, held, held)) {
     for (std::size_t i = 0; i < values.size(); ++i)
-      values[i] = bending(time[i], step_about(time, i, held), values[i]);
+      values[i] = bending(time[i], step_about(time, i, held), values[i], is_as_given ? arches[i] : 0.0);
+    is_as_given = false;
+  }
+}
+
+bool looks_back(const Model& model) {
+  const auto& outputs = model.equations.outputs;
+  if (std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
+        return equations_kind(*term.info)->memory == EquationsMemory::overflow &&
+               std::any_of(outputs.begin(), outputs.end(), [&](const auto& output) {
+                 return term.on == place_of_output(model.equations, output.name);
+               });
+      }))
+    return false;  // what runs over from one output to another is only known at the rows
+  return std::any_of(outputs.begin(), outputs.end(), [&](const auto& output) {
+    const auto all = bendings(model, place_of_output(model.equations, output.name), false, false);
+    return !all.empty() && all.front().looks_back();
+  });
 }
 
 std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,

@@ -31,8 +31,14 @@ class Bending {
   /// `held`: from row to row, as an input is. `has_changes`: there is a row at every instant at which what is held changes
   /// late; without them what comes late by a part of a step counts with the mean over it.
   Bending(const Term& term, bool held, bool has_changes);
-  /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next.
-  double operator()(double now, double step, double value);
+  /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next. `arch`: by how
+  /// much what is not held lies, halfway from the row before, above the straight line.
+  double operator()(double now, double step, double value, double arch = 0.0);
+
+  /// Does it ask for what was between the rows?
+  [[nodiscard]] bool looks_back() const {
+    return course_ == nullptr && (is_store() || (kind_ == EquationsMemory::delay && first_ > 0.0));
+  }
 
   /// Does a share arrive by way of a first-order store?
   [[nodiscard]] bool is_store() const { return share() > 0.0; }
@@ -51,9 +57,9 @@ class Bending {
     return kind_ == EquationsMemory::lag ? 1.0 : kind_ == EquationsMemory::hidden_state ? first_ : 0.0;
   }
   /// A share arrives by way of a first-order store, in balance at the start. What is held counts with the mean over its step,
-  /// as a machine feels it; what is smooth goes straight from row to row.
-  double through_store(double step, double value);
-  double late(double now, double value);
+  /// as a machine feels it; what is smooth goes by a parabola from row to row.
+  double through_store(double step, double value, double arch);
+  double late(double now, double value, double arch);
 
   EquationsMemory kind_;
   const Curve* course_;  // added to the value, over itself or over t; null: none
@@ -61,7 +67,7 @@ class Bending {
   double first_, second_;
   bool held_, has_changes_, at_rows_ = false, begun_ = false;
   double store_ = 0.0, last_ = 0.0;
-  std::vector<double> times_, values_;
+  std::vector<double> times_, values_, arches_;
   std::size_t place_ = 0;
 };
 
@@ -72,8 +78,11 @@ std::vector<Bending> bendings(const Model& model, const std::string& on, bool he
 double step_about(const std::vector<double>& time, std::size_t row, bool held);
 
 /// Terms `on` this signal bend its column. `held`: from row to row, as an input is; then with rows where it changes late.
+/// `arches`: of what is not held, by how much it lies above the straight line halfway from the row before; empty: nowhere.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
-          std::vector<double>& values, bool held);
+          std::vector<double>& values, bool held, const std::vector<double>& arches = {});
+/// Does a term at an output ask for what was between the rows?
+bool looks_back(const Model& model);
 /// The same of an input where the last thing that bends it is a store: the values as they are felt at the rows, and by row
 /// what they do until the next one. Empty, and nothing bent, where it is none.
 std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,

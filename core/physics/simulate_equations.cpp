@@ -156,6 +156,30 @@ class OwnEquations final : public Simulation {
     return bent;
   }
 
+  /// What an output was at each instant, and by how much it lies, halfway from the one before, above the straight line.
+  struct Between {
+    std::vector<double> values, arches;
+    double halfway = std::nan("");
+
+    void add(double value) {
+      const bool known = !values.empty() && std::isfinite(halfway);
+      arches.push_back(known ? halfway - 0.5 * (values.back() + value) : 0.0);
+      values.push_back(value);
+      halfway = std::nan("");
+    }
+  };
+
+  /// Where the states are halfway through a step, by Hermite's cubic; `from` and `to` with their rates.
+  template <class State>
+  static State halfway(const State& from, const State& from_rate, const State& to, const State& to_rate,
+                       double h) {
+    State mid = from;
+    for (std::size_t i = 0; i < mid.size(); ++i)
+      for (std::size_t l = 0; l < mid[i].size(); ++l)
+        mid[i][l] = 0.5 * (from[i][l] + to[i][l]) + 0.125 * h * (from_rate[i][l] - to_rate[i][l]);
+    return mid;
+  }
+
   template <std::size_t lanes>
   void run_lanes(const std::array<const Model*, lanes>& models,
                  const std::array<Outputs*, lanes>& outputs) const {
@@ -184,6 +208,8 @@ class OwnEquations final : public Simulation {
       for (std::size_t o = 0; o < count; ++o) out[o][l] = (*outputs[l])[o].data();
     }
     machine.balance_hidden(s);
+    const bool back = looks_back(*models[0]);
+    std::vector<std::array<Between, lanes>> between(back ? count : 0);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
     std::array<std::vector<Bending>, lanes> way;  // from the controller to the machine
     if (closed)
@@ -202,6 +228,8 @@ class OwnEquations final : public Simulation {
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
         if (row == 0) machine.balance_hidden(s);
+        for (auto& output : between)
+          for (auto& lane : output) lane.halfway = std::nan("");  // between two windows nothing went anywhere
         ++restart;
       }
       const std::size_t commanded_input = closed ? machine.controlled() - machine.states() : inputs_.size();
@@ -234,8 +262,10 @@ class OwnEquations final : public Simulation {
         renew(fastest, false);
       }
       machine.show(s, time[at]);
+      if (is_row || back) machine.work_out_outputs();
+      for (std::size_t o = 0; o < between.size(); ++o)
+        for (std::size_t l = 0; l < lanes; ++l) between[o][l].add(machine.output(o)[l]);
       if (is_row) {
-        machine.work_out_outputs();
         for (std::size_t o = 0; o < count; ++o)
           for (std::size_t l = 0; l < lanes; ++l)
             if (out[o][l] != nullptr) out[o][l][row] = machine.output(o)[l];
@@ -265,7 +295,15 @@ class OwnEquations final : public Simulation {
           else if (equations.inputs[i].linear)
             machine.set_input(i, l, {values[at], (values[at + 1] - values[at]) / h}, time[at]);
         }
+      typename EquationsMachine<lanes>::State from = s, rate{};
+      if (back) rate = machine.slope(s, time[at]);
       fastest.swing = std::max(fastest.swing, finely(machine, s, time[at], h, parts, stiff));
+      if (back && !stiff) {
+        machine.show(halfway(from, rate, s, machine.slope(s, time[at + 1]), h), time[at] + 0.5 * h);
+        machine.work_out_outputs();
+        for (std::size_t o = 0; o < count; ++o)
+          for (std::size_t l = 0; l < lanes; ++l) between[o][l].halfway = machine.output(o)[l];
+      }
       machine.hold_inputs();
     }
     std::vector<std::string> names;
@@ -274,7 +312,15 @@ class OwnEquations final : public Simulation {
       if (outputs[l] == nullptr) continue;
       run_over(*models[l], names, *outputs[l]);
       for (std::size_t o = 0; o < count; ++o) {
-        bend(*models[l], names[o], time_, (*outputs[l])[o], false);
+        auto& column = (*outputs[l])[o];
+        if (back) {
+          auto& all = between[o][l];
+          bend(*models[l], names[o], time, all.values, false, all.arches);
+          for (std::size_t at = 0, row = 0; at < n; ++at)
+            if (!grid || grid->is_row[at]) column[row++] = all.values[at];
+        } else {
+          bend(*models[l], names[o], time_, column, false);
+        }
         for (double& value : (*outputs[l])[o]) value = equations.outputs[o].limits.clamp(value);
       }
     }

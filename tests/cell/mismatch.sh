@@ -162,6 +162,7 @@ case $part in
     head='columns: {target_x: a, target_y: b, height: h, time: t, landed_x: x, landed_y: y}\nparameters: {placement_error_x: {value: 1e-6, unit: m}, placement_error_y: {value: 0, unit: m}, slope_x: {value: 0, unit: 1}, slope_y: {value: 0, unit: 1}, speed: {value: 2, unit: m/s}}'
     model droplet "$head"
     refuses 2 "is for a dispenser; \`stage_x\` is of type stage; the cell has no dispenser" $cell stage_x --model other.yaml
+    refuses 2 "columns: read what \`stage_x\` recorded, not \`stage_y\`" deployment/print-cell.yaml stage_y --model $believed
     refuses 2 "is for a stage; \`dispenser\` is of type dispenser; give it to stage_x, stage_y" deployment/print-cell.yaml dispenser --model $believed
     model droplet "$head\nterms: [{term: air_drag, diameter: {value: 5e-4, unit: m}}]"
     refuses 2 "terms[0]: a dispenser cannot aim by \`air_drag\`: its shift is not straight in the height; take it out, or give --partly" $cell stage_x --model other.yaml

@@ -65,14 +65,19 @@ std::string why_not_used(const physics::Term& term, physics::Plant plant) {
          std::string{why};
 }
 
-/// The file's faults are said here, before anything is asked of the cell. Returns the type of component that takes it; empty:
-/// the cell decides.
-std::string_view check_model(const std::filesystem::path& file, bool partly) {
+/// For whom a file is.
+struct Addressee {
+  std::string_view type;    // of component; empty: the cell decides
+  std::string recorded_of;  // the component whose recording its columns read; empty: none that is known
+};
+
+/// The file's faults are said here, before anything is asked of the cell.
+Addressee check_model(const std::filesystem::path& file, bool partly) {
   const auto yaml = config::Yaml::load(file);
   if (yaml.root().has("invar_compensation")) {
     if (compensation::check_seal(yaml) == 0)
       throw InputError{file.string(), "carries no checksum", "apply a file as a calibration wrote it"};
-    return "";
+    return {};
   }
   const auto model = model::read(yaml);
   yaml.finish();
@@ -92,13 +97,22 @@ std::string_view check_model(const std::filesystem::path& file, bool partly) {
   if (model.plant == physics::Plant::error_map)
     if (const auto why = compensation::why_not_corrected(model); !why.empty())
       throw InputError{file.string(), "cannot be corrected by: " + why, "then apply it again"};
-  return taker.type;
+  const auto* position = model.signal("position");
+  return {taker.type, position == nullptr ? "" : position->column.substr(0, position->column.find('.'))};
 }
 
-/// A model for a component of another type.
-void check_type(const config::Cell& cell, const std::string& name, std::string_view type,
-                const std::filesystem::path& file) {
+/// A model for a component of another type, or of another stage than this one.
+void check_addressee(const config::Cell& cell, const std::string& name, const Addressee& of,
+                     const std::filesystem::path& file) {
   const auto* component = cell.find(name);
+  const auto* recorded = cell.find(of.recorded_of);
+  if (component->type == "stage" && of.type == "stage" && recorded != nullptr && recorded != component &&
+      recorded->type == "stage")
+    throw InputError{file.string() + ": columns",
+                     "read what `" + of.recorded_of + "` recorded, not `" + name + "`",
+                     "give it to " + of.recorded_of + ", or where both are known to be alike write " + name +
+                         " in its columns"};
+  const auto type = of.type;
   if (type.empty() || component->type == type || component->type == "model_watch") return;
   std::string list;
   for (const auto& process : cell.processes)
@@ -196,18 +210,18 @@ nlohmann::ordered_json json_of(const std::string& component, const compensation:
 int apply(Options& options) {
   options.call.resolve();
   std::filesystem::path file;
-  std::string_view type;
+  Addressee of;
   if (!options.rollback && !options.none) {
     if (options.model.empty())
       throw InputError{"--model", "is missing", "name the model's file, or give --rollback or --none"};
     file = std::filesystem::absolute(options.model);
-    type = check_model(file, options.partly);
+    of = check_model(file, options.partly);
   }
   (void)interrupted();
   LiveCell cell{options.call};
   if (cell.file() != nullptr) {
     check_component(*cell.file(), options.call.word(0));
-    check_type(*cell.file(), options.call.word(0), type, file);
+    check_addressee(*cell.file(), options.call.word(0), of, file);
   }
   if (!cell.found()) {
     cell.say_not_found(options.call.command);

@@ -111,6 +111,29 @@ std::optional<std::pair<double, double>> line_at_first(const std::vector<double>
   return std::pair{median(levels), std::sqrt(tt / (n * tt - t * t))};
 }
 
+/// Where a carriage stands from the first row on, held by friction off the reference by less than one reading tells. Nothing
+/// where too few rows were read before the reference moves, or where the loop takes it to the reference.
+std::optional<double> stands_beside(const std::vector<double>& reference,
+                                    const std::vector<double>& position) {
+  constexpr std::size_t enough = 50, first = 10;    // rows
+  constexpr double plainly_off = 4.0, alike = 2.5;  // standard errors
+  double sum = 0.0, sum_of_first = 0.0, count = 0.0, count_of_first = 0.0;
+  std::size_t rows = 0;
+  for (; rows < position.size() && reference[rows] == reference[0]; ++rows) {
+    if (!std::isfinite(position[rows])) continue;
+    sum += position[rows], ++count;
+    if (rows < first) sum_of_first += position[rows], ++count_of_first;
+  }
+  if (rows < enough || count < 0.5 * static_cast<double>(rows) || count_of_first == 0.0) return std::nullopt;
+  const double mean = sum / count,
+               spread = spread_of_differences(
+                   {position.begin(), position.begin() + static_cast<std::ptrdiff_t>(rows)});
+  const bool is_off = std::abs(mean - reference[0]) > plainly_off * spread / std::sqrt(count),
+             from_the_first_on =
+                 std::abs(sum_of_first / count_of_first - mean) < alike * spread / std::sqrt(count_of_first);
+  return is_off && from_the_first_on ? std::optional{mean} : std::nullopt;
+}
+
 /// The initial state, where the first rows contradict the one that the model starts from.
 void give_start(Case& data, Recording& recording) {
   using physics::Plant;
@@ -138,6 +161,9 @@ void give_start(Case& data, Recording& recording) {
       doubt = 1e-6;
       if (reference != nullptr && reference->size() > 5) doubt += std::abs((*reference)[5] - (*reference)[0]);
     }
+    if (const auto* reference = inputs.find("reference");
+        data.model.controller && reference != nullptr && name == "position")
+      if (const auto at = stands_beside(*reference, recording.measured[o])) begin = *at, spread = doubt = 0.0;
     if (!std::isfinite(begin) || !std::isfinite(expected) ||
         !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt)))
       continue;
@@ -286,8 +312,8 @@ void check_filled(const physics::Model& model, const physics::Record& record,
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
-  data.doubts.clear();  // they are of the same model and units each time
-  for (const auto& doubt : content.doubts) data.doubts.push_back("units: " + doubt);
+  for (const auto& doubt : content.doubts)  // they are of the same model and units each time
+    if (data.recordings.empty()) data.doubts.push_back("units: " + doubt);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
@@ -318,6 +344,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   if (is_course && 2 * (data.count.out_of_order - before) > rows)
     throw InputError{table.file.string() + ": column `" + model.signal("time")->column + "`",
                      "goes back at most of its rows", "name the column of the time, and sort the rows by it"};
+  leave_out_what_died(model, record, table.file.filename().string(), data.doubts);
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};

@@ -85,7 +85,6 @@ struct Diagnosis {
   std::vector<FitRow> heldout, train;
   std::vector<OtherRun> other_runs;
   double unexplained = 1.0;  // residual over noise of the best model
-  std::vector<std::string> doubts;  // of the recording itself, a clause each
   std::vector<std::string> unexplained_over;
   std::optional<Suspect> suspect;  // of unknown physics that has no curve either
   double still_follows = 0.0;      // share of the mismatch that is left and follows what was recorded

@@ -146,14 +146,16 @@ class Candidates {
       const auto& span = spans_.of(input.symbol);
       add_late(input.symbol, step);
       add("hidden_state", input.symbol, "", 0.1, store_times());
-      for (const double share : {0.02, 0.1}) add("dead_zone", input.symbol, "", share * span.width());
+      add_dead_zone(input.symbol, span);
       add_limits(input.symbol, span);
     }
     for (const auto& output : equations_.outputs) {
       const auto place = physics::place_of_output(equations_, output.name);
       add_late(place, step);
       add("hidden_state", place, "", 0.1, store_times());
-      add_limits(place, spans_.of(place));
+      const auto& span = spans_.of(place);
+      add_limits(place, span);
+      if (span.low < 0.0 && span.high > 0.0) add_dead_zone(place, span);
     }
     return std::move(starts_);
   }
@@ -235,8 +237,11 @@ class Candidates {
       add("delay", state, "", steps * step);
       add("lag", state, "", steps * step);
     }
-    if (span.low < 0.0 && span.high > 0.0)
-      for (const double share : {0.02, 0.1}) add("dead_zone", state, "", share * span.width());
+    if (span.low < 0.0 && span.high > 0.0) add_dead_zone(state, span);
+  }
+
+  void add_dead_zone(const std::string& on, const Span& span) {
+    for (const double share : {0.02, 0.1}) add("dead_zone", on, "", share * span.width());
   }
 
   void add_limits(const std::string& on, const Span& span) {

@@ -118,9 +118,9 @@ std::string like_a_slip(double ratio) {
 
 /// Before anything is measured: columns that do not stand beside one another, and a number far from what was believed, are
 /// first of all slips in a file.
-std::string look_at_numbers(const Diagnosis& d) {
+std::string look_at_numbers(const Case& data, const Diagnosis& d) {
   constexpr double far = 3.0;  // times the noise: what is missing moved them
-  if (!d.doubts.empty()) return "First look at how the columns were put together. ";
+  if (data.is_moved) return "First look at how the columns were put together. ";
   if (d.unexplained >= far) return "";
   std::string text;
   for (const auto& one : moved_numbers(d, far_moved)) {
@@ -190,7 +190,7 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
 
 std::string next_experiment(const Case& data, const Diagnosis& d) {
   if (d.is_partial || (d.off_law && d.off_law->is_another_law())) return experiment_of(data, d);
-  return look_at_numbers(d) + experiment_of(data, d);
+  return look_at_numbers(data, d) + experiment_of(data, d);
 }
 
 }  // namespace invar::diagnose

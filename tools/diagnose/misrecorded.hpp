@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,8 +14,14 @@ namespace invar::diagnose {
 /// InputError where no output reads more. Of machines that move on from row to row.
 void leave_out_dead(Case& data, const std::filesystem::path& file);
 
-/// A clause for each output that comes too early: that the retuned or the believed model meets far better some rows
-/// later, as no physics does, and better than the best model meets it as it stands.
-std::vector<std::string> misrecorded(const Case& data, const Diagnosis& d);
+/// Leaves out an output from where on it reads one value to the end, though it never stood still before and another
+/// signal goes on: its sensor died. With a clause in `doubts` for each. Of machines that move on from row to row.
+void leave_out_what_died(const physics::Model& model, physics::Record& record, const std::string& file,
+                         std::vector<std::string>& doubts);
+
+/// The recordings with each output moved that comes too early: that the retuned or the believed model meets far better
+/// some rows later, as no physics does, and better than the best model meets it as it stands; with a clause in `doubts` for
+/// each. Nothing where none comes too early.
+std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged, const Diagnosis& d);
 
 }  // namespace invar::diagnose

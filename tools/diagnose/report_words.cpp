@@ -323,8 +323,7 @@ std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
   if (d.unexplained >= much)
     text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
-  for (const auto* doubts : {&d.doubts, &data.doubts})
-    for (const auto& doubt : *doubts) text += (text.empty() ? "" : "; ") + doubt;
+  for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + doubt;
   return text.empty() ? text : "Mind: " + text + ".";
 }
 

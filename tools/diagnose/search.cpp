@@ -12,6 +12,7 @@
 #include "tools/diagnose/form.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
+#include "tools/diagnose/misrecorded.hpp"
 #include "tools/diagnose/one_name.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/own_units.hpp"
@@ -599,6 +600,11 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
   Case as_read = data;
   auto d = Search{data, progress, options}.run();
   if (!options.refuses) return d;
+  if (auto in_step = with_columns_in_step(as_read, data, d)) {
+    data = as_read = std::move(*in_step);
+    as_read.remembered = std::make_shared<Remembered>();
+    d = Search{data, progress, options}.run();
+  }
   if ((named_by(d) < 2 || d.findings.size() > 1) && !d.is_partial && has_longer_windows(data)) {
     Case longer = as_read;
     longer.windows.few = true;

@@ -6,7 +6,6 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/left_over.hpp"
-#include "tools/diagnose/misrecorded.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/suspect.hpp"
@@ -304,7 +303,6 @@ void conclude(const Case& data, Diagnosis& d) {
                     ? Verdict::partly_explained
                     : Verdict::explained;
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);
-  d.doubts = misrecorded(data, d);
   // An equation, or a window of an axis, that says the right thing leaves noise. Many times that, and with what was
   // recorded, is more physics, however much was found.
   if ((data.model.plant == physics::Plant::equations || data.windows.count > 0) &&

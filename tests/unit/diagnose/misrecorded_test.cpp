@@ -1,6 +1,7 @@
 // Recordings in which a column is dead, or was put beside the others some rows off.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <random>
 
 #include "core/base/fault.hpp"
@@ -54,20 +55,21 @@ Columns recorded(std::size_t early) {
   return made;
 }
 
-Diagnosis diagnosed(Case data) {
+Diagnosis diagnosed(Case& data) {
   return search(data, [](double, const std::string&) {});
 }
 
-TEST(Misrecorded, AColumnThatComesEarlyIsSaid) {
+TEST(Misrecorded, AColumnThatComesEarlyIsSaidAndMoved) {
   const auto [table, model] = recorded(3);
-  const auto data = make_case(model, {table});
-  EXPECT_THAT(beside_the_verdict(data, diagnosed(data)),
-              HasSubstr("column `first` comes 3 rows (60 ms) too early"));
+  auto data = make_case(model, {table});
+  const auto d = diagnosed(data);
+  EXPECT_THAT(beside_the_verdict(data, d), HasSubstr("column `first` comes 3 rows (60 ms) too early"));
+  EXPECT_THAT(d.findings, ::testing::IsEmpty()) << "no physics acts before its cause";
 }
 
 TEST(Misrecorded, OfWhatStandsWhereItShouldNothingIsSaid) {
   const auto [table, model] = recorded(0);
-  const auto data = make_case(model, {table});
+  auto data = make_case(model, {table});
   const auto d = diagnosed(data);
   EXPECT_EQ(beside_the_verdict(data, d), "");
   EXPECT_EQ(d.verdict, Verdict::no_mismatch);
@@ -76,10 +78,38 @@ TEST(Misrecorded, OfWhatStandsWhereItShouldNothingIsSaid) {
 TEST(Misrecorded, AnOutputOfOneValueIsLeftOutAndSaid) {
   auto [table, model] = recorded(0);
   table.columns.back().values.assign(table.rows(), 0.25);
-  const auto data = make_case(model, {table});
+  auto data = make_case(model, {table});
   const auto d = diagnosed(data);
   EXPECT_THAT(beside_the_verdict(data, d), HasSubstr("column `second` reads one value in every row"));
   EXPECT_THAT(d.findings, ::testing::IsEmpty());
+}
+
+TEST(Misrecorded, AnOutputThatDiesIsLeftOutFromThereAndSaid) {
+  auto [table, model] = recorded(0);
+  auto& values = table.columns.back().values;
+  std::fill(values.begin() + 600, values.end(), values[600]);
+  auto data = make_case(model, {table});
+  const auto d = diagnosed(data);
+  EXPECT_THAT(beside_the_verdict(data, d),
+              HasSubstr("run.csv: column `second` reads one value from 12 s on and is left out there"));
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch);
+}
+
+TEST(Misrecorded, AnOutputThatRestsAtALimitHasNotDied) {
+  auto [table, model] = recorded(0);
+  auto& values = table.columns.back().values;
+  const double highest = *std::max_element(values.begin(), values.end());
+  std::fill(values.begin() + 600, values.end(), highest);
+  EXPECT_THAT(make_case(model, {table}).doubts, ::testing::IsEmpty());
+}
+
+TEST(Misrecorded, AnOutputThatRestsWithTheWholeMachineHasNotDied) {
+  auto [table, model] = recorded(0);
+  for (std::size_t c = 1; c < table.columns.size(); ++c) {
+    auto& values = table.columns[c].values;
+    std::fill(values.begin() + 600, values.end(), values[600]);
+  }
+  EXPECT_THAT(make_case(model, {table}).doubts, ::testing::IsEmpty());
 }
 
 TEST(Misrecorded, WhereAllOutputsAreDeadNothingIsDiagnosed) {

@@ -327,6 +327,31 @@ TEST(Equations, TermsActAsTheContractSays) {
   EXPECT_NEAR(last(constant, -0.5), -0.5, 1e-6);
 }
 
+TEST(Equations, AnInstrumentThatIsLateShowsWhatWasBetweenTheRows) {
+  constexpr double omega = 10.0, tau = 0.03, delay = 0.08;
+  const auto shown = [&](const std::string& term) {
+    std::vector<double> time;
+    for (int i = 0; i < 60; ++i) time.push_back(0.05 * i);  // half a radian: a straight line errs by 0.03
+    return simulated(
+        "plant: equations\ncolumns: {time: t}\ninputs: {}\nstates:\n"
+        "  x: {derivative: v, initial: {value: 0, unit: m, sigma: 0}}\n"
+        "  v: {derivative: '-100*x', initial: {value: 10, unit: m/s, sigma: 0}}\n"
+        "outputs: {y: {column: y, expression: x}}\nparameters: {}\nterms: [" +
+            term + "]\n",
+        time, {});
+  };
+  const auto late = shown("{term: delay, on: y, delay: {value: 0.08, unit: s}}"),
+             lagging = shown("{term: lag, on: y, time_constant: {value: 0.03, unit: s}}");
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    const double t = 0.05 * static_cast<double>(i), a = omega * tau;
+    EXPECT_NEAR(late[i], t > delay ? std::sin(omega * (t - delay)) : 0.0, 2e-3) << "row " << i;
+    EXPECT_NEAR(lagging[i],
+                (std::sin(omega * t) - a * std::cos(omega * t) + a * std::exp(-t / tau)) / (1.0 + a * a),
+                2e-3)
+        << "row " << i;
+  }
+}
+
 TEST(Equations, AnOutputThatBearsAStatesNameIsAPlaceOfItsOwn) {
   const auto at = [](const char* place) {
     const std::string text =
