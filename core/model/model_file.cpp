@@ -148,6 +148,7 @@ void read_controller(const Node& root, Model& model) {
   if (node.has("velocity_filter_hz"))
     settings.velocity_filter_hz = node.number("velocity_filter_hz", "1", Range::positive());
   settings.limit = node.number("limit", "1", Range::not_negative(), 0.0);
+  if (node.has("hold")) model.reference_goes_on = node.choice("hold", {"step", "smooth"}) == "smooth";
   model.controller = settings;
 }
 
@@ -499,6 +500,8 @@ std::string patched(const config::Yaml& original, const physics::Model& changed)
   }
   root["terms"] = YAML::Node{YAML::NodeType::Sequence};
   for (const auto& term : changed.terms) root["terms"].push_back(term_yaml(term, changed));
+  if (changed.reference_goes_on && !before.reference_goes_on)
+    root["controller"]["hold"] = *changed.reference_goes_on ? "smooth" : "step";
   if (const auto& covered = changed.baseline.temperature) {
     YAML::Node range;
     for (const double end : {covered->lower, covered->upper}) range.push_back(end);

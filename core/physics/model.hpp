@@ -92,6 +92,9 @@ struct Model {
   std::vector<Term> terms;
   std::map<std::string, double, std::less<>> noise;  // 1 sigma by signal, SI
   std::optional<AxisControllerSettings> controller;
+  /// Where not every cycle of the controller has its row: whether the reference goes smoothly on between two rows or is held
+  /// from one to the next. Nothing: not said, and held.
+  std::optional<bool> reference_goes_on;
   ThermalLayout thermal;
   Baseline baseline;
   Equations equations;

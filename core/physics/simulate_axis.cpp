@@ -16,10 +16,11 @@ double first_or(const Record& record, const char* name, double otherwise) {
 }
 
 /// What a cubic through two rows on each side adds to a straight line `at` ticks into a gap of `gap` ticks before `row`.
-/// Preconditions: the rows beyond are one tick away.
-double bend(const std::vector<double>& values, std::size_t row, std::size_t gap, std::size_t at) {
+/// `before`, `after`: ticks to the rows beyond.
+double bend(const std::vector<double>& values, std::size_t row, std::size_t gap, std::size_t at,
+            std::size_t before, std::size_t after) {
   const double g = static_cast<double>(gap), x = static_cast<double>(at);
-  const double known[] = {-1.0, 0.0, g, g + 1.0};
+  const double known[] = {-static_cast<double>(before), 0.0, g, g + static_cast<double>(after)};
   double cubic = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
     double weight = 1.0;
@@ -28,6 +29,17 @@ double bend(const std::vector<double>& values, std::size_t row, std::size_t gap,
     cubic += weight * values[row - 2 + i];
   }
   return cubic - (values[row - 1] + x / g * (values[row] - values[row - 1]));
+}
+
+/// Ticks from row to row, as a rule.
+std::size_t usual_ticks(const std::vector<double>& time, double rate) {
+  std::vector<long> ticks;
+  for (std::size_t i = 1; i < time.size(); ++i)
+    ticks.push_back(std::max(1L, std::lround((time[i] - time[i - 1]) * rate)));
+  if (ticks.empty()) return 1;
+  const auto middle = ticks.begin() + static_cast<std::ptrdiff_t>(ticks.size() / 2);
+  std::nth_element(ticks.begin(), middle, ticks.end());
+  return static_cast<std::size_t>(*middle);
 }
 
 /// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp.
@@ -44,23 +56,34 @@ class ClosedLoop final : public Simulation {
     const auto* forwards = inputs.find("feedforward");
     const auto forward = forwards != nullptr ? bridged(inputs.time, *forwards) : std::vector<double>{};
     tick_of_row_.reserve(inputs.rows());
+    const bool goes_on = structure.reference_goes_on.value_or(false);
+    const std::size_t usual = goes_on ? 1 : usual_ticks(inputs.time, rate);
     for (std::size_t row = 0; row < inputs.rows(); ++row) {
       const auto tick =
           static_cast<std::size_t>(std::max(0.0, std::round((inputs.time[row] - start_time_) * rate)));
       tick_of_row_.push_back(tick);
-      // Ticks that no row records: the reference is bridged, a lost cycle or two by a cubic, more by a straight line.
+      // Ticks that no row records, where most have one: the reference is bridged, a lost cycle or two by a cubic, more by a
+      // straight line. Where few have one it is held from row to row, and lost rows are put back first.
       const std::size_t known = reference_.size();
       if (tick < known) continue;
       const double from = row == 0 ? reference[0] : reference_.back();
       const double warm = row == 0 || temperature.empty() ? 20.0 : temperature_.back();
       const double fed = row == 0 || forward.empty() ? 0.0 : forward_.back();
-      const bool curved = (tick == known + 1 || tick == known + 2) && row > 1 && row + 1 < inputs.rows() &&
-                          tick_of_row_[row - 1] == tick_of_row_[row - 2] + 1 &&
-                          std::lround((inputs.time[row + 1] - inputs.time[row]) * rate) == 1;
+      const std::size_t gap = tick + 1 - known, step = 2 * gap <= 3 * usual ? std::max(usual, gap) : usual;
+      const std::size_t before = row > 1 ? tick_of_row_[row - 1] - tick_of_row_[row - 2] : 0,
+                        after = row + 1 < inputs.rows()
+                                    ? static_cast<std::size_t>(std::max(
+                                          0L, std::lround((inputs.time[row + 1] - inputs.time[row]) * rate)))
+                                    : 0;
+      const bool curved =
+          step == 1 && gap > 1 && row > 0 && before > 0 && after > 0 &&
+          (goes_on ? 2 * gap <= 3 * std::min(before, after) : gap <= 3 && before == 1 && after == 1);
       for (std::size_t k = known; k <= tick; ++k) {
-        const double share = static_cast<double>(k + 1 - known) / static_cast<double>(tick + 1 - known);
+        const std::size_t passed = k + 1 - known;
+        const double share =
+            passed == gap ? 1.0 : static_cast<double>(passed / step * step) / static_cast<double>(gap);
         reference_.push_back(from + share * (reference[row] - from) +
-                             (curved ? bend(reference, row, tick + 1 - known, k + 1 - known) : 0.0));
+                             (curved ? bend(reference, row, gap, passed, before, after) : 0.0));
         if (!temperature.empty())
           temperature_.push_back(row == 0 ? temperature[0] : warm + share * (temperature[row] - warm));
         if (!forward.empty()) forward_.push_back(row == 0 ? forward[0] : fed + share * (forward[row] - fed));

@@ -10,6 +10,7 @@
 #include "core/model/recording_file.hpp"
 #include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
+#include "tools/diagnose/even_rows.hpp"
 #include "tools/diagnose/lone_inputs.hpp"
 #include "tools/diagnose/misrecorded.hpp"
 #include "tools/diagnose/shorten.hpp"
@@ -344,6 +345,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   if (is_course && 2 * (data.count.out_of_order - before) > rows)
     throw InputError{table.file.string() + ": column `" + model.signal("time")->column + "`",
                      "goes back at most of its rows", "name the column of the time, and sort the rows by it"};
+  even_out(model, record, table.file.filename().string(), data.doubts);
   leave_out_what_died(model, record, table.file.filename().string(), data.doubts);
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)

@@ -155,7 +155,8 @@ class Candidates {
       add("hidden_state", place, "", 0.1, store_times());
       const auto& span = spans_.of(place);
       add_limits(place, span);
-      if (span.low < 0.0 && span.high > 0.0) add_dead_zone(place, span);
+      constexpr double plainly = 0.05;  // noise alone takes a reading to the other side
+      if (std::min(-span.low, span.high) > plainly * span.width()) add_dead_zone(place, span);
     }
     return std::move(starts_);
   }

@@ -18,6 +18,7 @@
 #include "tools/diagnose/own_units.hpp"
 #include "tools/diagnose/pairs.hpp"
 #include "tools/diagnose/quiet_inputs.hpp"
+#include "tools/diagnose/reference_hold.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/shaken_loose.hpp"
 #include "tools/diagnose/steps.hpp"
@@ -566,7 +567,8 @@ Diagnosis Search::run() {
   const bool paired = is_equations() && take([&] { return add_pair(); });
   name(!paired ? 0 : take([&] { return put_one_in_place(begun); }) ? 1 : 2);
   finish();
-  is_equations() ? try_believed(begun) : try_pairs(begun);
+  if (!is_equations()) try_pairs(begun);
+  try_believed(begun);
   if (options_.refuses && !d_.is_partial) {
     const auto stated = d_;
     if (set_aside(data_, d_)) {
@@ -597,6 +599,7 @@ int named_by(const Diagnosis& d) {
 
 Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
                  const Options& options) {
+  settle_hold(data);
   Case as_read = data;
   auto d = Search{data, progress, options}.run();
   if (!options.refuses) return d;

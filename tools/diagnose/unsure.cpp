@@ -88,7 +88,10 @@ void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far) {
     // Of the user's own equations a number may be far off: what he left out there is often a part of it.
     const bool is_astray =
         d.parameter_excursion > far_astray && finding.term.info->plant != physics::Plant::equations;
-    const double least = is_far || is_astray || rests[i] > plain_rest ? 0.3 : 0.1;
+    constexpr double very_far = 10.0;  // times the noise: what is less likely than not is no name for it
+    const double least = is_far && d.unexplained > very_far             ? 0.5
+                         : is_far || is_astray || rests[i] > plain_rest ? 0.3
+                                                                        : 0.1;
     if (!finding.term.curve.knots.empty() || finding.probability >= least) continue;
     finding.stand_in = finding.term.info;
     finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);

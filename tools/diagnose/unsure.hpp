@@ -20,7 +20,8 @@ bool set_aside(const Case& data, Diagnosis& d);
 
 /// Leaves the name of what is nine times as likely another cause away. What is so in seven cases of ten goes as well where
 /// residuals far from the noise show that it is not the whole truth (`rests`, a share by finding; `is_far`,
-/// of the outputs), or where the names lead the numbers of a built-in plant far astray.
+/// of the outputs), or where the names lead the numbers of a built-in plant far astray; in five, where these are ten times the
+/// noise.
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far);
 
 }  // namespace invar::diagnose

@@ -1,0 +1,42 @@
+#include "tools/diagnose/reference_hold.hpp"
+
+#include <algorithm>
+
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+namespace {
+
+Case with_hold(const Case& data, bool goes_on) {
+  Case other = data;
+  other.remembered = std::make_shared<Remembered>();
+  other.model.reference_goes_on = goes_on;
+  for (auto& recording : other.recordings)
+    recording.simulation = physics::prepare(other.model, recording.inputs);
+  return other;
+}
+
+/// Do the two say different things of the model as it is believed?
+bool are_apart(const Case& a, const Case& b) { return simulate(a, a.model) != simulate(b, b.model); }
+
+}  // namespace
+
+void settle_hold(Case& data) {
+  const auto& model = data.model;
+  if (model.plant != physics::Plant::axis || !model.controller || model.reference_goes_on) return;
+  auto goes_on = with_hold(data, true);
+  if (!are_apart(data, goes_on)) return;
+  const auto weighing = weigh(data, simulate(data, model), false);
+  constexpr int steps = 8;
+  const auto held = fit(data, weighing, model, model, steps);
+  const auto straight = fit(goes_on, weighing, goes_on.model, goes_on.model, steps);
+  if (!(straight.cost < held.cost - claim_margin)) return;
+  data = std::move(goes_on);
+  data.doubts.push_back(
+      "not every cycle of the controller has its row, and between the rows its reference is taken to go "
+      "straight on "
+      "(`hold: smooth`), which lies nearer than `hold: step`");
+}
+
+}  // namespace invar::diagnose
