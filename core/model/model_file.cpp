@@ -297,6 +297,16 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
     return false;
   }
   if (misreads) return true;
+  using physics::EquationsMemory;
+  const bool is_felt =
+      kind != nullptr && (kind->memory == EquationsMemory::delay || kind->memory == EquationsMemory::lag ||
+                          kind->memory == EquationsMemory::dead_zone);
+  if (is_felt && !term.with.empty() && (term.with != "others" || !on_state)) {
+    node["with"].fault("`" + name + "` is felt by all rates, or of a state by the `others` alone",
+                       "write `others`, or leave it out");
+    node.accept_all();
+    return false;
+  }
   if (term.curve.over.empty()) return true;
   std::vector<std::string> symbols{"t"};
   for (const auto& state : model.equations.states) symbols.push_back(state.name);

@@ -96,6 +96,13 @@ bool sticks(const Term& term) {
   return equations_kind(*term.info)->memory == EquationsMemory::dry_friction && term.with == term.on;
 }
 
+bool is_felt_by_others_alone(const Term& term) {
+  if (term.with != "others") return false;
+  const auto* kind = equations_kind(*term.info);
+  return kind != nullptr && (kind->memory == EquationsMemory::delay || kind->memory == EquationsMemory::lag ||
+                             kind->memory == EquationsMemory::dead_zone);
+}
+
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns) {
   const auto place = [&](const std::string& name) {

@@ -16,6 +16,10 @@ std::string place_of_output(const Equations& equations, const std::string& outpu
 /// sticks until its rate would pass the level, as a valve does, and then goes by so much slower.
 bool sticks(const Term& term);
 
+/// A delay, lag or dead zone of a state that names `others` under `with`: what it gives off arrives so at the rates of the
+/// other states, its own feels it as it is. A store whose outflow takes its time to the next is one.
+bool is_felt_by_others_alone(const Term& term);
+
 /// What passes a limit of one column goes, in part, to another. `names` are those of the columns.
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns);

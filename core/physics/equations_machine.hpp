@@ -214,6 +214,7 @@ class EquationsMachine {
     const EquationsTermKind* kind;
     std::size_t on, with;
     std::array<const double*, lanes> p;
+    bool by_others_alone = false;
   };
   struct Course {
     std::size_t on, over;
@@ -257,11 +258,19 @@ class EquationsMachine {
 
   /// The rates as they would be without friction and limits: those jump, and what jumps has no rate of change.
   State free_slope(const State& s, double t) {
-    show(s, t);
-    bend_states(s, t);
-    compiled_.formulas->template run<lanes>(Expressions::rates, slots_.data());
     State d;
-    for (std::size_t i = 0; i < states_; ++i) std::copy_n(slot(compiled_.rates[i]), lanes, d[i].begin());
+    for (const std::size_t own : spared_) {  // its rate feels it as it is
+      show(s, t);
+      bend_states(s, t, own);
+      compiled_.formulas->template run<lanes>(Expressions::rates, slots_.data());
+      std::copy_n(slot(compiled_.rates[own]), lanes, d[own].begin());
+    }
+    show(s, t);
+    bend_states(s, t, states_);
+    compiled_.formulas->template run<lanes>(Expressions::rates, slots_.data());
+    for (std::size_t i = 0; i < states_; ++i)
+      if (std::find(spared_.begin(), spared_.end(), i) == spared_.end())
+        std::copy_n(slot(compiled_.rates[i]), lanes, d[i].begin());
     for (const auto& term : rate_terms_)
       for (std::size_t l = 0; l < lanes; ++l) d[term.on][l] += term.kind->rate(slot(term.with)[l], term.p[l]);
     for (const auto& [on, over, curve, with] : curves_)
@@ -281,19 +290,21 @@ class EquationsMachine {
     return d;
   }
 
-  /// What the rates see of a state behind a dead zone, a lag or a delay; outputs show the state itself.
-  void bend_states(const State& s, double t) {
+  /// What the rates see of a state behind a dead zone, a lag or a delay; outputs show the state itself. `own`: the state whose
+  /// rate is asked for, where some are felt by the others alone.
+  void bend_states(const State& s, double t, std::size_t own) {
+    const auto is_as_it_is = [own](const Use& use) { return use.by_others_alone && use.on == own; };
     for (const auto& zone : dead_zones_)
-      for (std::size_t l = 0; l < lanes; ++l) {
+      for (std::size_t l = 0; l < lanes && !is_as_it_is(zone); ++l) {
         double& seen = slot(zone.on)[l];
         seen -= std::clamp(seen, -zone.p[l][0], zone.p[l][0]);
       }
     for (std::size_t k = 0; k < lags_.size(); ++k)
-      for (std::size_t l = 0; l < lanes; ++l)
+      for (std::size_t l = 0; l < lanes && !is_as_it_is(lags_[k]); ++l)
         slot(lags_[k].on)[l] -=
             lags_[k].p[l][0] / time_constant(lags_[k].p[l][0]) * (s[lags_[k].on][l] - s[first_lag() + k][l]);
     for (const auto& late : delays_)
-      for (std::size_t l = 0; l < lanes; ++l) {
+      for (std::size_t l = 0; l < lanes && !is_as_it_is(late.use); ++l) {
         const double by = late.use.p[l][0], when = t - by;
         const auto& past = late.past;
         if (past.empty() || !(by > 0.0)) continue;
@@ -460,7 +471,9 @@ class EquationsMachine {
       curves_.push_back(course);
       return;
     }
-    Use use{kind, on, with, {}};
+    Use use{kind, on, with, {}, is_felt_by_others_alone(term)};
+    if (use.by_others_alone && std::find(spared_.begin(), spared_.end(), on) == spared_.end())
+      spared_.push_back(on);
     for (std::size_t l = 0; l < lanes; ++l) use.p[l] = models[l]->terms[t].values.data();
     if (kind->rate != nullptr) rate_terms_.push_back(use);
     switch (kind->memory) {
@@ -503,6 +516,7 @@ class EquationsMachine {
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
   std::vector<Courses> courses_;
+  std::vector<std::size_t> spared_;  // states of which something is felt by the others alone
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_, sticking_;
   double shortest_ = 0.0;
   double step_ = 0.0;  // [s] that is being taken; 0: none

@@ -231,18 +231,29 @@ class Candidates {
     return times;
   }
 
-  /// What the rates see of a state.
+  /// What the rates see of a state, all of them or all but its own.
   void add_felt(const std::string& state, double step) {
     const auto& span = spans_.of(state);
-    for (const double steps : {0.5, 6.0}) {
-      add("delay", state, "", steps * step);
-      add("lag", state, "", steps * step);
+    for (const char* by : {"", "others"}) {
+      if (*by != '\0' && !is_felt_by_both(state)) continue;
+      for (const double steps : {0.5, 6.0}) {
+        add("delay", state, by, steps * step);
+        add("lag", state, by, steps * step);
+      }
+      if (span.low < 0.0 && span.high > 0.0) add_dead_zone(state, span, by);
     }
-    if (span.low < 0.0 && span.high > 0.0) add_dead_zone(state, span);
   }
 
-  void add_dead_zone(const std::string& on, const Span& span) {
-    for (const double share : {0.02, 0.1}) add("dead_zone", on, "", share * span.width());
+  /// Does a state's own rate look at it, and another's too?
+  [[nodiscard]] bool is_felt_by_both(const std::string& state) const {
+    bool own = false, other = false;
+    for (const auto& one : states_)
+      if (mentions(one.derivative, state)) (one.name == state ? own : other) = true;
+    return own && other;
+  }
+
+  void add_dead_zone(const std::string& on, const Span& span, const std::string& with = "") {
+    for (const double share : {0.02, 0.1}) add("dead_zone", on, with, share * span.width());
   }
 
   void add_limits(const std::string& on, const Span& span) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/common_factor.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/own_rows.hpp"
@@ -204,7 +205,7 @@ double rarity(const Case& data, const Model& model, const physics::Term& term) {
     return 0.0;
   }
   // A law bends over its own state; what another one does mostly goes straight (a coupling).
-  if (!term.with.empty())
+  if (!term.with.empty() && !physics::is_felt_by_others_alone(term))
     return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size())) +
            (term.info->name == "quadratic" || term.info->name == "cubic" ? 3.0 : 0.0);
   const bool speed = std::any_of(model.equations.states.begin(), model.equations.states.end(),

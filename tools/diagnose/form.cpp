@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/diagnosis.hpp"
 #include "tools/diagnose/screen.hpp"
 
@@ -10,7 +11,7 @@ namespace invar::diagnose {
 std::string variable_of(const physics::Term& term) {
   if (!term.curve.over.empty()) return term.curve.over;
   if (term.info->name == "constant") return "";
-  return term.with.empty() ? term.on : term.with;
+  return term.with.empty() || physics::is_felt_by_others_alone(term) ? term.on : term.with;
 }
 
 namespace {

@@ -38,7 +38,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
     if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
-    names.push_back(term.with.empty() ? term.on : term.with);
+    names.push_back(term.with.empty() || physics::is_felt_by_others_alone(term) ? term.on : term.with);
   }
   return names;
 }
@@ -174,6 +174,7 @@ std::string place_of(const Case& data, const physics::Term& term) {
     for (const auto& output : data.model.equations.outputs)
       if (physics::place_of_output(data.model.equations, output.name) == term.on)
         return "output " + output.name;
+    if (physics::is_felt_by_others_alone(term)) return "state " + term.on + " as the others feel it";
     return "state " + term.on + (term.with.empty() || term.with == term.on ? "" : ", with " + term.with);
   }
   std::string text = site;

@@ -92,6 +92,14 @@ constexpr Machine spring{
     "  c: {value: 3.2, unit: N s/m, sigma: 0.26}\nnoise: {way: 0.002}\n",
     0.005, 0.002, 1000, levels<61, -100, 100>};
 
+constexpr Machine spool{
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
+    "states:\n  x: {derivative: '(u - x)/tau', initial: {value: 0, unit: 1, sigma: 0}}\n"
+    "  v: {derivative: '40*x - b*v', initial: {value: 0, unit: m/s, sigma: 0}}\n"
+    "outputs: {speed: {column: y, expression: v}}\n"
+    "parameters: {tau: {value: 0.1, unit: s, sigma: 0.01}, b: {value: 1.5, unit: 1/s, sigma: 0.2}}\n",
+    0.02, 0.03, 1500, levels<17, -100, 100>};
+
 class Equations : public ::testing::Test {
  protected:
   /// `rate`: of the last state, where the machine obeys another law than any term.
@@ -140,6 +148,13 @@ TEST_F(Equations, NamesASpringThatHardens) {
 
 TEST_F(Equations, NamesDryFriction) {
   expect(diagnose(motor, {term("dry_friction", "w", {4.0})}, 3), "dry_friction", "w", 4.0, 0.3);
+}
+
+/// The spool goes where it is told, and what flows has a gap.
+TEST_F(Equations, NamesTheGapThroughWhichOthersFeelAState) {
+  const auto d = diagnose(spool, {term("dead_zone", "x", {0.1}, "others")}, 8);
+  expect(d, "dead_zone", "x", 0.1, 0.01);
+  EXPECT_EQ(d.findings[0].term.with, "others");
 }
 
 TEST_F(Equations, NamesFrictionOfWhatNeverTurnsItsSign) {

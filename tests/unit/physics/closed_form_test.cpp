@@ -352,6 +352,33 @@ TEST(Equations, AnInstrumentThatIsLateShowsWhatWasBetweenTheRows) {
   }
 }
 
+TEST(Equations, WhatOnlyTheOthersFeelLeavesAStateAsItIs) {
+  const auto shown = [&](const std::string& rate, const std::string& more, const std::string& term) {
+    std::vector<double> time;
+    for (int i = 0; i <= 60; ++i) time.push_back(0.05 * i);
+    return simulated(
+        "plant: equations\ncolumns: {time: t}\ninputs: {}\nstates:\n"
+        "  a: {derivative: '-a', initial: {value: 1, unit: m, sigma: 0}}\n" +
+            more + "  b: {derivative: '" + rate +
+            "', initial: {value: 0, unit: m, sigma: 0}}\n"
+            "outputs: {y: {column: y, expression: b}}\nparameters: {}\nterms: [" +
+            term + "]\n",
+        time, {});
+  };
+  const auto late = shown("a", "", "{term: delay, on: a, with: others, delay: {value: 0.5, unit: s}}"),
+             gap = shown("a", "", "{term: dead_zone, on: a, with: others, width: {value: 0.3, unit: m}}"),
+             lag = shown("a", "", "{term: lag, on: a, with: others, time_constant: {value: 0.4, unit: s}}"),
+             as_lag =
+                 shown("z", "  z: {derivative: '(a - z)/0.4', initial: {value: 1, unit: m, sigma: 0}}\n", "");
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    const double t = 0.05 * static_cast<double>(i), emptied = -std::log(0.3);  // when a is down to the gap
+    EXPECT_NEAR(late[i], std::min(t, 0.5) + std::max(0.0, 1.0 - std::exp(-(t - 0.5))), 1e-3) << "row " << i;
+    EXPECT_NEAR(gap[i], 1.0 - std::exp(-std::min(t, emptied)) - 0.3 * std::min(t, emptied), 1e-3)
+        << "row " << i;
+    EXPECT_NEAR(lag[i], as_lag[i], 1e-4) << "row " << i;
+  }
+}
+
 TEST(Equations, AnOutputThatBearsAStatesNameIsAPlaceOfItsOwn) {
   const auto at = [](const char* place) {
     const std::string text =

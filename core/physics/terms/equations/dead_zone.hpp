@@ -16,7 +16,9 @@ struct DeadZone {
       .depends_on = {},
       .parameters = {{{"width", "*", {0.0, 1e300}, Role::amplitude, {1e-3}, "on each side of zero"}}},
       .description = "Play, overlap of a valve, cross-over of an amplifier.",
-      .source = "s - width sign(s) where |s| > width, else 0; of a state: in all rates"};
+      .source =
+          "s - width sign(s) where |s| > width, else 0; of a state: in all rates, or (`with: others`) in all "
+          "but its own"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dead_zone};
 };
 

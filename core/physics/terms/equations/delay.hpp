@@ -16,7 +16,7 @@ struct Delay {
       .depends_on = {"history"},
       .parameters = {{{"delay", "*", {0.0, 1e6}, Role::amplitude, {1e-3}, "in the unit of time"}}},
       .description = "Transport through a pipe, a bus or a computation.",
-      .source = "s(t - delay); of a state: in all rates"};
+      .source = "s(t - delay); of a state: in all rates, or (`with: others`) in all but its own"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::delay};
 };
 

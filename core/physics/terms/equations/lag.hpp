@@ -16,7 +16,9 @@ struct Lag {
       .depends_on = {"history"},
       .parameters = {{{"time_constant", "*", {0.0, 1e9}, Role::amplitude, {1e-3}, "in the unit of time"}}},
       .description = "An actuator or a sensor that follows like a first-order lag.",
-      .source = "z for s, dz/dt = (s - z) / time_constant; of a state: in all rates"};
+      .source =
+          "z for s, dz/dt = (s - z) / time_constant; of a state: in all rates, or (`with: others`) in all "
+          "but its own"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::lag};
 };
 
