@@ -352,7 +352,10 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
         if (name == "encoder_periodic_error") shapes = periods.reading_pitch;
         if (name == "periodic_disturbance" || name == "additive_disturbance")
           shapes = periods.force_frequency;
-        if (name == "position_stiffness") shapes = {0.0};
+        if (name == "position_stiffness") {  // about a far center it is first of all a steady force
+          shapes = {0.0};
+          if (const auto way = covered(data, "reference")) shapes.push_back(0.5 * (way->lower + way->upper));
+        }
         if (name == "presliding_friction") shapes = bristles_for(data, *info);
         // What rings, rings at one pitch: from far off it would seem to push the other way.
         if (name == "flexible_mode") {
