@@ -121,6 +121,19 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   if (d.is_partial && d.findings.empty() && d.verdict == Verdict::ambiguous)
     report["ambiguity"].push_back({{"between", {"nothing is missing", "physics that was not tried"}},
                                    {"experiment", "none: let the diagnosis run to its end"}});
+  // What has neither a name nor a curve is said with its place alone. That something is missing at all is as good as sure.
+  if (d.suspect && d.findings.empty() && d.verdict == Verdict::unknown_physics) {
+    constexpr double of_its_place = 0.9;
+    report["findings"].push_back({{"term", "unmodelled"},
+                                  {"site", d.suspect->site},
+                                  {"probability", of_its_place},
+                                  {"share", d.still_follows},
+                                  {"parameters", json::object()},
+                                  {"alternatives", json::array()},
+                                  {"description",
+                                   "What no known term describes, nor a curve over what was recorded; "
+                                   "patched.yaml is the retuned model."}});
+  }
   if (d.suspect)
     report["location"].push_back(
         {{"site", d.suspect->site},
