@@ -75,9 +75,8 @@ class ClosedLoop final : public Simulation {
                                     ? static_cast<std::size_t>(std::max(
                                           0L, std::lround((inputs.time[row + 1] - inputs.time[row]) * rate)))
                                     : 0;
-      const bool curved =
-          step == 1 && gap > 1 && row > 0 && before > 0 && after > 0 &&
-          (goes_on ? 2 * gap <= 3 * std::min(before, after) : gap <= 3 && before == 1 && after == 1);
+      const bool curved = step == 1 && gap > 1 && before > 0 && after > 0 &&
+                          gap <= 3 * std::min(before, after) && (goes_on || (before == 1 && after == 1));
       for (std::size_t k = known; k <= tick; ++k) {
         const std::size_t passed = k + 1 - known;
         const double share =

@@ -79,14 +79,14 @@ class OwnEquations final : public Simulation {
     run_lanes<lanes>(some, into);
   }
 
-  /// The rows, and between them the instants at which held inputs change because they come late.
+  /// The rows, and between them the instants at which inputs that come late change, or bend.
   struct Grid {
     std::vector<double> time;
     std::vector<std::vector<double>> inputs;
     std::vector<bool> is_row;
   };
 
-  /// Nothing where no held input comes late by a part of the time between two rows.
+  /// Nothing where no input comes late by a part of the time between two rows.
   template <std::size_t lanes>
   [[nodiscard]] std::optional<Grid> changes_between_rows(
       const std::array<const Model*, lanes>& models) const {
@@ -100,9 +100,9 @@ class OwnEquations final : public Simulation {
         const bool alone = std::count_if(model->terms.begin(), model->terms.end(),
                                          [&](const Term& other) { return other.on == term.on; }) == 1;
         for (std::size_t i = 0; i < inputs_.size(); ++i) {
-          if (equations.inputs[i].symbol != term.on || equations.inputs[i].linear) continue;
+          if (equations.inputs[i].symbol != term.on) continue;
           for (std::size_t row = 1; row < time_.size(); ++row)
-            if (!alone || inputs_[i][row] != inputs_[i][row - 1])
+            if (!alone || equations.inputs[i].linear || inputs_[i][row] != inputs_[i][row - 1])
               between.push_back(time_[row] + term.values[0]);
         }
       }
@@ -156,28 +156,38 @@ class OwnEquations final : public Simulation {
     return bent;
   }
 
-  /// What an output was at each instant, and by how much it lies, halfway from the one before, above the straight line.
+  /// What the outputs were between the rows: at either end of each piece of the way, and by how much they lie halfway above the
+  /// straight line. Where a held input jumps an output has two values at one instant.
+  template <std::size_t lanes>
   struct Between {
-    std::vector<double> values, arches;
-    double halfway = std::nan("");
+    struct Course {
+      std::vector<double> values, arches;
+      double halfway = std::nan("");
+    };
+    std::vector<std::array<Course, lanes>> of;  // by output
+    std::vector<double> time;
+    std::vector<std::size_t> rows;  // where each row stands in these
 
-    void add(double value) {
-      const bool known = !values.empty() && std::isfinite(halfway);
-      arches.push_back(known ? halfway - 0.5 * (values.back() + value) : 0.0);
-      values.push_back(value);
-      halfway = std::nan("");
+    void add(EquationsMachine<lanes>& machine, double now) {
+      const bool goes = !time.empty() && now > time.back();
+      for (std::size_t o = 0; o < of.size(); ++o)
+        for (std::size_t l = 0; l < lanes; ++l) {
+          auto& [values, arches, halfway] = of[o][l];
+          const double value = machine.output(o)[l];
+          arches.push_back(goes && std::isfinite(halfway) ? halfway - 0.5 * (values.back() + value) : 0.0);
+          values.push_back(value);
+        }
+      time.push_back(now);
+    }
+    void add_halfway(EquationsMachine<lanes>& machine) {
+      for (std::size_t o = 0; o < of.size(); ++o)
+        for (std::size_t l = 0; l < lanes; ++l) of[o][l].halfway = machine.output(o)[l];
     }
   };
-
-  /// Where the states are halfway through a step, by Hermite's cubic; `from` and `to` with their rates.
-  template <class State>
-  static State halfway(const State& from, const State& from_rate, const State& to, const State& to_rate,
-                       double h) {
-    State mid = from;
-    for (std::size_t i = 0; i < mid.size(); ++i)
-      for (std::size_t l = 0; l < mid[i].size(); ++l)
-        mid[i][l] = 0.5 * (from[i][l] + to[i][l]) + 0.125 * h * (from_rate[i][l] - to_rate[i][l]);
-    return mid;
+  /// A parabola is near what fades within two time constants.
+  static int pieces_for(double turn) {
+    constexpr double bears = 1.0, most = 8.0;
+    return static_cast<int>(std::clamp(std::ceil(turn / bears), 1.0, most));
   }
 
   template <std::size_t lanes>
@@ -209,7 +219,8 @@ class OwnEquations final : public Simulation {
     }
     machine.balance_hidden(s);
     const bool back = looks_back(*models[0]);
-    std::vector<std::array<Between, lanes>> between(back ? count : 0);
+    Between<lanes> between;
+    between.of.resize(back ? count : 0);
     const bool closed = !equations.controlled_input.empty() && machine.controlled() >= machine.states();
     std::array<std::vector<Bending>, lanes> way;  // from the controller to the machine
     if (closed)
@@ -228,8 +239,6 @@ class OwnEquations final : public Simulation {
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
         if (row == 0) machine.balance_hidden(s);
-        for (auto& output : between)
-          for (auto& lane : output) lane.halfway = std::nan("");  // between two windows nothing went anywhere
         ++restart;
       }
       const std::size_t commanded_input = closed ? machine.controlled() - machine.states() : inputs_.size();
@@ -263,9 +272,9 @@ class OwnEquations final : public Simulation {
       }
       machine.show(s, time[at]);
       if (is_row || back) machine.work_out_outputs();
-      for (std::size_t o = 0; o < between.size(); ++o)
-        for (std::size_t l = 0; l < lanes; ++l) between[o][l].add(machine.output(o)[l]);
+      if (back) between.add(machine, time[at]);
       if (is_row) {
+        if (back) between.rows.push_back(between.time.size() - 1);
         for (std::size_t o = 0; o < count; ++o)
           for (std::size_t l = 0; l < lanes; ++l)
             if (out[o][l] != nullptr) out[o][l][row] = machine.output(o)[l];
@@ -276,12 +285,14 @@ class OwnEquations final : public Simulation {
       if (!(h > 0.0)) continue;
       // What is faster than the shortest explicit steps bear is at its balance after an implicit one; the rest needs few.
       constexpr double stiff_parts = 15.0;
-      const bool stiff = h * fastest.radius > 1.5 * most_parts;
-      int parts = static_cast<int>(stiff ? stiff_parts : parts_for(h * fastest.swing));
+      const int pieces = back ? 2 * pieces_for(h * fastest.radius) : 1;
+      const double step = h / pieces;
+      const bool stiff = step * fastest.radius > 1.5 * most_parts;
+      int parts = static_cast<int>(stiff ? stiff_parts : parts_for(step * fastest.swing));
       machine.set_stiff(stiff);
       const auto follow = [&](std::size_t input, std::size_t lane, const InputCourse& course, double from) {
         machine.set_input(input, lane, course, from);
-        parts = std::max(parts, parts_for_fading(course, h));
+        parts = std::max(parts, parts_for_fading(course, step));
       };
       for (std::size_t i = 0; i < inputs_.size(); ++i)
         for (std::size_t l = 0; l < lanes; ++l) {
@@ -295,14 +306,14 @@ class OwnEquations final : public Simulation {
           else if (equations.inputs[i].linear)
             machine.set_input(i, l, {values[at], (values[at + 1] - values[at]) / h}, time[at]);
         }
-      typename EquationsMachine<lanes>::State from = s, rate{};
-      if (back) rate = machine.slope(s, time[at]);
-      fastest.swing = std::max(fastest.swing, finely(machine, s, time[at], h, parts, stiff));
-      if (back && !stiff) {
-        machine.show(halfway(from, rate, s, machine.slope(s, time[at + 1]), h), time[at] + 0.5 * h);
+      for (int piece = 0; piece < pieces; ++piece) {
+        const double t = time[at] + piece * step;
+        fastest.swing = std::max(fastest.swing, finely(machine, s, t, step, parts, stiff));
+        if (!back) continue;
+        const double end = piece + 1 == pieces ? time[at + 1] : t + step;
+        machine.show(s, end);
         machine.work_out_outputs();
-        for (std::size_t o = 0; o < count; ++o)
-          for (std::size_t l = 0; l < lanes; ++l) between[o][l].halfway = machine.output(o)[l];
+        piece % 2 == 0 ? between.add_halfway(machine) : between.add(machine, end);
       }
       machine.hold_inputs();
     }
@@ -314,10 +325,9 @@ class OwnEquations final : public Simulation {
       for (std::size_t o = 0; o < count; ++o) {
         auto& column = (*outputs[l])[o];
         if (back) {
-          auto& all = between[o][l];
-          bend(*models[l], names[o], time, all.values, false, all.arches);
-          for (std::size_t at = 0, row = 0; at < n; ++at)
-            if (!grid || grid->is_row[at]) column[row++] = all.values[at];
+          auto& all = between.of[o][l];
+          bend(*models[l], names[o], between.time, all.values, false, all.arches);
+          for (std::size_t row = 0; row < column.size(); ++row) column[row] = all.values[between.rows[row]];
         } else {
           bend(*models[l], names[o], time_, column, false);
         }

@@ -73,23 +73,6 @@ double median_step(const std::vector<double>& time) {
   return steps.empty() ? 1.0 : median(steps);
 }
 
-/// A loop that stands still and yet commands: its sum is not zero, the first command says how much it holds.
-void give_start_of_sum(const Case& data, Recording& recording) {
-  auto& inputs = recording.inputs;
-  const auto* reference = inputs.find("reference");
-  const auto* forward = inputs.find("feedforward");
-  if (!data.model.controller || reference == nullptr || inputs.rows() < 8) return;
-  const auto& position = recording.measured[0];
-  const auto& current = recording.measured[1];
-  if ((*reference)[5] != (*reference)[0] || !std::isfinite(position[0]) || !std::isfinite(current[0])) return;
-  physics::AxisController fresh{*data.model.controller};
-  const double expected =
-      fresh.step((*reference)[0], position[0]) + (forward != nullptr ? forward->front() : 0.0);
-  if (!(std::abs(current[0] - expected) > 6.0 * spread_of_differences(current))) return;
-  inputs.signals["current"].assign(inputs.rows(), nothing);
-  inputs.signals["current"].front() = current[0];
-}
-
 /// Heat is slow: the straight line through the first rows (Theil and Sen's: one slip among them moves it little), at the first
 /// of them, and what of the noise of one row is left in it. Nothing where too few were read.
 std::optional<std::pair<double, double>> line_at_first(const std::vector<double>& time,
@@ -112,27 +95,43 @@ std::optional<std::pair<double, double>> line_at_first(const std::vector<double>
   return std::pair{median(levels), std::sqrt(tt / (n * tt - t * t))};
 }
 
-/// Where a carriage stands from the first row on, held by friction off the reference by less than one reading tells. Nothing
-/// where too few rows were read before the reference moves, or where the loop takes it to the reference.
-std::optional<double> stands_beside(const std::vector<double>& reference,
-                                    const std::vector<double>& position) {
+/// What a reading is from the first row on while the reference rests, where that is off what is expected by less than one
+/// reading tells. Nothing where too few rows were read before the reference moves, or where it goes elsewhere.
+std::optional<double> rests_beside(double expected, const std::vector<double>& reference,
+                                   const std::vector<double>& values) {
   constexpr std::size_t enough = 50, first = 10;    // rows
   constexpr double plainly_off = 4.0, alike = 2.5;  // standard errors
   double sum = 0.0, sum_of_first = 0.0, count = 0.0, count_of_first = 0.0;
   std::size_t rows = 0;
-  for (; rows < position.size() && reference[rows] == reference[0]; ++rows) {
-    if (!std::isfinite(position[rows])) continue;
-    sum += position[rows], ++count;
-    if (rows < first) sum_of_first += position[rows], ++count_of_first;
+  for (; rows < values.size() && reference[rows] == reference[0]; ++rows) {
+    if (!std::isfinite(values[rows])) continue;
+    sum += values[rows], ++count;
+    if (rows < first) sum_of_first += values[rows], ++count_of_first;
   }
   if (rows < enough || count < 0.5 * static_cast<double>(rows) || count_of_first == 0.0) return std::nullopt;
-  const double mean = sum / count,
-               spread = spread_of_differences(
-                   {position.begin(), position.begin() + static_cast<std::ptrdiff_t>(rows)});
-  const bool is_off = std::abs(mean - reference[0]) > plainly_off * spread / std::sqrt(count),
+  const double mean = sum / count, spread = spread_of_differences(
+                                       {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rows)});
+  const bool is_off = std::abs(mean - expected) > plainly_off * spread / std::sqrt(count),
              from_the_first_on =
                  std::abs(sum_of_first / count_of_first - mean) < alike * spread / std::sqrt(count_of_first);
   return is_off && from_the_first_on ? std::optional{mean} : std::nullopt;
+}
+
+/// A loop that stands still and yet commands: its sum is not zero, the first command says how much it holds.
+void give_start_of_sum(const Case& data, Recording& recording) {
+  auto& inputs = recording.inputs;
+  const auto* reference = inputs.find("reference");
+  const auto* forward = inputs.find("feedforward");
+  if (!data.model.controller || reference == nullptr || inputs.rows() < 8) return;
+  const auto& position = recording.measured[0];
+  const auto& current = recording.measured[1];
+  if ((*reference)[5] != (*reference)[0] || !std::isfinite(position[0]) || !std::isfinite(current[0])) return;
+  physics::AxisController fresh{*data.model.controller};
+  const double expected =
+      fresh.step((*reference)[0], position[0]) + (forward != nullptr ? forward->front() : 0.0);
+  if (!(std::abs(current[0] - expected) > 6.0 * spread_of_differences(current))) return;
+  inputs.signals["current"].assign(inputs.rows(), nothing);
+  inputs.signals["current"].front() = rests_beside(expected, *reference, current).value_or(current[0]);
 }
 
 /// The initial state, where the first rows contradict the one that the model starts from.
@@ -164,7 +163,8 @@ void give_start(Case& data, Recording& recording) {
     }
     if (const auto* reference = inputs.find("reference");
         data.model.controller && reference != nullptr && name == "position")
-      if (const auto at = stands_beside(*reference, recording.measured[o])) begin = *at, spread = doubt = 0.0;
+      if (const auto at = rests_beside(reference->front(), *reference, recording.measured[o]))
+        begin = *at, spread = doubt = 0.0;
     if (!std::isfinite(begin) || !std::isfinite(expected) ||
         !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt)))
       continue;

@@ -49,7 +49,7 @@ struct Case {
   DataCount count;
   std::vector<TakenInSi> taken_in_si;  // columns of the user's own equations
   std::vector<std::string> doubts;     // what does not go together in the recordings, a clause each
-  bool is_moved = false;               // a column that came too early stands where it belongs
+  std::vector<std::size_t> moved;      // outputs that came too early and stand where they belong now
   struct Windows {
     std::size_t count = 0;  // 0: each recording is simulated from its first row to its last
     double length = 0.0;    // of one, in the unit of time

@@ -16,37 +16,81 @@ struct Even {
   double step = 0.0, scatter = 0.0;  // [s], of the stamps: root mean square
 };
 
-/// The even steps nearest to these stamps; nothing where there are none, or none but these.
-std::optional<Even> even_steps(const std::vector<double>& time) {
-  constexpr double most_off = 0.45, trifle = 2e-3;  // of a step
+/// The usual step between stamps, also where many rows are lost: the median of those that are no two.
+double usual_step(const std::vector<double>& time) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
-  const double usual = median(steps);
-  // Time over the number of the step, by least squares.
-  double k = 0.0, sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0, off = 0.0;
-  std::vector<double> number{0.0};
-  const double n = static_cast<double>(time.size());
-  for (const double step : steps) {
-    const double count = std::max(1.0, std::round(step / usual));
-    off += std::abs(step / usual - count) > most_off ? 1.0 : 0.0;
-    number.push_back(k += count);
+  double usual = median(steps);
+  for (int again = 0; again < 20; ++again) {
+    std::vector<double> single;
+    for (const double step : steps)
+      if (step < 1.5 * usual) single.push_back(step);
+    usual = median(single);
   }
-  constexpr double some = 0.01;  // of the rows
-  if (off > some * n) return std::nullopt;
-  for (std::size_t i = 0; i < time.size(); ++i) {
-    const double t = time[i] - time.front();
-    sum_k += number[i], sum_t += t, sum_kk += number[i] * number[i], sum_kt += number[i] * t;
-  }
+  return usual;
+}
+
+/// The even steps nearest to the stamps of a stretch without a gap; nothing where there are none.
+std::optional<Even> even_steps_of(const std::vector<double>& time, double step) {
+  constexpr double most_off = 0.5, follows = 0.05;
   Even even;
-  even.step = (n * sum_kt - sum_k * sum_t) / (n * sum_kk - sum_k * sum_k);
-  const double begin = time.front() + (sum_t - even.step * sum_k) / n;
+  std::vector<double> number(time.size(), 0.0);
+  // Numbered along steps that follow the stamps slowly; then time over the number by least squares, and again with that step.
+  double begin = 0.0;
+  for (int again = 0; again < 3; ++again) {
+    std::vector<double> first;
+    for (std::size_t i = 0; i < std::min<std::size_t>(20, time.size()); ++i) {
+      const double count = std::round((time[i] - time.front()) / step);
+      first.push_back(time[i] - count * step);
+    }
+    double at = median(first), k = 0.0, sum_k = 0.0, sum_t = 0.0, sum_kk = 0.0, sum_kt = 0.0;
+    for (std::size_t i = 0; i < time.size(); ++i) {
+      if (i > 0) {
+        const double count = std::max(1.0, std::round((time[i] - at) / step));
+        k += count, at += count * step;
+        at += follows * (time[i] - at);
+      }
+      number[i] = k;
+      const double t = time[i] - time.front();
+      sum_k += k, sum_t += t, sum_kk += k * k, sum_kt += k * t;
+    }
+    const double n = static_cast<double>(time.size());
+    step = (n * sum_kt - sum_k * sum_t) / (n * sum_kk - sum_k * sum_k);
+    begin = time.front() + (sum_t - step * sum_k) / n;
+  }
   double squares = 0.0;
   for (std::size_t i = 0; i < time.size(); ++i) {
-    even.time.push_back(begin + even.step * number[i]);
-    squares += std::pow(time[i] - even.time.back(), 2);
-    if (std::abs(time[i] - even.time.back()) > 0.5 * even.step) return std::nullopt;  // a clock that wanders
+    even.time.push_back(begin + step * number[i]);
+    const double off = time[i] - even.time.back();
+    squares += off * off;
+    if (std::abs(off) > most_off * step) return std::nullopt;  // a clock that wanders, or none
   }
-  even.scatter = std::sqrt(squares / n);
+  even.step = step;
+  even.scatter = std::sqrt(squares / static_cast<double>(time.size()));
+  return even;
+}
+
+/// The same stretch by stretch: behind a gap a recorder begins anew. Nothing where the stamps are even already.
+std::optional<Even> even_steps(const std::vector<double>& time) {
+  constexpr double trifle = 2e-3, gap = 8.5;  // steps
+  constexpr std::size_t enough = 50;
+  const double usual = usual_step(time);
+  Even even;
+  double squares = 0.0;
+  for (std::size_t from = 0; from < time.size();) {
+    std::size_t to = from + 1;
+    while (to < time.size() && time[to] - time[to - 1] < gap * usual) ++to;
+    if (to - from < enough) return std::nullopt;
+    const auto stretch = even_steps_of(
+        {time.begin() + static_cast<std::ptrdiff_t>(from), time.begin() + static_cast<std::ptrdiff_t>(to)},
+        usual);
+    if (!stretch) return std::nullopt;
+    even.time.insert(even.time.end(), stretch->time.begin(), stretch->time.end());
+    even.step = stretch->step;
+    squares += stretch->scatter * stretch->scatter * static_cast<double>(to - from);
+    from = to;
+  }
+  even.scatter = std::sqrt(squares / static_cast<double>(time.size()));
   return even.scatter > trifle * even.step ? std::optional{even} : std::nullopt;
 }
 

@@ -120,7 +120,7 @@ std::string like_a_slip(double ratio) {
 /// first of all slips in a file.
 std::string look_at_numbers(const Case& data, const Diagnosis& d) {
   constexpr double far = 3.0;  // times the noise: what is missing moved them
-  if (data.is_moved) return "First look at how the columns were put together. ";
+  if (!data.moved.empty()) return "First look at how the columns were put together. ";
   if (d.unexplained >= far) return "";
   std::string text;
   for (const auto& one : moved_numbers(d, far_moved)) {

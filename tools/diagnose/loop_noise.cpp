@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/physics/library.hpp"
+#include "tools/diagnose/kin.hpp"
 
 namespace invar::diagnose {
 
@@ -17,6 +18,12 @@ std::optional<std::size_t> fed_back(const Case& data) {
   if (data.model.plant != physics::Plant::axis || !data.model.controller || at == data.outputs.end())
     return std::nullopt;
   return static_cast<std::size_t>(at - data.outputs.begin());
+}
+
+/// Does a carriage stick, or a reading or a current stay, while noise alone decides?
+bool bends(const physics::Term& term) {
+  return is_friction(term) || term.with == "direction" || term.info->name == "backlash" ||
+         term.info->name == "dead_zone";
 }
 
 using Noise = std::vector<std::vector<double>>;  // of the encoder, by recording
@@ -167,6 +174,10 @@ void LoopNoise::put(Readings readings) {
 double LoopNoise::take_off(const physics::Model& model) {
   const auto position = fed_back(data_);
   if (!position) return 0.0;
+  if (std::none_of(model.terms.begin(), model.terms.end(), bends)) {
+    (void)put_back();
+    return 0.0;
+  }
   const auto noise = noise_left_by(model, data_, recorded_, *position);
   (void)put_back();
   const auto simulated = simulate(data_, model);
@@ -182,17 +193,21 @@ double LoopNoise::take_off(const physics::Model& model) {
       told_by(row_by_row(runs, simulated, variance_of),
               row_by_row(shaken(without, data_, noise, few_shifts), simulate(data_, without), variance_of));
   double untold = 0.0, rows = 0.0;
-  for (std::size_t r = 0; r < off.size(); ++r) {
+  for (const auto& one : told) {
+    rows += static_cast<double>(one.size());
+    untold += static_cast<double>(std::count(one.begin(), one.end(), false));
+  }
+  // Where chance would decide in most rows there would be nothing left to judge by: a loop that hardly holds scatters so.
+  constexpr double most = 0.9;
+  const bool is_judged = untold < most * rows;
+  for (std::size_t r = 0; r < off.size(); ++r)
     for (std::size_t o = 0; o < off[r].size(); ++o)
       for (std::size_t i = 0; i < off[r][o].size(); ++i) {
         auto& measured = data_.recordings[r].measured[o][i];
         if (nearer > 0.0) measured -= off[r][o][i];
-        if (!told[r][i]) measured = std::numeric_limits<double>::quiet_NaN();
+        if (is_judged && !told[r][i]) measured = std::numeric_limits<double>::quiet_NaN();
       }
-    rows += static_cast<double>(told[r].size());
-    untold += static_cast<double>(std::count(told[r].begin(), told[r].end(), false));
-  }
-  return untold / rows;
+  return is_judged ? untold / rows : 0.0;
 }
 
 std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model, bool roughly) const {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/fault.hpp"
+#include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/candidates.hpp"
 #include "tools/report/page.hpp"
 
@@ -93,6 +94,9 @@ void leave_out_dead(Case& data, const std::filesystem::path& file) {
         "` reads one value in every row and is left out: its sensor is dead, or nothing moved");
     for (auto& recording : data.recordings) {
       auto& measured = recording.measured[o];
+      if (data.model.plant == physics::Plant::axis && recording.inputs.signals.erase(data.outputs[o]) > 0)
+        recording.simulation =
+            physics::prepare(data.model, recording.inputs);  // it starts where it is told to
       const auto first =
           std::find_if(measured.begin(), measured.end(), [](double v) { return std::isfinite(v); });
       if (first != measured.end()) std::fill(first + 1, measured.end(), std::nan(""));
@@ -134,9 +138,9 @@ std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged
     double least = far_less * std::min(when_later(0), squares_when_later(judged, best, o, 0, most));
     for (std::size_t later = 1; later <= most; ++later)
       if (const double left = when_later(later); left < least) least = left, rows = later;
-    if (rows == 0) continue;
+    if (rows == 0 || rows == most) continue;  // at the end of what was tried it is no minimum
     if (!moved) moved = as_read, moved->remembered = std::make_shared<Remembered>();
-    moved->is_moved = true;
+    moved->moved.push_back(o);
     for (auto& recording : moved->recordings) {
       auto& measured = recording.measured[o];
       const std::size_t by = std::min(rows, measured.size());
@@ -153,6 +157,19 @@ std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged
                             "together");
   }
   return moved;
+}
+
+bool comes_late_again(const Case& moved, const Diagnosis& d) {
+  return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
+    const auto& name = finding.term.info->name;
+    const bool is_late = name == "delay" || name == "lag" || name == "hidden_state" ||
+                         name == "transport_delay" || name == "measurement_delay" ||
+                         name == "amplifier_lag" || name == "sensor_lag";
+    if (moved.model.plant != physics::Plant::equations) return is_late;
+    return is_late && std::any_of(moved.moved.begin(), moved.moved.end(), [&](std::size_t o) {
+             return finding.term.on == physics::place_of_output(moved.model.equations, moved.outputs[o]);
+           });
+  });
 }
 
 }  // namespace invar::diagnose

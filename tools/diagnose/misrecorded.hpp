@@ -24,4 +24,8 @@ void leave_out_what_died(const physics::Model& model, physics::Record& record, c
 /// each. Nothing where none comes too early.
 std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged, const Diagnosis& d);
 
+/// Is an output said to come late that was moved since it came too early? Then it was not the column: what repeats is early by
+/// one wave less what it is late by.
+bool comes_late_again(const Case& moved, const Diagnosis& d);
+
 }  // namespace invar::diagnose

@@ -30,13 +30,12 @@ void settle_hold(Case& data) {
   const auto weighing = weigh(data, simulate(data, model), false);
   constexpr int steps = 8;
   const auto held = fit(data, weighing, model, model, steps);
-  const auto straight = fit(goes_on, weighing, goes_on.model, goes_on.model, steps);
-  if (!(straight.cost < held.cost - claim_margin)) return;
+  const auto smooth = fit(goes_on, weighing, goes_on.model, goes_on.model, steps);
+  if (!(smooth.cost < held.cost - claim_margin)) return;
   data = std::move(goes_on);
   data.doubts.push_back(
       "not every cycle of the controller has its row, and between the rows its reference is taken to go "
-      "straight on "
-      "(`hold: smooth`), which lies nearer than `hold: step`");
+      "on smoothly (`hold: smooth`), which lies nearer than `hold: step`");
 }
 
 }  // namespace invar::diagnose

@@ -595,6 +595,17 @@ int named_by(const Diagnosis& d) {
                                                                                      : 0;
 }
 
+/// Does the one leave plainly less of an output than the other? What lags behind its inputs is like one whose inputs were
+/// smoothed, but not as near.
+bool is_nearer(const Case& data, const Diagnosis& d, const Case& other_data, const Diagnosis& other) {
+  constexpr double plainly_less = 0.7;  // of the squares
+  const auto left = squares_left(data, d.best.model),
+             left_by_other = squares_left(other_data, other.best.model);
+  for (std::size_t o = 0; o < left.size(); ++o)
+    if (left[o] < plainly_less * left_by_other[o]) return true;
+  return false;
+}
+
 }  // namespace
 
 Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
@@ -604,9 +615,14 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
   auto d = Search{data, progress, options}.run();
   if (!options.refuses) return d;
   if (auto in_step = with_columns_in_step(as_read, data, d)) {
-    data = as_read = std::move(*in_step);
-    as_read.remembered = std::make_shared<Remembered>();
-    d = Search{data, progress, options}.run();
+    Case before_search = *in_step;
+    before_search.remembered = std::make_shared<Remembered>();
+    auto after = Search{*in_step, progress, options}.run();
+    if (!comes_late_again(*in_step, after)) {
+      as_read = std::move(before_search);
+      data = std::move(*in_step);
+      d = std::move(after);
+    }
   }
   if ((named_by(d) < 2 || d.findings.size() > 1) && !d.is_partial && has_longer_windows(data)) {
     Case longer = as_read;
@@ -626,8 +642,11 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
     }
   }
   if (auto quiet = with_quiet_inputs(as_read, data, d)) {
-    data = std::move(*quiet);
-    d = Search{data, progress, options}.run();
+    auto in_quiet = Search{*quiet, progress, options}.run();
+    if (in_quiet.is_partial || !is_nearer(data, d, *quiet, in_quiet)) {
+      data = std::move(*quiet);
+      d = std::move(in_quiet);
+    }
   }
   return d;
 }

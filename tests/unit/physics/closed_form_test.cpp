@@ -352,6 +352,32 @@ TEST(Equations, AnInstrumentThatIsLateShowsWhatWasBetweenTheRows) {
   }
 }
 
+/// x' = k (u - x) with u from 0 to 1 at the first row and back at each fourth, k h = 10, shown by way of a store.
+TEST(Equations, AnInstrumentThatIsLateShowsWhatIsOverBetweenTheRows) {
+  constexpr double k = 200.0, tau = 0.02, h = 0.05;
+  std::vector<double> time, input;
+  for (int i = 0; i < 40; ++i) time.push_back(h * i), input.push_back(i % 8 < 4 ? 1.0 : 0.0);
+  for (const char* shown : {"x", "x + u"}) {
+    const auto lag = simulated(
+        "plant: equations\ncolumns: {time: t}\ninputs: {u: u}\nstates:\n"
+        "  x: {derivative: '200*(u - x)', initial: {value: 0, unit: m, sigma: 0}}\n"
+        "outputs: {y: {column: y, expression: " +
+            std::string{shown} +
+            "}}\nparameters: {}\nterms: [{term: lag, on: y, time_constant: {value: 0.02, unit: s}}]\n",
+        time, {{"u", input}});
+    const bool fed_through = std::string{shown} != "x";
+    double x = 0.0, z = fed_through ? 1.0 : 0.0;
+    for (std::size_t i = 0; i < time.size(); ++i) {
+      EXPECT_NEAR(lag[i], z, 0.02) << shown << " row " << i;
+      // Of y = level + off exp(-k t) within the step.
+      const double level = input[i] * (fed_through ? 2.0 : 1.0), off = x - input[i],
+                   share = off / (1.0 - k * tau);
+      z = level + share * std::exp(-k * h) + (z - level - share) * std::exp(-h / tau);
+      x = input[i] + off * std::exp(-k * h);
+    }
+  }
+}
+
 TEST(Equations, WhatOnlyTheOthersFeelLeavesAStateAsItIs) {
   const auto shown = [&](const std::string& rate, const std::string& more, const std::string& term) {
     std::vector<double> time;
