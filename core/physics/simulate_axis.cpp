@@ -42,7 +42,18 @@ std::size_t usual_ticks(const std::vector<double>& time, double rate) {
   return static_cast<std::size_t>(*middle);
 }
 
-/// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp.
+/// Do the rows come faster than the controller's cycles? Then some are records of what the carriage did within one.
+bool is_within_cycles(const std::vector<double>& time, double rate) {
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < time.size(); ++i) steps.push_back((time[i] - time[i - 1]) * rate);
+  if (steps.empty()) return false;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::nth_element(steps.begin(), middle, steps.end());
+  return *middle < 0.75;
+}
+
+/// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp, or where rows
+/// come faster of what the carriage did behind it.
 class ClosedLoop final : public Simulation {
  public:
   ClosedLoop(const Model& structure, const Record& inputs) {
@@ -58,9 +69,15 @@ class ClosedLoop final : public Simulation {
     tick_of_row_.reserve(inputs.rows());
     const bool goes_on = structure.reference_goes_on.value_or(false);
     const std::size_t usual = goes_on ? 1 : usual_ticks(inputs.time, rate);
+    const bool within = is_within_cycles(inputs.time, rate);
     for (std::size_t row = 0; row < inputs.rows(); ++row) {
-      const auto tick =
-          static_cast<std::size_t>(std::max(0.0, std::round((inputs.time[row] - start_time_) * rate)));
+      constexpr double trifle = 0.02;  // of a cycle
+      const double cycles = std::max(0.0, (inputs.time[row] - start_time_) * rate);
+      const auto tick = static_cast<std::size_t>(within ? std::floor(cycles + trifle) : std::round(cycles));
+      if (within) {
+        const double part = cycles - static_cast<double>(tick);
+        behind_tick_.push_back(part > trifle ? part * period_ : 0.0);
+      }
       tick_of_row_.push_back(tick);
       // Ticks that no row records, where most have one: the reference is bridged, a lost cycle or two by a cubic, more by a
       // straight line. Where few have one it is held from row to row, and lost rows are put back first.
@@ -89,6 +106,9 @@ class ClosedLoop final : public Simulation {
       }
     }
     start_position_ = first_or(inputs, "position", reference_.front());
+    start_velocity_ = first_or(inputs, "velocity", 0.0);
+    if (inputs.rows() > 1)
+      start_moves_ = (reference[1] - reference[0]) / (inputs.time[1] - inputs.time[0]) * period_;
     start_current_ = first_or(inputs, "current", std::numeric_limits<double>::quiet_NaN());
     limit_ = structure.controller->limit;
   }
@@ -120,9 +140,14 @@ class ClosedLoop final : public Simulation {
           command += forward_[tick];
           if (limit_ > 0.0) command = std::clamp(command, -limit_, limit_);
         }
-        for (std::size_t r = row; r < next; ++r) outputs[i][0][r] = shown, outputs[i][1][r] = command;
         if (!temperature_.empty()) plant.set_temperature(temperature_[tick]);
-        plant.step(command, period_);
+        double gone = 0.0;
+        for (std::size_t r = row; r < next; ++r) {
+          if (!behind_tick_.empty() && behind_tick_[r] > gone)
+            plant.step(command, behind_tick_[r] - gone), gone = behind_tick_[r];
+          outputs[i][0][r] = gone > 0.0 ? plant.reading() : shown, outputs[i][1][r] = command;
+        }
+        plant.step(command, period_ - gone);
       }
       row = next;
     }
@@ -137,6 +162,13 @@ class ClosedLoop final : public Simulation {
   [[nodiscard]] Loop begun(const Model& model) const {
     Loop loop{make_axis(model, period_), AxisController{*model.controller}};
     loop.plant.rest_at(start_position_, start_time_);
+    if (start_velocity_ != 0.0) {  // a loop without a sum that was on its way: its filter has followed
+      loop.plant.go_on_from(start_position_, start_velocity_);
+      const double reading = loop.plant.reading();
+      for (double k = -100.0; k < 0.0; ++k)
+        (void)loop.controller.step(reference_.front() + k * start_moves_,
+                                   reading + k * start_velocity_ * period_);
+    }
     if (std::isfinite(start_current_)) {  // a loop that has run before: its sum holds what the error does not
       AxisController fresh{*model.controller};
       (void)loop.controller.shift(start_current_ - (forward_.empty() ? 0.0 : forward_.front()) -
@@ -145,9 +177,11 @@ class ClosedLoop final : public Simulation {
     return loop;
   }
 
-  double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0, start_current_ = 0.0, limit_ = 0.0;
+  double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0, start_velocity_ = 0.0, start_moves_ = 0.0,
+         start_current_ = 0.0, limit_ = 0.0;
   std::vector<double> reference_, temperature_, forward_;  // a tick
   std::vector<std::size_t> tick_of_row_;
+  std::vector<double> behind_tick_;  // [s] by row; empty: every row is a tick
 };
 
 class OpenLoop final : public Simulation {

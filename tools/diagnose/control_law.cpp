@@ -54,6 +54,8 @@ Stretch stretch_of(const AxisControllerSettings& settings, const std::vector<dou
   return stretch;
 }
 
+bool is_one_cycle(double step, double rate) { return step * rate > 0.6 && std::lround(step * rate) == 1; }
+
 }  // namespace
 
 std::optional<LawOff> off_the_law(const Case& data) {
@@ -91,7 +93,7 @@ std::optional<LawOff> off_the_law(const Case& data) {
     for (std::size_t i = 0; i < time.size();) {
       std::size_t end = i;
       while (end < time.size() && usable(end) &&
-             (end == i || std::lround((time[end] - time[end - 1]) * settings.rate) == 1))
+             (end == i || is_one_cycle(time[end] - time[end - 1], settings.rate)))
         ++end;
       if (end > i + 2 * settles) {
         all.push_back(stretch_of(settings, reference, position, current, forward, simulated[r][position_at],

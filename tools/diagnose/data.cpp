@@ -134,6 +134,23 @@ void give_start_of_sum(const Case& data, Recording& recording) {
   inputs.signals["current"].front() = rests_beside(expected, *reference, current).value_or(current[0]);
 }
 
+/// [m/s] The steady speed at which a carriage comes into the recording; nothing where it rests, or begins to move.
+std::optional<double> comes_at(const std::vector<double>& time, const std::vector<double>& position) {
+  constexpr std::size_t rows = 8;
+  constexpr double alike = 0.2, plainly = 10.0;
+  if (position.size() < rows ||
+      !std::all_of(position.begin(), position.begin() + rows, [](double v) { return std::isfinite(v); }))
+    return std::nullopt;
+  const auto speed = [&](std::size_t from, std::size_t to) {
+    return (position[to] - position[from]) / (time[to] - time[from]);
+  };
+  const double v = speed(0, rows - 1), early = speed(0, rows / 2 - 1), late = speed(rows / 2, rows - 1);
+  const double noise = spread_of_differences(position) / (time[rows / 2 - 1] - time[0]);
+  if (!(std::abs(v) > plainly * noise) || std::abs(early - late) > alike * std::abs(v) + 3.0 * noise)
+    return std::nullopt;
+  return early - 0.375 * (late - early);  // at the first row, 1.5 rows before the middle of the early half
+}
+
 /// The initial state, where the first rows contradict the one that the model starts from.
 void give_start(Case& data, Recording& recording) {
   using physics::Plant;
@@ -165,12 +182,21 @@ void give_start(Case& data, Recording& recording) {
         data.model.controller && reference != nullptr && name == "position")
       if (const auto at = rests_beside(reference->front(), *reference, recording.measured[o]))
         begin = *at, spread = doubt = 0.0;
+    // A loop without a sum may have been on its way: its first rows say how it came.
+    const bool has_no_sum = name == "position" && data.model.controller &&
+                            data.model.controller->kind == physics::AxisControllerSettings::Kind::cascade;
+    const auto speed = has_no_sum ? comes_at(inputs.time, recording.measured[o]) : std::nullopt;
+    if (speed) doubt = 1e-6;
     if (!std::isfinite(begin) || !std::isfinite(expected) ||
         !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt)))
       continue;
-    auto& column = inputs.signals[name];
-    column.assign(inputs.rows(), nothing);
-    column.front() = begin;
+    const auto give = [&](const std::string& signal, double value) {
+      auto& column = inputs.signals[signal];
+      column.assign(inputs.rows(), nothing);
+      column.front() = value;
+    };
+    give(name, begin);
+    if (speed) give("velocity", *speed);
   }
 }
 
