@@ -374,9 +374,12 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     const auto& parameter = term.info->parameters[i];
     const std::string key{parameter.name};
     if (node.has(key)) {
-      // "*": in whatever unit the place has on which the term acts; then only a number is checked.
-      const auto quantity = parameter.unit == "*" ? free_quantity(node[key], parameter.bounds)
-                                                  : node[key].as_quantity(parameter.unit, parameter.bounds);
+      // "*": in whatever unit the place has on which the term acts; then only a number is checked. A time is one in any.
+      const bool is_time = (key == "delay" || key == "time_constant") && node[key].is_map() &&
+                           node[key].text("unit", "*") != "*";
+      const auto quantity = parameter.unit == "*" && !is_time
+                                ? free_quantity(node[key], parameter.bounds)
+                                : node[key].as_quantity(is_time ? "s" : parameter.unit, parameter.bounds);
       term.values[i] = quantity.value;
       term.sigmas[i] = quantity.sigma;
       term.given[i] = true;

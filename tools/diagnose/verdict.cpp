@@ -308,6 +308,10 @@ void conclude(const Case& data, Diagnosis& d) {
   if ((data.model.plant == physics::Plant::equations || data.windows.count > 0) &&
       most_followed > plainly_followed && d.verdict == Verdict::explained && d.unexplained > 10.0)
     d.verdict = Verdict::partly_explained;
+  // A closed loop keeps what is left of a position small: three times the noise there is far more in a force.
+  if (data.model.plant == physics::Plant::axis && data.model.controller && d.verdict == Verdict::explained &&
+      d.unexplained > times_the_noise)
+    d.verdict = Verdict::partly_explained;
   // Where every window of an axis begins anew, numbers that are off leave noise.
   if (d.verdict == Verdict::parameters_only && data.model.plant == physics::Plant::axis &&
       data.windows.count > 0 && d.unexplained > 3.0) {

@@ -322,6 +322,7 @@ TEST(Equations, TermsActAsTheContractSays) {
   EXPECT_NEAR(last("{term: dead_zone, on: u, width: {value: 0.1, unit: 1}}"), 2.0 * (0.5 - 0.1), 1e-9);
   EXPECT_NEAR(last("{term: delay, on: u, delay: {value: 0.5, unit: s}}", 0.5), 1.0,
               1e-9);  // it was so before
+  EXPECT_NEAR(last("{term: delay, on: u, delay: {value: 500, unit: ms}}", 0.5), 1.0, 1e-9);
   const std::string constant = "{term: constant, on: x, value: {value: 0.25, unit: 1}}";
   EXPECT_NEAR(last(constant), 1.5, 1e-6);
   EXPECT_NEAR(last(constant, -0.5), -0.5, 1e-6);
