@@ -297,11 +297,7 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
     return false;
   }
   if (misreads) return true;
-  using physics::EquationsMemory;
-  const bool is_felt =
-      kind != nullptr && (kind->memory == EquationsMemory::delay || kind->memory == EquationsMemory::lag ||
-                          kind->memory == EquationsMemory::dead_zone);
-  if (is_felt && !term.with.empty() && (term.with != "others" || !on_state)) {
+  if (physics::is_felt_otherwise(term) && !term.with.empty() && (term.with != "others" || !on_state)) {
     node["with"].fault("`" + name + "` is felt by all rates, or of a state by the `others` alone",
                        "write `others`, or leave it out");
     node.accept_all();

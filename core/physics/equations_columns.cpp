@@ -96,11 +96,16 @@ bool sticks(const Term& term) {
   return equations_kind(*term.info)->memory == EquationsMemory::dry_friction && term.with == term.on;
 }
 
-bool is_felt_by_others_alone(const Term& term) {
-  if (term.with != "others") return false;
+bool is_felt_otherwise(const Term& term) {
   const auto* kind = equations_kind(*term.info);
   return kind != nullptr && (kind->memory == EquationsMemory::delay || kind->memory == EquationsMemory::lag ||
                              kind->memory == EquationsMemory::dead_zone);
+}
+
+bool is_felt_by_others_alone(const Term& term) { return term.with == "others" && is_felt_otherwise(term); }
+
+const std::string& goes_over(const Term& term) {
+  return term.with.empty() || is_felt_by_others_alone(term) ? term.on : term.with;
 }
 
 void run_over(const Model& model, const std::vector<std::string>& names,

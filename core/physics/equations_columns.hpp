@@ -16,9 +16,13 @@ std::string place_of_output(const Equations& equations, const std::string& outpu
 /// sticks until its rate would pass the level, as a valve does, and then goes by so much slower.
 bool sticks(const Term& term);
 
+/// A delay, a lag or a dead zone: what others feel of a signal is no longer what it is.
+bool is_felt_otherwise(const Term& term);
 /// A delay, lag or dead zone of a state that names `others` under `with`: what it gives off arrives so at the rates of the
 /// other states, its own feels it as it is. A store whose outflow takes its time to the next is one.
 bool is_felt_by_others_alone(const Term& term);
+/// The variable that a term without a curve goes over: what it names under `with`, or what it acts on.
+const std::string& goes_over(const Term& term);
 
 /// What passes a limit of one column goes, in part, to another. `names` are those of the columns.
 void run_over(const Model& model, const std::vector<std::string>& names,
@@ -85,12 +89,12 @@ double step_about(const std::vector<double>& time, std::size_t row, bool held);
 /// `arches`: of what is not held, by how much it lies above the straight line halfway from the row before; empty: nowhere.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held, const std::vector<double>& arches = {});
-/// Does a term at an output ask for what was between the rows?
-bool looks_back(const Model& model);
 /// The same of an input where the last thing that bends it is a store: the values as they are felt at the rows, and by row
 /// what they do until the next one. Empty, and nothing bent, where it is none.
 std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,
                                        const std::vector<double>& time, std::vector<double>& values,
                                        bool held);
+/// Does a term at an output ask for what was between the rows?
+bool looks_back(const Model& model);
 
 }  // namespace invar::physics

@@ -31,25 +31,14 @@ double bend(const std::vector<double>& values, std::size_t row, std::size_t gap,
   return cubic - (values[row - 1] + x / g * (values[row] - values[row - 1]));
 }
 
-/// Ticks from row to row, as a rule.
-std::size_t usual_ticks(const std::vector<double>& time, double rate) {
-  std::vector<long> ticks;
-  for (std::size_t i = 1; i < time.size(); ++i)
-    ticks.push_back(std::max(1L, std::lround((time[i] - time[i - 1]) * rate)));
-  if (ticks.empty()) return 1;
-  const auto middle = ticks.begin() + static_cast<std::ptrdiff_t>(ticks.size() / 2);
-  std::nth_element(ticks.begin(), middle, ticks.end());
-  return static_cast<std::size_t>(*middle);
-}
-
-/// Do the rows come faster than the controller's cycles? Then some are records of what the carriage did within one.
-bool is_within_cycles(const std::vector<double>& time, double rate) {
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < time.size(); ++i) steps.push_back((time[i] - time[i - 1]) * rate);
-  if (steps.empty()) return false;
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle < 0.75;
+/// Cycles of the controller from row to row, as a rule; 1 of a single row.
+double usual_cycles(const std::vector<double>& time, double rate) {
+  std::vector<double> cycles;
+  for (std::size_t i = 1; i < time.size(); ++i) cycles.push_back((time[i] - time[i - 1]) * rate);
+  if (cycles.empty()) return 1.0;
+  const auto middle = cycles.begin() + static_cast<std::ptrdiff_t>(cycles.size() / 2);
+  std::nth_element(cycles.begin(), middle, cycles.end());
+  return *middle;
 }
 
 /// The controller ticks at its own rate; every row is the record of one tick, the nearest to its time stamp, or where rows
@@ -68,8 +57,9 @@ class ClosedLoop final : public Simulation {
     const auto forward = forwards != nullptr ? bridged(inputs.time, *forwards) : std::vector<double>{};
     tick_of_row_.reserve(inputs.rows());
     const bool goes_on = structure.reference_goes_on.value_or(false);
-    const std::size_t usual = goes_on ? 1 : usual_ticks(inputs.time, rate);
-    const bool within = is_within_cycles(inputs.time, rate);
+    const double cycles_a_row = usual_cycles(inputs.time, rate);
+    const std::size_t usual = goes_on ? 1 : static_cast<std::size_t>(std::max(1L, std::lround(cycles_a_row)));
+    const bool within = cycles_a_row < 0.75;  // some rows are records of what the carriage did within a cycle
     for (std::size_t row = 0; row < inputs.rows(); ++row) {
       constexpr double trifle = 0.02;  // of a cycle
       const double cycles = std::max(0.0, (inputs.time[row] - start_time_) * rate);

@@ -30,9 +30,7 @@ std::vector<std::vector<double>> pulse_responses(const Case& data, const Weighin
   const double t = recording.inputs.time[at], period = recording.inputs.time[at + 1] - t;
   // Friction would hold the carriage against a small pulse; the loop's linear part is wanted.
   physics::Model smooth = model;
-  std::erase_if(smooth.terms, [](const physics::Term& term) {
-    return is_friction(term) || term.info->name == "backlash" || term.info->name == "dead_zone";
-  });
+  std::erase_if(smooth.terms, sticks_and_slips);
   physics::Model pulsed = smooth;
   physics::Term pulse;
   pulse.info = physics::unmodelled(physics::Plant::axis, site);

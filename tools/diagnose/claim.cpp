@@ -59,7 +59,7 @@ bool is_known_better(const Case& data, const Fit& fit, std::size_t term) {
 
 /// Did the recording let the term show what sets it apart?
 bool acts(const Case& data, const physics::Model& model, const Term& term) {
-  const std::string over = term.with.empty() || physics::is_felt_by_others_alone(term) ? term.on : term.with;
+  const std::string& over = physics::goes_over(term);
   const auto [low, high] = span_of(data, model, over);
   const double size = std::max(std::abs(low), std::abs(high));
   // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.

@@ -38,8 +38,7 @@ Series variable_of(const Case& data, const Diagnosis& d, const std::string& name
 Course course_in_equations(const Case& data, const Diagnosis& d, const physics::Term& term) {
   const auto& kind = *physics::equations_kind(*term.info);
   const bool is_over = kind.memory == EquationsMemory::overflow;
-  Course course{
-      term.with.empty() || is_over || physics::is_felt_by_others_alone(term) ? term.on : term.with, {}, {}};
+  Course course{is_over ? term.on : physics::goes_over(term), {}, {}};
   if (kind.memory == EquationsMemory::delay || kind.memory == EquationsMemory::lag ||
       kind.memory == EquationsMemory::hidden_state)
     return course;

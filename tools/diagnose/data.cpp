@@ -117,6 +117,13 @@ std::optional<double> rests_beside(double expected, const std::vector<double>& r
   return is_off && from_the_first_on ? std::optional{mean} : std::nullopt;
 }
 
+/// An initial state is a column whose first row alone is filled.
+void give_first(physics::Record& inputs, const std::string& signal, double value) {
+  auto& column = inputs.signals[signal];
+  column.assign(inputs.rows(), nothing);
+  column.front() = value;
+}
+
 /// A loop that stands still and yet commands: its sum is not zero, the first command says how much it holds.
 void give_start_of_sum(const Case& data, Recording& recording) {
   auto& inputs = recording.inputs;
@@ -130,8 +137,7 @@ void give_start_of_sum(const Case& data, Recording& recording) {
   const double expected =
       fresh.step((*reference)[0], position[0]) + (forward != nullptr ? forward->front() : 0.0);
   if (!(std::abs(current[0] - expected) > 6.0 * spread_of_differences(current))) return;
-  inputs.signals["current"].assign(inputs.rows(), nothing);
-  inputs.signals["current"].front() = rests_beside(expected, *reference, current).value_or(current[0]);
+  give_first(inputs, "current", rests_beside(expected, *reference, current).value_or(current[0]));
 }
 
 /// [m/s] The steady speed at which a carriage comes into the recording; nothing where it rests, or begins to move.
@@ -190,13 +196,8 @@ void give_start(Case& data, Recording& recording) {
     if (!std::isfinite(begin) || !std::isfinite(expected) ||
         !(std::abs(begin - expected) > 4.0 * std::hypot(spread, doubt)))
       continue;
-    const auto give = [&](const std::string& signal, double value) {
-      auto& column = inputs.signals[signal];
-      column.assign(inputs.rows(), nothing);
-      column.front() = value;
-    };
-    give(name, begin);
-    if (speed) give("velocity", *speed);
+    give_first(inputs, name, begin);
+    if (speed) give_first(inputs, "velocity", *speed);
   }
 }
 
@@ -339,8 +340,8 @@ void check_filled(const physics::Model& model, const physics::Record& record,
 /// One file among `files`: it has its share of the rows that a diagnosis runs through.
 void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
   auto content = model::to_record(table, model, true);
-  for (const auto& doubt : content.doubts)  // they are of the same model and units each time
-    if (data.recordings.empty()) data.doubts.push_back("units: " + doubt);
+  if (data.recordings.empty())  // they are of the same model and units each time
+    for (const auto& doubt : content.doubts) data.doubts.push_back("units: " + doubt);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "tools/diagnose/statistics.hpp"
 #include "tools/report/page.hpp"
@@ -25,7 +26,8 @@ double usual_step(const std::vector<double>& time) {
     std::vector<double> single;
     for (const double step : steps)
       if (step < 1.5 * usual) single.push_back(step);
-    usual = median(single);
+    const double was = std::exchange(usual, median(single));
+    if (usual == was) break;
   }
   return usual;
 }

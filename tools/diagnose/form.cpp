@@ -11,7 +11,7 @@ namespace invar::diagnose {
 std::string variable_of(const physics::Term& term) {
   if (!term.curve.over.empty()) return term.curve.over;
   if (term.info->name == "constant") return "";
-  return term.with.empty() || physics::is_felt_by_others_alone(term) ? term.on : term.with;
+  return physics::goes_over(term);
 }
 
 namespace {

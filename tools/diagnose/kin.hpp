@@ -8,6 +8,11 @@ namespace invar::diagnose {
 /// A law of dry friction, sliding or springing first.
 inline bool is_friction(const physics::Term& term) { return term.info->name.ends_with("_friction"); }
 
+/// What holds a carriage, a reading or a current still until it slips.
+inline bool sticks_and_slips(const physics::Term& term) {
+  return is_friction(term) || term.info->name == "backlash" || term.info->name == "dead_zone";
+}
+
 /// The model with found term `term` put as another law of the same variable: another power, with the strength that gives as
 /// much at the sizes that the variable takes; of what comes late, a lag or a delay of the same
 /// time, there and of each input. A machine that swings for long answers in phase: from strength zero no such fit arrives.

@@ -21,10 +21,7 @@ std::optional<std::size_t> fed_back(const Case& data) {
 }
 
 /// Does a carriage stick, or a reading or a current stay, while noise alone decides?
-bool bends(const physics::Term& term) {
-  return is_friction(term) || term.with == "direction" || term.info->name == "backlash" ||
-         term.info->name == "dead_zone";
-}
+bool bends(const physics::Term& term) { return sticks_and_slips(term) || term.with == "direction"; }
 
 using Noise = std::vector<std::vector<double>>;  // of the encoder, by recording
 

@@ -7,6 +7,7 @@
 #include "core/base/fault.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/odds.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::diagnose {
@@ -161,10 +162,7 @@ std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged
 
 bool comes_late_again(const Case& moved, const Diagnosis& d) {
   return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
-    const auto& name = finding.term.info->name;
-    const bool is_late = name == "delay" || name == "lag" || name == "hidden_state" ||
-                         name == "transport_delay" || name == "measurement_delay" ||
-                         name == "amplifier_lag" || name == "sensor_lag";
+    const bool is_late = comes_late(finding.term) || finding.term.info->name == "hidden_state";
     if (moved.model.plant != physics::Plant::equations) return is_late;
     return is_late && std::any_of(moved.moved.begin(), moved.moved.end(), [&](std::size_t o) {
              return finding.term.on == physics::place_of_output(moved.model.equations, moved.outputs[o]);

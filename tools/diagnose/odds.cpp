@@ -12,6 +12,12 @@ namespace invar::diagnose {
 using physics::Plant;
 using physics::Term;
 
+bool comes_late(const Term& term) {
+  const auto name = term.info->name;
+  return name == "lag" || name == "delay" || name == "amplifier_lag" || name == "transport_delay" ||
+         name == "measurement_delay" || name == "sensor_lag";
+}
+
 namespace {
 
 bool is_alternative(const Finding& finding, auto is) {
@@ -32,13 +38,6 @@ double odds_of_other_site(const Finding& finding) {
     return 0.0;
   const double price = price_of_current(term.values[term.info->index_of("frequency")]);
   return std::exp(0.5 * (is_current ? price : -price));
-}
-
-/// By a lag or by a delay: an instrument's latency is the name of either.
-bool comes_late(const Term& term) {
-  const auto name = term.info->name;
-  return name == "lag" || name == "delay" || name == "amplifier_lag" || name == "transport_delay" ||
-         name == "measurement_delay" || name == "sensor_lag";
 }
 
 /// Ends a value as it stands: on the way to a state as in it.

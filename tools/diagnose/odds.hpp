@@ -29,6 +29,9 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
 /// that runs alike is the same name for the same cause.
 bool is_another_cause(const Finding& finding, const Alternative& alternative);
 
+/// By a lag or by a delay: an instrument's latency is the name of either.
+bool comes_late(const physics::Term& term);
+
 /// Are they one effect whose place alone is open? What comes late before a model in one piece comes late behind it as well,
 /// a steady rate or a drag that acts at one state acts at the next in a chain, and so does a limit or a dead zone on the way.
 bool is_elsewhere(const physics::Term& one, const physics::Term& other);

@@ -1,6 +1,7 @@
 #include "tools/diagnose/reference_hold.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "tools/diagnose/diagnosis.hpp"
 
@@ -8,13 +9,25 @@ namespace invar::diagnose {
 
 namespace {
 
-Case with_hold(const Case& data, bool goes_on) {
+/// With a reference that goes on between the rows.
+Case going_on(const Case& data) {
   Case other = data;
   other.remembered = std::make_shared<Remembered>();
-  other.model.reference_goes_on = goes_on;
+  other.model.reference_goes_on = true;
   for (auto& recording : other.recordings)
     recording.simulation = physics::prepare(other.model, recording.inputs);
   return other;
+}
+
+/// Then there is nothing between the rows.
+bool has_every_cycle(const Case& data) {
+  const double rate = data.model.controller->rate;
+  return std::all_of(data.recordings.begin(), data.recordings.end(), [rate](const Recording& recording) {
+    const auto& time = recording.inputs.time;
+    const auto cycle = [&](double t) { return std::lround((t - time.front()) * rate); };
+    return std::adjacent_find(time.begin(), time.end(),
+                              [&](double a, double b) { return cycle(b) > cycle(a) + 1; }) == time.end();
+  });
 }
 
 /// Do the two say different things of the model as it is believed?
@@ -25,7 +38,8 @@ bool are_apart(const Case& a, const Case& b) { return simulate(a, a.model) != si
 void settle_hold(Case& data) {
   const auto& model = data.model;
   if (model.plant != physics::Plant::axis || !model.controller || model.reference_goes_on) return;
-  auto goes_on = with_hold(data, true);
+  if (has_every_cycle(data)) return;
+  auto goes_on = going_on(data);
   if (!are_apart(data, goes_on)) return;
   const auto weighing = weigh(data, simulate(data, model), false);
   constexpr int steps = 8;

@@ -38,7 +38,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
     if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
-    names.push_back(term.with.empty() || physics::is_felt_by_others_alone(term) ? term.on : term.with);
+    names.push_back(physics::goes_over(term));
   }
   return names;
 }
@@ -138,7 +138,7 @@ std::string title_of(const Finding& finding) {
   auto title = readable(term.info->name);
   if (term.info->plant != physics::Plant::equations) return title;
   // A law's name alone says nothing of a machine.
-  const auto& over = term.with.empty() ? term.on : term.with;
+  const auto& over = physics::goes_over(term);
   if (term.info->name == "coupling") return title + " to " + over;
   for (const auto* law : {"linear", "quadratic", "cubic", "periodic"})
     if (term.info->name == law) title += " in " + over;
