@@ -6,6 +6,8 @@ set(INVAR_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wsha
 # -ffp-contract=off keeps simulated time repeatable bit for bit across CPUs.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 add_compile_options(-ffp-contract=off)
+# What a package names beside what is called stays out of every process.
+add_link_options(-Wl,--as-needed)
 
 set(INVAR_SANITIZE "" CACHE STRING "sanitizers to build with, for example address,undefined or thread")
 if(INVAR_SANITIZE)
@@ -23,6 +25,18 @@ function(invar_library name)
     PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARG_HEADERS})
   target_compile_options(invar_${name} PRIVATE ${INVAR_WARNINGS})
   target_link_libraries(invar_${name} PUBLIC ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE})
+endfunction()
+
+# invar_loadable(target FILE name SOURCES ... LIBRARIES ...) makes lib/invar/lib<name>.so, which core/base/library.hpp loads. It
+# offers only what its sources export; all else stays its own.
+function(invar_loadable target)
+  cmake_parse_arguments(ARG "" "FILE" "SOURCES;LIBRARIES" ${ARGN})
+  add_library(${target} MODULE ${ARG_SOURCES})
+  target_compile_options(${target} PRIVATE ${INVAR_WARNINGS})
+  target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES})
+  target_link_options(${target} PRIVATE -Wl,--exclude-libs,ALL)
+  set_target_properties(${target} PROPERTIES OUTPUT_NAME ${ARG_FILE} LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/invar)
+  install(TARGETS ${target} LIBRARY DESTINATION lib/invar)
 endfunction()
 
 # invar_paths(target) tells a target of the tests where this tree lies. Only the few that read from it: a path on the command

@@ -8,7 +8,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 # External libraries by the beginning of the path that is included.
 LIBRARIES = {
-    "yaml-cpp/": "yaml-cpp", "Eigen/": "Eigen", "ceres/": "Ceres", "opencv2/": "OpenCV", "modbus.h": "libmodbus",
+    "yaml-cpp/": "yaml-cpp", "Eigen/": "Eigen", "opencv2/": "OpenCV", "modbus.h": "libmodbus",
     "modbus/": "libmodbus", "fastdds/": "Fast DDS", "fastrtps/": "Fast DDS", "fastcdr/": "Fast DDS", "zlib.h": "compression",
     "zstd.h": "compression", "lz4": "compression", "CLI/": "CLI11", "nlohmann/": "nlohmann-json", "muParser": "muParser",
     "spdlog/": "spdlog", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
@@ -18,8 +18,8 @@ LIBRARIES = {
 ROOMS = {
     "core/base": [],
     "core/config": ["core/base", "yaml-cpp"],
-    "core/numerics": ["core/base", "Eigen", "Ceres"],
-    "core/metrology": ["core/base", "core/numerics", "Eigen", "Ceres"],
+    "core/numerics": ["core/base", "Eigen"],
+    "core/metrology": ["core/base", "core/numerics", "Eigen"],
     "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "yaml-cpp", "Eigen"],
     "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
@@ -33,7 +33,7 @@ ROOMS = {
 }
 COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/compensation",
              "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
-MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["OpenCV", "core/model", "core/recording"],
+MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "core/recording"],
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "compensation": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
 

@@ -87,17 +87,6 @@ cv::Mat annotate(const cv::Mat& image, const Droplets& droplets,
   return annotate(image, outlines, targets);
 }
 
-void point_at_nearest(std::vector<AnnotatedTarget>& targets, const Droplets& droplets, double reach) {
-  for (AnnotatedTarget& target : targets) {
-    double nearest = reach;
-    for (const Droplet& drop : droplets.droplets) {
-      const double away = std::hypot(drop.x - target.x, drop.y - target.y);
-      if (drop.status == DropletStatus::ok && away < nearest)
-        nearest = away, target.to_x = drop.x, target.to_y = drop.y;
-    }
-  }
-}
-
 std::vector<unsigned char> encode_png(const cv::Mat& image) {
   std::vector<unsigned char> bytes;
   cv::imencode(".png", image, bytes);

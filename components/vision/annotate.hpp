@@ -1,11 +1,14 @@
 // Draws what was measured into the image, for reports and for people at the cell.
 #pragma once
 
-#include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
 #include "components/vision/droplets.hpp"
+
+namespace cv {
+class Mat;
+}  // namespace cv
 
 namespace invar::vision {
 

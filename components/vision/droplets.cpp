@@ -237,25 +237,6 @@ bool measure(const cv::Mat& image, int polarity, Filters& filters, double blur, 
 
 }  // namespace
 
-std::string_view name(DropletStatus status) {
-  switch (status) {
-    case DropletStatus::ok:
-      return "ok";
-    case DropletStatus::satellite:
-      return "satellite";
-    case DropletStatus::cut:
-      return "cut";
-    case DropletStatus::dust:
-      return "dust";
-  }
-  return "dust";
-}
-
-std::size_t Droplets::sound() const {
-  return static_cast<std::size_t>(std::count_if(
-      droplets.begin(), droplets.end(), [](const Droplet& d) { return d.status == DropletStatus::ok; }));
-}
-
 cv::Mat gray(const cv::Mat& image) {
   cv::Mat out = image;
   if (out.channels() == 3) cv::cvtColor(out, out, cv::COLOR_BGR2GRAY);

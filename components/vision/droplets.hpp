@@ -2,11 +2,14 @@
 #pragma once
 
 #include <limits>
-#include <opencv2/core/mat.hpp>
 #include <string_view>
 #include <vector>
 
 #include "components/vision/outline.hpp"
+
+namespace cv {
+class Mat;
+}  // namespace cv
 
 namespace invar::vision {
 

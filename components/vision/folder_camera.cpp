@@ -5,7 +5,7 @@
 #include <cctype>
 #include <string_view>
 
-#include "components/vision/image_file.hpp"
+#include "components/vision/library.hpp"
 #include "core/base/fault.hpp"
 
 namespace invar::vision {
@@ -35,7 +35,7 @@ FolderCamera::FolderCamera(const Parameters& parameters)
                      "put PNG, JPEG, TIFF, BMP or PGM files there"};
 }
 
-void FolderCamera::configure() { (void)read_gray_image(files_.front()); }
+void FolderCamera::configure() { (void)library().read(files_.front()); }
 
 void FolderCamera::activate() {
   FrameCamera::activate();
@@ -47,7 +47,7 @@ bool FolderCamera::take_picture(const Tick&, std::uint64_t, Picture& picture) {
     if (!parameters_.again) return false;
     next_ = 0;
   }
-  picture.image = read_gray_image(files_[next_++]);
+  picture.pixels = library().read(files_[next_++]);
   return true;
 }
 

@@ -54,27 +54,22 @@ FrameCamera::Position FrameCamera::position_at(Instant time) const {
   return between;
 }
 
-void FrameCamera::publish(const Picture& picture, std::uint64_t request) {
-  const cv::Mat& image = picture.image;
-  const std::size_t bytes = image.total() * image.elemSize();
-  if ((image.type() != CV_8UC1 && image.type() != CV_16UC1) || bytes == 0)
-    throw std::runtime_error{"a picture that is not grey"};
-  if (bytes > most_pixels)
-    throw std::runtime_error{"a picture of " + std::to_string(bytes) +
+void FrameCamera::publish(Picture& picture, std::uint64_t request) {
+  Pixels& pixels = picture.pixels;
+  if (pixels.bytes.empty()) throw std::runtime_error{"a picture without pixels"};
+  if (pixels.bytes.size() > most_pixels)
+    throw std::runtime_error{"a picture of " + std::to_string(pixels.bytes.size()) +
                              " bytes; a frame holds 2 MiB: choose a smaller format"};
   stamp(sample_, picture.at);
   sample_.sensor(id);
   sample_.number(number_);
   sample_.request(request);
-  sample_.width(static_cast<std::uint32_t>(image.cols));
-  sample_.height(static_cast<std::uint32_t>(image.rows));
-  sample_.format(image.depth() == CV_8U ? image::PIXEL_MONO8 : image::PIXEL_MONO16);
+  sample_.width(static_cast<std::uint32_t>(pixels.width));
+  sample_.height(static_cast<std::uint32_t>(pixels.height));
+  sample_.format(pixels.wide ? image::PIXEL_MONO16 : image::PIXEL_MONO8);
   sample_.exposure_ns(Duration::seconds(parameters_.exposure).ns);
   sample_.position() = position_at(picture.at);
-  sample_.pixels().resize(bytes);
-  const std::size_t row = bytes / static_cast<std::size_t>(image.rows);
-  for (int y = 0; y < image.rows; ++y)
-    std::copy_n(image.ptr<std::uint8_t>(y), row, sample_.pixels().data() + static_cast<std::size_t>(y) * row);
+  sample_.pixels().swap(pixels.bytes);
   frame_.write(sample_);
 }
 

@@ -4,10 +4,10 @@
 #include <array>
 #include <deque>
 #include <memory>
-#include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
 
+#include "components/vision/pixels.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "idl/image.h"
@@ -35,8 +35,8 @@ class FrameCamera : public Component {
 
  protected:
   struct Picture {
-    cv::Mat image;  // CV_8UC1 or CV_16UC1
-    Instant at;     // middle of the exposure
+    Pixels pixels;
+    Instant at;  // middle of the exposure
   };
   /// A picture that is wanted now; false: there is none. What it throws takes the component to error.
   virtual bool take_picture(const Tick& tick, std::uint64_t number, Picture& picture) = 0;
@@ -48,7 +48,7 @@ class FrameCamera : public Component {
   [[nodiscard]] bool is_due(const Tick& tick);
   void follow_stage(const Tick& tick);
   [[nodiscard]] Position position_at(Instant time) const;
-  void publish(const Picture& picture, std::uint64_t request);
+  void publish(Picture& picture, std::uint64_t request);
 
   const CameraParameters& parameters_;
   Inbox<image::ExposeCommand> expose_{*this, "expose", {.optional = true, .profile = "command"}};

@@ -60,15 +60,6 @@ bool stays_inside(const RaySamples& samples, const Shape& shape, double outward)
 
 }  // namespace
 
-double Shape::equal_area_radius() const {
-  return std::sqrt(radius * radius + 0.5 * (cos2 * cos2 + sin2 * sin2));
-}
-
-double Shape::axis_ratio() const {
-  const double amplitude = std::hypot(cos2, sin2);
-  return (radius - amplitude) / (radius + amplitude);
-}
-
 void Rays::choose(double radius) {
   count = 16 * std::clamp(static_cast<int>(std::lround(radius * std::numbers::pi / 20.0)), 1, most / 16);
   std::fill_n(open.begin(), count, true);

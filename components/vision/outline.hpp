@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
-#include <opencv2/core/mat.hpp>
 
 #include "components/vision/edge_filter.hpp"
+
+namespace cv {
+class Mat;
+}  // namespace cv
 
 namespace invar::vision {
 

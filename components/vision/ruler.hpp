@@ -1,13 +1,16 @@
 // Camera scale from a picture of circles of known radius.
 #pragma once
 
-#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "components/vision/camera.hpp"
 #include "components/vision/outline.hpp"
+
+namespace cv {
+class Mat;
+}  // namespace cv
 
 namespace invar::vision {
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "components/vision/library.hpp"
 #include "core/base/fault.hpp"
 
 namespace invar::vision {
@@ -18,6 +19,8 @@ SimulatedCamera::SimulatedCamera(const Parameters& parameters)
   for (const RulerMark& mark : read_ruler(parameters.ruler->file))
     marks_.push_back({zero + mark.at, mark.radius});
 }
+
+void SimulatedCamera::configure() { (void)library(); }
 
 void SimulatedCamera::activate() {
   FrameCamera::activate();
@@ -59,7 +62,7 @@ bool SimulatedCamera::take_picture(const Tick&, std::uint64_t number, Picture& p
         continue;
       scene.discs.push_back({.x = at.x(), .y = at.y(), .radius = radius});
     }
-  picture.image = render(scene);
+  picture.pixels = library().render(scene);
   return true;
 }
 

@@ -8,8 +8,8 @@
 
 #include "components/vision/frame_camera.hpp"
 #include "components/vision/mount.hpp"
-#include "components/vision/render.hpp"
 #include "components/vision/ruler_file.hpp"
+#include "components/vision/scene.hpp"
 #include "idl/dispensing.h"
 #include "idl/sensing.h"
 
@@ -56,6 +56,7 @@ class SimulatedCamera final : public FrameCamera {
     std::int64_t dust = 0;
   };
   explicit SimulatedCamera(const Parameters& parameters);
+  void configure() override;
   void activate() override;
 
  private:

@@ -9,12 +9,9 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <exception>
 #include <filesystem>
-#include <opencv2/core/utils/logger.hpp>
 #include <stdexcept>
 
-#include "components/vision/droplets.hpp"
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
 #include "core/component/plugin.hpp"
@@ -64,19 +61,16 @@ bool V4lCamera::is_file() const {
 }
 
 void V4lCamera::configure() {
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   stop();
   if (!is_file()) check(parameters_.device);
-  if (!device_.open(parameters_.device, is_file() ? cv::CAP_ANY : cv::CAP_V4L2)) {
+  video_ = open_video({parameters_.device, is_file(), parameters_.width, parameters_.height});
+  if (!video_) {
     if (is_file())
       throw InputError{parameters_.device, "no video can be opened there",
                        "name a device (/dev/video0) or a video file that OpenCV reads"};
     throw InputError{parameters_.device, "gives no pictures in a format that is known here",
                      "end the program that uses it; `v4l2-ctl --list-formats` shows its formats"};
   }
-  if (parameters_.width > 0) device_.set(cv::CAP_PROP_FRAME_WIDTH, static_cast<double>(parameters_.width));
-  if (parameters_.height > 0) device_.set(cv::CAP_PROP_FRAME_HEIGHT, static_cast<double>(parameters_.height));
-  device_.set(cv::CAP_PROP_BUFFERSIZE, 1.0);
   newest_ = {};
   taken_ = {};
   lost_ = false;
@@ -87,21 +81,15 @@ void V4lCamera::configure() {
 void V4lCamera::stop() noexcept {
   stopping_ = true;
   if (thread_.joinable()) thread_.join();
-  device_.release();
+  video_.reset();
 }
 
 void V4lCamera::read() {
-  const double rate = is_file() ? device_.get(cv::CAP_PROP_FPS) : 0.0;
+  const double rate = is_file() ? video_->rate() : 0.0;
   auto due = std::chrono::steady_clock::now();
   while (!stopping_) {
-    cv::Mat image;
-    bool good = false;
-    try {
-      good = device_.read(image) && !image.empty();
-      if (good) image = gray(image);
-    } catch (const std::exception&) {
-      good = false;
-    }
+    Pixels pixels;
+    const bool good = video_->read(pixels);
     const Instant at = utc_now();
     {
       const std::lock_guard lock{mutex_};
@@ -109,7 +97,7 @@ void V4lCamera::read() {
         lost_ = true;
         return;
       }
-      newest_.image = image;
+      newest_.pixels = std::move(pixels);
       newest_.at = at - Duration::seconds(parameters_.latency);
     }
     if (!(rate > 0.0)) continue;  // a device keeps its own time
@@ -121,9 +109,10 @@ void V4lCamera::read() {
 bool V4lCamera::take_picture(const Tick&, std::uint64_t, Picture& picture) {
   const std::lock_guard lock{mutex_};
   // Only what was exposed since the last one was taken.
-  if (!newest_.image.empty() && newest_.at > taken_) {
-    picture = newest_;
-    taken_ = newest_.at;
+  if (!newest_.pixels.bytes.empty() && newest_.at > taken_) {
+    picture = std::move(newest_);
+    taken_ = picture.at;
+    newest_.pixels.bytes.clear();
     return true;
   }
   if (lost_)

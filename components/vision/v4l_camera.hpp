@@ -3,12 +3,13 @@
 #pragma once
 
 #include <atomic>
+#include <memory>
 #include <mutex>
-#include <opencv2/videoio.hpp>
 #include <string>
 #include <thread>
 
 #include "components/vision/frame_camera.hpp"
+#include "components/vision/video.hpp"
 
 namespace invar::vision {
 
@@ -44,7 +45,7 @@ class V4lCamera final : public FrameCamera {
   [[nodiscard]] bool is_file() const;
 
   const Parameters& parameters_;
-  cv::VideoCapture device_;
+  std::unique_ptr<Video> video_;
   std::thread thread_;
   std::atomic<bool> stopping_{true};
   std::mutex mutex_;

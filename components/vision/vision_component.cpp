@@ -5,9 +5,8 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "components/vision/annotate.hpp"
 #include "components/vision/camera_file.hpp"
-#include "components/vision/ruler.hpp"
+#include "components/vision/library.hpp"
 #include "components/vision/ruler_file.hpp"
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
@@ -35,13 +34,13 @@ image::DropletStatus wire_status(DropletStatus status) {
 
 Eigen::Vector2d stage_at(const image::Frame& frame) { return {frame.position()[0], frame.position()[1]}; }
 
-/// The frame's pixels in place; they live as long as the frame. Empty where its numbers contradict one another.
-cv::Mat pixels_of(const image::Frame& frame) {
+/// The frame's pixels in place; they live as long as the frame. Nothing where its numbers contradict one another.
+std::optional<PixelsView> pixels_of(const image::Frame& frame) {
   const bool wide = frame.format() == image::PIXEL_MONO16;
   const std::size_t wanted = std::size_t{frame.width()} * frame.height() * (wide ? 2U : 1U);
   if (frame.width() < 16 || frame.height() < 16 || frame.pixels().size() != wanted) return {};
-  return {static_cast<int>(frame.height()), static_cast<int>(frame.width()), wide ? CV_16UC1 : CV_8UC1,
-          const_cast<std::uint8_t*>(frame.pixels().data())};  // NOLINT: nothing writes there
+  return PixelsView{static_cast<int>(frame.width()), static_cast<int>(frame.height()), wide,
+                    frame.pixels().data()};
 }
 
 }  // namespace
@@ -57,6 +56,7 @@ Vision::Vision(const Parameters& parameters) : parameters_{parameters} {
 }
 
 void Vision::configure() {
+  (void)library();
   camera_.reset();
   if (!parameters_.camera.empty()) camera_ = read_camera(parameters_.camera);
 }
@@ -127,8 +127,8 @@ Duration Vision::since(const image::Frame& frame) const {
   return (simulated_time ? now() : utc_now()) - Instant{frame.at().time_ns()};
 }
 
-Eigen::Vector2d Vision::middle(const cv::Mat& picture) const {
-  return camera_->to_metres({0.5 * (picture.cols - 1), 0.5 * (picture.rows - 1)});
+Eigen::Vector2d Vision::middle(const PixelsView& picture) const {
+  return camera_->to_metres({0.5 * (picture.width - 1), 0.5 * (picture.height - 1)});
 }
 
 void Vision::step(const Tick&) noexcept {
@@ -158,22 +158,22 @@ void Vision::take(const image::Frame& frame) {
   if (last_number_ != 0 && frame.number() > last_number_ + 1)
     sample_.frames_dropped(sample_.frames_dropped() + frame.number() - last_number_ - 1);
   last_number_ = frame.number();
-  const cv::Mat seen = pixels_of(frame);
-  if (seen.empty()) throw std::runtime_error{"a frame whose size does not fit its pixels"};
-  const cv::Mat picture = gray(seen);
+  const auto seen = pixels_of(frame);
+  if (!seen) throw std::runtime_error{"a frame whose size does not fit its pixels"};
+  const PixelsView& picture = *seen;
   const bool asked = running_ && frame.request() == running_->id();
   if (asked && running_->wanted() == image::VISION_CALIBRATE) {
     calibrate(picture);
-    show_view(picture.cols, picture.rows);
+    show_view(picture.width, picture.height);
     running_.reset();
     report(job::JOB_DONE, "calibrated");
   } else if (camera_) {
-    if (camera_->width > 0 && (camera_->width != picture.cols || camera_->height != picture.rows))
-      throw std::runtime_error{"frames of " + std::to_string(picture.cols) + " x " +
-                               std::to_string(picture.rows) + " px, but the camera was calibrated with " +
+    if (camera_->width > 0 && (camera_->width != picture.width || camera_->height != picture.height))
+      throw std::runtime_error{"frames of " + std::to_string(picture.width) + " x " +
+                               std::to_string(picture.height) + " px, but the camera was calibrated with " +
                                std::to_string(camera_->width) + " x " + std::to_string(camera_->height) +
                                ": calibrate again"};
-    show_view(picture.cols, picture.rows);
+    show_view(picture.width, picture.height);
     measure(frame, picture, asked);
     if (asked) {
       running_.reset();
@@ -184,13 +184,15 @@ void Vision::take(const image::Frame& frame) {
   }
 }
 
-void Vision::calibrate(const cv::Mat& picture) {
+void Vision::calibrate(const PixelsView& picture) {
   RulerFailure failure;
-  const auto fit = calibrate_ruler(picture, radii_, failure);
+  const auto fit = library().calibrate(picture, radii_, failure);
   if (!fit) throw std::runtime_error{"the image " + failure.what};
-  std::vector<AnnotatedOutline> outlines;
-  for (const RulerCircle& circle : fit->circles) outlines.push_back({circle.outline, Colour::green, ""});
-  write_picture(annotate(picture, outlines));
+  if (wants_picture()) {
+    std::vector<AnnotatedOutline> outlines;
+    for (const RulerCircle& circle : fit->circles) outlines.push_back({circle.outline, Colour::green, ""});
+    write_picture(library().draw_outlines(picture, outlines));
+  }
   const std::filesystem::path folder = parameters_.out;
   std::filesystem::create_directories(folder);
   std::ofstream out{folder / "camera.yaml"};
@@ -200,14 +202,14 @@ void Vision::calibrate(const cv::Mat& picture) {
   camera_ = fit->camera;
 }
 
-void Vision::measure(const image::Frame& frame, const cv::Mat& picture, bool asked) {
+void Vision::measure(const image::Frame& frame, const PixelsView& picture, bool asked) {
   MeasureOptions options{.polarity = polarity_};
   options.least_radius = 0.5 * parameters_.least_diameter / camera_->scale;
   if (parameters_.largest_diameter > 0.0)
     options.largest_radius = 0.5 * parameters_.largest_diameter / camera_->scale;
-  const Droplets found = measure_droplets(picture, options);
+  const Droplets found = library().measure(picture, options);
   publish(frame, found, asked ? running_->id() : 0);
-  if (!asked || running_->picture_path().size() == 0) return;
+  if (!asked || !wants_picture()) return;
   std::vector<AnnotatedTarget> targets;
   for (const auto& target : running_->targets()) {
     const auto seen = camera_->to_pixels(
@@ -216,7 +218,7 @@ void Vision::measure(const image::Frame& frame, const cv::Mat& picture, bool ask
     if (seen) targets.push_back({seen->x(), seen->y(), seen->x(), seen->y()});
   }
   point_at_nearest(targets, found, 2.0 * found.radius);
-  write_picture(annotate(picture, found, targets));
+  write_picture(library().draw_droplets(picture, found, targets));
 }
 
 void Vision::publish(const image::Frame& frame, const Droplets& found, std::uint64_t request) {
@@ -254,13 +256,13 @@ void Vision::publish(const image::Frame& frame, const Droplets& found, std::uint
   droplets_.write(measured_);
 }
 
-void Vision::write_picture(const cv::Mat& annotated) const {
-  if (!running_ || running_->picture_path().size() == 0) return;
+bool Vision::wants_picture() const { return running_ && running_->picture_path().size() > 0; }
+
+void Vision::write_picture(const std::vector<unsigned char>& png) const {
   const std::filesystem::path file = running_->picture_path().c_str();
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-  const auto bytes = encode_png(annotated);
   std::ofstream out{file, std::ios::binary};
-  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  out.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
   out.close();
   if (!out) throw std::runtime_error{file.string() + " cannot be written"};
 }

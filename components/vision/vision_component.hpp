@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "components/vision/camera.hpp"
 #include "components/vision/droplets.hpp"
 #include "components/vision/mount.hpp"
+#include "components/vision/pixels.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "idl/image.h"
@@ -52,13 +52,14 @@ class Vision final : public Component {
   void start(const image::VisionCommand& command);
   void ask();
   void take(const image::Frame& frame);
-  void measure(const image::Frame& frame, const cv::Mat& picture, bool asked);
-  void calibrate(const cv::Mat& picture);
+  void measure(const image::Frame& frame, const PixelsView& picture, bool asked);
+  void calibrate(const PixelsView& picture);
   void publish(const image::Frame& frame, const Droplets& found, std::uint64_t request);
-  void write_picture(const cv::Mat& annotated) const;
+  [[nodiscard]] bool wants_picture() const;
+  void write_picture(const std::vector<unsigned char>& png) const;
   void report(job::JobPhase phase, const std::string& text);
   [[nodiscard]] Duration since(const image::Frame& frame) const;
-  [[nodiscard]] Eigen::Vector2d middle(const cv::Mat& picture) const;
+  [[nodiscard]] Eigen::Vector2d middle(const PixelsView& picture) const;
   void show_view(int width, int height);
 
   const Parameters& parameters_;

@@ -17,6 +17,7 @@
 
 #include "components/vision/camera_file.hpp"
 #include "components/vision/frame_camera.hpp"
+#include "components/vision/library.hpp"
 #include "components/vision/vision_component.hpp"
 #include "core/dds/node.hpp"
 #include "core/executor/executor.hpp"
@@ -59,17 +60,18 @@ class StillCamera final : public vision::FrameCamera {
   StillCamera(const Settings& s, const vision::CameraParameters& parameters)
       : FrameCamera{parameters}, settings_{s} {
     const auto recipes = vision::testing::recipes();
-    picture_ = render(vision::testing::make_scene(recipes.at(static_cast<std::size_t>(s.recipe)), 1).scene);
+    picture_ = vision::library().render(
+        vision::testing::make_scene(recipes.at(static_cast<std::size_t>(s.recipe)), 1).scene);
   }
 
  private:
   bool take_picture(const Tick&, std::uint64_t, Picture& picture) override {
     picture.at = utc_now();
-    picture.image = picture_;
+    picture.pixels = picture_;
     return frames_flow(settings_, monotonic_now().ns);
   }
   const Settings& settings_;
-  cv::Mat picture_;
+  vision::Pixels picture_;
 };
 
 /// A process with one component, stepped `rate` times a second by the usual scheduling.

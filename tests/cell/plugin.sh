@@ -21,6 +21,13 @@ source "$source/tests/support/claims.sh"
 sed -i "s/^domain: .*/domain: $domain/" cell.yaml
 invar=$folder/installed/bin/invar
 "$invar" check cell.yaml
+# Pictures need a library of their own, which is installed beside the program.
+printf 'P5 64 48 255\n' >dark.pgm; head -c 3072 /dev/zero >>dark.pgm
+"$invar" measure droplets --image dark.pgm --output drops.csv | grep -q '^dark.pgm: 0 droplets'
+mv "$folder/installed/lib/invar" "$folder/installed/lib/gone"
+if "$invar" measure droplets --image dark.pgm --output drops.csv 2>said; then echo "measured without its library"; exit 1; fi
+grep -q 'lib/invar/libinvar_vision.so: cannot be loaded' said && [[ $(wc -l <said) == 1 ]] || { cat said; exit 1; }
+mv "$folder/installed/lib/gone" "$folder/installed/lib/invar"
 "$invar" types --plugin liblow_pass.so low_pass | tee types
 grep -Eq '^raw +input +invar::stage::AxisFeedback +realtime' types
 grep -Eq '^cutoff +number +Hz +\[0\.1, 450\] +100 +yes +-3 dB corner' types

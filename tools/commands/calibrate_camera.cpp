@@ -5,10 +5,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "components/vision/annotate.hpp"
 #include "components/vision/camera_file.hpp"
-#include "components/vision/image_file.hpp"
-#include "components/vision/ruler.hpp"
+#include "components/vision/library.hpp"
 #include "components/vision/ruler_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
@@ -22,7 +20,7 @@ namespace {
 
 struct Results {
   const vision::RulerFit& fit;
-  const cv::Mat& image;
+  const vision::Pixels& image;
 };
 
 nlohmann::json report_json(const Results& r) {
@@ -94,7 +92,7 @@ report::Page make_page(const Results& r) {
   std::vector<vision::AnnotatedOutline> outlines;
   for (const vision::RulerCircle& c : r.fit.circles)
     outlines.push_back({c.outline, vision::Colour::green, number(c.radius * 1e3, 4) + " mm"});
-  page.image(vision::encode_png(vision::annotate(r.image, outlines)), "image/png",
+  page.image(vision::library().draw_outlines(r.image.view(), outlines), "image/png",
              "The ruler with the outlines that were fitted");
   page.plot({.title = "Radius: measured minus modelled",
              .x_label = "radius [mm]",
@@ -107,9 +105,9 @@ report::Page make_page(const Results& r) {
 
 void calibrate_by_ruler(const CameraOptions& options) {
   const auto radii = vision::radii_of(vision::read_ruler(*options.ruler));
-  const cv::Mat image = vision::read_gray_image(*options.image);
+  const vision::Pixels image = vision::library().read(*options.image);
   vision::RulerFailure failure;
-  const auto fit = vision::calibrate_ruler(image, radii, failure);
+  const auto fit = vision::library().calibrate(image.view(), radii, failure);
   if (!fit) throw InputError{options.image->string(), failure.what, "see " + options.ruler->string()};
 
   const Results results{*fit, image};

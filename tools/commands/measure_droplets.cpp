@@ -5,8 +5,7 @@
 #include <optional>
 
 #include "components/vision/camera_file.hpp"
-#include "components/vision/droplets.hpp"
-#include "components/vision/image_file.hpp"
+#include "components/vision/library.hpp"
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
 #include "tools/image/droplets_page.hpp"
@@ -31,13 +30,13 @@ void measure(const Options& options) {
   std::optional<vision::CameraModel> camera;
   if (options.camera) camera = vision::read_camera(*options.camera);
   // Every image is read before anything is measured: a bad one must not cost the time of the good ones.
-  std::vector<cv::Mat> images;
-  for (const auto& file : options.images) images.push_back(vision::read_gray_image(file));
+  std::vector<vision::Pixels> images;
+  for (const auto& file : options.images) images.push_back(vision::library().read(file));
 
   Rows rows;
   std::vector<MeasuredImage> shown;
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const vision::Droplets found = vision::measure_droplets(images[i]);
+    const vision::Droplets found = vision::library().measure(images[i].view(), {});
     for (const vision::Droplet& drop : found.droplets) {
       rows.image.push_back(options.images[i].string());
       rows.status.emplace_back(vision::name(drop.status));

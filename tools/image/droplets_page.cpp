@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/vision/annotate.hpp"
+#include "components/vision/library.hpp"
 
 namespace invar::tools {
 
@@ -61,7 +61,7 @@ void add_droplets(report::Page& page, const std::vector<MeasuredImage>& images,
        "standard deviation [" + unit + "]", "sigma of a centre [px]", "blur [px]", "contrast [grey levels]"},
       rows);
   for (const MeasuredImage& image : images)
-    page.image(vision::encode_png(vision::annotate(image.image, image.droplets)), "image/png",
+    page.image(vision::library().draw_droplets(image.image.view(), image.droplets, {}), "image/png",
                image.name + ": sound droplets green, satellites blue, cut ones amber, dust red");
   if (all.values.size() < 5) return;
   std::sort(all.values.begin(), all.values.end());

@@ -7,13 +7,14 @@
 
 #include "components/vision/camera.hpp"
 #include "components/vision/droplets.hpp"
+#include "components/vision/pixels.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
 
 struct MeasuredImage {
   std::string name;
-  cv::Mat image;  // CV_8UC1
+  vision::Pixels image;
   vision::Droplets droplets;
 };
 

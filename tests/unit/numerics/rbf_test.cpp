@@ -10,7 +10,6 @@
 #include "core/numerics/rbf_descent.hpp"
 #include "core/numerics/rbf_kernel.hpp"
 #include "core/numerics/rbf_network.hpp"
-#include "core/numerics/rbf_refine.hpp"
 #include "core/numerics/rbf_ridge.hpp"
 
 namespace invar::numerics {
@@ -201,17 +200,6 @@ TEST(RbfDescent, StopRuleIsTrueBeforeTrainingWhenTargetsAreInMillimetres) {
   const DescentResult result = train_by_descent(samples(), y, 1e-3, {});
   EXPECT_TRUE(result.converged);
   EXPECT_EQ(result.epochs, 1);
-}
-
-TEST(RbfRefine, TwelveMovingCentresBeatTwelveFixedOnes) {
-  const Curve curve{6};
-  const Eigen::VectorXd y = values(curve, 0.0, 1);
-  RidgeOptions few;
-  few.counts = {12};
-  const RbfNetwork start = fit_ridge(samples(), y, few).network;
-  const RefineResult refined = refine(start, samples(), y, 300);
-  EXPECT_LT(refined.rms_after, 0.85 * refined.rms_before);
-  EXPECT_LT(rms_error(refined.network, curve), rms_error(start, curve));
 }
 
 TEST(LookupTable, StaysWithinItsProvenBound) {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <opencv2/videoio.hpp>
 
 #include "core/base/clock.hpp"
 #include "tests/support/fault_of.hpp"
