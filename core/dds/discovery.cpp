@@ -85,6 +85,11 @@ void Discovery::raise(Alarm alarm) {
   alarms_.push_back(std::move(alarm));
 }
 
+void Discovery::add_source(std::function<std::optional<Alarm>()> source) {
+  const std::lock_guard lock{mutex_};
+  sources_.push_back(std::move(source));
+}
+
 Snapshot Discovery::snapshot() const {
   const std::lock_guard lock{mutex_};
   Snapshot out;
@@ -97,6 +102,8 @@ std::vector<Alarm> Discovery::take_alarms() {
   const std::lock_guard lock{mutex_};
   std::vector<Alarm> out{alarms_.begin(), alarms_.end()};
   alarms_.clear();
+  for (const auto& source : sources_)
+    if (auto alarm = source()) out.push_back(std::move(*alarm));
   return out;
 }
 

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,6 +55,8 @@ class Discovery {
   void add_endpoint(Endpoint endpoint);
   void remove_endpoint(const std::string& id);
   void raise(Alarm alarm);
+  /// Something else that may have an alarm to raise; it is asked each time that somebody takes the alarms.
+  void add_source(std::function<std::optional<Alarm>()> source);
 
   [[nodiscard]] Snapshot snapshot() const;
   /// The alarms since the last call, oldest first.
@@ -81,6 +85,7 @@ class Discovery {
   std::uint64_t came_ = 0;
   std::map<std::string, Endpoint> endpoints_;
   std::deque<Alarm> alarms_;
+  std::vector<std::function<std::optional<Alarm>()>> sources_;
 };
 
 }  // namespace invar::dds

@@ -17,13 +17,17 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <sstream>
 #include <string_view>
 
+#include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/dds/datagram_size.hpp"
 #include "core/dds/guid_text.hpp"
 #include "core/dds/qos.hpp"
+#include "core/dds/rtps_bytes.hpp"
 #include "core/dds/writer_keys.hpp"
 
 namespace invar::dds {
@@ -111,8 +115,25 @@ std::vector<PeerAddress> addresses_of(const rtps::ParticipantProxyData& peer) {
   return addresses;
 }
 
+GuidPrefix prefix_of(const rtps::GUID_t& guid) {
+  GuidPrefix prefix;
+  std::memcpy(prefix.data(), guid.guidPrefix.value, prefix.size());
+  return prefix;
+}
+
+std::uint32_t entity_of(const rtps::GUID_t& guid) {
+  return RtpsBytes{std::as_bytes(std::span{guid.entityId.value}), false}.entity();
+}
+
+/// A sample takes half of the segment at most; ports that belong to another domain are not this one's.
+RtpsLimits limits_of(const NodeOptions& options) {
+  const std::uint32_t first = 7400U + 250U * options.domain;
+  return {options.segment_size / 2, first, first + 249U};
+}
+
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
-                                           Traffic traffic, const Profiles& profiles) {
+                                           Traffic traffic, const Profiles& profiles,
+                                           const std::shared_ptr<Reception>& reception) {
   namespace transport = eprosima::fastdds::rtps;
   fdds::DomainParticipantQos qos;
   qos.name(name);
@@ -125,14 +146,17 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   qos.wire_protocol().participant_id = own_number(options.domain);
   const bool realtime = traffic == Traffic::realtime;
   if (options.shared_memory) {
-    auto shm = std::make_shared<transport::SharedMemTransportDescriptor>();
+    auto shm = std::make_shared<Filtered<transport::SharedMemTransportDescriptor>>();
+    shm->reception = reception;
     // A segment holds several of the largest samples, or samples of that size are lost or slow.
     shm->segment_size(realtime ? 2U << 20U : options.segment_size);
     shm->max_message_size(realtime ? 65'500 : options.segment_size / 2);
     shm->port_queue_capacity(1024);
     qos.transport().user_transports.push_back(shm);
   }
-  auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
+  auto udp = std::make_shared<Filtered<transport::UDPv4TransportDescriptor>>();
+  udp->reception = reception;
+  udp->largest_sent = largest_datagram(options.addresses);
   udp->interfaceWhiteList = options.addresses;
   udp->non_blocking_send = realtime;
   udp->sendBufferSize = udp->receiveBufferSize = realtime ? 1U << 20U : 8U << 20U;
@@ -165,7 +189,9 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
 
 Participant::Participant(const NodeOptions& options, Traffic traffic, const Profiles& profiles,
                          Discovery& discovery)
-    : discovery_{discovery}, name_{"invar/" + options.cell + "/" + options.process} {
+    : discovery_{discovery},
+      name_{"invar/" + options.cell + "/" + options.process},
+      reception_{std::make_shared<Reception>(limits_of(options))} {
   if (traffic == Traffic::realtime) name_ += "/realtime";
   // Between two components of a process that an executor did not join, samples go the same way as between
   // processes: a writer never runs a reader's listener.
@@ -175,11 +201,17 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
 
   const Priority priority{traffic == Traffic::realtime ? options.realtime_priority : 0};
   participant_ = fdds::DomainParticipantFactory::get_instance()->create_participant(
-      options.domain, participant_qos(options, name_, traffic, profiles), this, fdds::StatusMask::none());
+      options.domain, participant_qos(options, name_, traffic, profiles, reception_), this,
+      fdds::StatusMask::none());
   if (participant_ == nullptr)
     throw InputError{"domain " + std::to_string(options.domain), "Fast DDS could not create a participant",
                      "check that the host's address is one of this PC's, and that /dev/shm has room"};
   discovery_.add_participant(guid_text(participant_->guid().guidPrefix), name_);
+  discovery_.add_source([reception = reception_]() -> std::optional<Alarm> {
+    auto text = reception->report(monotonic_now());
+    if (!text) return std::nullopt;
+    return Alarm{"network", std::move(*text), false};
+  });
 }
 
 Participant::~Participant() {
@@ -279,6 +311,8 @@ void Participant::on_participant_discovery(fdds::DomainParticipant* own,
     else
       peers_.erase(id);
   }
+  const GuidPrefix prefix = prefix_of(info.info.m_guid);
+  is_gone ? reception_->guard().forget(prefix) : reception_->know_participant(prefix);
   if (is_gone)
     discovery_.remove_participant(id);
   else
@@ -287,7 +321,12 @@ void Participant::on_participant_discovery(fdds::DomainParticipant* own,
 
 void Participant::on_publisher_discovery(fdds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) {
   const std::string id = guid_text(info.info.guid());
-  if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) return discovery_.remove_endpoint(id);
+  const GuidPrefix prefix = prefix_of(info.info.guid());
+  if (info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) {
+    reception_->guard().forget(prefix, entity_of(info.info.guid()));
+    return discovery_.remove_endpoint(id);
+  }
+  reception_->guard().know(prefix, entity_of(info.info.guid()));
   discovery_.add_endpoint({id, "", info.info.topicName().c_str(), info.info.typeName().c_str(), true, false,
                            described(info.info.m_qos)});
 }

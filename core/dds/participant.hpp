@@ -12,6 +12,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "core/dds/discovery.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/profile.hpp"
+#include "core/dds/receive_filter.hpp"
 
 namespace invar::dds {
 
@@ -43,6 +45,8 @@ class Participant final : private fdds::DomainParticipantListener {
   /// A process of this PC that takes part in the cell ended without taking leave (it was killed, or crashed), and its lease
   /// has not run out yet. Any thread.
   [[nodiscard]] bool has_dead_peer() const;
+  /// What arrived and was not let through to the middleware. Any thread.
+  [[nodiscard]] const Reception& reception() const { return *reception_; }
 
  private:
   fdds::Topic* topic(const std::string& name, fdds::TopicDataType* type);
@@ -58,6 +62,7 @@ class Participant final : private fdds::DomainParticipantListener {
 
   Discovery& discovery_;
   std::string name_;
+  std::shared_ptr<Reception> reception_;
   fdds::DomainParticipant* participant_ = nullptr;
   std::mutex mutex_;
   mutable std::mutex peers_mutex_;

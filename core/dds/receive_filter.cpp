@@ -1,0 +1,156 @@
+#include "core/dds/receive_filter.hpp"
+
+#include <fastdds/rtps/network/SenderResource.h>
+#include <fastrtps/utils/IPLocator.h>
+
+#include <cstring>
+#include <span>
+
+#include "core/dds/rtps_submessage.hpp"
+
+namespace invar::dds {
+
+namespace {
+
+namespace rtps = eprosima::fastrtps::rtps;
+namespace transport = eprosima::fastdds::rtps;
+
+constexpr std::size_t largest_datagram = 65'536;
+
+/// A copy of a message that the library may read beyond its end, and in which parameters can be taken out. Made once a thread.
+std::byte* scratch() {
+  thread_local const auto bytes = std::make_unique<std::array<std::byte, 2 * largest_datagram>>();
+  return bytes->data();
+}
+
+/// The id of a parameter that readers skip, in both byte orders.
+void hide(std::byte* message, const RtpsContent& content) {
+  for (std::size_t i = 0; i < content.hidden_count; ++i)
+    std::memset(message + content.hidden[i], 0, sizeof(std::uint16_t));
+}
+
+/// Our own fragments, as they go out.
+void note_fragments(std::span<const std::byte> message, SequenceGuard& guard) {
+  constexpr std::uint8_t data_frag = 0x16;
+  std::size_t position = rtps_header_size;
+  while (const auto sub = submessage_at(message, position)) {
+    position = sub->end;
+    if (sub->id != data_frag) continue;
+    RtpsBytes bytes = sub->bytes();
+    bytes.skip(8);  // flags, length to inline QoS, reader
+    const std::uint32_t writer = bytes.entity();
+    const std::int64_t number = bytes.sequence_number();
+    bytes.skip(6);  // first fragment, count
+    const std::uint32_t size = bytes.u16();
+    const std::uint32_t sample = bytes.u32();
+    if (bytes.ok() && size > 0) guard.sent(writer, number, (sample + size - 1) / size);
+  }
+}
+
+class Filter final : public transport::ChainingTransport {
+ public:
+  Filter(const transport::ChainingTransportDescriptor& chain, std::shared_ptr<Reception> reception)
+      : ChainingTransport{chain}, below_{chain.low_level_descriptor}, reception_{std::move(reception)} {}
+
+  transport::TransportDescriptorInterface* get_configuration() override { return below_.get(); }
+
+  bool send(rtps::SenderResource* below, const rtps::octet* data, std::uint32_t size,
+            rtps::LocatorsIterator* begin, rtps::LocatorsIterator* end,
+            const std::chrono::steady_clock::time_point& timeout) override {
+    note_fragments(std::as_bytes(std::span{data, size}), reception_->guard());
+    return below->send(data, size, begin, end, timeout);
+  }
+
+  void receive(transport::TransportReceiverInterface* next, const rtps::octet* data, std::uint32_t size,
+               const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
+    const auto message = std::as_bytes(std::span{data, size});
+    RtpsContent content;
+    const Flaw flaw = examine(message, reception_->limits(), reception_->guard(), content);
+    if (flaw != Flaw::none) return reception_->drop(flaw, remote);
+    const bool copied = (content.has_fragments || content.hidden_count > 0) && size <= largest_datagram;
+    if (copied) {
+      std::memcpy(scratch(), data, content.size);
+      hide(scratch(), content);
+      data = reinterpret_cast<const rtps::octet*>(scratch());
+    } else if (content.hidden_count > 0) {
+      return reception_->drop(Flaw::discovery, remote);
+    }
+    next->OnDataReceived(data, static_cast<std::uint32_t>(content.size), local, remote);
+  }
+
+ private:
+  std::shared_ptr<transport::TransportDescriptorInterface> below_;
+  std::shared_ptr<Reception> reception_;
+};
+
+/// What the constructor of a chaining transport asks for.
+struct Chain final : transport::ChainingTransportDescriptor {
+  using ChainingTransportDescriptor::ChainingTransportDescriptor;
+  [[nodiscard]] transport::TransportInterface* create_transport() const override { return nullptr; }
+};
+
+/// Address and port as one number; 0: of no UDP sender.
+std::uint64_t sender_of(const rtps::Locator_t& locator) {
+  if (locator.kind != LOCATOR_KIND_UDPv4) return 0;
+  std::uint64_t sender = 0;
+  for (const rtps::octet octet : std::span{locator.address}.last<4>()) sender = sender << 8U | octet;
+  return sender << 16U | rtps::IPLocator::getPhysicalPort(locator);
+}
+
+std::string sender_text(std::uint64_t sender) {
+  if (sender == 0) return "shared memory of this PC";
+  std::string text;
+  for (unsigned shift = 48; shift > 16; shift -= 8)
+    text += (text.empty() ? "" : ".") + std::to_string(sender >> (shift - 8U) & 0xffU);
+  return text + ":" + std::to_string(sender & 0xffffU);
+}
+
+}  // namespace
+
+transport::TransportInterface* make_filter(std::shared_ptr<transport::TransportDescriptorInterface> below,
+                                           std::shared_ptr<Reception> reception) {
+  return new Filter{Chain{std::move(below)}, std::move(reception)};
+}
+
+void Reception::know_participant(const GuidPrefix& prefix) {
+  for (const std::uint32_t writer :
+       {participant_writer, participant_message_writer, publication_writer, subscription_writer})
+    guard_.know(prefix, writer);
+}
+
+void Reception::drop(Flaw flaw, const rtps::Locator_t& sender) {
+  dropped_[static_cast<std::size_t>(flaw)].fetch_add(1, std::memory_order_relaxed);
+  sender_.store(sender_of(sender), std::memory_order_relaxed);
+}
+
+std::uint64_t Reception::dropped(Flaw flaw) const {
+  return dropped_[static_cast<std::size_t>(flaw)].load(std::memory_order_relaxed);
+}
+
+std::uint64_t Reception::dropped() const {
+  std::uint64_t sum = 0;
+  for (const auto& count : dropped_) sum += count.load(std::memory_order_relaxed);
+  return sum;
+}
+
+std::optional<std::string> Reception::report(Instant now) {
+  constexpr Duration pause = Duration::seconds(10);  // a person reads no faster
+  if (now - told_at_ < pause) return std::nullopt;
+  std::string causes;
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < flaws; ++i) {
+    const std::uint64_t count = dropped_[i].load(std::memory_order_relaxed);
+    if (count != told_[i])
+      causes += (causes.empty() ? "" : ", ") + std::to_string(count - told_[i]) + " with " +
+                std::string{flaw_text(static_cast<Flaw>(i))};
+    told_[i] = count;
+    sum += count;
+  }
+  if (causes.empty()) return std::nullopt;
+  told_at_ = now;
+  return "dropped messages that no DDS program should send: " + causes + "; the last one from " +
+         sender_text(sender_.load(std::memory_order_relaxed)) + "; " + std::to_string(sum) +
+         " since the start; find out what sends there";
+}
+
+}  // namespace invar::dds

@@ -1,0 +1,68 @@
+// ReceiveFilter: stands between the network and the middleware, and keeps from it what it could not survive.
+#pragma once
+
+#include <fastdds/rtps/transport/ChainingTransport.h>
+
+#include <array>
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/base/time.hpp"
+#include "core/dds/rtps_message.hpp"
+#include "core/dds/sequence_guard.hpp"
+
+namespace invar::dds {
+
+/// What the filters of one participant share: their limits, what they know of writers, what they dropped. Any thread.
+class Reception {
+ public:
+  explicit Reception(const RtpsLimits& limits) : limits_{limits} {}
+
+  [[nodiscard]] const RtpsLimits& limits() const { return limits_; }
+  [[nodiscard]] SequenceGuard& guard() { return guard_; }
+  /// The writers that discovery shows; those of discovery itself belong to each participant.
+  void know_participant(const GuidPrefix& prefix);
+
+  /// Receiving threads, without locks.
+  void drop(Flaw flaw, const eprosima::fastrtps::rtps::Locator_t& sender);
+  /// Messages dropped since the start, of one cause or of all.
+  [[nodiscard]] std::uint64_t dropped(Flaw flaw) const;
+  [[nodiscard]] std::uint64_t dropped() const;
+  /// A sentence for a person where messages were dropped since the last one; at most one in ten seconds.
+  [[nodiscard]] std::optional<std::string> report(Instant now);
+
+ private:
+  RtpsLimits limits_;
+  SequenceGuard guard_;
+  std::array<std::atomic<std::uint64_t>, flaws> dropped_{};
+  std::atomic<std::uint64_t> sender_{0};  // IPv4 address and port of the last one; 0: this PC's shared memory
+  std::array<std::uint64_t, flaws> told_{};
+  Instant told_at_{INT64_MIN / 2};
+};
+
+/// The transport that `below` describes, behind a filter.
+[[nodiscard]] eprosima::fastdds::rtps::TransportInterface* make_filter(
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below,
+    std::shared_ptr<Reception> reception);
+
+/// A transport behind a filter. Fast DDS looks at the type of a descriptor to know that a participant has shared memory: so it
+/// is derived from that of the transport.
+template <class Below>
+struct Filtered final : Below {
+  std::shared_ptr<Reception> reception;
+  /// The largest message to send [bytes]; zero: as large as one that is received. A participant writes for all of its
+  /// transports at once and keeps to the smallest.
+  std::uint32_t largest_sent = 0;
+
+  [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* create_transport() const override {
+    return make_filter(std::make_shared<Below>(*this), reception);
+  }
+  using Below::max_message_size;
+  [[nodiscard]] std::uint32_t max_message_size() const override {
+    return largest_sent != 0 ? largest_sent : Below::max_message_size();
+  }
+};
+
+}  // namespace invar::dds
