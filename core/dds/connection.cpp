@@ -5,6 +5,7 @@
 #include <mutex>
 #include <sstream>
 
+#include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
 #include "core/dds/raw_type.hpp"
 
@@ -39,6 +40,29 @@ WriterConnection::~WriterConnection() {
   participant_.remove(*writer_);
 }
 
+std::shared_ptr<LocalWriter> WriterConnection::share(LocalExchange& exchange) {
+  const std::lock_guard lock{local_mutex_};
+  local_ = exchange.writer(endpoint_id(writer_->guid()), type_.largest_sample());
+  for (const EndpointId& reader : matched_)
+    if (local_) local_->matched(reader);
+  return local_;
+}
+
+void WriterConnection::on_publication_matched(fdds::DataWriter*,
+                                              const fdds::PublicationMatchedStatus& status) {
+  readers_ = status.current_count;
+  const EndpointId reader =
+      endpoint_id(eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle));
+  const std::lock_guard lock{local_mutex_};
+  if (status.current_count_change > 0) {
+    matched_.insert(reader);
+    if (local_) local_->matched(reader);
+  } else if (status.current_count_change < 0) {
+    matched_.erase(reader);
+    if (local_) local_->unmatched(reader);
+  }
+}
+
 std::size_t WriterConnection::matched() const { return static_cast<std::size_t>(readers_.load()); }
 
 bool WriterConnection::write(const void* sample) {
@@ -56,27 +80,33 @@ void WriterConnection::forget() {
 
 ReaderConnection::ReaderConnection(Participant& participant, const std::string& topic,
                                    fdds::TopicDataType* type, const Profile& profile, Discovery& discovery,
-                                   Receive receive, std::shared_ptr<CommandGate> gate)
+                                   Receive receive, std::shared_ptr<CommandGate> gate,
+                                   std::shared_ptr<LocalReader> local)
     : participant_{participant},
       discovery_{discovery},
       topic_{topic},
       receive_{std::move(receive)},
       gate_{std::move(gate)},
+      local_{std::move(local)},
       reader_{&participant.create_reader(topic, type, profile, this)} {}
 
 ReaderConnection::~ReaderConnection() {
   reader_->set_listener(nullptr);
+  if (local_) local_->end();
   participant_.remove(*reader_);
 }
 
 std::size_t ReaderConnection::matched() const { return static_cast<std::size_t>(matched_.load()); }
 
-void ReaderConnection::on_subscription_matched(fdds::DataReader*,
+void ReaderConnection::on_subscription_matched(fdds::DataReader* reader,
                                                const fdds::SubscriptionMatchedStatus& status) {
   matched_ = status.current_count;
+  const auto guid = eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle);
+  if (local_ && status.current_count_change > 0)
+    local_->matched(endpoint_id(guid), endpoint_id(reader->guid()));
   if (status.current_count_change >= 0) return;
-  const std::string writer =
-      guid_text(eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle));
+  if (local_) local_->unmatched(endpoint_id(guid));
+  const std::string writer = guid_text(guid);
   if (gate_) gate_->gone(writer);
   const std::lock_guard lock{silent_mutex_};
   silent_.erase(writer);

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/dds/command_gate.hpp"
+#include "core/dds/local_exchange.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/participant.hpp"
 #include "core/dds/wire_type.hpp"
@@ -24,6 +25,8 @@ class WriterConnection final : public Connection, private fdds::DataWriterListen
   [[nodiscard]] fdds::DataWriter& writer() { return *writer_; }
   /// Readers connected now.
   [[nodiscard]] const std::atomic<std::int32_t>& readers() const { return readers_; }
+  /// Set-up, before anything is written: which way samples go to readers of this PC; nullptr: by the middleware.
+  [[nodiscard]] std::shared_ptr<LocalWriter> share(LocalExchange& exchange);
 
   [[nodiscard]] std::size_t matched() const override;
   [[nodiscard]] std::uint64_t lost() const override { return refused_; }
@@ -32,12 +35,13 @@ class WriterConnection final : public Connection, private fdds::DataWriterListen
   void forget() override;
 
  private:
-  void on_publication_matched(fdds::DataWriter*, const fdds::PublicationMatchedStatus& status) override {
-    readers_ = status.current_count;
-  }
+  void on_publication_matched(fdds::DataWriter*, const fdds::PublicationMatchedStatus& status) override;
 
   Participant& participant_;
   const WireType& type_;
+  std::mutex local_mutex_;
+  std::shared_ptr<LocalWriter> local_;
+  std::set<EndpointId> matched_;
   std::atomic<std::int32_t> readers_{0};
   std::atomic<std::uint64_t> refused_{0};
   fdds::DataWriter* writer_;
@@ -50,11 +54,11 @@ class ReaderConnection final : public Connection, private fdds::DataReaderListen
   using Receive = std::function<void(fdds::DataReader& reader)>;
   ReaderConnection(Participant& participant, const std::string& topic, fdds::TopicDataType* type,
                    const Profile& profile, Discovery& discovery, Receive receive,
-                   std::shared_ptr<CommandGate> gate = nullptr);
+                   std::shared_ptr<CommandGate> gate = nullptr, std::shared_ptr<LocalReader> local = nullptr);
   ~ReaderConnection() override;
 
   [[nodiscard]] std::size_t matched() const override;
-  [[nodiscard]] std::uint64_t lost() const override { return lost_; }
+  [[nodiscard]] std::uint64_t lost() const override { return lost_ + (local_ ? local_->lost() : 0); }
   bool write(const void*) override { return false; }
   bool wait_for_acknowledgments(Duration) override { return true; }
 
@@ -71,6 +75,7 @@ class ReaderConnection final : public Connection, private fdds::DataReaderListen
   std::string topic_;
   Receive receive_;
   std::shared_ptr<CommandGate> gate_;
+  std::shared_ptr<LocalReader> local_;
   std::mutex silent_mutex_;
   std::set<std::string> silent_;  // writers, told so
   std::atomic<std::int32_t> matched_{0};

@@ -8,6 +8,8 @@
 #include "core/base/fault.hpp"
 #include "core/component/component.hpp"
 #include "core/dds/connection.hpp"
+#include "core/dds/endpoint_id.hpp"
+#include "core/dds/local_exchange.hpp"
 #include "core/dds/publishing.hpp"
 #include "core/dds/raw_type.hpp"
 #include "core/dds/shared_memory.hpp"
@@ -54,6 +56,7 @@ struct Node::Parts {
   Discovery discovery;
   std::mutex mutex;  // set-up only
   std::unique_ptr<Participant> realtime, general, raw;
+  std::unique_ptr<LocalExchange> exchange;
   std::vector<BoundOutput> outputs;
   std::vector<std::unique_ptr<Connection>> inputs;
   Publishing realtime_publishing, general_publishing;
@@ -68,6 +71,26 @@ struct Node::Parts {
     const std::lock_guard lock{mutex};
     if (!raw) raw = std::make_unique<Participant>(options, Traffic::general, profiles, discovery);
     return *raw;
+  }
+  /// nullptr where samples of this profile have no way through shared memory.
+  LocalExchange* exchange_of(const Profile& qos) {
+    if (!options.shared_memory || !is_kept(qos) || qos.durability != Durability::volatile_) return nullptr;
+    auto& participant = this->participant(qos.traffic);
+    const std::lock_guard lock{mutex};
+    if (!exchange)
+      exchange = std::make_unique<LocalExchange>(participant_of(endpoint_id(participant.id())),
+                                                 options.realtime_priority);
+    return exchange.get();
+  }
+  std::shared_ptr<LocalReader> local_reader(const Profile& qos, const std::shared_ptr<Inlet>& inlet,
+                                            Clock clock) {
+    LocalExchange* found = exchange_of(qos);
+    if (found == nullptr) return nullptr;
+    auto local = found->reader([to = inlet.get(), clock = std::move(clock)](std::span<const std::byte> cdr) {
+      (void)to->deliver(cdr, clock());
+    });
+    inlet->prefer(local);
+    return local;
   }
   Publishing& publishing(Traffic traffic) {
     return traffic == Traffic::realtime ? realtime_publishing : general_publishing;
@@ -119,8 +142,10 @@ void Node::bind(OutputPort& port, OutputBinding binding, const Profile& qos) {
     // Room for a tenth of a second in which the publishing thread does not get to run.
     const auto capacity =
         static_cast<std::size_t>(std::max<std::int64_t>(64, 400'000'000 / binding.period.ns));
-    bound.outlet = type.attach_paced(port, bound.connection->writer(), capacity, binding.separation);
-    parts_->publishing(qos.traffic).add(*bound.outlet, binding.period);
+    LocalExchange* exchange = parts_->exchange_of(qos);
+    bound.outlet = type.attach_paced(port, bound.connection->writer(), capacity, binding.separation,
+                                     exchange != nullptr ? bound.connection->share(*exchange) : nullptr);
+    parts_->publishing(qos.traffic).add(*bound.outlet);
   }
   parts_->outputs.push_back(std::move(bound));
 }
@@ -131,20 +156,28 @@ void Node::bind(InputPort& port, Clock clock) {
   std::shared_ptr<Inlet> inlet = type.attach(port, is_kept(qos));
   const auto gate = gate_of(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
   inlet->guard(gate);
+  auto local = parts_->local_reader(qos, inlet, clock);
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
-      [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); },
-      gate));
+      [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }, gate,
+      std::move(local)));
 }
 
-void Node::start(std::function<Instant()> ended) {
-  parts_->realtime_publishing.start(parts_->options.realtime_priority, parts_->options.realtime_cpu, ended);
-  parts_->general_publishing.start(0, std::nullopt, ended);
+void Node::start() {
+  parts_->realtime_publishing.start(parts_->options.realtime_priority, parts_->options.realtime_cpu);
+  parts_->general_publishing.start(0, std::nullopt);
+}
+
+void Node::cycle_ended() noexcept {
+  if (parts_->exchange) parts_->exchange->wake_readers();
+  parts_->realtime_publishing.cycle_ended();
+  parts_->general_publishing.cycle_ended();
 }
 
 void Node::stop() {
   parts_->realtime_publishing.stop();
   parts_->general_publishing.stop();
+  if (parts_->exchange) parts_->exchange->wake_readers();  // for what was written after the last cycle
   parts_->inputs.clear();
 }
 
@@ -184,9 +217,10 @@ std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::typ
       wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, is_kept(profile));
   const auto gate = gate_of(topic, profile, parts_->discovery);
   inlet->guard(gate);
+  auto local = parts_->local_reader(profile, inlet, utc_now);
   return std::make_unique<ReaderConnection>(
       parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,
-      [inlet](fdds::DataReader& reader) { inlet->receive(reader, utc_now()); }, gate);
+      [inlet](fdds::DataReader& reader) { inlet->receive(reader, utc_now()); }, gate, std::move(local));
 }
 
 }  // namespace invar::dds

@@ -105,9 +105,10 @@ class Node {
   void bind(OutputPort& port, OutputBinding binding, const Profile& profile);
   void bind(InputPort& port, Clock clock = utc_now);
   /// Starts the publishing threads of ports bound with a period. Discovery and receiving begin with `bind`.
-  /// `ended` gives the nominal start of the loop's newest finished cycle, wait-free; with it the threads never look
-  /// in the middle of a cycle: [&] { return executor.counters().now; }
-  void start(std::function<Instant()> ended = {});
+  void start();
+  /// At the end of each cycle of the loop, on its thread: wakes the threads, here and in other processes of this PC, that
+  /// wait for a sample of this cycle. *Real-time*: one FUTEX_WAKE a thread that sleeps.
+  void cycle_ended() noexcept;
   /// Publishes what is left and stops the threads. Readers of ports are removed: nothing arrives any more.
   void stop();
 

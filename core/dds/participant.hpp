@@ -42,6 +42,7 @@ class Participant final : private fdds::DomainParticipantListener {
                                   fdds::DataReaderListener* listener);
   void remove(fdds::DataWriter& writer);
   void remove(fdds::DataReader& reader);
+  [[nodiscard]] const eprosima::fastrtps::rtps::GUID_t& id() const { return participant_->guid(); }
   /// A process of this PC that takes part in the cell ended without taking leave (it was killed, or crashed), and its lease
   /// has not run out yet. Any thread.
   [[nodiscard]] bool has_dead_peer() const;

@@ -9,7 +9,9 @@
 #include <mutex>
 
 #include "core/dds/command_gate.hpp"
+#include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/local_exchange.hpp"
 #include "core/dds/type.hpp"
 #include "core/dds/wire_type.hpp"
 
@@ -40,18 +42,20 @@ class Thinning {
   Instant last_{INT64_MIN};
 };
 
-template <class T>
+template <class T, class B>
 class PacedOutlet final : public Outlet {
  public:
-  PacedOutlet(Output<T>& port, fdds::DataWriter& writer, std::size_t capacity, Duration separation)
-      : writer_{writer}, ring_{capacity}, thinning_{separation} {
+  PacedOutlet(Output<T>& port, fdds::DataWriter& writer, std::size_t capacity, Duration separation,
+              std::shared_ptr<LocalWriter> local)
+      : writer_{writer}, ring_{capacity}, thinning_{separation}, local_{std::move(local)} {
     port.add_sink([this](const T& sample, Instant now) {
       if (!thinning_.passes(now)) return;
-      newest_ns_.store(now.ns, std::memory_order_relaxed);
-      ring_.push(sample);
+      if (local_ && local_->has_readers()) write_locally(sample);
+      if (!local_ || local_->needs_middleware()) ring_.push(sample);
     });
   }
   std::size_t drain() override {
+    if (local_) local_->update();
     std::size_t count = 0;
     for (; ring_.pop(sample_); ++count)
       if (!write_sample(writer_, sample_)) refused_.fetch_add(1, std::memory_order_relaxed);
@@ -60,14 +64,26 @@ class PacedOutlet final : public Outlet {
   [[nodiscard]] std::uint64_t lost() const override {
     return ring_.lost() + refused_.load(std::memory_order_relaxed);
   }
-  [[nodiscard]] Instant newest() const override { return {newest_ns_.load(std::memory_order_relaxed)}; }
+  [[nodiscard]] bool is_waiting() const noexcept override { return ring_.size() != 0; }
 
  private:
+  /// On the loop's thread: the CDR is made in the place where readers find it.
+  void write_locally(const T& sample) {
+    const auto room = local_->begin();
+    eprosima::fastrtps::rtps::SerializedPayload_t payload;
+    payload.data = reinterpret_cast<eprosima::fastrtps::rtps::octet*>(room.data());
+    payload.max_size = static_cast<std::uint32_t>(room.size());
+    const bool good = type_.serialize(const_cast<T*>(&sample), &payload);  // NOLINT: it only reads
+    payload.data = nullptr;                                                // not the payload's to free
+    if (good) local_->commit(payload.length);
+  }
+
   fdds::DataWriter& writer_;
   Ring<T> ring_;
   T sample_;
   Thinning thinning_;
-  std::atomic<std::int64_t> newest_ns_{INT64_MIN};
+  std::shared_ptr<LocalWriter> local_;
+  Type<B> type_;
   std::atomic<std::uint64_t> refused_{0};
 };
 
@@ -85,7 +101,7 @@ class DirectOutlet final : public Outlet {
   }
   std::size_t drain() override { return 0; }
   [[nodiscard]] std::uint64_t lost() const override { return refused_.load(std::memory_order_relaxed); }
-  [[nodiscard]] Instant newest() const override { return {INT64_MIN}; }
+  [[nodiscard]] bool is_waiting() const noexcept override { return false; }
 
  private:
   Thinning thinning_;
@@ -103,7 +119,7 @@ class TypedInlet final : public Inlet {
     fdds::SampleInfo info;
     while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
            ReturnCode_t::RETCODE_OK)
-      if (info.valid_data && is_obeyed(info)) sink_(sample_, now);
+      if (info.valid_data && !came_locally(info) && is_obeyed(info)) sink_(sample_, now);
   }
 
   bool deliver(std::span<const std::byte> cdr, Instant now) override {
@@ -119,6 +135,10 @@ class TypedInlet final : public Inlet {
   }
 
  private:
+  bool came_locally(const fdds::SampleInfo& info) const {
+    return local_ && local_->serves(endpoint_id(info.sample_identity.writer_guid()));
+  }
+
   bool is_obeyed(const fdds::SampleInfo& info) {
     if (!gate_) return true;
     eprosima::fastrtps::rtps::InstanceHandle_t handle;
@@ -144,6 +164,7 @@ class TypedWire final : public WireType {
   [[nodiscard]] bool is_stamped() const override {
     return requires(const T& sample) { sample.at().time_ns(); };
   }
+  [[nodiscard]] std::size_t largest_sample() const override { return Type<B>{}.m_typeSize; }
   [[nodiscard]] fdds::TopicDataType* make_support() const override {
     auto* type = new Type<B>;            // NOLINT: Fast DDS takes it over
     type->auto_fill_type_object(false);  // Cyclone DDS would refuse the endpoint
@@ -152,9 +173,10 @@ class TypedWire final : public WireType {
   }
 
   [[nodiscard]] std::unique_ptr<Outlet> attach_paced(OutputPort& port, fdds::DataWriter& writer,
-                                                     std::size_t capacity,
-                                                     Duration separation) const override {
-    return std::make_unique<PacedOutlet<T>>(static_cast<Output<T>&>(port), writer, capacity, separation);
+                                                     std::size_t capacity, Duration separation,
+                                                     std::shared_ptr<LocalWriter> local) const override {
+    return std::make_unique<PacedOutlet<T, B>>(static_cast<Output<T>&>(port), writer, capacity, separation,
+                                               std::move(local));
   }
   [[nodiscard]] std::unique_ptr<Outlet> attach_direct(
       OutputPort& port, fdds::DataWriter& writer, Duration separation,

@@ -23,6 +23,8 @@ class TopicDataType;
 namespace invar::dds {
 
 class CommandGate;
+class LocalReader;
+class LocalWriter;
 
 /// The samples of one output on their way to the middleware.
 class Outlet {
@@ -32,8 +34,8 @@ class Outlet {
   virtual std::size_t drain() = 0;
   /// Samples lost: the ring was full, or the middleware refused them. Any thread.
   [[nodiscard]] virtual std::uint64_t lost() const = 0;
-  /// The cycle start of the newest sample written, for pacing. Any thread.
-  [[nodiscard]] virtual Instant newest() const = 0;
+  /// Whether a sample waits for `drain`. Real-time.
+  [[nodiscard]] virtual bool is_waiting() const noexcept = 0;
 };
 
 /// The samples of one input as they arrive.
@@ -46,9 +48,12 @@ class Inlet {
   virtual bool deliver(std::span<const std::byte> cdr, Instant now) = 0;
   /// Set-up only: what a reader hands over passes it first.
   void guard(std::shared_ptr<CommandGate> gate) { gate_ = std::move(gate); }
+  /// Set-up only: samples of writers that `local` serves are left out of what a reader hands over.
+  void prefer(std::shared_ptr<const LocalReader> local) { local_ = std::move(local); }
 
  protected:
   std::shared_ptr<CommandGate> gate_;
+  std::shared_ptr<const LocalReader> local_;
 };
 
 /// Takes the CDR (with encapsulation) of each sample that an output writes, on the writer's thread.
@@ -63,15 +68,18 @@ class WireType {
   [[nodiscard]] virtual std::type_index index() const = 0;
   /// Its samples say when they were made: `at`, an invar::base::Stamp.
   [[nodiscard]] virtual bool is_stamped() const = 0;
+  /// Bytes of the largest sample on the wire.
+  [[nodiscard]] virtual std::size_t largest_sample() const = 0;
   /// A type support to register; the caller owns it.
   [[nodiscard]] virtual eprosima::fastdds::dds::TopicDataType* make_support() const = 0;
 
   /// Through a ring of `capacity` samples that `drain` empties: nothing of the middleware on the writer's
-  /// thread. Cycles that begin less than `separation` after the last one sent are left out.
+  /// thread. Cycles that begin less than `separation` after the last one sent are left out. With `local`, samples also go
+  /// through shared memory, and to the middleware only while a reader needs that.
   [[nodiscard]] virtual std::unique_ptr<Outlet> attach_paced(OutputPort& port,
                                                              eprosima::fastdds::dds::DataWriter& writer,
-                                                             std::size_t capacity,
-                                                             Duration separation) const = 0;
+                                                             std::size_t capacity, Duration separation,
+                                                             std::shared_ptr<LocalWriter> local) const = 0;
   /// Straight to the middleware, on the thread that writes; with `readers`, only while there are any.
   [[nodiscard]] virtual std::unique_ptr<Outlet> attach_direct(
       OutputPort& port, eprosima::fastdds::dds::DataWriter& writer, Duration separation,

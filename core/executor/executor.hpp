@@ -4,6 +4,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <future>
 #include <map>
 #include <memory>
@@ -73,7 +74,8 @@ struct StateChange {
 /// stopping may be asked from any thread but the loop's; what only reads is wait-free for the loop and never
 /// disturbs it.
 ///
-/// The loop neither allocates nor locks nor makes any system call but the one that sleeps.
+/// The loop neither allocates nor locks. The loop makes no system call but the one that sleeps, and what `at_cycle_end`
+/// makes: one FUTEX_WAKE for each thread that sleeps until a sample comes.
 class Executor {
  public:
   explicit Executor(ExecutorOptions options);
@@ -88,6 +90,8 @@ class Executor {
   std::size_t add(std::unique_ptr<Component> component, Placement placement = {});
   [[nodiscard]] BlackBox& black_box() { return box_; }
   [[nodiscard]] const ExecutorOptions& options() const { return options_; }
+  /// Called by the loop at the end of each cycle, before it sleeps. *Real-time*: it may wake threads, not wait.
+  void at_cycle_end(std::function<void()> call) { cycle_ended_ = std::move(call); }
 
   // --- running by the clock (options.simulated == false)
 
@@ -212,6 +216,7 @@ class Executor {
   [[nodiscard]] std::chrono::nanoseconds patience() const;
 
   ExecutorOptions options_;
+  std::function<void()> cycle_ended_;
   std::vector<std::unique_ptr<Slot>> slots_;
   std::vector<std::size_t> take_down_order_;
   BlackBox box_;

@@ -117,6 +117,7 @@ void Executor::loop(std::promise<bool>& ready) {
     count_.skipped = pacer.skipped();
     count_.stretch = pacer.stretch();
     close_cycle(start, late, done - woke);
+    if (cycle_ended_) cycle_ended_();
   }
   running_.store(false, std::memory_order_release);
 }

@@ -15,12 +15,17 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <new>
 #include <thread>
 
+#include "core/dds/bell.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/participant.hpp"
+#include "core/dds/shared_file.hpp"
 #include "core/executor/executor.hpp"
 #include "cyclone_channel.h"
 #include "idl/types.hpp"
@@ -40,12 +45,13 @@ struct Settings {
 
 constexpr Duration turn_length = Duration::milliseconds(1000);
 /// What is sent in a turn; the two orders alternate so that none is always first.
-enum Kind { ours, bare, cyclone, quiet, separated, together_quiet, together };
-constexpr std::array latency_kinds{ours, bare, cyclone};
+enum Kind { ours, bare, cyclone, futex, quiet, separated, together_quiet, together };
+constexpr std::array latency_kinds{ours, bare, cyclone, futex};
 constexpr std::array separation_kinds{quiet, separated, together_quiet, together};
 constexpr std::array names{"Invar ports",
                            "bare Fast DDS",
                            "Cyclone DDS (UDP)",
+                           "bare futex wake-up",
                            "alone",
                            "beside calibration",
                            "one participant and profile: alone",
@@ -114,6 +120,13 @@ class Sender final : public Component {
   const Settings& settings_;
 };
 
+/// The limit: a word in shared memory and a thread that sleeps on it. The newest moment of writing lies beside the bell.
+struct BareWord {
+  dds::Bell bell;
+  std::atomic<std::int64_t> sent_ns{0};
+};
+std::string bare_name(const Settings& s) { return "bench_" + std::to_string(s.start_ns); }
+
 /// A rival's loop: sleeps to absolute times and sends in its turns.
 void rival_loop(const Settings& s, Kind mine, const std::function<void(std::int64_t)>& send) {
   if (s.cpu >= 0) {
@@ -152,8 +165,9 @@ int send(const Settings& s) {
   executor.add(std::move(component));
   node.bind(sender.out, {loop.period, {}});
   node.bind(sender.mixed, {loop.period, {}}, mixed_profile());
+  executor.at_cycle_end([&] { node.cycle_ended(); });
+  node.start();
   executor.start();
-  node.start([&] { return executor.counters().now; });
   executor.transition(0, Transition::configure);
   executor.transition(0, Transition::activate);
 
@@ -191,6 +205,15 @@ int send(const Settings& s) {
       set_priority(s.priority > 10 ? s.priority - 10 : 0);  // for the threads that it makes
       if (cyclone_open_writer(domain()) != 0) std::cerr << "Cyclone DDS could not open its writer\n";
       rival_loop(s, cyclone, cyclone_write);
+    });
+    others.emplace_back([&] {
+      const auto file = dds::SharedFile::open(bare_name(s));
+      if (!file) return;
+      auto& word = *std::launder(reinterpret_cast<BareWord*>(file->data()));
+      rival_loop(s, futex, [&](std::int64_t now) {
+        word.sent_ns = now;
+        dds::ring(word.bell);
+      });
     });
   }
   for (auto& other : others) other.join();
@@ -272,24 +295,89 @@ class BareReader final : public eprosima::fastdds::dds::DataReaderListener {
   stage::AxisState sample_;
 };
 
-void print(const Settings& s, Board& board) {
-  std::cout << "| | samples | p50 us | p99 us | p99.9 us | max us | p50 ratio | p99 ratio |\n"
-            << "| --- | --- | --- | --- | --- | --- | --- | --- |\n"
-            << std::fixed;
+/// Receives from the bare word until the run is over.
+void watch_bare_word(const Settings& s, BareWord& word, Board& board) {
+  set_priority(s.priority > 10 ? s.priority - 10 : 0);
+  prctl(PR_SET_TIMERSLACK, 1);
+  for (std::int64_t last = 0; monotonic_now().ns < s.start_ns + static_cast<std::int64_t>(s.seconds * 1e9);) {
+    const std::uint32_t rung = word.bell.rung;
+    const std::int64_t sent = word.sent_ns;
+    if (sent == last)
+      dds::sleep_on(word.bell, rung, Duration::milliseconds(500));
+    else
+      board.take(last = sent, futex);
+  }
+}
+
+/// Nanoseconds that the threads of a process have run.
+std::int64_t cpu_time(pid_t pid) {
+  std::int64_t sum = 0;
+  std::error_code error;
+  for (const auto& task :
+       std::filesystem::directory_iterator{"/proc/" + std::to_string(pid) + "/task", error}) {
+    std::int64_t ran = 0;
+    std::ifstream{task.path() / "schedstat"} >> ran;
+    sum += ran;
+  }
+  return sum;
+}
+
+/// The share of a core that both processes take in the turns of each kind.
+class CpuShares {
+ public:
+  CpuShares(const Settings& s, pid_t other) : settings_{s}, other_{other}, thread_{[this] { run(); }} {}
+  ~CpuShares() { thread_.join(); }
+  double percent(Kind kind) {
+    const auto& [ran, wall] = times_[static_cast<std::size_t>(kind)];
+    return wall == 0 ? 0.0 : 100.0 * static_cast<double>(ran) / static_cast<double>(wall);
+  }
+
+ private:
+  void run() {
+    const std::int64_t turns = static_cast<std::int64_t>(settings_.seconds * 1e9) / turn_length.ns;
+    for (std::int64_t turn = 0; turn < turns; ++turn) {
+      const Instant begin{settings_.start_ns + turn * turn_length.ns + 60'000'000};
+      wait_until(begin);
+      const auto before = cpu_time(getpid()) + cpu_time(other_);
+      wait_until(begin + turn_length - Duration::milliseconds(120));
+      const auto kind = kind_at(settings_, begin);
+      if (!kind) continue;
+      auto& [ran, wall] = times_[static_cast<std::size_t>(*kind)];
+      ran += cpu_time(getpid()) + cpu_time(other_) - before;
+      wall += turn_length.ns - 120'000'000;
+    }
+  }
+  static void wait_until(Instant at) {
+    std::this_thread::sleep_for(
+        std::chrono::nanoseconds{std::max<std::int64_t>(0, at.ns - monotonic_now().ns)});
+  }
+  const Settings& settings_;
+  pid_t other_;
+  std::array<std::pair<std::int64_t, std::int64_t>, names.size()> times_{};
+  std::thread thread_;
+};
+
+void print(const Settings& s, Board& board, CpuShares& cpu) {
+  std::cout
+      << "| | samples | p50 us | p99 us | p99.9 us | max us | p50 ratio | p99 ratio | CPU % of a core |\n"
+      << "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+      << std::fixed;
   const auto row = [&](Kind kind, Kind over) {
     const auto f = board.figures(kind), base = board.figures(over);
     std::cout << std::setprecision(1) << "| " << names[static_cast<std::size_t>(kind)] << " | " << f.count
               << " | " << f.p50 << " | " << f.p99 << " | " << f.p999 << " | " << f.max << " | "
               << std::setprecision(2) << turn_ratio(f.turn_p50, base.turn_p50) << " | "
-              << turn_ratio(f.turn_p99, base.turn_p99) << " |\n";
+              << turn_ratio(f.turn_p99, base.turn_p99) << " | " << std::setprecision(1) << cpu.percent(kind)
+              << " |\n";
   };
   if (s.separation) {
     row(quiet, quiet), row(separated, quiet), row(together_quiet, together_quiet),
         row(together, together_quiet);
     std::cout << "\nRatios: over the same stream alone, median over neighbouring turns of 1 s.\n";
   } else {
-    row(ours, bare), row(bare, bare), row(cyclone, bare);
-    std::cout << "\nRatios: over bare Fast DDS, median over neighbouring turns of 1 s.\n";
+    row(ours, cyclone), row(bare, cyclone), row(cyclone, cyclone), row(futex, cyclone);
+    std::cout << "\nRatios: over Cyclone DDS, median over neighbouring turns of 1 s. CPU: both processes "
+                 "together.\n";
   }
 }
 
@@ -312,6 +400,9 @@ int receive(Settings s, const std::string& self) {
   std::vector<char*> arguments;
   for (auto& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
+  const auto bare_file = dds::SharedFile::make(bare_name(s), sizeof(BareWord));
+  if (!bare_file) return 1;
+  auto& bare_word = *new (bare_file->data()) BareWord;
   pid_t pid = 0;
   if (posix_spawn(&pid, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ) != 0) return 1;
 
@@ -343,9 +434,12 @@ int receive(Settings s, const std::string& self) {
         std::cerr << "Cyclone DDS could not open its reader\n";
     }}.join();
   }
+  std::thread bare_watcher{[&] { watch_bare_word(s, bare_word, board); }};
+  CpuShares cpu{s, pid};
   int status = 0;
   waitpid(pid, &status, 0);
-  print(s, board);
+  bare_watcher.join();
+  print(s, board, cpu);
   if (s.separation)
     std::cout << "Calibration readings received: " << apart_count << " apart, " << mixed_count
               << " on one participant.\n";

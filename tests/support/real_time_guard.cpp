@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 #include <linux/filter.h>
+#include <linux/futex.h>
 #include <linux/seccomp.h>
 #include <pthread.h>
 #include <semaphore.h>
@@ -89,23 +90,22 @@ namespace invar::support {
 
 ThreadCounts thread_counts() noexcept { return {allocations, locks}; }
 
-bool forbid_system_calls() noexcept {
-  const auto allow_unless_next = [](unsigned number) {
-    return std::array<sock_filter, 2>{{
-        BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, number, 0, 1),
-        BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
-    }};
+bool forbid_system_calls(Waking waking) noexcept {
+  const auto load = [](std::size_t offset) {
+    return sock_filter BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset));
   };
-  const auto sleep = allow_unless_next(SYS_clock_nanosleep);
-  const auto clock = allow_unless_next(SYS_clock_gettime);  // usually no system call at all
-  std::array<sock_filter, 6> program{{
-      BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
-      sleep[0],
-      sleep[1],
-      clock[0],
-      clock[1],
-      BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS),
-  }};
+  const auto unless = [](unsigned value, std::uint8_t skipped) {
+    return sock_filter BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, skipped);
+  };
+  const sock_filter allow BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW);
+  const sock_filter kill BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_KILL_PROCESS);
+  constexpr unsigned none = ~0U;  // the number of no system call
+  // The second argument of a futex call says what it does.
+  std::array<sock_filter, 10> program{
+      {load(offsetof(seccomp_data, nr)), unless(SYS_clock_nanosleep, 1), allow, unless(SYS_clock_gettime, 1),
+       allow,  // usually no system call at all
+       unless(waking == Waking::allowed ? SYS_futex : none, 3),
+       load(offsetof(seccomp_data, args) + sizeof(std::uint64_t)), unless(FUTEX_WAKE, 1), allow, kill}};
   sock_fprog filter{static_cast<unsigned short>(program.size()), program.data()};
   return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
          prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) == 0;

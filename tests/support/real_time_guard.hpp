@@ -30,9 +30,11 @@ class RealTimeGuard {
   ThreadCounts before_;
 };
 
-/// From now on the calling thread may sleep (clock_nanosleep) and look at clocks; any other system call kills the
-/// process with SIGSYS. For child processes (death tests): it cannot be taken back. False: the kernel has no
-/// seccomp.
-[[nodiscard]] bool forbid_system_calls() noexcept;
+enum class Waking { forbidden, allowed };
+
+/// From now on the calling thread may sleep (clock_nanosleep), look at clocks and, with `Waking::allowed`, wake others
+/// (FUTEX_WAKE); any other system call kills the process with SIGSYS. For child processes (death tests): it cannot be
+/// taken back. False: the kernel has no seccomp.
+[[nodiscard]] bool forbid_system_calls(Waking waking = Waking::forbidden) noexcept;
 
 }  // namespace invar::support

@@ -226,7 +226,8 @@ class RunningProcess {
         node_.bind(static_cast<InputPort&>(port));
     });
     record_topics();
-    node_.start([this] { return executor_.counters().now; });
+    executor_.at_cycle_end([this] { node_.cycle_ended(); });
+    node_.start();
     executor_.start();
     const bool up = bring_up();
     service_->publish_status();  // who waits for the cell need not wait for the next regular one

@@ -1,9 +1,12 @@
 // The loop neither allocates nor locks nor makes any system call but the one that sleeps; also while others look
 // at it, change its parameters and record. Each claim is made by a check that is shown to fail.
 #include <gmock/gmock.h>
+#include <linux/futex.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <chrono>
+#include <climits>
 #include <csignal>
 #include <cstdio>
 #include <mutex>
@@ -33,21 +36,23 @@ struct Seen {
 
 /// Steps a servo loop with a first component that counts, or forbids, and `misbehaves` besides.
 struct Stand {
-  explicit Stand(bool forbid, std::function<void()> misbehave = {}) : loop{options()} {
-    auto probe = std::make_unique<Call>(
-        [this, forbid, misbehave, step = std::uint64_t{0}, before = ThreadCounts{}](const Tick&) mutable {
-          ++step;
-          if (step == warm) {
-            before = thread_counts();
-            if (forbid && !support::forbid_system_calls()) std::_Exit(3);
-          }
-          if (step == warm + 10 && misbehave) misbehave();
-          if (step == enough) {
-            seen.allocations = thread_counts().allocations - before.allocations;
-            seen.locks = thread_counts().locks - before.locks;
-            seen.done = true;
-          }
-        });
+  explicit Stand(bool forbid, std::function<void()> misbehave = {},
+                 support::Waking waking = support::Waking::forbidden)
+      : loop{options()} {
+    auto probe = std::make_unique<Call>([this, forbid, misbehave, waking, step = std::uint64_t{0},
+                                         before = ThreadCounts{}](const Tick&) mutable {
+      ++step;
+      if (step == warm) {
+        before = thread_counts();
+        if (forbid && !support::forbid_system_calls(waking)) std::_Exit(3);
+      }
+      if (step == warm + 10 && misbehave) misbehave();
+      if (step == enough) {
+        seen.allocations = thread_counts().allocations - before.allocations;
+        seen.locks = thread_counts().locks - before.locks;
+        seen.done = true;
+      }
+    });
     probe->name = "probe";
     loop.executor.add(std::move(probe));
     loop.executor.black_box().watch("measured", "m", [this] { return loop.servo->measured; });
@@ -147,6 +152,21 @@ TEST(RealTimeDeathTest, TheLoopMakesNoSystemCallButTheOneThatSleeps) {
 TEST(RealTimeDeathTest, NorDoesItWhileOthersLookSetAndRecord) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
   EXPECT_EXIT(run_forbidden(true, {}), testing::ExitedWithCode(0), "");
+}
+
+/// A loop that wakes a thread of another at the end of each cycle, as it does where another process waits for its samples.
+[[noreturn]] void run_waking(support::Waking waking) {
+  Stand stand{true, {}, waking};
+  std::atomic<std::uint32_t> word{0};
+  stand.loop.executor.at_cycle_end(
+      [&word] { syscall(SYS_futex, &word, FUTEX_WAKE, INT_MAX, nullptr, nullptr, 0); });
+  std::_Exit(stand.run(false) ? 0 : 4);
+}
+
+TEST(RealTimeDeathTest, AtTheEndOfACycleItMayWakeOthersAndDoNothingElse) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(run_waking(support::Waking::allowed), testing::ExitedWithCode(0), "");
+  EXPECT_EXIT(run_waking(support::Waking::forbidden), testing::KilledBySignal(SIGSYS), "");
 }
 
 TEST(RealTimeDeathTest, TheFilterKillsALoopWhoseComponentMakesASystemCall) {
