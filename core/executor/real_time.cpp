@@ -1,13 +1,13 @@
 #include "core/executor/real_time.hpp"
 
-#include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
-#include <sys/mman.h>
 #include <sys/prctl.h>
 
 #include <cerrno>
 #include <cstring>
+
+#include "core/executor/locked_memory.hpp"
 
 namespace invar {
 
@@ -36,12 +36,8 @@ void touch_stack(std::size_t bytes) noexcept {
 std::vector<Grant> claim_real_time(const RealTimeRequest& request) {
   std::vector<Grant> grants;
   if (request.lock_memory) {
-    // Freed memory stays with the process: giving it back and taking it again are page faults.
-    mallopt(M_TRIM_THRESHOLD, -1);
-    mallopt(M_MMAP_MAX, 0);
-    const int error = mlockall(MCL_CURRENT | MCL_FUTURE) == 0 ? 0 : errno;
     grants.push_back(
-        grant("memory locked", "realtime.lock_memory", error,
+        grant("memory locked", "realtime.lock_memory", lock_memory(),
               "run as root, or raise `memlock` in /etc/security/limits.conf (LimitMEMLOCK in systemd)"));
   }
   if (request.cpu) {

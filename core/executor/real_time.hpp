@@ -18,8 +18,8 @@ struct Grant {
   std::string mend;  // and what helps
 };
 
-/// Asks for everything on the calling thread (memory is locked for the whole process). Never fails: it says
-/// what was granted. Set-up only.
+/// Asks for everything on the calling thread, which is to be the loop's; of the memory see locked_memory.hpp. Never fails: it
+/// says what was granted. Set-up only.
 [[nodiscard]] std::vector<Grant> claim_real_time(const RealTimeRequest& request);
 
 /// Touches the next `bytes` of the calling thread's stack, so that no page fault comes later. Keep it well

@@ -42,6 +42,12 @@ P
 # By the wall clock, from another process yet.
 "$invar" run cell.yaml --real-time >real-time.log 2>&1 & pid=$!
 "$invar" echo cell.yaml vision.droplets --count 5 --json --wait 30 >seen.json || { cat real-time.log; exit 1; }
+for child in $(cat "/proc/$pid/task/$pid/children"); do
+  process=$(tr '\0' ' ' <"/proc/$child/cmdline" | sed 's/.*--process \([a-z]*\).*/\1/')
+  has=$(grep -c libopencv_core "/proc/$child/maps" || true)
+  [[ $process == record ]] && wanted=0 || wanted=1
+  [[ $((has > 0)) == "$wanted" ]] || { echo "process $process: OpenCV is in $has mappings"; exit 1; }
+done
 kill -INT "$pid"; wait "$pid" || true; pid=
 /usr/bin/python3 - <<'P'
 import json, math, re

@@ -21,8 +21,10 @@
 #include "core/dds/cell_client.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
+#include "core/dds/segment_size.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "core/dds/wire_type.hpp"
+#include "core/executor/locked_memory.hpp"
 #include "core/executor/process_control.hpp"
 #include "core/recording/type_book.hpp"
 #include "idl/job.h"
@@ -36,7 +38,16 @@ namespace invar::tools {
 
 namespace {
 
-dds::NodeOptions node_options(const LoadedCell& loaded, const config::CellProcess& process) {
+std::vector<std::type_index> outputs_of(const LoadedProcess& process) {
+  std::vector<std::type_index> types;
+  for (const LoadedComponent& member : process.components)
+    for (const Port* port : member.component->ports())
+      if (port->direction() == Port::Direction::output) types.push_back(port->type());
+  return types;
+}
+
+dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of, bool simulated) {
+  const config::CellProcess& process = *of.file;
   dds::NodeOptions options;
   options.cell = loaded.cell->name;
   options.process = process.name;
@@ -48,6 +59,8 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const config::CellProces
     options.realtime_priority = std::max(0, process.realtime->priority - 10);
     options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps
   }
+  // In simulated time samples travel in bundles, those of a window in one.
+  if (!simulated) options.segment_size = dds::segment_size_for(outputs_of(of));
   return options;
 }
 
@@ -60,7 +73,7 @@ class RunningProcess {
         file_{*process.file},
         executor_{executor_options(file_, options.simulated)},
         control_{executor_},
-        node_{node_options(loaded, file_), dds::load_profiles(loaded.cell->profiles)} {
+        node_{node_options(loaded, process, options.simulated), dds::load_profiles(loaded.cell->profiles)} {
     for (LoadedComponent& member : process.components) {
       member.component->simulated_time = options.simulated;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
@@ -234,6 +247,8 @@ class RunningProcess {
     for (bool over = false; up && !over && !orders.stop.load() && !asked_to_stop_ && executor_.is_running() &&
                             (!job_ended_ || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (const std::string refused = memory_.look(); !refused.empty())
+        spdlog::warn("{}: {}", file_.name, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
       leave_progress();
       for (const dds::Alarm& alarm : node_.take_alarms()) {
@@ -428,6 +443,7 @@ class RunningProcess {
   const pid_t parent_ = options_.launcher != 0 ? options_.launcher : getppid();
   std::optional<Instant> orphan_since_;
   bool resting_ = false, told_rest_ = false;
+  MemoryKeeper memory_{file_.realtime};
   recorder::Recorder* recorder_ = nullptr;
   supervisor::Supervisor* supervisor_ = nullptr;
   std::vector<std::unique_ptr<dds::Connection>> topics_;
@@ -455,6 +471,7 @@ int run_process(const ProcessOptions& options, const ProcessOrders& orders) {
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
                      mend_name(options.process, loaded.process_names())};
   const ProcessClaim claim{*loaded.cell, options.process};
+  if (process->file->realtime) keep_memory_small();
   return RunningProcess{options, loaded, *process}.run(orders);
 }
 
