@@ -10,7 +10,7 @@
 namespace invar::dds {
 
 std::uint32_t segment_size_for(const std::vector<std::type_index>& written) {
-  constexpr std::uint32_t least = 4U << 20U, most = 16U << 20U, at_once = 8;
+  constexpr std::uint32_t least = 1U << 20U, most = 16U << 20U, at_once = 8;
   std::uint32_t largest = 0;
   for (const auto& type : written)
     if (const WireType* known = WireTypes::all().find(type)) {

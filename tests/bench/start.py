@@ -1,14 +1,16 @@
 #!/usr/bin/env python3
-"""How long a cell takes from `invar run` until all its components are active, and from Ctrl-C until it is gone.
+"""How long a cell takes from `invar run` until all its components are active, and from Ctrl-C until it is gone; and two commands.
 
 Usage: start.py INVAR SOURCE_FOLDER [RUNS]
 Runs deployment/xy-table.yaml by the wall clock on a random DDS domain. When a component became active is told by the stamp of
-the first status that says so (UTC), not by when this program heard of it.
+the first status that says so (UTC), not by when this program heard of it. Of `invar --help`, and of `invar status` on the running
+cell, the time by the clock and that of the CPU, which a busy host lengthens less.
 """
 import json
 import pathlib
 import random
 import re
+import resource
 import shutil
 import signal
 import socket
@@ -41,6 +43,16 @@ def components(file):
     return set(re.findall(r"^      (\w+):", file.read_text(), flags=re.M))
 
 
+def command(folder, *words):
+    """Time by the clock and of the CPU [ms]."""
+    def spent():
+        used = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return used.ru_utime + used.ru_stime
+    began, before = time.monotonic(), spent()
+    subprocess.run([INVAR, *words], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+    return 1e3 * (time.monotonic() - began), 1e3 * (spent() - before)
+
+
 def run(folder, file, wanted):
     hearer = subprocess.Popen([INVAR, "echo", file, "cell/xy_table/process/components", "--json", "--wait", "60"],
                               stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=folder)
@@ -57,13 +69,14 @@ def run(folder, file, wanted):
             break
     hearer.send_signal(signal.SIGINT)
     hearer.communicate(timeout=60)
+    commands = command(folder, "--help") + command(folder, "status", file)
     stopping = time.monotonic()
     cell.send_signal(signal.SIGINT)
     if cell.wait(timeout=60) != 0:
         sys.exit("the cell did not end in order")
     if not wanted <= active.keys():
         sys.exit(f"never active: {wanted - active.keys()}")
-    return max(active.values()), time.monotonic() - stopping
+    return max(active.values()), time.monotonic() - stopping, *commands
 
 
 def main():
@@ -73,8 +86,10 @@ def main():
         wanted = components(file)
         runs = [run(folder, file, wanted) for _ in range(RUNS)]
     print(f"{RUNS} runs of {len(wanted)} components in xy-table.yaml")
-    for what, times in zip(("all active after", "gone after"), zip(*runs)):
-        print(f"{what:17} median {statistics.median(times):.2f} s, {min(times):.2f} to {max(times):.2f} s")
+    figures = ("all active after", "s"), ("gone after", "s"), ("--help", "ms"), ("  of the CPU", "ms"), ("status", "ms"), ("  of the CPU", "ms")
+    for (what, unit), times in zip(figures, zip(*runs)):
+        digits = 2 if unit == "s" else 0
+        print(f"{what:17} median {statistics.median(times):.{digits}f} {unit}, {min(times):.{digits}f} to {max(times):.{digits}f} {unit}")
 
 
 main()
