@@ -149,7 +149,7 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
     auto shm = std::make_shared<Filtered<transport::SharedMemTransportDescriptor>>();
     shm->reception = reception;
     // A segment holds several of the largest samples, or samples of that size are lost or slow.
-    shm->segment_size(realtime ? 2U << 20U : options.segment_size);
+    shm->segment_size(realtime ? 512U << 10U : options.segment_size);
     shm->max_message_size(realtime ? 65'500 : options.segment_size / 2);
     shm->port_queue_capacity(1024);
     qos.transport().user_transports.push_back(shm);

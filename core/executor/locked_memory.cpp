@@ -32,6 +32,9 @@ enum class Extent { none, touched, whole };
 constexpr std::array<std::string_view, 5> in_every_loop{"libc.so", "libm.so", "libstdc++.so", "libgcc_s.so",
                                                         "ld-linux"};
 
+/// Rings in shared memory that the loop writes its samples into; other shared memory is the middleware's.
+constexpr std::string_view own_shared = "/dev/shm/invar_";
+
 struct Mapping {
   std::uintptr_t begin = 0, end = 0;
   std::string rights, path;
@@ -57,7 +60,9 @@ bool is_stack_behind(const Mapping& guard, const Mapping& mapping) {
 }
 
 Extent extent_of(const Mapping& mapping, const Mapping& before, const std::string& program) {
-  if (!mapping.rights.starts_with('r') || mapping.rights.ends_with('s')) return Extent::none;
+  if (!mapping.rights.starts_with('r')) return Extent::none;
+  if (mapping.rights.ends_with('s'))
+    return mapping.path.starts_with(own_shared) ? Extent::whole : Extent::none;
   if (mapping.path.empty()) return is_stack_behind(before, mapping) ? Extent::none : Extent::whole;
   if (mapping.path.starts_with('[')) return mapping.path == "[heap]" ? Extent::whole : Extent::none;
   if (mapping.path == program) return Extent::whole;

@@ -4,6 +4,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include "tools/live/commands.hpp"
 #include "tools/live/live_cell.hpp"
@@ -19,6 +21,24 @@ struct Options {
   bool json = false;
 };
 
+/// What was said before arrives behind the state of the processes, one after the other: silence means that all is there. Writers
+/// that a reader is not yet connected to repeat their offer each 20 ms.
+std::vector<event::Notice> hear_notices(LiveCell& cell) {
+  using Clock = std::chrono::steady_clock;
+  constexpr auto silence = std::chrono::milliseconds{30}, longest = std::chrono::milliseconds{100};
+  std::vector<event::Notice> notices;
+  const auto began = Clock::now();
+  auto heard = began;
+  for (std::size_t known = 0; Clock::now() - heard < silence && Clock::now() - began < longest;) {
+    for (auto& notice : cell.client().take_notices()) notices.push_back(std::move(notice));
+    const std::size_t now = notices.size() + cell.client().components().size();
+    if (now != known) heard = Clock::now();
+    known = now;
+    std::this_thread::sleep_for(std::chrono::milliseconds{2});
+  }
+  return notices;
+}
+
 int status(Options& options) {
   options.call.resolve();
   LiveCell cell{options.call};
@@ -26,11 +46,9 @@ int status(Options& options) {
       .cell = cell.name(), .processes = {}, .components = {}, .missing = {}, .silent = {}, .notices = {}};
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
+    status.notices = hear_notices(cell);
     status.processes = cell.client().processes();
     status.components = cell.client().components();
-    std::this_thread::sleep_for(
-        std::chrono::milliseconds{100});  // what was said before arrives behind the state
-    status.notices = cell.client().take_notices();
   }
   if (options.json)
     std::cout << to_json(status).dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';

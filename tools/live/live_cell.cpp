@@ -13,7 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
-constexpr Duration look = Duration::milliseconds(20);
+constexpr Duration look = Duration::milliseconds(5);
 constexpr auto quiet =
     std::chrono::milliseconds{200};  // nobody new for so long: all that are there have been seen
 
