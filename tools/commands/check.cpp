@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/base/name.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/command.hpp"
 
@@ -34,7 +35,7 @@ int check(const Options& options) {
       report["faults"].push_back({{"where", fault.where}, {"what", fault.what}, {"mend", fault.mend}});
     std::cout << report.dump(2) << '\n';
   } else {
-    for (const Fault& fault : faults) std::cerr << fault.line() << '\n';
+    for (const Fault& fault : faults) std::cerr << printable(fault.line()) << '\n';
     if (faults.empty())
       std::cout << options.file.string() << ": sound (" << components << " components in " << processes
                 << " processes)\n";
