@@ -8,71 +8,22 @@
 #include <cmath>
 #include <set>
 #include <sstream>
-#include <unordered_map>
 
 #include "core/base/input_file.hpp"
 #include "core/base/limits.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
-#include "core/config/fault_list.hpp"
 #include "core/config/quotes.hpp"
 #include "core/config/yaml_bounds.hpp"
+#include "core/config/yaml_document.hpp"
 
 namespace invar::config {
-
-namespace detail {
-
-struct Place {
-  YAML::Node yaml;
-  std::string path;
-  std::string key;
-  int line = 0;
-  bool accept_all = false;
-  bool empty = false;  // the key stands there, without a value
-  std::set<std::string> known;
-  std::vector<std::pair<std::string, std::shared_ptr<Place>>> children;
-  std::unordered_map<std::string, std::size_t> child_of;  // by key, into `children`
-  std::optional<std::unordered_map<std::string, YAML::Node>>
-      values;                                  // of a map, by key; found at the first question
-  std::unordered_map<std::string, int> lines;  // of its keys
-
-  void look_at_keys() {
-    if (values) return;
-    values.emplace();
-    for (const auto& entry : yaml) {
-      if (!entry.first.IsScalar()) continue;
-      if (!values->emplace(entry.first.Scalar(), entry.second).second) continue;
-      if (!entry.first.Mark().is_null()) lines[entry.first.Scalar()] = entry.first.Mark().line + 1;
-    }
-  }
-  std::shared_ptr<Place> add(const std::string& name, std::shared_ptr<Place> child) {
-    child_of.emplace(name, children.size());
-    children.emplace_back(name, child);
-    return child;
-  }
-  [[nodiscard]] std::shared_ptr<Place> child(const std::string& name) const {
-    const auto found = child_of.find(name);
-    return found == child_of.end() ? nullptr : children[found->second].second;
-  }
-};
-
-struct Document {
-  std::filesystem::path file;
-  std::string text;
-  std::shared_ptr<Place> root;
-  FaultList faults;
-};
-
-}  // namespace detail
 
 namespace {
 
 using detail::Document;
+using detail::joined;
 using detail::Place;
-
-std::string joined(const std::string& path, const std::string& key) {
-  return path.empty() ? clipped(key) : path + "." + clipped(key);
-}
 
 int line_of(const YAML::Node& node, int otherwise) {
   return node.IsDefined() && !node.IsNull() && !node.Mark().is_null() ? node.Mark().line + 1 : otherwise;
@@ -83,42 +34,6 @@ std::string located(const Document& document, const Place& place) {
   if (place.line > 0) where += ":" + std::to_string(place.line);
   if (!place.path.empty()) where += ": " + place.path;
   return where;
-}
-
-/// Keys right here that stand twice (of which the parser would keep the first) and keys that nobody asked for.
-void collect_keys_at(const Document& document, const Place& place, FaultList& faults) {
-  if (!place.yaml.IsDefined() || !place.yaml.IsMap()) return;
-  const auto located_at = [&](const YAML::Node& key) {
-    return document.file.string() + ":" + std::to_string(key.Mark().line + 1) + ": " +
-           joined(place.path, key.IsNull()     ? "~"
-                              : key.IsScalar() ? key.Scalar()
-                                               : "?");
-  };
-  std::set<std::string> seen;
-  for (const auto& entry : place.yaml)
-    if (!entry.first.IsScalar())
-      faults.add({located_at(entry.first), "is no key", "write a word before the colon"});
-    else if (!seen.insert(entry.first.Scalar()).second)
-      faults.add({located_at(entry.first), "stands twice", "keep one of them"});
-  if (place.accept_all || place.known.empty()) return;
-  const std::vector<std::string> known{place.known.begin(), place.known.end()};
-  for (const auto& entry : place.yaml) {
-    const std::string key = entry.first.Scalar();
-    if (!entry.first.IsScalar() || place.known.contains(key)) continue;
-    std::string mend = "remove it, or use one of: ";
-    if (const std::string near = nearest(key, known); !near.empty()) {
-      mend = "did you mean `" + near + "`?";
-    } else {
-      for (const auto& name : known) mend += (name == known.front() ? "" : ", ") + name;
-    }
-    faults.add({located_at(entry.first), "unknown key", mend});
-  }
-}
-
-void collect_keys(const Document& document, const Place& place, FaultList& faults) {
-  collect_keys_at(document, place, faults);
-  if (place.accept_all) return;
-  for (const auto& [key, child] : place.children) collect_keys(document, *child, faults);
 }
 
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
@@ -475,7 +390,7 @@ const std::string& Yaml::text() const { return document_->text; }
 
 std::vector<Fault> Yaml::faults() const {
   auto faults = document_->faults;
-  collect_keys(*document_, *document_->root, faults);
+  detail::collect_keys(*document_, *document_->root, faults);
   return faults.all();
 }
 
