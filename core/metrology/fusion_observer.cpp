@@ -79,6 +79,7 @@ void FusionObserver::start(const FusionSample& sample) noexcept {
     mode.covariance.diagonal() = deviation.cwiseAbs2();
     mode.probability = 1.0 / models;
   }
+  counted_ = modes_;
   started_ = true;
 }
 

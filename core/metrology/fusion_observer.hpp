@@ -18,7 +18,8 @@ namespace invar::metrology {
 /// against any velocity sensor: then it is the estimate that was lost, and the gains are sought anew. Noise of the velocity sensors is estimated from their second differences. A
 /// sensor that repeats itself, contradicts the others or is missing loses its weight and gets it back when it
 /// agrees again: within one period where a reading is missing or jumps, within four repetitions more than it ever
-/// showed where a continuous one dies, within the way of about two cells where an encoder sticks.
+/// showed where a continuous one dies, within the way of about two cells where an encoder sticks. An encoder that stood still
+/// while the others moved comes back only after it has counted again: the true position may pass the stuck one.
 /// Source: metrology.md section 10 (interval observer and its Kalman version).
 class FusionObserver final : public FusionEstimator {
  public:
@@ -51,8 +52,11 @@ class FusionObserver final : public FusionEstimator {
   struct PositionMemory {
     double last = std::numeric_limits<double>::quiet_NaN();
     double conflict = 0.0;  // cumulated surprise while the reading stands still
-    double pulled = 0.0;    // what its cell moved the estimate by since then [m]
-    double travel = 0.0;    // that the velocity sensors report since the reading last changed [m]
+    double agreed = 0.0;    // estimate when it last met no conflict [m] ...
+    double agreed_variance = 0.0;
+    double agreed_travel = 0.0;  // ... and `travel` then
+    double agreed_travel_variance = 0.0;
+    double travel = 0.0;  // that the velocity sensors report since the reading last changed [m]
     double travel_variance = 0.0;
     double leapt = 0.0;  // changes of the reading that no motion explains, since it was last believed [m]
     double from = 0.0;   // reading when it last was doubted, or leapt [m]
@@ -61,6 +65,7 @@ class FusionObserver final : public FusionEstimator {
     int odd = 0;   // surprising readings in a row
     int good = 0;  // unsurprising ones in a row
     bool faulty = false;
+    bool left = false;  // it stood still while others moved, and has not counted since
   };
   struct VelocityMemory {
     std::array<double, 2> last{};
@@ -83,6 +88,8 @@ class FusionObserver final : public FusionEstimator {
   void use_velocity(std::size_t i, const FusionSample& sample) noexcept;
   void use_position(std::size_t i, const FusionSample& sample) noexcept;
   void add_travel(const FusionSample& sample) noexcept;
+  [[nodiscard]] bool travelled_on(std::size_t position) const noexcept;
+  [[nodiscard]] bool stood_still(std::size_t position, const FusionSample& sample) const noexcept;
   [[nodiscard]] bool refuted_standing(std::size_t position) const noexcept;
   [[nodiscard]] bool refuted_jump(std::size_t position) const noexcept;
   [[nodiscard]] bool counts_on(std::size_t position, double reading) const noexcept;
@@ -93,6 +100,8 @@ class FusionObserver final : public FusionEstimator {
   [[nodiscard]] bool outlived(std::size_t still, std::size_t moving, double reading) const noexcept;
   void undo(std::size_t steps) noexcept;
   void advance(double period) noexcept;
+  void agree(std::size_t position) noexcept;
+  void go_on_without(std::size_t position, const FusionSample& sample) noexcept;
   void restart_at(std::size_t position, double reading) noexcept;
   [[nodiscard]] bool alone(std::size_t position) const noexcept;
   void renormalise(const std::array<double, models>& likelihood) noexcept;
@@ -116,6 +125,7 @@ class FusionObserver final : public FusionEstimator {
   Eigen::Index states_;
   State drift_;  // spectral density of each drifting property
   std::array<Mode, models> modes_{};
+  std::array<Mode, models> counted_{};  // when a position sensor that is believed last changed its reading
   static constexpr std::size_t history = 16;
   struct Past {
     std::array<Mode, models> modes;  // as predicted for the sample, before its readings

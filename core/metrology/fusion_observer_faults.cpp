@@ -74,16 +74,30 @@ double FusionObserver::doubt() const noexcept {
   return std::min(most, 0.5);
 }
 
-/// True where a witness says that a position which reads the same cannot stand still: a velocity sensor beyond
-/// its noise and what its gain may be, or another position sensor. A filter that merely expected motion is no witness.
-bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
+/// True where the velocity sensors tell, beyond their noise and what their gain may be, that a position which reads the same
+/// went on by more than its cell.
+bool FusionObserver::travelled_on(std::size_t position) const noexcept {
   const PositionMemory& memory = position_memory_[position];
   const double cell =
       std::max(0.75 * model_.positions[position].step, 10.0 * model_.positions[position].noise);
-  if (std::abs(memory.travel) > (1.0 + 2.0 * doubt()) * cell + 5.0 * std::sqrt(memory.travel_variance) &&
-      memory.travel_variance > 0.0)
-    return true;
-  return !only_position(position);
+  return std::abs(memory.travel) > (1.0 + 2.0 * doubt()) * cell + 5.0 * std::sqrt(memory.travel_variance) &&
+         memory.travel_variance > 0.0;
+}
+
+/// True where others moved on while this position reads the same: velocity sensors, or another position sensor.
+bool FusionObserver::stood_still(std::size_t position, const FusionSample& sample) const noexcept {
+  if (travelled_on(position)) return true;
+  for (std::size_t k = 0; k < positions_; ++k)
+    if (k != position && !position_memory_[k].faulty && !silent(sample, k) &&
+        std::isfinite(sample.positions[k]) && outlived(position, k, sample.positions[k]))
+      return true;
+  return false;
+}
+
+/// True where a witness says that a position which reads the same cannot stand still: a velocity sensor, or another position
+/// sensor. A filter that merely expected motion is no witness.
+bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
+  return travelled_on(position) || !only_position(position);
 }
 
 /// A reading that differs from the one before, `time` earlier: what no motion explains is a leap. A sensor that comes back
@@ -174,14 +188,58 @@ void FusionObserver::undo(std::size_t steps) noexcept {
   }
 }
 
+/// The estimate where a position sensor meets no conflict: from here it can go on without it.
+void FusionObserver::agree(std::size_t position) noexcept {
+  PositionMemory& memory = position_memory_[position];
+  memory.agreed = 0.0;
+  memory.agreed_variance = 0.0;
+  for (const Mode& mode : modes_) {
+    memory.agreed += mode.probability * mode.mean(0);
+    memory.agreed_variance += mode.probability * mode.covariance(0, 0);
+  }
+  memory.agreed_travel = memory.travel;
+  memory.agreed_travel_variance = memory.travel_variance;
+}
+
+/// A sensor that stood still while the axis moved held the estimate back, and taught it wrong gains: on from where they last
+/// agreed, by what the velocity sensors told since, with the gains as they were when positions were last counted.
+void FusionObserver::go_on_without(std::size_t position, const FusionSample& sample) noexcept {
+  const PositionMemory& memory = position_memory_[position];
+  double speed = 0.0, speed_variance = 0.0;
+  for (std::size_t i = 0; i < velocities_; ++i) {
+    if (silent(sample, positions_ + i) || velocity_memory_[i].faulty || !std::isfinite(sample.velocities[i]))
+      continue;
+    const double gain = std::max(std::abs(model_.velocities[i].sensitivity(0.0)), 1e-6);
+    speed = (sample.velocities[i] - model_.velocities[i].offset) / gain;
+    speed_variance = velocity_memory_[i].variance / (gain * gain);
+    break;
+  }
+  const double travel = memory.travel - memory.agreed_travel;
+  const double variance =
+      memory.agreed_variance + std::max(0.0, memory.travel_variance - memory.agreed_travel_variance);
+  constexpr double hardest = 2.0;  // m/s2, that the axis may accelerate by meanwhile
+  for (std::size_t j = 0; j < models; ++j) {
+    Mode& mode = modes_[j];
+    if (counted_[j].mean.size() == states_) {
+      mode.mean.tail(states_ - 3) = counted_[j].mean.tail(states_ - 3);
+      mode.covariance = counted_[j].covariance;
+    }
+    mode.mean.head<3>() << memory.agreed + travel, speed, 0.0;
+    mode.covariance.topRows<3>().setZero();
+    mode.covariance.leftCols<3>().setZero();
+    mode.covariance.diagonal().head<3>() << variance, speed_variance, hardest * hardest;
+    mode.probability = 1.0 / models;
+  }
+}
+
 /// The sensor is to be trusted, not the estimate: begin anew in the cell that is read, at unknown speed. What is known of the
 /// sensors stays, but gains with which the estimate was lost are not known.
 void FusionObserver::restart_at(std::size_t position, double reading) noexcept {
   const PositionSensorModel& sensor = model_.positions[position];
   PositionMemory& memory = position_memory_[position];
-  memory.faulty = false;
+  memory.faulty = memory.left = false;
   memory.odd = 0;
-  memory.conflict = memory.pulled = memory.leapt = 0.0;
+  memory.conflict = memory.leapt = 0.0;
   double fastest = 0.3;
   for (const VelocitySensorModel& velocity : model_.velocities) fastest = velocity.largest;
   const double cell = std::hypot(sensor.step / std::sqrt(12.0), sensor.noise);

@@ -150,6 +150,8 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
   }
   const bool moved = reading != memory.last && std::isfinite(memory.last);
   if (moved) see_change(i, reading, sample.period);
+  if (moved) memory.left = false;
+  if (!moved && memory.faulty && sensor.step > 0.0 && stood_still(i, sample)) memory.left = true;
   memory.last = reading;
   std::array<State, models> gains;
   std::array<Cut, models> cuts;
@@ -188,12 +190,12 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
   }
   // A reading that stands still while the rest moves on is refuted little by little; an edge clears it.
   const bool odd = probability < surprise;
-  if (moved && !odd) memory.conflict = memory.pulled = 0.0;
+  if (moved && !odd) memory.conflict = 0.0;
   if (moved) memory.travel = memory.travel_variance = 0.0;
   memory.conflict = std::clamp(
       memory.conflict - std::log(std::max(probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0), 0.0,
       2.0 * stuck_conflict);  // no more, so that a sensor can live it down
-  if (memory.conflict <= 0.0) memory.pulled = 0.0;
+  if (memory.conflict <= 0.0 || moved) agree(i);
   memory.odd = odd ? memory.odd + 1 : 0;
   memory.good = odd || probability < doubtful ? 0 : memory.good + 1;
   if (alone(i) && !(memory.faulty && !moved) && (memory.odd >= 2 || memory.conflict > stuck_conflict)) {
@@ -209,7 +211,8 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
         return;
       }
   // Nobody contradicts the sensor: it is the estimate that was lost.
-  if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i)) {
+  const bool stuck = !moved && sensor.step > 0.0 && travelled_on(i);
+  if (!memory.faulty && memory.odd >= odd_limit && !stuck && !refuted_jump(i)) {
     restart_at(i, reading);
     return;
   }
@@ -219,37 +222,32 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
       return;
     }
     memory.faulty = false;
-    memory.conflict = memory.pulled = 0.0;
+    memory.conflict = 0.0;
   }
   if (!memory.faulty &&
       (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict && refuted_standing(i)))) {
     memory.faulty = true;
     memory.from = reading;
-    for (Mode& mode : modes_) {
-      mode.mean(0) -= memory.pulled;  // what the stuck reading held back
-      mode.covariance(0, 0) += memory.pulled * memory.pulled * 0.05;
-    }
+    if (!moved && sensor.step > 0.0 && travelled_on(i)) go_on_without(i, sample);
   }
-  if (memory.faulty && memory.good >= good_limit && memory.conflict <= 0.0) memory.faulty = false;
+  if (memory.faulty && !memory.left && memory.good >= good_limit && memory.conflict <= 0.0)
+    memory.faulty = false;
   if (memory.faulty || odd) return;
   memory.leapt = 0.0;
   double information = 0.0;
-  double moved_by = 0.0;
   std::array<double, models> likelihood{};
   for (std::size_t j = 0; j < models; ++j) {
     Mode& mode = modes_[j];
     const double ratio =
         edge[j] / (deviation[j] * deviation[j]);  // the state's share of the scalar's variance
-    const double before = mode.mean(0);
     const double keep = 1.0 - (1.0 - cuts[j].variance) * ratio;
     information += mode.probability * apply(mode.mean, mode.covariance, gains[j], edge[j],
                                             cuts[j].mean * deviation[j] * ratio, keep);
-    moved_by += mode.probability * (mode.mean(0) - before);
     likelihood[j] = sensor.step > 0.0 ? cuts[j].probability : cuts[j].probability / deviation[j];
   }
-  if (memory.conflict > 0.0) memory.pulled += moved_by;
   information_[i] += information;
   renormalise(likelihood);
+  if (moved) counted_ = modes_;
 }
 
 }  // namespace invar::metrology
