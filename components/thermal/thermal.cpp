@@ -26,6 +26,7 @@ Thermal::Thermal(const Parameters& parameters)
                                         {"comm_lost"}});
   modbus::must_take(map, "power", {0.0, parameters.power_limit}, "power_limit");
   device_ = parameters.modbus.device(map);
+  if (map.heartbeat) lets_go_ = map.heartbeat->timeout.in_seconds();
   modbus::must_let_go(map, "modbus.map", {"enable", "power"});
   has_fault_bit_ = map.find("sensor_fault").has_value();
   has_latch_bit_ = map.find("over_temperature").has_value();
@@ -59,7 +60,6 @@ void Thermal::activate() {
   told_unsound_ = told_undriven_ = told_stuck_ = false;
   unsound_since_.reset();
   stuck_since_.reset();
-  full_since_.reset();
 }
 
 void Thermal::deactivate() noexcept {
@@ -103,6 +103,7 @@ void Thermal::obey(const ThermalCommand& command) noexcept {
     wanted_ = command.enabled();
     if (command.reset_latch()) {
       latched_ = false;
+      watch_.reset();
       reset_at_ = now();
       if (has_reset_) (void)client_.device().write("reset_alarms", 1.0);
     }
@@ -195,20 +196,41 @@ void Thermal::look_at_delivery(const Tick& tick) noexcept {
   }
 }
 
-/// Below full power a temperature that stands still may be the one that is held; at full power it never is.
-void Thermal::look_at_response(const Tick& tick) noexcept {
-  const auto& [rise, within] = parameters_.response;
-  if (!(power_ > 0.0 && power_ >= parameters_.power_limit)) return full_since_.reset();
-  if (!full_since_ || temperature_ - full_from_ >= rise) full_since_ = tick.now, full_from_ = temperature_;
-  if (tick.now - *full_since_ < Duration::seconds(within)) return;
-  latched_ = true;
-  full_since_.reset();
-  std::array<char, 240> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "%.4g W for %.4g s have not warmed the slide by %.4g K (it reads %.4g degC): a thermistor that is "
-      "off or frozen, or a pad that is dead or too weak; the heater is off until a command resets the latch",
-      power_, within, rise, temperature_);
+HeatWatch::Settings Thermal::watched() const noexcept {
+  const Response& response = parameters_.response;
+  return {.full = parameters_.power_limit,
+          .rise = response.rise,
+          .within = response.within,
+          .hold = response.hold,
+          .leap = response.leap,
+          .lets_go = lets_go_};
+}
+
+/// Heat that does not show in the temperature, or a temperature that no heat makes: off until somebody resets it.
+void Thermal::look_at_response(std::optional<double> reading, const Tick& tick) noexcept {
+  using Doubt = HeatWatch::Doubt;
+  const double before = watch_.waited();
+  const Doubt doubt = watch_.look(watched(), reading, setpoint_, power_, tick.now, tick.period);
+  if (doubt == Doubt::none) return;
+  watch_.reset();
+  if (std::exchange(latched_, true)) return;
+  const auto& [rise, within, hold, leap] = parameters_.response;
+  std::array<char, 320> text{};
+  if (doubt == Doubt::leapt)
+    std::snprintf(
+        text.data(), text.size(),
+        "the slide's reading leapt by more than %.4g K within a second, from %.4g degC: a thermistor that is "
+        "loose; the heater is off until a command resets the latch",
+        leap, temperature_);
+  else
+    std::snprintf(
+        text.data(), text.size(),
+        "the heat of %.4g W for %.4g s, given in %.4g s, has not %s (it reads %.4g degC): a "
+        "thermistor that is off or frozen, or a pad that is dead or too weak; the heater is off until a "
+        "command resets the latch",
+        parameters_.power_limit, within, std::max(before + tick.period, within),
+        doubt == Doubt::frozen ? "changed the slide's reading at all" : "warmed the slide as `response` says",
+        temperature_);
   notices_.say(event::SEVERITY_TRIP, text.data());
 }
 
@@ -218,8 +240,8 @@ void Thermal::step(const Tick& tick) noexcept {
   if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
   client_.receive(tick.now);
   const auto measured_now = measured("slide_resistance", thermistor_);
-  const bool sound = measured_now.has_value();
-  tell(sound, tick);
+  tell(measured_now.has_value(), tick);
+  const bool sound = watch_.trusts(watched(), measured_now, tick.now) && measured_now.has_value();
   // A device that refuses to be switched off is left to its watchdog.
   if (!client_.refuses()) client_.device().refresh();
 
@@ -234,7 +256,7 @@ void Thermal::step(const Tick& tick) noexcept {
   } else if (enable) {
     told_undriven_ = false;
   }
-  look_at_response(tick);
+  look_at_response(sound ? measured_now : std::nullopt, tick);
   client_.send(tick.now);
   look_at_delivery(tick);
 

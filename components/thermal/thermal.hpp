@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "components/thermal/heat_watch.hpp"
 #include "core/component/component.hpp"
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
@@ -21,8 +22,8 @@ namespace invar::thermal {
 /// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go when readings are stale or outside
 /// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
 /// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature`, or when
-/// the device latches at a limit of its own (register `over_temperature`), or when full power does not show in the temperature
-/// (`response`: a thermistor that came off or froze, a pad that is dead or too weak). It holds until a command resets it, and the device
+/// the device latches at a limit of its own (register `over_temperature`), or when the heat given does not show in the temperature
+/// (`response`: a thermistor that came off or froze, a pad that is dead or too weak), however interrupted. It holds until a command resets it, and the device
 /// with it (register `reset_alarms`). A controller that delivers power though it was told to be off is said, too. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
 /// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component {
@@ -53,11 +54,20 @@ class Thermal final : public Component {
   struct Response {
     double rise = 0.5;
     double within = 120.0;
+    double hold = 0.5;
+    double leap = 5.0;
     void describe(auto& p) {
       p(rise, "rise", "K", Range{1e-3, 50.0}, "by which the slide must warm at full power ...",
         while_running);
-      p(within, "within", "s", Range{1.0, 1e5}, "... each time this has passed, or the latch lets go",
+      p(within, "within", "s", Range{1.0, 1e5},
+        "... in this time; the latch lets go when as much heat, however interrupted, did not warm it so",
         while_running);
+      p(hold, "hold", "1", Range{0.0, 0.9},
+        "largest share of power_limit that holding a temperature takes: heat below it need not warm the "
+        "slide",
+        while_running);
+      p(leap, "leap", "K", Range{0.1, 200.0},
+        "a change of the reading beyond it within a second is a fault of the thermistor", while_running);
     }
   };
   /// A further thermistor of the controller: register <name>_resistance.
@@ -114,7 +124,8 @@ class Thermal final : public Component {
   void tell(bool sound, const Tick& tick) noexcept;
   void latch(bool sound, const Tick& tick) noexcept;
   void look_at_delivery(const Tick& tick) noexcept;
-  void look_at_response(const Tick& tick) noexcept;
+  void look_at_response(std::optional<double> reading, const Tick& tick) noexcept;
+  [[nodiscard]] HeatWatch::Settings watched() const noexcept;
 
   static constexpr double unknown = std::numeric_limits<double>::quiet_NaN();  // before the first reading
   const Parameters& parameters_;
@@ -151,8 +162,8 @@ class Thermal final : public Component {
   std::optional<Instant> stuck_since_;    // power flows, and none was asked for
   std::optional<Instant> unsound_since_;  // the device answers, and its sensor cannot be
   double power_ = 0.0;
-  std::optional<Instant> full_since_;  // full power
-  double full_from_ = 0.0;             // temperature then [degC]
+  HeatWatch watch_;
+  double lets_go_ = 0.0;  // how long the device goes on heating without its master [s]
 };
 
 }  // namespace invar::thermal
