@@ -46,17 +46,22 @@ Task AxisRunner::wait(double seconds) {
 /// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
 Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* record) {
   send(command);
+  loop_.reset();
+  const std::string axis_said = axis_name(state_.topic, axis_);
   const Instant started = now();
   for (;;) {
     co_await NextStep{};
     if (record != nullptr) take_down(*record);
     const auto* state = state_.latest();
+    if (state != nullptr) loop_.take(*state);
     const bool answered = state != nullptr && state->command_id() == command.id();
-    if (answered && state->command_refused())
-      throw std::runtime_error{"the axis refused a motion of the job"};
     if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
-      throw std::runtime_error{"the axis tripped while moving"};
-    if (answered && state->command_done()) co_return;
+      throw std::runtime_error{axis_said + " tripped while moving" + loop_.figures()};
+    if (answered && state->command_refused()) throw std::runtime_error{axis_said + " refused a motion of the job"};
+    if (answered && state->command_done()) {
+      if (const auto fault = loop_.fault()) throw std::runtime_error{axis_said + ": " + *fault};
+      co_return;
+    }
     if (!answered && now() - started > Duration::seconds(5.0))
       throw std::runtime_error{"the axis does not answer: is its stage active?"};
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "components/calibration/job_component.hpp"
+#include "components/calibration/loop_watch.hpp"
 #include "core/recording/table.hpp"
 #include "idl/compensation.h"
 #include "idl/sensing.h"
@@ -32,7 +33,7 @@ class AxisRunner : public JobComponent {
   virtual void take_down(recording::Table& record) = 0;
 
   Task enable();
-  /// A command to its end; nullptr: nothing is taken down.
+  /// A command to its end; nullptr: nothing is taken down. A loop that is at its current limit or trips fails the job.
   Task command_axis(stage::AxisCommand command, recording::Table* record);
   Task move(double target, double velocity, recording::Table* record);
   Task wait(double seconds);
@@ -50,6 +51,7 @@ class AxisRunner : public JobComponent {
   void send(stage::AxisCommand& command);
 
   const std::int64_t& axis_;
+  LoopWatch loop_;  // of the motion under way
   Output<stage::AxisCommand> command_{*this, "command", "command"};
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};

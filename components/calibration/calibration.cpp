@@ -85,6 +85,7 @@ void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double pos
   command.acceleration(pace.acceleration);
   command.jerk(pace.jerk);
   axes_[axis]->last_command = command.id();
+  axes_[axis]->loop.reset();
   axes_[axis]->command.write(command);
 }
 
@@ -129,19 +130,31 @@ Task Calibration::move_to(Point target, Pace pace) {
     bool settled = true;
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       const auto* state = axes_[i]->state.latest();
+      LoopWatch& loop = axes_[i]->loop;
+      if (state != nullptr) loop.take(*state);
       const bool answered = state != nullptr && state->command_id() == axes_[i]->last_command;
+      const auto axis_said = [&] { return axis_name(axes_[i]->state.topic, static_cast<std::int64_t>(i)); };
+      if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
+        throw std::runtime_error{axis_said() + " tripped while moving" + loop.figures()};
+      if (const auto fault = loop.fault(); fault && answered && state->command_done())
+        throw std::runtime_error{axis_said() + ": " + *fault};
       if (answered && state->command_refused())
         throw std::runtime_error{std::string{"axis "} + letters[i] + " refused to move to " +
                                  std::to_string(target[static_cast<Eigen::Index>(i)]) + " m"};
-      if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
-        throw std::runtime_error{std::string{"axis "} + letters[i] + " tripped while moving"};
       done = done && answered && state->command_done();
       settled = settled && answered && state->settled();
     }
     if (done && settled) co_return;
     if (done && !arrived) arrived = now();
     const Duration patience = Duration::seconds(parameters_.settle_timeout);
-    if (arrived && now() - *arrived > patience) throw std::runtime_error{"an axis does not settle"};
+    if (arrived && now() - *arrived > patience) {
+      std::string which;
+      for (std::size_t i = 0; i < axes_.size(); ++i)
+        if (const auto* state = axes_[i]->state.latest(); state != nullptr && !state->settled())
+          which += (which.empty() ? "" : ", ") +
+                   axis_name(axes_[i]->state.topic, static_cast<std::int64_t>(i)) + axes_[i]->loop.figures();
+      throw std::runtime_error{"an axis does not settle: " + which};
+    }
     if (!done && now() - started > Duration::seconds(120.0) + patience)
       throw std::runtime_error{"an axis does not answer to `move`"};
   }

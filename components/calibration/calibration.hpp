@@ -15,6 +15,7 @@
 #include "components/calibration/job_component.hpp"
 #include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
+#include "components/calibration/loop_watch.hpp"
 #include "components/calibration/printing.hpp"
 #include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
@@ -76,6 +77,7 @@ class Calibration final : public JobComponent, private JobHost {
     Input<stage::AxisState> state;
     Output<stage::AxisCommand> command;
     std::uint64_t last_command = 0;
+    LoopWatch loop;  // of the motion under way
   };
 
   // calibration.cpp: jobs, and what all of them are made of.

@@ -11,6 +11,7 @@
 #include "core/dds/cell_client.hpp"
 #include "core/dds/wire_type.hpp"
 #include "idl/event.h"
+#include "tools/cell/drives.hpp"
 #include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
@@ -233,6 +234,7 @@ void connect_ports(LoadedCell& loaded) {
       for (Port* port : member.component->ports()) connect_port(loaded, member, *port);
     }
   check_owners(loaded);
+  check_drives(loaded);
   check_claims(loaded);
   check_rates(loaded);
   check_latencies(loaded);

@@ -4,7 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "core/base/name.hpp"
+#include "tools/cell/drives.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/command.hpp"
 
@@ -18,13 +18,14 @@ struct Options {
 };
 
 int check(const Options& options) {
-  std::vector<Fault> faults;
+  std::vector<Fault> faults, notes;
   std::size_t components = 0;
   std::size_t processes = 0;
   try {
     const LoadedCell loaded = load_cell(options.file);
     for (const LoadedProcess& process : loaded.processes) components += process.components.size();
     processes = loaded.processes.size();
+    notes = unchecked(loaded);
   } catch (const InputError& error) {
     faults = error.faults();
   }
@@ -33,12 +34,16 @@ int check(const Options& options) {
         {"file", options.file.string()}, {"sound", faults.empty()}, {"faults", nlohmann::json::array()}};
     for (const Fault& fault : faults)
       report["faults"].push_back({{"where", fault.where}, {"what", fault.what}, {"mend", fault.mend}});
+    report["unchecked"] = nlohmann::json::array();
+    for (const Fault& note : notes)
+      report["unchecked"].push_back({{"where", note.where}, {"what", note.what}, {"mend", note.mend}});
     std::cout << report.dump(2) << '\n';
   } else {
-    for (const Fault& fault : faults) std::cerr << printable(fault.line()) << '\n';
+    for (const Fault& fault : faults) std::cerr << fault.line() << '\n';
     if (faults.empty())
       std::cout << options.file.string() << ": sound (" << components << " components in " << processes
                 << " processes)\n";
+    for (const Fault& note : notes) std::cout << note.line() << '\n';
   }
   return faults.empty() ? 0 : 2;
 }

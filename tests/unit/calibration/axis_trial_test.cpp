@@ -154,7 +154,45 @@ TEST(AxisTrial, SaysWhyAJobCannotRun) {
   EXPECT_STREQ(cell.run("nonsense").text().c_str(), "`nonsense` is no job of this component");
   const auto status = cell.run("track");
   EXPECT_EQ(status.phase(), job::JOB_FAILED);
-  EXPECT_STREQ(status.text().c_str(), "the axis refused a motion of the job");
+  EXPECT_STREQ(status.text().c_str(), "axis x refused a motion of the job");
+}
+
+/// The job `track` with a servo and an axis that do not go together.
+std::string tracked(const stage::Stage::Parameters& of_stage, double mass) {
+  AxisTrial::Parameters of_trial;
+  of_trial.tracking.resize(1);
+  of_trial.tracking[0].name = "track";
+  of_trial.tracking[0].periods = {3.0};
+  const invar::testing::TemporaryFolder folder;
+  of_trial.tracking[0].out = (folder / "track").string();
+  auto of_world = support::trial_world();
+  of_world.x.mass = mass;
+  Cell cell{of_world, of_stage, of_trial};
+  cell.bring_up();
+  const auto status = cell.run("track");
+  return (status.phase() == job::JOB_FAILED ? "failed: " : "") + std::string{status.text().c_str()};
+}
+
+TEST(AxisTrial, ALoopAtItsCurrentLimitOrThatSwingsFailsItsJobWithTheFigure) {
+  stage::Stage::Parameters sound;
+  sound.travel = {-0.005, 0.205};
+  sound.limits = {0.65, 5.0, 100.0};
+  sound.control.feedforward_velocity = 25.0 / 12.0;
+  sound.control.feedforward_acceleration = 3.2 / 12.0;
+  EXPECT_EQ(tracked(sound, 3.2).find("failed"), std::string::npos) << tracked(sound, 3.2);
+
+  auto weak = sound;  // a motor that cannot follow
+  weak.control.limit = 0.35;
+  weak.following_error = 0.1;
+  EXPECT_THAT(tracked(weak, 3.2), ::testing::HasSubstr("axis x: current at its limit of 0.35 A for"));
+
+  auto swings = sound;  // a motor that is told to move thrice of what it moves, and gains for that
+  swings.control.kp = 4e5;
+  swings.control.kd = 3000;
+  swings.following_error = 0.1;
+  EXPECT_THAT(tracked(swings, 1.0), ::testing::AllOf(::testing::HasSubstr("failed: axis x"),
+                                                     ::testing::HasSubstr("current at its limit of 10 A"),
+                                                     ::testing::HasSubstr("Hz")));
 }
 
 }  // namespace
