@@ -6,28 +6,14 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <utility>
 
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
-#include "core/physics/axis_stability.hpp"
 
 namespace invar::stage {
 
 namespace {
-
-physics::AxisControllerSettings settings(const Stage::Control& control, double period) {
-  using Kind = physics::AxisControllerSettings::Kind;
-  physics::AxisControllerSettings result;
-  result.kind = control.kind == "cascade" ? Kind::cascade : Kind::pid;
-  result.rate = 1.0 / period;
-  result.kp = control.kp;
-  result.ki = control.ki;
-  result.kd = control.kd;
-  result.kv = control.kv;
-  result.velocity_filter_hz = control.velocity_filter;
-  result.limit = control.limit;
-  return result;
-}
 
 double chosen(double asked, double own) { return asked > 0.0 ? std::min(asked, own) : own; }
 
@@ -62,19 +48,6 @@ std::vector<Component::Claim> Stage::claims() const {
   return {{"axis " + std::to_string(parameters_.axis), "axis"}};
 }
 
-std::optional<Component::Unfit> Stage::unfit(double period) const {
-  const Control& control = parameters_.control;
-  if (!(control.feedforward_acceleration > 0.0)) return {};
-  const double radius = physics::spectral_radius(settings(control, period), control.feedforward_acceleration,
-                                                 control.feedforward_velocity);
-  if (radius < 1.0) return {};
-  std::array<char, 160> why{};
-  std::snprintf(why.data(), why.size(),
-                "with these gains the loop swings up when it runs at %.6g Hz (by %.3g times a period)",
-                1.0 / period, radius);
-  return Unfit{why.data(), "control", "step it more often, or lower kp, ki and kd (in a cascade kp and kv)"};
-}
-
 void Stage::activate() {
   mode_ = AXIS_MODE_DISABLED;
   primed_ = false;
@@ -86,6 +59,10 @@ void Stage::activate() {
   correction_held_ = 0.0;
   settled_ = false;
   fed_forward_ = reading_error_ = {};
+  fused_watch_.reset(fused_.received());
+  correction_watch_.reset(correction_.received());
+  without_correction_ = in_vain_ = false;
+  standing_current_ = 0.0;
   model_changed_ = false;
   model_.announce();
 }
@@ -147,13 +124,17 @@ void Stage::begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode)
   mode_ = mode;
 }
 
+bool Stage::has_arrived(const Tick& tick) const noexcept {
+  return (tick.now - trajectory_start_).in_seconds() >= trajectory_.duration();
+}
+
 MotionPoint Stage::setpoint(const Tick& tick) const noexcept {
   return trajectory_.at((tick.now - trajectory_start_).in_seconds());
 }
 
 /// Setpoint := measured, so that nothing moves on activation or enabling.
 void Stage::prime(const Tick& tick) noexcept {
-  controller_ = physics::AxisController{settings(parameters_.control, tick.period)};
+  controller_ = physics::AxisController{controller_settings(tick.period)};
   begin(Trajectory::rest(position_ - correction_held_), tick, mode_);
   outside_at_ = tick.now;
   primed_ = true;
@@ -182,25 +163,17 @@ bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
                             chosen(command.jerk(), own.jerk)};
   const bool standing = mode_ == AXIS_MODE_HOLDING;
   if (!are_usable(limits, own)) return false;
-  if (command.kind() == AXIS_COMMAND_MOVE) {
-    const Range travel = parameters_.travel;
-    const auto move = Trajectory::move(setpoint(tick).position, command.position(), limits);
-    if (!standing || !homed_ || !travel.contains(command.position()) || !ends(move)) return false;
-    begin(move, tick, AXIS_MODE_MOVING);
-    return true;
-  }
-  const double beyond = setpoint(tick).position - 1.5 * parameters_.travel.width();
-  const auto home = Trajectory::move(setpoint(tick).position, beyond,
-                                     {parameters_.homing_velocity, limits.acceleration, limits.jerk});
-  if (!standing || !ends(home)) return false;
-  begin(home, tick, AXIS_MODE_HOMING);
-  homed_ = false;
+  const Range travel = parameters_.travel;
+  const auto move = Trajectory::move(setpoint(tick).position, command.position(), limits);
+  if (!standing || !homed_ || !travel.contains(command.position()) || !ends(move)) return false;
+  begin(move, tick, AXIS_MODE_MOVING);
   return true;
 }
 
 void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
   bool accepted = true;
   bool done = true;
+  in_vain_ = false;
   switch (command.kind()) {
     case AXIS_COMMAND_ENABLE:
       accepted = mode_ == AXIS_MODE_DISABLED || mode_ == AXIS_MODE_HOLDING;
@@ -219,12 +192,15 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       }
       break;
     case AXIS_COMMAND_MOVE:
+      accepted = !without_correction_ && start_move(command, tick);
+      done = !accepted;
+      break;
     case AXIS_COMMAND_HOME:
-      accepted = start_move(command, tick);
+      accepted = !without_correction_ && start_homing(tick);
       done = !accepted;
       break;
     case AXIS_COMMAND_SINE:
-      accepted = start_sine(command, tick);
+      accepted = !without_correction_ && start_sine(command, tick);
       done = !accepted;
       break;
     case AXIS_COMMAND_STOP:
@@ -247,33 +223,14 @@ void Stage::brake(const MotionPoint& from, const Tick& tick) noexcept {
 
 /// Lets go of the motor and says why.
 void Stage::trip(const char* why) noexcept {
+  if (mode_ == AXIS_MODE_HOMING) {
+    sample_.command_refused(true);
+    sample_.command_done(true);
+  }
   mode_ = AXIS_MODE_FAULT;
   disabling_ = false;
   fed_forward_ = {};
   notices_.say(event::SEVERITY_TRIP, why);
-}
-
-/// What of the inputs is no number; nullptr: nothing.
-const char* Stage::unusable(const AxisFeedback& feedback) noexcept {
-  const auto* fused = fused_.latest();
-  const auto* correction = correction_.latest();
-  if (!std::isfinite(feedback.position()) || !std::isfinite(feedback.velocity()))
-    return "braked without feedback and tripped: the encoder's position or velocity is not a number";
-  if (fused != nullptr && fused->valid() && !std::isfinite(fused->position()))
-    return "braked without feedback and tripped: the fused position is not a number";
-  if (correction != nullptr && !std::isfinite(correction->correction()))
-    return "braked without feedback and tripped: the correction is not a number";
-  return nullptr;
-}
-
-/// Feedback is gone: brake along the stopping trajectory on feedforward alone, then let go.
-void Stage::stop_blindly(const char* why, const Tick& tick) noexcept {
-  if (!blind_) {
-    blind_ = true;
-    blind_because_ = why;
-    brake(setpoint(tick), tick);
-  }
-  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration()) trip(blind_because_);
 }
 
 double Stage::feedforward(const Tick& tick) noexcept {
@@ -302,37 +259,37 @@ void Stage::read_position(const AxisFeedback& feedback, const Tick& tick) noexce
       (fused != nullptr && fused->valid() ? fused->position() : feedback.position() - known) + offset_;
 }
 
-/// What ends a motion: the home switch, the end of the trajectory, a following error, a limit switch or the drive.
+/// What ends a motion: the end of the trajectory, a following error, a limit switch or the drive.
 void Stage::supervise(const Tick& tick) noexcept {
   const auto& feedback = *feedback_.latest();
-  const double velocity = setpoint(tick).velocity;
-  const bool at_limit = (feedback.limit_low() && velocity < 0.0 && mode_ == AXIS_MODE_MOVING) ||
-                        (feedback.limit_high() && velocity > 0.0);
+  constexpr double pressing = 5.0;  // times the following error: what a hard stop is pressed with
+  const bool presses = mode_ == AXIS_MODE_HOMING && homing_.presses();
   const char* why = nullptr;
-  if (at_limit) why = "tripped: it runs into a limit switch";
-  if (!(std::abs(following_error_) <= parameters_.following_error))
+  if (!(std::abs(following_error_) <= parameters_.following_error * (presses ? pressing : 1.0)))
     why = "tripped: the following error is above `following_error`";
   if (feedback.drive_fault()) why = "tripped: its drive reports a fault";
   if (!std::isfinite(current_)) why = "tripped: the current that it worked out is not a number";
   if (why != nullptr) return trip(why);
-  if (mode_ == AXIS_MODE_HOMING && feedback.home_switch()) {
-    const double shift = parameters_.travel.lower - position_;
-    MotionPoint from = setpoint(tick);
-    from.position += shift;
-    offset_ += shift;
-    position_ += shift;
-    controller_.reset();
-    homed_ = true;
-    brake(from, tick);
-  }
-  if ((tick.now - trajectory_start_).in_seconds() >= trajectory_.duration() && mode_ != AXIS_MODE_HOLDING) {
-    if (mode_ == AXIS_MODE_HOMING) {  // travelled the whole way and never saw the switch
-      sample_.command_refused(true);
-    }
+  if (mode_ == AXIS_MODE_HOMING) return carry_out(homing_.step(sensed(tick)), tick);
+  stop_at_limit(feedback, tick);
+  if (has_arrived(tick) && mode_ != AXIS_MODE_HOLDING) {
     mode_ = disabling_ ? AXIS_MODE_DISABLED : AXIS_MODE_HOLDING;
     disabling_ = false;
     sample_.command_done(true);
+    if (std::exchange(in_vain_, false)) sample_.command_refused(true);
   }
+}
+
+/// A limit switch that closes ahead ends the motion under control: let go of, the carriage would coast on past it.
+void Stage::stop_at_limit(const AxisFeedback& feedback, const Tick& tick) noexcept {
+  const double velocity = setpoint(tick).velocity;
+  const bool low = feedback.limit_low() && velocity < 0.0;
+  if (mode_ != AXIS_MODE_MOVING || !(low || (feedback.limit_high() && velocity > 0.0))) return;
+  notices_.say(event::SEVERITY_FAULT,
+               low ? "stopped: the lower limit switch is closed; only moves upwards are taken"
+                   : "stopped: the upper limit switch is closed; only moves downwards are taken");
+  in_vain_ = true;
+  brake(setpoint(tick), tick);
 }
 
 void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
@@ -351,13 +308,16 @@ void Stage::step(const Tick& tick) noexcept {
   if (usable) seen_ = feedback_.arrived();
   const bool fresh = usable && feedback_.received() != received_;
   received_ = feedback_.received();
-  const bool seeing = seen_ && tick.now - *seen_ <= patience;
+  const double forgiven = parameters_.feedback_timeout / tick.period;
+  const bool fused_lost = fused_watch_.lost(fused_.received(), forgiven);
+  const bool seeing = seen_ && tick.now - *seen_ <= patience && !fused_lost;
   model_changed_ = model_.update();
   if (seeing && usable) read_position(*feedback, tick);
   // A correction that stays away is held where it was: no step.
   if (const auto* correction = correction_.latest(); correction != nullptr && bad == nullptr)
     correction_held_ = correction->correction();
   if (seeing && !primed_) prime(tick);
+  look_for_correction(tick);
 
   AxisCommand command;
   while (command_.take(command)) {
@@ -375,18 +335,22 @@ void Stage::step(const Tick& tick) noexcept {
   if (leaving_ && !seeing && mode_ == AXIS_MODE_HOLDING) mode_ = AXIS_MODE_DISABLED;
   const bool driving = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;
   if (driving && !seeing) {
-    stop_blindly(
-        bad != nullptr ? bad : "braked without feedback and tripped: none came for `feedback_timeout`", tick);
-    current_ = feedforward(tick);
+    stop_blindly(bad != nullptr ? bad
+                 : fused_lost   ? "the fused position stays away"
+                                : "none came for `feedback_timeout`",
+                 tick);
     if (!std::isfinite(current_)) trip("tripped: the current that it worked out is not a number");
   } else if (driving && blind_) {
-    trip(blind_because_);         // sight came back too late: stay stopped until somebody clears the fault
+    see_again(*feedback, tick);
   } else if (driving && fresh) {  // a missing sample is no motion: without one the current is held
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
     const double forward = feedforward(tick);
     const double feedback_current = controller_.step(at.position + correction_held_, position_);
-    current_ = std::clamp(feedback_current + forward, -parameters_.control.limit, parameters_.control.limit);
+    current_ = std::clamp(feedback_current + forward, -highest_current(), highest_current());
+    constexpr double remembers = 0.05;  // s
+    if (mode_ == AXIS_MODE_HOLDING)
+      standing_current_ += std::min(1.0, tick.period / remembers) * (feedback_current - standing_current_);
     supervise(tick);
   }
   const bool enabled = mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT;

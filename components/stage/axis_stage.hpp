@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "components/stage/homing.hpp"
+#include "components/stage/input_watch.hpp"
 #include "components/stage/trajectory.hpp"
 #include "core/component/component.hpp"
 #include "core/component/notices.hpp"
@@ -15,6 +17,7 @@
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
 #include "idl/compensation.h"
+#include "idl/index.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
 
@@ -24,9 +27,10 @@ namespace invar::stage {
 /// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction). A model.yaml of
 /// the axis, as `invar diagnose` writes it, may be loaded, also while running: then its forces, those of its terms included,
 /// are what is fed forward, and what its encoder terms know is taken out of the reading.
-/// Safe value: motor not enabled. Feedback that is stale or no number: it brakes on feedforward, then trips. Following error,
-/// limit switches and a fault of the drive trip it at once; a notice says why. To be disabled or deactivated, it brakes first;
-/// deactivated while it still moves it says in a notice how fast.
+/// Safe value: motor not enabled. Feedback or a fused position that is stale or no number: it brakes on feedforward; a correction
+/// that stays away: it brakes; then it lets go or holds (`on_lost_input`). A limit switch that closes brakes it, and only moves
+/// away from it are taken. Following error and a fault of the drive trip it at once. A notice says why. To be disabled or
+/// deactivated, it brakes first; deactivated while it still moves it says in a notice how fast.
 class Stage final : public Component {
  public:
   struct Control {
@@ -73,11 +77,13 @@ class Stage final : public Component {
     Limits limits;
     std::filesystem::path model;
     double homing_velocity = 0.01;
+    HomingParameters homing;
     bool absolute_encoder = true;
     double following_error = 1e-3;
     double settle_window = 1e-6;
     double settle_time = 0.02;
     double feedback_timeout = 0.002;
+    std::string on_lost_input = "off";
     void describe(auto& p) {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(travel, "travel", "m", "soft limits");
@@ -86,21 +92,29 @@ class Stage final : public Component {
       p(model, "model",
         "model.yaml of plant axis: its forces are fed forward in place of feedforward_velocity and "
         "_acceleration");
-      p(homing_velocity, "homing_velocity", "m/s", Range{1e-5, 1.0}, "towards the home switch");
+      p(homing_velocity, "homing_velocity", "m/s", Range{1e-5, 1.0}, "towards the home");
+      p(homing, "homing", "how the command `home` finds the zero");
       p(absolute_encoder, "absolute_encoder", "homed from the start");
       p(following_error, "following_error", "m", Range{1e-7, 1.0}, "trip above it", while_running);
       p(settle_window, "settle_window", "m", Range{1e-9, 1e-2}, "settled: following error inside",
         while_running);
       p(settle_time, "settle_time", "s", Range{0.0, 10.0}, "... for so long", while_running);
       p(feedback_timeout, "feedback_timeout", "s", Range{1e-4, 1.0},
-        "older feedback: controlled stop, then trip");
+        "older feedback, or two periods of a slower fused position or correction: controlled stop");
+      p(on_lost_input, "on_lost_input",
+        "then off (the drive lets go) or hold (on, standing; goes on where the input comes back)");
+      if constexpr (requires { p.node(); })
+        if (on_lost_input != "off" && on_lost_input != "hold")
+          p.node()["on_lost_input"].fault("`" + on_lost_input + "` is neither", "use off or hold");
     }
   };
 
   explicit Stage(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
-  /// A loop that swings up at this rate, by the inertia that it is fed forward; without one nothing is said.
+  /// A loop that swings up at this rate, by the inertia that it is fed forward or that its model tells.
   [[nodiscard]] std::optional<Unfit> unfit(double period) const override;
+  /// False where nobody says what the motor moves, so that `unfit` cannot know. Set-up.
+  [[nodiscard]] bool gains_can_be_checked() const { return inertia().has_value(); }
   void configure() override { model_.open(parameters_.model, "diagnose the axis again"); }
   void activate() override;
   void cleanup() noexcept override { model_.close(); }
@@ -116,17 +130,31 @@ class Stage final : public Component {
     double operator()(double value, bool changed, double period) noexcept;
   };
 
+  struct Inertia {
+    double mass = 0.0;     // over motor constant [A s2/m]
+    double damping = 0.0;  // likewise [A s/m]
+  };
+  [[nodiscard]] std::optional<Inertia> inertia() const;
+  [[nodiscard]] physics::AxisControllerSettings controller_settings(double period) const;
   [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
   void read_position(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void obey(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_sine(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
+  [[nodiscard]] bool start_homing(const Tick& tick) noexcept;
+  void carry_out(const Homing::Order& order, const Tick& tick) noexcept;
+  [[nodiscard]] Homing::Sensed sensed(const Tick& tick) noexcept;
+  [[nodiscard]] double highest_current() const noexcept;
+  [[nodiscard]] bool has_arrived(const Tick& tick) const noexcept;
   void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
   void prime(const Tick& tick) noexcept;
   void brake(const MotionPoint& from, const Tick& tick) noexcept;
   void trip(const char* why) noexcept;
   [[nodiscard]] const char* unusable(const AxisFeedback& feedback) noexcept;
   void stop_blindly(const char* why, const Tick& tick) noexcept;
+  void see_again(const AxisFeedback& feedback, const Tick& tick) noexcept;
+  void look_for_correction(const Tick& tick) noexcept;
+  void stop_at_limit(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void supervise(const Tick& tick) noexcept;
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
   void publish(const MotionPoint& setpoint) noexcept;
@@ -138,6 +166,7 @@ class Stage final : public Component {
   Input<AxisFeedback> feedback_{*this, "feedback"};
   Input<sensing::FusedPosition> fused_{*this, "fused", {.optional = true}};
   Input<compensation::AxisCorrection> correction_{*this, "correction", {.optional = true}};
+  Input<IndexPulse> index_{*this, "index", {.optional = true}};
   Inbox<AxisCommand> command_{*this, "command"};
   Output<MotorCommand> motor_{*this, "motor"};
   Output<AxisState> state_{*this, "state"};
@@ -155,10 +184,15 @@ class Stage final : public Component {
   bool homed_ = false;
   bool blind_ = false;  // feedback is lost: braking on feedforward alone
   const char* blind_because_ = "";
-  bool leaving_ = false;         // to be deactivated: it brakes and takes no commands
-  bool disabling_ = false;       // told to let go of the motor: it brakes first
-  std::optional<Instant> seen_;  // when feedback that is usable came last
-  double offset_ = 0.0;          // what homing adds to the encoder's reading
+  Homing homing_;
+  InputWatch fused_watch_, correction_watch_;
+  bool without_correction_ = false;  // it came, and stays away now
+  bool in_vain_ = false;             // the stop under way ends the command as refused
+  double standing_current_ = 0.0;    // of the controller, while it holds
+  bool leaving_ = false;             // to be deactivated: it brakes and takes no commands
+  bool disabling_ = false;           // told to let go of the motor: it brakes first
+  std::optional<Instant> seen_;      // when feedback that is usable came last
+  double offset_ = 0.0;              // what homing adds to the encoder's reading
   double position_ = 0.0;
   double correction_held_ = 0.0;
   double current_ = 0.0;

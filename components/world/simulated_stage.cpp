@@ -1,5 +1,6 @@
 #include "components/world/simulated_stage.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -19,14 +20,16 @@ constexpr double longest_period = 0.01;  // s, of the loop: sizes the history of
 
 /// One drive with its carriage and encoder.
 struct SimulatedStage::Device {
-  Device(SimulatedStage& owner, int axis_number, const Axis& axis_parameters)
+  Device(SimulatedStage& owner, int axis_number, const Axis& axis_parameters, Range travel)
       : parameters{axis_parameters},
         axis{axis_number},
         plant{plant_of(parameters, parameters.model)},
         later{plant_of(parameters, parameters.changed.empty() ? parameters.model : parameters.changed)},
         motor{owner, "motor_" + letter(axis_number), {.optional = true}},
         feedback{owner, "feedback_" + letter(axis_number)},
-        truth{owner, "truth_" + letter(axis_number)} {}
+        index{owner, "index_" + letter(axis_number)},
+        truth{owner, "truth_" + letter(axis_number)},
+        ends{axis_parameters.ends, travel} {}
 
   static physics::AxisPlant plant_of(const Axis& axis, const std::filesystem::path& file) {
     if (file.empty())
@@ -49,7 +52,21 @@ struct SimulatedStage::Device {
   bool is_changed = false;
   Input<stage::MotorCommand> motor;
   Output<stage::AxisFeedback> feedback;
+  Output<stage::IndexPulse> index;
   Output<sensing::AxisReading> truth;
+  AxisEnds ends;
+
+  [[nodiscard]] double zero() const { return parameters.ends.incremental ? parameters.start : 0.0; }
+  void tell_index(const stage::AxisFeedback& of) {
+    if (!ends.has_index()) return;
+    stage::IndexPulse pulse;
+    pulse.cell(of.cell());
+    pulse.axis(of.axis());
+    pulse.at() = of.at();
+    pulse.count(ends.pulses());
+    pulse.position(ends.pulse_at() - zero());
+    index.write(pulse);
+  }
 };
 
 SimulatedStage::SimulatedStage(const Parameters& parameters)
@@ -60,7 +77,9 @@ SimulatedStage::SimulatedStage(const Parameters& parameters)
   directions_ = metrology::axis_directions(machine_.chain, machine_.errors->squareness);
   const Axis* axes[] = {&parameters.x, &parameters.y, &parameters.z};
   for (int axis = 0; axis < metrology::axis_count; ++axis)
-    if (machine_.chain.has(axis)) devices_.push_back(std::make_unique<Device>(*this, axis, *axes[axis]));
+    if (machine_.chain.has(axis))
+      devices_.push_back(std::make_unique<Device>(*this, axis, *axes[axis],
+                                                  machine_.travel[static_cast<std::size_t>(axis)]));
 }
 
 SimulatedStage::~SimulatedStage() = default;
@@ -78,6 +97,7 @@ void SimulatedStage::activate() {
     if (device->is_changed) std::swap(device->plant, device->later);
     device->is_changed = false;
     device->plant.rest_at(device->parameters.start, (now() - *began_).in_seconds());
+    device->ends.reset(device->parameters.start);
   }
 }
 
@@ -98,6 +118,10 @@ void SimulatedStage::move(Device& device, const Tick& tick, int periods) const n
     const bool held =
         command != nullptr && command->enabled() && age < Duration::seconds(parameters_.watchdog);
     device.plant.step(held ? command->current() : 0.0, tick.period);
+    const Range stops = device.ends.stops();
+    const double at = device.plant.position(), velocity = device.plant.velocity();
+    if ((at < stops.lower && velocity < 0.0) || (at > stops.upper && velocity > 0.0))
+      device.plant.go_on_from(std::clamp(at, stops.lower, stops.upper), 0.0);
   }
 }
 
@@ -128,10 +152,10 @@ void SimulatedStage::step(const Tick& tick) noexcept {
 
     const double velocity = device->plant.velocity();
     if (velocity != 0.0) moving_[device->axis] = velocity > 0.0 ? 1.0 : -1.0;
-    double reading = device->plant.reading() + device->parameters.noise * normal_(random_);
+    device->ends.update(device->plant.position(), tick.now, tick.cycle);
+    double reading = device->plant.reading() - device->zero() + device->parameters.noise * normal_(random_);
     if (const double count = device->parameters.resolution; count > 0.0)
       reading = count * std::round(reading / count);
-    const Range travel = machine_.travel[static_cast<std::size_t>(device->axis)];
 
     stage::AxisFeedback feedback;
     stamp(feedback);
@@ -140,10 +164,11 @@ void SimulatedStage::step(const Tick& tick) noexcept {
     feedback.velocity(velocity + device->parameters.velocity_noise * normal_(random_));
     feedback.current(device->plant.motor_current());
     feedback.drive_enabled(enabled);
-    feedback.limit_low(reading < travel.lower - 2e-3);
-    feedback.limit_high(reading > travel.upper + 2e-3);
-    feedback.home_switch(reading < travel.lower);
+    feedback.limit_low(device->ends.limit_low());
+    feedback.limit_high(device->ends.limit_high());
+    feedback.home_switch(device->ends.home());
     device->feedback.write(feedback);
+    device->tell_index(feedback);
     sensing::AxisReading truth;
     truth.cell(cell);
     truth.sensor(static_cast<std::uint32_t>(device->axis));

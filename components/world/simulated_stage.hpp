@@ -9,10 +9,12 @@
 #include <string>
 #include <vector>
 
+#include "components/world/axis_ends.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/machine.hpp"
 #include "core/physics/axis_plant.hpp"
+#include "idl/index.h"
 #include "idl/sensing.h"
 #include "idl/stage.h"
 #include "idl/thermal.h"
@@ -21,7 +23,7 @@ namespace invar::world {
 
 /// Integrates one physics::AxisPlant an axis of the machine file's chain, and carries the carriages' positions to the tool by
 /// the machine's hidden geometric errors (exact transforms) and by what the heat of slide and base does to it. Every axis `a`
-/// has the ports `motor_a` and `feedback_a`, and `truth_a` for simulated sensors.
+/// has the ports `motor_a`, `feedback_a` and `index_a`, and `truth_a` for simulated sensors. Its carriage ends at hard stops.
 /// The drive lets go of the motor when its command is older than the watchdog, as real drives do.
 class SimulatedStage final : public Component {
  public:
@@ -34,6 +36,7 @@ class SimulatedStage final : public Component {
     double noise = 2e-8;
     double velocity_noise = 1e-4;
     double start = 0.0;
+    AxisEndsParameters ends;
     std::filesystem::path changed;  // another truth ...
     double change_at = 1e9;         // ... from this time on
     void describe(auto& p);
@@ -84,6 +87,7 @@ void SimulatedStage::Axis::describe(auto& p) {
   p(noise, "noise", "m", Range{0.0, 1e-3}, "1 sigma of the encoder");
   p(velocity_noise, "velocity_noise", "m/s", Range{0.0, 1.0}, "1 sigma of the velocity sensor");
   p(start, "start", "m", Range{-10.0, 10.0}, "where the carriage stands at the start");
+  p(ends, "ends", "home switch, limit switches, index marks and hard stops");
   p(changed, "changed", "model.yaml that takes the place of `model` at `change_at`: wear, damage, a fault");
   p(change_at, "change_at", "s", Range{0.0, 1e9}, "when, in seconds since the stage was first active",
     while_running);

@@ -11,9 +11,7 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
-#include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
-#include "core/config/quotes.hpp"
 
 namespace invar::compensation {
 
@@ -31,6 +29,15 @@ std::string all_of(const std::filesystem::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
+}
+
+std::string quoted(const std::string& value) {
+  std::string out = "\"";
+  for (const char c : value) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c == '\n' ? ' ' : c;
+  }
+  return out + "\"";
 }
 
 }  // namespace
@@ -52,7 +59,7 @@ std::string& ModelText::line(const std::string& key) {
 }
 
 ModelText& ModelText::comment(const std::string& text) {
-  text_ += std::string(depth_ * 2, ' ') + "# " + printable(text) + "\n";
+  text_ += std::string(depth_ * 2, ' ') + "# " + text + "\n";
   return *this;
 }
 
@@ -93,7 +100,7 @@ ModelText& ModelText::integer(const std::string& key, long value) {
 }
 
 ModelText& ModelText::text(const std::string& key, const std::string& value) {
-  line(key) += " " + config::in_quotes(value) + "\n";
+  line(key) += " " + quoted(value) + "\n";
   return *this;
 }
 
