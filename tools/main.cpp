@@ -2,10 +2,15 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <new>
+#include <string>
 
 #include "core/base/fault.hpp"
+#include "core/base/input_file.hpp"
+#include "core/base/name.hpp"
 #include "tools/command.hpp"
 #include "tools/live/commands.hpp"
+#include "tools/live/terminal.hpp"
 #include "tools/wrong_call.hpp"
 
 namespace {
@@ -47,19 +52,25 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     // Help and version come this way too, with status 0; every real fault of the call is status 2.
     if (error.get_exit_code() == 0) return program.exit(error);
-    std::cerr << "invar: " << invar::tools::wrong_call(program, {argv + 1, argv + argc}, error) << '\n';
+    std::cerr << "invar: "
+              << invar::printable(invar::tools::wrong_call(program, {argv + 1, argv + argc}, error)) << '\n';
     return 2;
   } catch (const invar::InputError& error) {
     std::cerr << error.what();
     if (const auto more = error.faults().size() - 1; more > 0) std::cerr << " (and " << more << " more)";
     std::cerr << '\n';
     return 2;
+  } catch (const std::bad_alloc&) {
+    const std::string file = invar::last_input();
+    std::cerr << (file.empty() ? "invar" : invar::printable(file))
+              << ": needs more memory than this PC gives; name a smaller file, or part of it\n";
+    return 2;
   } catch (const std::filesystem::filesystem_error& error) {
-    std::cerr << error.path1().string() << ": " << error.code().message()
+    std::cerr << invar::printable(error.path1().string()) << ": " << error.code().message()
               << "; check the path and its permissions\n";
     return 2;
   } catch (const std::exception& error) {
-    std::cerr << "invar: " << error.what() << '\n';
+    std::cerr << "invar: " << invar::printable(error.what()) << '\n';
     return 1;
   }
   return 0;
@@ -68,6 +79,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const invar::tools::LettersOnly out{std::cout}, err{std::cerr};
   const int status = run(argc, argv);
   if (std::cout.flush()) return status;
   // A full disk or a closed pipe: who reads the output must not take nothing for an answer.

@@ -35,8 +35,11 @@ KeptModels::Kept KeptModels::read(const std::filesystem::path& folder) {
     throw InputError{yaml.file().string(), "it carries no checksum", "calibrate again"};
   (void)yaml.root().integer("invar_compensation", 1, 1);
   (void)yaml.root().choice("kind", {"kept"});
-  for (const config::Node& model : yaml.root()["models"].children())
+  for (const config::Node& model : yaml.root()["models"].children()) {
+    if (const std::filesystem::path file = model.text("file"); file != file.filename())
+      model["file"].fault("is no file of this folder", "name the file alone");
     kept.models.push_back({folder / model.text("file"), checksum_number(model.text("crc32"))});
+  }
   yaml.finish();
   return kept;
 }

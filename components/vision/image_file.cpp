@@ -12,7 +12,10 @@
 #include <vector>
 
 #include "components/vision/droplets.hpp"
+#include "components/vision/image_header.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/input_file.hpp"
+#include "core/base/limits.hpp"
 
 namespace invar::vision {
 
@@ -45,15 +48,19 @@ std::vector<unsigned char> bytes_of(const std::filesystem::path& file) {
     throw InputError{file.string(), "no such image file", "check the path"};
   if (kind == std::filesystem::file_type::directory)
     throw InputError{file.string(), "is a folder, not an image", "name a file"};
-  // gzopen reads plain files as they are.
-  gzFile in = gzopen(file.c_str(), "rb");
+  // zlib reads plain files as they are.
+  gzFile in = gzdopen(open_input(file, "an image"), "rb");
   if (in == nullptr) throw InputError{file.string(), "the image cannot be read", "check its permissions"};
   std::vector<unsigned char> bytes;
   std::array<unsigned char, 65536> part{};
   int n = 0;
   while ((n = gzread(in, part.data(), static_cast<unsigned>(part.size()))) > 0) {
     bytes.insert(bytes.end(), part.begin(), part.begin() + n);
-    if (bytes.size() > (std::size_t{1} << 31)) break;
+    if (bytes.size() <= limits::image_file) continue;
+    gzclose_r(in);
+    throw InputError{file.string(),
+                     "has more than " + std::to_string(limits::image_file / limits::mib) + " MiB",
+                     "name an image file"};
   }
   const bool broken = n < 0;
   const bool cut = gzclose_r(in) != Z_OK;
@@ -69,10 +76,30 @@ bool starts_with(const std::vector<unsigned char>& bytes, const std::string& tex
                     [](char a, unsigned char b) { return static_cast<unsigned char>(a) == b; });
 }
 
+constexpr const char* formats = "give a PNG, JPEG, TIFF, BMP or PGM file";
+
+/// A few bytes may say that they are a picture of a thousand megabytes.
+void check_size(const std::vector<unsigned char>& bytes, const std::filesystem::path& file) {
+  const auto header = image_header(bytes);
+  if (!header) throw InputError{file.string(), "is no image that can be decoded", formats};
+  constexpr std::uint64_t longest_side = 1U << 20U;
+  if (header->width <= longest_side && header->height <= longest_side &&
+      header->width * header->height <= limits::image_pixels && header->pixel_bytes <= 64 &&
+      header->bytes() <= limits::image_unpacked)
+    return;
+  throw InputError{
+      file.string(),
+      "says that it has " + std::to_string(header->width) + " x " + std::to_string(header->height) +
+          " pixels of " + std::to_string(header->pixel_bytes) + " bytes",
+      "images of up to " + std::to_string(limits::image_pixels / 1'000'000) + " million pixels and " +
+          std::to_string(limits::image_unpacked / limits::gib) + " GiB are read: cut it into several"};
+}
+
 }  // namespace
 
 cv::Mat read_gray_image(const std::filesystem::path& file) {
   const auto bytes = bytes_of(file);
+  check_size(bytes, file);
   cv::Mat image;
   {
     QuietStderr quiet;
@@ -80,12 +107,10 @@ cv::Mat read_gray_image(const std::filesystem::path& file) {
     try {
       image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
     } catch (const cv::Exception&) {
-      image.release();
+      image.release();  // what it dislikes, or has no memory for
     }
   }
-  if (image.empty())
-    throw InputError{file.string(), "is no image that can be decoded",
-                     "give a PNG, JPEG, TIFF, BMP or PGM file"};
+  if (image.empty()) throw InputError{file.string(), "is no image that can be decoded", formats};
   // A decoder fills what is missing of a cut JPEG with grey: measuring that would be wrong without a word.
   if (starts_with(bytes, "\xff\xd8")) {
     std::size_t end = bytes.size();

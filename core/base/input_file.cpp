@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <mutex>
 #include <string_view>
 
 #include "core/base/fault.hpp"
@@ -36,7 +37,22 @@ std::string_view wait_for_writer(int pipe) {
 
 }  // namespace
 
+namespace {
+std::mutex last_lock;
+std::string last_opened;  // NOLINT: one for the process
+}  // namespace
+
+void note_input(const std::filesystem::path& file) {
+  const std::lock_guard lock{last_lock};
+  last_opened = file.string();
+}
+std::string last_input() {
+  const std::lock_guard lock{last_lock};
+  return last_opened;
+}
+
 int open_input(const std::filesystem::path& file, const std::string& named) {
+  note_input(file);
   const auto refuse = [&](int opened, std::string_view what) {
     if (opened >= 0) close(opened);
     throw InputError{file.string(), std::string{what}, "name " + named};

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <sstream>
 
+#include "core/base/limits.hpp"
+
 namespace invar {
 
 namespace {
@@ -177,6 +179,7 @@ bool Unit::same_quantity(const Unit& other) const {
 }
 
 std::optional<Unit> parse_unit(std::string_view text) {
+  if (text.size() > limits::unit) return std::nullopt;  // the parser below goes as deep as the brackets
   if (text.empty() || text == "-") return Unit{};
   if (text == "K") return Unit{{0, 0, 0, 0, 1, 0, 0, 0}, 1.0, -273.15};
   if (text == "degF" || text == "\xC2\xB0\x46")

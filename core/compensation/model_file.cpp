@@ -11,7 +11,9 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
+#include "core/config/quotes.hpp"
 
 namespace invar::compensation {
 
@@ -29,15 +31,6 @@ std::string all_of(const std::filesystem::path& file) {
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
-}
-
-std::string quoted(const std::string& value) {
-  std::string out = "\"";
-  for (const char c : value) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
-  }
-  return out + "\"";
 }
 
 }  // namespace
@@ -59,7 +52,7 @@ std::string& ModelText::line(const std::string& key) {
 }
 
 ModelText& ModelText::comment(const std::string& text) {
-  text_ += std::string(depth_ * 2, ' ') + "# " + text + "\n";
+  text_ += std::string(depth_ * 2, ' ') + "# " + printable(text) + "\n";
   return *this;
 }
 
@@ -100,7 +93,7 @@ ModelText& ModelText::integer(const std::string& key, long value) {
 }
 
 ModelText& ModelText::text(const std::string& key, const std::string& value) {
-  line(key) += " " + quoted(value) + "\n";
+  line(key) += " " + config::in_quotes(value) + "\n";
   return *this;
 }
 

@@ -3,9 +3,9 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
-#include <cctype>
 #include <set>
 
+#include "core/base/name.hpp"
 #include "core/base/shown.hpp"
 
 namespace invar::config {
@@ -16,14 +16,10 @@ namespace {
 /// not have a `-` (Cyclone DDS refuses to read them).
 enum class In { topics, files };
 void check_name(const Node& node, const std::string& name, In where) {
-  const bool good =
-      !name.empty() && name.size() <= 31 && std::all_of(name.begin(), name.end(), [&](unsigned char c) {
-        return std::isalnum(c) != 0 || c == '_' || (c == '-' && where == In::files);
-      });
-  if (!good)
-    node.fault("`" + clipped(name) + "` is no name",
-               where == In::files ? "use 1 to 31 letters, digits, _ or -"
-                                  : "use 1 to 31 letters, digits or _, since it stands in topics");
+  const auto flaw = flaw_of_identifier(name, where == In::files ? "-" : "");
+  if (flaw)
+    node.fault("`" + clipped(name) + "` is no name: it " + flaw->what,
+               flaw->mend + (where == In::files ? "" : ", since it stands in topics"));
 }
 
 void check_file(const Node& node, const std::filesystem::path& path) {

@@ -30,6 +30,9 @@ std::size_t edits(std::string_view a, std::string_view b) {
 
 std::string nearest(std::string_view word, const std::vector<std::string>& choices) {
   std::string best;
+  constexpr std::size_t longest_word =
+      64;  // nobody misspells a longer one, and the comparison takes its square
+  if (word.size() > longest_word) return best;
   std::size_t best_distance = std::max<std::size_t>(1, word.size() / 3) + 1;
   for (const auto& choice : choices) {
     if (const std::size_t distance = edits(word, choice); distance < best_distance) {

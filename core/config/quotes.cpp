@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "core/base/name.hpp"
+
 namespace invar::config {
 
 namespace {
@@ -62,6 +64,15 @@ std::optional<int> open_quote(std::string_view text) {
     }
   }
   return std::nullopt;
+}
+
+std::string in_quotes(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : printable(text)) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += c;
+  }
+  return out + "\"";
 }
 
 }  // namespace invar::config

@@ -1,7 +1,8 @@
-// Quotes that somebody forgot to close: yaml-cpp takes the rest of the file as text, or stops far below.
+// Quotes of YAML: a text within them, and those that somebody forgot to close, where yaml-cpp takes the rest of the file.
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace invar::config {
@@ -16,5 +17,8 @@ struct Quoted {
 
 /// The line (from 1) of the first quote that opens and is not closed on its line; for text that is no YAML.
 [[nodiscard]] std::optional<int> open_quote(std::string_view text);
+
+/// A text as a YAML scalar in double quotes, which nothing in it can leave; control characters become their escapes as letters.
+[[nodiscard]] std::string in_quotes(std::string_view text);
 
 }  // namespace invar::config

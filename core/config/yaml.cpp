@@ -10,42 +10,20 @@
 #include <sstream>
 
 #include "core/base/input_file.hpp"
+#include "core/base/limits.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 #include "core/config/quotes.hpp"
+#include "core/config/yaml_bounds.hpp"
+#include "core/config/yaml_document.hpp"
 
 namespace invar::config {
-
-namespace detail {
-
-struct Place {
-  YAML::Node yaml;
-  std::string path;
-  std::string key;
-  int line = 0;
-  bool accept_all = false;
-  bool empty = false;  // the key stands there, without a value
-  std::set<std::string> known;
-  std::vector<std::pair<std::string, std::shared_ptr<Place>>> children;
-};
-
-struct Document {
-  std::filesystem::path file;
-  std::string text;
-  std::shared_ptr<Place> root;
-  std::vector<Fault> faults;
-};
-
-}  // namespace detail
 
 namespace {
 
 using detail::Document;
+using detail::joined;
 using detail::Place;
-
-std::string joined(const std::string& path, const std::string& key) {
-  return path.empty() ? clipped(key) : path + "." + clipped(key);
-}
 
 int line_of(const YAML::Node& node, int otherwise) {
   return node.IsDefined() && !node.IsNull() && !node.Mark().is_null() ? node.Mark().line + 1 : otherwise;
@@ -58,46 +36,20 @@ std::string located(const Document& document, const Place& place) {
   return where;
 }
 
-/// Keys that stand twice (of which the parser would keep the first) and keys that nobody asked for.
-void collect_keys(const Document& document, const Place& place, std::vector<Fault>& faults) {
-  const auto located_at = [&](const YAML::Node& key) {
-    return document.file.string() + ":" + std::to_string(key.Mark().line + 1) + ": " +
-           joined(place.path, key.IsNull()     ? "~"
-                              : key.IsScalar() ? key.Scalar()
-                                               : "?");
-  };
-  if (place.yaml.IsDefined() && place.yaml.IsMap()) {
-    std::set<std::string> seen;
-    for (const auto& entry : place.yaml)
-      if (!entry.first.IsScalar())
-        faults.push_back({located_at(entry.first), "is no key", "write a word before the colon"});
-      else if (!seen.insert(entry.first.Scalar()).second)
-        faults.push_back({located_at(entry.first), "stands twice", "keep one of them"});
-  }
-  if (place.accept_all) return;
-  if (place.yaml.IsDefined() && place.yaml.IsMap() && !place.known.empty()) {
-    const std::vector<std::string> known{place.known.begin(), place.known.end()};
-    for (const auto& entry : place.yaml) {
-      const std::string key = entry.first.Scalar();
-      if (!entry.first.IsScalar() || place.known.contains(key)) continue;
-      std::string mend = "remove it, or use one of: ";
-      if (const std::string near = nearest(key, known); !near.empty()) {
-        mend = "did you mean `" + near + "`?";
-      } else {
-        for (const auto& name : known) mend += (name == known.front() ? "" : ", ") + name;
-      }
-      faults.push_back({located_at(entry.first), "unknown key", mend});
-    }
-  }
-  for (const auto& [key, child] : place.children) collect_keys(document, *child, faults);
-}
-
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
   throw InputError{file.string(), what, mend};
 }
 
 InputError open_quote_at(const std::string& name, int line) {
   return {name + ":" + std::to_string(line), "a quote is not closed", "close it on this line"};
+}
+
+/// A text is one line, however it is folded in the file.
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text;
 }
 
 /// yaml-cpp closes an open quote at the end of the file, or another opening quote closes it some lines below. `seen`: places
@@ -146,11 +98,7 @@ const YAML::Node& Node::raw() const { return place_->yaml; }
 void Node::accept_all() const { place_->accept_all = true; }
 
 void Node::fault(std::string what, std::string mend) const {
-  Fault fault{where(), std::move(what), std::move(mend)};
-  const bool known = std::any_of(document_->faults.begin(), document_->faults.end(), [&](const Fault& other) {
-    return other.where == fault.where && other.what == fault.what;
-  });
-  if (!known) document_->faults.push_back(std::move(fault));
+  document_->faults.add({where(), std::move(what), std::move(mend)});
 }
 
 bool Node::has(std::string_view name) const { return (*this)[name].exists(); }
@@ -158,27 +106,24 @@ bool Node::has(std::string_view name) const { return (*this)[name].exists(); }
 Node Node::operator[](std::string_view name) const {
   const std::string key{name};
   place_->known.insert(key);
-  for (const auto& [known, child] : place_->children)
-    if (known == key) return {document_, child};
+  if (auto known = place_->child(key)) return {document_, std::move(known)};
   if (is_scalar()) fault("a map is expected here", "write `" + key + ": ...` below it");
   auto child = std::make_shared<Place>();
-  if (is_map()) {  // a missing key must not become a node of its own: yaml-cpp's "zombie" throws on every use
-    const auto& map = static_cast<const YAML::Node&>(place_->yaml);
-    if (map[key].IsDefined()) child->yaml.reset(map[key]);
+  bool stands = false;
+  if (is_map()) {
+    place_->look_at_keys();
+    const auto value = place_->values->find(key);
+    stands = value != place_->values->end();
+    if (stands) child->yaml.reset(value->second);
   }
   child->key = key;
   child->path = joined(place_->path, key);
   child->line = line_of(child->yaml, place_->line);
-  place_->children.emplace_back(key, child);
-  const Node result{document_, child};
-  if (is_map() && !result.exists()) {
-    for (const auto& entry : place_->yaml) {
-      if (!entry.first.IsScalar() || entry.first.Scalar() != key) continue;
-      child->empty = true;
-      child->line = line_of(entry.first, child->line);
-      result.fault("has no value", "write one behind the colon, or remove the key");
-      break;
-    }
+  const Node result{document_, place_->add(key, child)};
+  if (stands && !result.exists()) {
+    child->empty = true;
+    if (const auto line = place_->lines.find(key); line != place_->lines.end()) child->line = line->second;
+    result.fault("has no value", "write one behind the colon, or remove the key");
   }
   return result;
 }
@@ -222,18 +167,15 @@ std::vector<Node> Node::children() const {
     std::size_t index = 0;
     for (const auto& entry : place_->yaml) {
       const std::string key = std::to_string(index++);
-      auto found = std::find_if(place_->children.begin(), place_->children.end(),
-                                [&](const auto& child) { return child.first == key; });
-      if (found == place_->children.end()) {
-        auto child = std::make_shared<Place>();
+      auto child = place_->child(key);
+      if (child == nullptr) {
+        child = place_->add(key, std::make_shared<Place>());
         child->yaml.reset(entry);
         child->key = key;
         child->path = place_->path + "[" + key + "]";
         child->line = line_of(entry, place_->line);
-        place_->children.emplace_back(key, child);
-        found = std::prev(place_->children.end());
       }
-      result.push_back({document_, found->second});
+      result.push_back({document_, child});
     }
   }
   return result;
@@ -326,7 +268,7 @@ std::string Node::as_text() const {
     fault("a text is expected here", "write one word or a quoted text");
     return {};
   }
-  return place_->yaml.Scalar();
+  return one_line(place_->yaml.Scalar());
 }
 
 std::string Node::as_choice(std::initializer_list<std::string_view> choices) const {
@@ -407,7 +349,8 @@ Yaml Yaml::load(const std::filesystem::path& file) {
   std::string text;
   std::array<char, 1U << 16U> block{};
   ssize_t got = 0;
-  while ((got = read(opened, block.data(), block.size())) > 0)
+  // One byte beyond the bound is enough for `parse` to refuse it.
+  while (text.size() <= limits::yaml_bytes && (got = read(opened, block.data(), block.size())) > 0)
     text.append(block.data(), static_cast<std::size_t>(got));
   close(opened);
   return parse(text, file.string());
@@ -421,6 +364,7 @@ Yaml Yaml::parse(const std::string& text, const std::string& name) {
   result.document_->root = std::make_shared<Place>();
   if (text.find('\0') != std::string::npos) return fail(name, "is not a text file", "name a YAML file");
   try {
+    check_bounds(text, name);
     auto documents = YAML::LoadAll(text);
     for (std::size_t i = 1; i < documents.size(); ++i)
       if (!documents[i].IsNull())
@@ -446,11 +390,11 @@ const std::string& Yaml::text() const { return document_->text; }
 
 std::vector<Fault> Yaml::faults() const {
   auto faults = document_->faults;
-  collect_keys(*document_, *document_->root, faults);
-  return faults;
+  detail::collect_keys(*document_, *document_->root, faults);
+  return faults.all();
 }
 
-std::size_t Yaml::fault_count() const { return document_->faults.size(); }
+std::size_t Yaml::fault_count() const { return document_->faults.count(); }
 
 void Yaml::finish() const {
   if (auto all = faults(); !all.empty()) throw InputError{std::move(all)};

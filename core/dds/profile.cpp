@@ -7,6 +7,9 @@
 #include <limits>
 #include <sstream>
 
+#include "core/base/name.hpp"
+#include "core/base/shown.hpp"
+
 namespace invar::dds {
 
 namespace {
@@ -25,6 +28,8 @@ Durability durability_of(const config::Node& node) {
 Profile read_profile(const config::Node& node) {
   Profile p;
   p.name = node.key();
+  if (const auto flaw = flaw_of_identifier(p.name, "-"))
+    node.fault("`" + clipped(p.name) + "` is no name: it " + flaw->what, flaw->mend);
   p.purpose = node.text("for");
   p.traffic = node.choice("traffic", {"realtime", "general"}, "general") == "realtime" ? Traffic::realtime
                                                                                        : Traffic::general;

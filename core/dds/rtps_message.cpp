@@ -43,17 +43,18 @@ struct NumberSet {
   std::int64_t highest = 0;  // that is in the set; below the base where it is empty
 };
 
-bool read_set(RtpsBytes& bytes, NumberSet& set, bool of_fragments) {
+Flaw read_set(RtpsBytes& bytes, NumberSet& set, bool of_fragments) {
   set.base = of_fragments ? bytes.u32() : bytes.sequence_number();
   set.bits = bytes.u32();
-  if (!bytes.ok() || set.bits > most_bits) return false;
+  if (!bytes.ok() || set.bits > most_bits) return Flaw::length;
+  if (set.base < 0 || set.base > SequenceGuard::last) return Flaw::numbers;
   set.highest = set.base - 1;
   for (std::uint32_t bit = 0; bit < set.bits; bit += 32) {
     const std::uint32_t word = bytes.u32();
-    for (std::uint32_t i = 0; word << i != 0 && i < 32; ++i)
+    for (std::uint32_t i = 0; i < 32 && word << i != 0; ++i)
       if ((word << i & 0x80000000U) != 0 && bit + i < set.bits) set.highest = set.base + bit + i;
   }
-  return bytes.ok();
+  return bytes.ok() ? Flaw::none : Flaw::length;
 }
 
 /// The head that DATA and DATA_FRAG share, up to the sequence number.
@@ -168,7 +169,7 @@ Flaw check_gap(const Submessage& sub, Context& context) {
   const std::uint32_t writer = bytes.entity();
   const std::int64_t start = bytes.sequence_number();
   NumberSet set;
-  if (!read_set(bytes, set, false)) return Flaw::length;
+  if (const Flaw flaw = read_set(bytes, set, false); flaw != Flaw::none) return flaw;
   if (!is_number(start) || set.base < start) return Flaw::numbers;
   return context.guard.admits(context.source, writer, std::max(set.base - 1, set.highest),
                               SequenceGuard::Step::walked, context.now)
@@ -180,12 +181,11 @@ Flaw check_acknack(const Submessage& sub) {
   RtpsBytes bytes = sub.bytes();
   bytes.skip(8);  // reader and writer
   NumberSet set;
-  if (!read_set(bytes, set, false)) return Flaw::length;
+  if (const Flaw flaw = read_set(bytes, set, false); flaw != Flaw::none) return flaw;
   bytes.skip(4);  // count
   if (!bytes.ok()) return Flaw::length;
   // Base 0 without bits asks for the writer's first heartbeat.
-  return set.base < 0 || set.base > SequenceGuard::last || (set.base == 0 && set.bits > 0) ? Flaw::numbers
-                                                                                           : Flaw::none;
+  return set.base == 0 && set.bits > 0 ? Flaw::numbers : Flaw::none;
 }
 
 Flaw check_nack_frag(const Submessage& sub, const Context& context) {
@@ -194,7 +194,7 @@ Flaw check_nack_frag(const Submessage& sub, const Context& context) {
   const std::uint32_t writer = bytes.entity();
   const std::int64_t number = bytes.sequence_number();
   NumberSet set;
-  if (!read_set(bytes, set, true)) return Flaw::length;
+  if (const Flaw flaw = read_set(bytes, set, true); flaw != Flaw::none) return flaw;
   bytes.skip(4);  // count
   if (!bytes.ok()) return Flaw::length;
   if (!is_number(number) || set.base < 1 || set.highest < set.base) return Flaw::numbers;

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "core/base/limits.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 #include "core/config/yaml.hpp"
@@ -130,10 +131,10 @@ void read_quantity(const config::Yaml& yaml, const Node& node, Register& reg) {
       reg.unit = "1";
     }
   }
-  const std::size_t before = yaml.faults().size();
+  const std::size_t before = yaml.fault_count();
   reg.scale = scale.exists() ? scale.as_number("1") : 1.0;
   if (reg.scale == 0.0) {
-    if (yaml.faults().size() == before)
+    if (yaml.fault_count() == before)
       scale.fault("a scale of 0 loses the value", "write how much one count is, for example 0.01");
     reg.scale = 1.0;
   }
@@ -357,13 +358,22 @@ RegisterMap read(const config::Yaml& yaml) {
         .fault("values would be stale between two polls", "make `timeouts.stale` at least twice `poll`");
 
   const Node registers = root.required("registers");
+  if (registers.map().size() > limits::map_registers) {
+    registers.fault("has more than " + std::to_string(limits::map_registers) + " registers",
+                    "make several maps of it");
+    yaml.finish();
+  }
   std::vector<bool> sound;  // what hangs on a wrong register is not reported a second time
   for (const Node& node : registers.map()) {
-    const std::size_t before = yaml.faults().size();
+    const std::size_t before = yaml.fault_count();
     map.registers.push_back(read_register(yaml, node, order));
     map.registers.back().stale_after = stale;
-    sound.push_back(yaml.faults().size() == before);
+    sound.push_back(yaml.fault_count() == before);
   }
+  for (const Fault& fault : yaml.faults())  // keys that nobody asked for are among them
+    for (std::size_t i = 0; i < sound.size(); ++i)
+      if (fault.where.find(": registers." + map.registers[i].name + ".") != std::string::npos)
+        sound[i] = false;
   if (registers.is_map() && map.registers.empty())
     registers.fault("no registers", "write `name: {address: 0, kind: holding, type: uint16, access: read}`");
   check_overlaps(registers, map, sound);

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/limits.hpp"
 #include "core/base/unit.hpp"
 #include "core/physics/expression.hpp"
 
@@ -144,6 +145,14 @@ std::vector<Formula> formulas_of(const physics::Model& model, const physics::Uni
 }  // namespace
 
 void check_own_expressions(const Node& root, const physics::Model& model) {
+  if (model.equations.states.size() + model.equations.inputs.size() + model.equations.outputs.size() +
+          model.parameters.size() >
+      limits::equation_names) {
+    root.fault("names more than " + std::to_string(limits::equation_names) +
+                   " states, inputs, outputs and parameters",
+               "take fewer: each formula is read with all of them");
+    return;
+  }
   Names names;
   std::vector<Node> formulas;
   for (const auto& node : root["states"].children()) {

@@ -78,6 +78,14 @@ const recording::Member* member_at(const recording::Type& type, std::string_view
   return dot == std::string_view::npos ? &*found : member_at(*found->type, path.substr(dot + 1));
 }
 
+/// Says a sample when it was made, and in which cycle, in the numbers that a stamp has?
+bool has_stamp(const recording::Type& type) {
+  const auto* time = member_at(type, "at.time_ns");
+  const auto* cycle = member_at(type, "at.cycle");
+  return time != nullptr && cycle != nullptr && time->type->kind == recording::Kind::int64 &&
+         cycle->type->kind == recording::Kind::uint64;
+}
+
 std::string names_of(const recording::Type& type) {
   std::string list;
   for (const auto& member : type.members) list += (list.empty() ? "" : ", ") + member.name;
@@ -227,10 +235,9 @@ class Reader {
       const auto found = recording_.schemas().find(schema);
       if (found == recording_.schemas().end() || found->second.encoding != "omgidl")
         refuse("`" + topic.name + "` has no IDL schema", "record it with `invar record`");
-      topic.type =
-          recording::parse_idl(found->second.data, "schema " + found->second.name).find(found->second.name);
-      if (topic.type == nullptr || member_at(*topic.type, "at.time_ns") == nullptr ||
-          member_at(*topic.type, "at.cycle") == nullptr)
+      topic.type = recording::parse_idl(found->second.data, file_ + ": schema " + found->second.name)
+                       .find(found->second.name);
+      if (topic.type == nullptr || !has_stamp(*topic.type))
         refuse("`" + topic.name + "` carries no stamp `at`",
                "name a topic whose samples say when they were made");
     }

@@ -11,6 +11,8 @@
 #include <numbers>
 
 #include "core/base/fault.hpp"
+#include "core/base/limits.hpp"
+#include "core/base/shown.hpp"
 
 namespace invar::physics {
 
@@ -193,6 +195,10 @@ std::size_t Expressions::result(Section section, Operation operation, std::size_
 }
 
 std::size_t Expressions::add(Section section, const std::string& formula, const std::string& where) {
+  if (formula.size() > limits::formula)
+    throw InputError{where,
+                     "`" + clipped(formula) + "` has " + std::to_string(formula.size()) + " characters",
+                     "write formulas of at most " + std::to_string(limits::formula)};
   try {
     return FormulaRecorder{*this, section}.record(formula);
   } catch (const mu::ParserError& error) {

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/base/contract.hpp"
+#include "core/base/limits.hpp"
 
 namespace invar::recording {
 
@@ -69,6 +70,7 @@ class Decoder {
       case Kind::array:
         return elements(*type.element, type.bound, value);
       case Kind::structure: {
+        if (!takes(type.members.size())) return fail(CdrFault::many);
         std::vector<Value> members(type.members.size());
         for (std::size_t i = 0; i < members.size(); ++i)
           if (!read(*type.members[i].type, members[i])) return false;
@@ -133,16 +135,23 @@ class Decoder {
       value.content = Bytes{all.begin(), all.end()};
       return true;
     }
-    std::vector<Value> list;
-    for (std::uint32_t i = 0; i < length; ++i)
-      if (!read(element, list.emplace_back())) return false;
+    if (!takes(length)) return fail(CdrFault::many);
+    std::vector<Value> list(length);
+    for (Value& each : list)
+      if (!read(element, each)) return false;
     value.content = std::move(list);
     return true;
   }
 
+  /// Each value takes many times the memory of its bytes.
+  bool takes(std::size_t values) {
+    values_ += values;
+    return values_ <= limits::message_values;
+  }
+
   ByteView body_;
   bool swapped_;
-  std::size_t at_ = 0;
+  std::size_t at_ = 0, values_ = 0;
   std::optional<CdrFault> fault_;
 };
 
@@ -269,6 +278,8 @@ std::string_view sentence(CdrFault fault) {
       return "a string does not end with a zero byte";
     case CdrFault::bound:
       return "a string or sequence is longer than its type allows";
+    case CdrFault::many:
+      return "it holds more than a million values";
   }
   return "";
 }

@@ -17,7 +17,8 @@ enum class CdrFault : std::uint8_t {
   too_long,       // more than padding is left after the type
   boolean,        // a boolean is neither 0 nor 1
   text,           // a string does not end with its zero byte
-  bound           // a string or sequence is longer than its type allows
+  bound,          // a string or sequence is longer than its type allows
+  many            // it holds more values than are taken apart (limits::message_values)
 };
 std::string_view sentence(CdrFault fault);
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <type_traits>
 
+#include "core/base/fault.hpp"
+#include "core/base/limits.hpp"
+
 namespace invar::recording {
 
 namespace {
@@ -25,6 +28,10 @@ Columns::Columns(const Type& type, std::size_t longest) : longest_{longest}, roo
 
 Columns::Node Columns::layout(const Type& type, std::string path, std::string unit) {
   Node node{&type, std::move(path), std::move(unit), {}, false};
+  if (++columns_ > limits::table_columns)
+    throw InputError{"type `" + type.name + "`",
+                     "has more than " + std::to_string(limits::table_columns) + " columns as a table",
+                     "export it as JSON (--json), or with fewer elements of its arrays (--elements)"};
   if (type.kind == Kind::structure) {
     for (const Member& member : type.members)
       node.children.push_back(layout(*member.type, join(node.path, member.name), member.unit));
@@ -46,10 +53,16 @@ void Columns::widen(Node& node, const Value& value) {
   const auto* list = std::get_if<std::vector<Value>>(&value.content);
   if (list == nullptr) return;
   if (node.type->kind == Kind::sequence) {
+    const std::uint64_t each = 64 * node.type->element->values;  // octets of an array are up to 64 columns
     if (list->size() > longest_) node.shortened = true;
-    while (node.children.size() < std::min(list->size(), longest_))
+    while (node.children.size() < std::min(list->size(), longest_)) {
+      if (columns_ + each > limits::table_columns) {
+        node.shortened = true;
+        break;
+      }
       node.children.push_back(
           layout(*node.type->element, element_path(node.path, node.children.size()), node.unit));
+    }
   }
   for (std::size_t i = 0; i < std::min(list->size(), node.children.size()); ++i)
     widen(node.children[i], (*list)[i]);

@@ -24,6 +24,7 @@ using Cell = std::variant<std::monostate, std::int64_t, std::uint64_t, double, f
 /// columns, booleans 0 and 1.
 class Columns {
  public:
+  /// Throws InputError where there would be more than limits::table_columns; a sequence beyond them is shortened.
   explicit Columns(const Type& type, std::size_t longest = 64);
 
   /// Makes room for the sequences of a message; call it for every message before the first row.
@@ -51,7 +52,7 @@ class Columns {
   static void list_shortened(const Node& node, std::vector<std::string>& paths);
   static void fill(const Node& node, const Value* value, std::vector<Cell>& row);
 
-  std::size_t longest_;
+  std::size_t longest_, columns_ = 0;
   bool has_sequences_ = false;
   Node root_;
 };

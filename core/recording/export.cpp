@@ -10,7 +10,9 @@
 #include <set>
 
 #include "core/base/fault.hpp"
+#include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
+#include "core/base/shown.hpp"
 #include "core/recording/cdr.hpp"
 #include "core/recording/columns.hpp"
 #include "core/recording/value_json.hpp"
@@ -183,7 +185,7 @@ class Exporter {
       return;
     }
     try {
-      topic.type = parse_idl(schema->data, "schema " + schema->name).find(schema->name);
+      topic.type = parse_idl(schema->data, "schema " + clipped(printable(schema->name))).find(schema->name);
     } catch (const InputError& error) {
       topic.report.problem = error.what();
       return;
@@ -192,7 +194,12 @@ class Exporter {
       topic.report.problem = "its schema does not define `" + schema->name + "`";
       return;
     }
-    if (!options_.json) topic.columns.emplace(*topic.type, options_.longest);
+    try {
+      if (!options_.json) topic.columns.emplace(*topic.type, options_.longest);
+    } catch (const InputError& error) {
+      topic.report.problem = error.what();
+      return;
+    }
     const std::string stem = file_name(channel.topic);
     std::string name = stem;
     for (int n = 2; !file_names_.insert(name).second; ++n) name = stem + "-" + std::to_string(n);

@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <charconv>
 #include <limits>
 #include <optional>
 #include <set>
 
 #include "core/base/fault.hpp"
+#include "core/base/limits.hpp"
 #include "core/recording/idl_lexer.hpp"
 #include "core/recording/idl_type.hpp"
 
@@ -65,7 +67,28 @@ class Parser {
   }
 
   [[nodiscard]] std::string scoped(const std::string& name) const {
-    return scope_.empty() ? name : scope_ + "::" + name;
+    std::string full = scope_.empty() ? name : scope_ + "::" + name;
+    if (full.size() > limits::idl_name) fail("a name with its modules is too long", "shorten it");
+    return full;
+  }
+  /// The type with its size and depth, which are bounded: whoever decodes it or lays it out walks over all of it.
+  TypePointer sized(Type type) {
+    if (type.element != nullptr) {
+      const bool one = type.kind == Kind::sequence || type.element->kind == Kind::octet;
+      type.values = one ? 1 : type.element->values * type.bound;
+      type.depth = type.element->depth + 1;
+    }
+    if (type.kind == Kind::structure) type.values = 0;
+    for (const Member& member : type.members) {
+      type.values += member.type->values;
+      type.depth = std::max(type.depth, member.type->depth + 1);
+    }
+    if (type.values > limits::idl_values)
+      fail("a type has more than " + std::to_string(limits::idl_values) + " values, arrays multiplied out",
+           "make its arrays shorter, or sequences of them");
+    if (type.depth > limits::idl_depth)
+      fail("types are nested more than " + std::to_string(limits::idl_depth) + " deep", "nest them less");
+    return std::make_shared<Type>(std::move(type));
   }
   void declare(const std::string& full) {
     if (!declared_.insert(full).second) fail("`" + full + "` is defined twice", "keep one of them");
@@ -112,6 +135,7 @@ class Parser {
           if (open > 0) argument += now().text;
         }
       }
+      if (argument.size() > limits::unit && what == "unit") fail("a unit is too long", "shorten it");
       if (what == "unit") found.unit = argument;
       if (what == "key") found.key = argument.empty() || argument == "TRUE" || argument == "true";
       if (what == "value") found.value = number(argument);
@@ -142,7 +166,8 @@ class Parser {
       expect(";");
     }
     if (type->members.empty()) unsupported("a structure without members");
-    schema_.types[type->name] = std::move(type);
+    const std::string full = type->name;
+    schema_.types[full] = sized(std::move(*type));
   }
 
   void enumeration() {
@@ -238,7 +263,7 @@ class Parser {
         fail("an array has too many dimensions", "take fewer");
     }
     for (auto each = lengths.rbegin(); each != lengths.rend(); ++each)
-      element = std::make_shared<Type>(Type{Kind::array, "", *each, std::move(element)});
+      element = sized({Kind::array, "", *each, std::move(element)});
     return element;
   }
 
@@ -268,7 +293,7 @@ class Parser {
       TypePointer element = type_spec(depth + 1);
       const std::uint32_t bound = accept(",") ? length() : 0;
       expect(">");
-      return std::make_shared<Type>(Type{Kind::sequence, "", bound, std::move(element)});
+      return sized({Kind::sequence, "", bound, std::move(element)});
     }
     if (const auto found = primitives().find(now().text);
         now().kind == IdlToken::Kind::name && found != primitives().end()) {
@@ -293,6 +318,11 @@ class Parser {
 
 }  // namespace
 
-IdlSchema parse_idl(std::string_view text, const std::string& name) { return Parser{text, name}.all(); }
+IdlSchema parse_idl(std::string_view text, const std::string& name) {
+  if (text.size() > limits::idl_text)
+    throw InputError{name, "has " + std::to_string(text.size()) + " bytes of IDL",
+                     "keep to " + std::to_string(limits::idl_text)};
+  return Parser{text, name}.all();
+}
 
 }  // namespace invar::recording

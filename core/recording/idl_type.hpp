@@ -49,6 +49,9 @@ struct Type {
   TypePointer element{};          // of arrays and sequences
   std::vector<Member> members{};  // of structures
   std::vector<std::pair<std::string, std::int32_t>> enumerators{};  // of enumerations
+  std::uint64_t values =
+      1;                  // of fixed length within it, arrays multiplied out; octets of an array count as one
+  std::size_t depth = 1;  // types within types, itself included
 };
 
 /// The structures and enumerations of a text, by scoped name (typedefs are resolved).

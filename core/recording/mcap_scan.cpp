@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <string>
 
+#include "core/base/name.hpp"
+#include "core/base/shown.hpp"
+
 namespace invar::recording {
 
 using mcap::Opcode;
@@ -37,12 +40,31 @@ void count(const mcap::Message& message, mcap::Statistics& statistics, Segment& 
   segment.channels.insert(message.channel_id);
 }
 
+/// Texts are copied out of the file, several times what they have there: together they are bounded.
+bool has_room(RecordingContents& contents, std::size_t bytes) {
+  const bool before = contents.definitions <= limits::mcap_definitions;
+  contents.definitions += bytes;
+  if (contents.definitions <= limits::mcap_definitions) return true;
+  if (before)
+    contents.add_damage("its schemas, channels and metadata have more than " +
+                        std::to_string(limits::mcap_definitions / limits::mib) +
+                        " MiB; those beyond are left out");
+  return false;
+}
+
 void add_definition(RecordingContents& contents, const mcap::Record& record) {
+  if (record.opcode != Opcode::schema && record.opcode != Opcode::channel) return;
+  if (!has_room(contents, record.content.size())) return;
   if (record.opcode == Opcode::schema) {
     if (auto schema = mcap::parse_schema(record.content))
       contents.schemas.emplace(schema->id, std::move(*schema));
   } else if (record.opcode == Opcode::channel) {
-    if (auto channel = mcap::parse_channel(record.content))
+    auto channel = mcap::parse_channel(record.content);
+    if (!channel) return;
+    if (const auto flaw = flaw_of_label(channel->topic, longest_topic))
+      contents.add_damage("the name of channel " + std::to_string(channel->id) + ", `" +
+                          clipped(printable(channel->topic)) + "`, " + flaw->what + "; it is left out");
+    else
       contents.channels.emplace(channel->id, std::move(*channel));
   }
 }
@@ -52,13 +74,22 @@ void scan_chunk(RecordingContents& contents, const mcap::Chunk& chunk, bool cut)
       "the chunk at byte " + std::to_string(chunk.records.data() - contents.bytes.data());
   auto segment = segment_of(chunk, contents.bytes);
   if (!segment) {
-    contents.damage.push_back(where + " is packed by `" + chunk.compression + "`, which is not known here");
+    contents.add_damage(where + " is packed by `" + clipped(printable(chunk.compression)) +
+                        "`, which is not known here");
     return;
   }
+  if (chunk.size > limits::mcap_chunk || contents.unpacked + chunk.size > contents.most_unpacked()) {
+    contents.add_damage(where + " unpacks to " + std::to_string(chunk.size / limits::mib) + " MiB, " +
+                        (chunk.size > limits::mcap_chunk ? "more than one chunk may"
+                                                         : "with those before more than its size allows") +
+                        "; its messages are left out");
+    return;
+  }
+  contents.unpacked += chunk.size;
   segment->cut = cut;
   const auto records = records_of(*segment, contents.bytes);
   if (!records) {
-    contents.damage.push_back(where + " is damaged (its CRC does not match); its messages are left out");
+    contents.add_damage(where + " is damaged (its CRC does not match); its messages are left out");
     return;
   }
   ++contents.statistics.chunks;
@@ -84,8 +115,8 @@ bool add_attachment(RecordingContents& contents, ByteView content, std::uint64_t
   auto attachment = mcap::parse_attachment(content);
   if (!attachment) return false;
   if (!attachment->intact)
-    contents.damage.push_back("the attachment `" + attachment->name + "` at byte " + std::to_string(offset) +
-                              " is damaged (its CRC does not match)");
+    contents.add_damage("the attachment `" + clipped(printable(attachment->name)) + "` at byte " +
+                        std::to_string(offset) + " is damaged (its CRC does not match)");
   contents.attachments.push_back(std::move(*attachment));
   return true;
 }
@@ -117,7 +148,9 @@ bool add_from_summary(RecordingContents& contents, const mcap::Record& record, s
       const auto at = record_at(contents.bytes, index->chunk_start, Opcode::chunk);
       const auto chunk = at ? mcap::parse_chunk(at->content) : std::nullopt;
       auto segment = chunk ? segment_of(*chunk, contents.bytes) : std::nullopt;
-      if (!segment) return false;
+      if (!segment || segment->size > limits::mcap_chunk) return false;
+      contents.unpacked += segment->size;
+      if (contents.unpacked > contents.most_unpacked()) return false;
       for (const auto& [channel, offset] : index->message_indexes) segment->channels.insert(channel);
       contents.segments.push_back(std::move(*segment));
       indexed += indexed_messages(*index);
@@ -131,7 +164,8 @@ bool add_from_summary(RecordingContents& contents, const mcap::Record& record, s
     case Opcode::metadata_index: {
       const auto index = mcap::parse_metadata_index(record.content);
       const auto at = index ? record_at(contents.bytes, index->offset, Opcode::metadata) : std::nullopt;
-      auto metadata = at ? mcap::parse_metadata(at->content) : std::nullopt;
+      const bool kept = at && has_room(contents, at->content.size());
+      auto metadata = kept ? mcap::parse_metadata(at->content) : std::nullopt;
       if (!metadata) return false;
       contents.metadata.push_back(std::move(*metadata));
       return true;
@@ -207,6 +241,7 @@ void scan(RecordingContents& contents) {
         if (add_attachment(contents, record->content, offset())) ++contents.statistics.attachments;
         break;
       case Opcode::metadata:
+        if (!has_room(contents, record->content.size())) break;
         if (auto metadata = mcap::parse_metadata(record->content)) {
           contents.metadata.push_back(std::move(*metadata));
           ++contents.statistics.metadata;
@@ -226,10 +261,12 @@ void scan(RecordingContents& contents) {
   contents.statistics.schemas = static_cast<std::uint16_t>(contents.schemas.size());
   contents.statistics.channels = static_cast<std::uint32_t>(contents.channels.size());
   if (!ended)
-    contents.damage.push_back("the file ends at byte " + std::to_string(contents.bytes.size()) +
-                              " without its end; it is read up to there");
+    contents.add_damage("the file ends at byte " + std::to_string(contents.bytes.size()) +
+                        " without its end; it is read up to there");
   else if (!contents.complete)
-    contents.damage.push_back("the file's summary is missing; all its data are there");
+    contents.add_damage("the file's summary is missing; all its data are there");
+  if (contents.more_damage > 0)
+    contents.damage.back() += " (and " + std::to_string(contents.more_damage) + " more of such faults)";
 }
 
 }  // namespace invar::recording

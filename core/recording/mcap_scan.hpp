@@ -1,14 +1,17 @@
 // What an MCAP file holds, found by its summary or, where there is none, by walking over it up to the cut.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
+#include "core/base/limits.hpp"
 #include "core/recording/recording_reader.hpp"
 
 namespace invar::recording {
 
 struct RecordingContents {
+  std::filesystem::path file;
   ByteView bytes;  // the whole file
   std::shared_ptr<const void> keeper;
 
@@ -18,8 +21,22 @@ struct RecordingContents {
   std::vector<mcap::Attachment> attachments;
   std::vector<mcap::Metadata> metadata;
   std::vector<Segment> segments;
-  std::vector<std::string> damage;
+  std::vector<std::string> damage;  // the first of them
+  std::size_t more_damage = 0;      // sentences that are only counted
+  std::uint64_t unpacked = 0;       // [bytes] of all chunks so far
+  std::uint64_t definitions = 0;    // [bytes] of schemas, channels and metadata so far
   bool complete = false;
+
+  void add_damage(std::string sentence) {
+    if (damage.size() < limits::mcap_damage)
+      damage.push_back(std::move(sentence));
+    else
+      ++more_damage;
+  }
+  /// How much its chunks may hold together: what is packed may not grow without end.
+  [[nodiscard]] std::uint64_t most_unpacked() const {
+    return limits::mcap_unpacked_free + limits::mcap_unpacked_times * bytes.size();
+  }
 };
 
 /// Fills the contents from the summary at the file's end. False (contents in any state) when there is none,

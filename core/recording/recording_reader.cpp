@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "core/base/fault.hpp"
+#include "core/base/input_file.hpp"
+#include "core/base/limits.hpp"
 #include "core/recording/mcap_scan.hpp"
 
 namespace invar::recording {
@@ -24,6 +26,7 @@ void map_file(const std::filesystem::path& file, RecordingContents& contents) {
     return InputError{file.string(), std::string{"cannot be read: "} + std::strerror(error),
                       "name a recording (.mcap)"};
   };
+  note_input(file);
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe is not waited for
   if (descriptor < 0) throw refuse(errno);
   struct stat about {};
@@ -48,6 +51,7 @@ void map_file(const std::filesystem::path& file, RecordingContents& contents) {
 
 Recording Recording::open(const std::filesystem::path& file) {
   auto contents = std::make_shared<RecordingContents>();
+  contents->file = file;
   map_file(file, *contents);
   const std::size_t head = std::min(contents->bytes.size(), mcap::magic.size());
   if (!std::equal(contents->bytes.begin(), contents->bytes.begin() + static_cast<std::ptrdiff_t>(head),
@@ -55,6 +59,7 @@ Recording Recording::open(const std::filesystem::path& file) {
     throw InputError{file.string(), "is no MCAP file", "name a recording (.mcap)"};
   if (!read_summary(*contents)) {
     auto anew = std::make_shared<RecordingContents>();
+    anew->file = file;
     anew->bytes = contents->bytes;
     anew->keeper = contents->keeper;
     anew->complete = contents->complete;
@@ -93,6 +98,12 @@ struct MessageStream::Loaded {
   Bytes records;
   std::vector<Entry> entries;  // by time
   std::size_t next = 0;
+
+  /// By the time of its next message, equal ones in file order: the latest first, as a heap wants it.
+  static bool is_later(const std::shared_ptr<Loaded>& a, const std::shared_ptr<Loaded>& b) {
+    const auto key = [](const Loaded& it) { return std::pair{it.entries[it.next].time, it.segment->offset}; };
+    return key(*a) > key(*b);
+  }
 };
 
 MessageStream::MessageStream(std::shared_ptr<const RecordingContents> contents, Selection selection)
@@ -112,6 +123,11 @@ MessageStream::MessageStream(std::shared_ptr<const RecordingContents> contents, 
 }
 
 void MessageStream::load(const Segment& segment) {
+  if (loaded_bytes_ + segment.size > limits::mcap_loaded && !loaded_.empty())
+    throw InputError{contents_->file.string(),
+                     "its chunks overlap in time, more than " +
+                         std::to_string(limits::mcap_loaded / limits::mib) + " MiB of them at once",
+                     "record again, or write it anew by a program that orders its messages"};
   auto records = records_of(segment, contents_->bytes);
   if (!records) {
     ++damaged_;
@@ -132,29 +148,33 @@ void MessageStream::load(const Segment& segment) {
   }
   std::stable_sort(loaded->entries.begin(), loaded->entries.end(),
                    [](const auto& a, const auto& b) { return a.time < b.time; });
-  if (!loaded->entries.empty()) loaded_.push_back(std::move(loaded));
+  if (loaded->entries.empty()) return;
+  loaded_bytes_ += loaded->records.size();
+  loaded_.push_back(std::move(loaded));
+  std::push_heap(loaded_.begin(), loaded_.end(), Loaded::is_later);
 }
 
 std::optional<RecordedMessage> MessageStream::next() {
-  // Used-up chunks are let go only now: the message handed out last may point into one.
-  std::erase_if(loaded_, [](const auto& chunk) { return chunk->next == chunk->entries.size(); });
+  handed_out_.reset();  // the message of before may point into a chunk that is used up
   for (;;) {
-    Loaded* earliest = nullptr;
-    for (const auto& chunk : loaded_) {
-      const auto key = [](const Loaded& it) {
-        return std::pair{it.entries[it.next].time, it.segment->offset};
-      };
-      if (earliest == nullptr || key(*chunk) < key(*earliest)) earliest = chunk.get();
-    }
-    if (!waiting_.empty() &&
-        (earliest == nullptr || waiting_.back()->start <= earliest->entries[earliest->next].time)) {
+    const auto earliest = [&] { return loaded_.front()->entries[loaded_.front()->next].time; };
+    if (!waiting_.empty() && (loaded_.empty() || waiting_.back()->start <= earliest())) {
       const Segment& segment = *waiting_.back();
       waiting_.pop_back();
       load(segment);
       continue;
     }
-    if (earliest == nullptr) return std::nullopt;
-    const auto message = mcap::parse_message(earliest->entries[earliest->next++].content);
+    if (loaded_.empty()) return std::nullopt;
+    std::pop_heap(loaded_.begin(), loaded_.end(), Loaded::is_later);
+    handed_out_ = std::move(loaded_.back());
+    loaded_.pop_back();
+    const auto message = mcap::parse_message(handed_out_->entries[handed_out_->next++].content);
+    if (handed_out_->next < handed_out_->entries.size()) {
+      loaded_.push_back(handed_out_);
+      std::push_heap(loaded_.begin(), loaded_.end(), Loaded::is_later);
+    } else {
+      loaded_bytes_ -= handed_out_->records.size();
+    }
     return RecordedMessage{&contents_->channels.at(message->channel_id), message->sequence, message->log_time,
                            message->publish_time, message->data};
   }

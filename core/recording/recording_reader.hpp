@@ -77,10 +77,10 @@ struct RecordedMessage {
 };
 
 /// Messages of one selection in order of log time; equal times in file order. Holds a few unpacked chunks at
-/// a time.
+/// a time, at most 512 MiB of them.
 class MessageStream {
  public:
-  /// Nothing when there are no more.
+  /// Nothing when there are no more. Throws InputError where more of them overlap in time.
   std::optional<RecordedMessage> next();
   /// Chunks passed over so far because their bytes are damaged.
   [[nodiscard]] std::size_t damaged_chunks() const { return damaged_; }
@@ -95,8 +95,10 @@ class MessageStream {
   std::shared_ptr<const RecordingContents> contents_;
   Selection selection_;
   std::set<std::uint16_t> wanted_;
-  std::vector<const Segment*> waiting_;  // by start time, latest first: the next one is at the back
-  std::vector<std::shared_ptr<Loaded>> loaded_;
+  std::vector<const Segment*> waiting_;          // by start time, latest first: the next one is at the back
+  std::vector<std::shared_ptr<Loaded>> loaded_;  // a heap by the time of the next message
+  std::shared_ptr<Loaded> handed_out_;           // where the message handed out last stands
+  std::uint64_t loaded_bytes_ = 0;
   std::size_t damaged_ = 0;
 };
 

@@ -12,8 +12,12 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/input_file.hpp"
+#include "core/base/limits.hpp"
+#include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
+#include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
+#include "core/recording/columns.hpp"
 
 namespace invar::recording {
 
@@ -37,16 +41,22 @@ class Lines {
     auto end = text_.find('\n', at_);
     while (end == std::string::npos && !ended_) {
       const std::size_t seen = text_.size() - at_;
+      if (seen > limits::csv_line)
+        throw InputError{file_ + ":" + std::to_string(lines_ + 1),
+                         "a line has more than " + std::to_string(limits::csv_line / limits::mib) + " MiB",
+                         "name a CSV file: a header, then one row a sample"};
       more();
       end = text_.find('\n', at_ + seen);
     }
     if (at_ >= text_.size()) return false;
+    ++lines_;
     line = std::string_view{text_}.substr(at_, end == std::string::npos ? end : end - at_);
     at_ = end == std::string::npos ? text_.size() : end + 1;
     return true;
   }
   /// Throws where the rest of the file is damaged: that is what is wrong with it then, whatever a line seems to lack.
   void check_rest() {
+    if (gzdirect(stream_.get()) != 0) return;  // not packed: nothing is damaged
     while (!ended_) at_ = text_.size(), more();
   }
 
@@ -58,6 +68,8 @@ class Lines {
     const int got = gzread(stream_.get(), text_.data() + kept, static_cast<unsigned>(block));
     if (got < 0) throw InputError{file_, "is damaged (gzip cannot unpack it)", "copy the file again"};
     text_.resize(kept + static_cast<std::size_t>(got));
+    unpacked_ += static_cast<std::uint64_t>(got);
+    check_size();
     if (text_.find('\0', kept) != std::string::npos)
       throw InputError{file_, "is not a text file", "name a CSV file"};
     if (got > 0) return;
@@ -67,11 +79,23 @@ class Lines {
     if (status == Z_BUF_ERROR) throw InputError{file_, "is cut off (gzip ends early)", "copy the file again"};
   }
 
+  /// What is packed must not grow without end; numbers shrink to a third or a tenth.
+  void check_size() const {
+    const auto packed = static_cast<std::uint64_t>(std::max<z_off_t>(gzoffset(stream_.get()), 0));
+    if (gzdirect(stream_.get()) != 0 ||
+        unpacked_ <= limits::csv_unpacked_free + limits::csv_unpacked_times * packed)
+      return;
+    throw InputError{file_,
+                     "unpacks to more than " + std::to_string(limits::csv_unpacked_times) + " times its size",
+                     "see that it is the right file; if it is, unpack it by `gunzip` and name that"};
+  }
+
   static constexpr std::size_t block = 1U << 18U;
   std::string file_;
   std::unique_ptr<gzFile_s, int (*)(gzFile)> stream_{nullptr, gzclose};
   std::string text_;  // from the line at `at_` to the end of the last block
-  std::size_t at_ = 0;
+  std::size_t at_ = 0, lines_ = 0;
+  std::uint64_t unpacked_ = 0;
   bool ended_ = false;
 };
 
@@ -139,6 +163,8 @@ Column header(std::string_view cell, const std::string& where) {
     column.unit = std::string{trimmed(cell.substr(open + 1, close - open - 1))};
   }
   if (column.name.empty()) throw InputError{where, "a column has no name", "write `name [unit]`"};
+  if (const auto flaw = flaw_of_label(cell))
+    throw InputError{where + ": column `" + clipped(std::string{cell}) + "`", flaw->what, flaw->mend};
   return column;
 }
 
@@ -168,6 +194,9 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
       if (cells.size() == 1 && line.find_first_of(";\t") != std::string_view::npos)
         refuse(where(), "the cells are parted by semicolons or tabs",
                "part them by commas, and write decimal points");
+      if (cells.size() > limits::csv_columns)
+        refuse(where(), "has " + std::to_string(cells.size()) + " columns",
+               "use at most " + std::to_string(limits::csv_columns));
       std::set<std::string> names;
       for (const auto cell : cells) {
         table.columns.push_back(header(cell, where()));
@@ -187,6 +216,9 @@ Table Table::read(const std::filesystem::path& file, const std::vector<std::stri
       Column& column = table.columns[i];
       const auto value = number(cells[i]);
       if (is_text[i]) {
+        if (const auto flaw = flaw_of_label(cells[i]))
+          refuse(where() + ": column `" + column.name + "`",
+                 "`" + clipped(std::string{cells[i]}) + "` " + flaw->what, flaw->mend);
         column.texts.emplace_back(cells[i]);
         column.values.push_back(value.value_or(missing));
         continue;
@@ -209,8 +241,7 @@ void Table::write(const std::filesystem::path& target) const {
   std::string text;
   for (const Column& column : columns) {
     if (&column != &columns.front()) text += ',';
-    text += column.name;
-    if (!column.unit.empty()) text += " [" + column.unit + "]";
+    append_cell(text, column.name + (column.unit.empty() ? "" : " [" + column.unit + "]"));
   }
   text += '\n';
   char digits[40];
@@ -218,7 +249,7 @@ void Table::write(const std::filesystem::path& target) const {
     for (const Column& column : columns) {
       if (&column != &columns.front()) text += ',';
       if (!column.texts.empty()) {
-        text += column.texts[row];
+        append_cell(text, column.texts[row]);
       } else if (const double value = column.values[row]; std::isinf(value)) {
         text += value > 0 ? "inf" : "-inf";
       } else if (!std::isnan(value)) {

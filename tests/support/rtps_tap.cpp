@@ -15,9 +15,11 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <random>
-#include <tuple>
+#include <span>
 
 #include "core/dds/raw_type.hpp"
+#include "core/dds/rtps_message.hpp"
+#include "core/dds/sequence_guard.hpp"
 
 namespace invar::testing {
 
@@ -38,12 +40,19 @@ class Tap final : public transport::ChainingTransport {
   bool send(rtps::SenderResource* below, const rtps::octet* data, std::uint32_t size,
             rtps::LocatorsIterator* begin, rtps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
-    messages_->add(data, size);
+    if (!messages_->guarded) messages_->add(data, size);
     return below->send(data, size, begin, end, timeout);
   }
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* data, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
-    messages_->add(data, size);
+    if (messages_->guarded) {
+      dds::RtpsContent content;
+      const auto message = std::as_bytes(std::span{data, size});
+      if (examine(message, {}, guard_, content) != dds::Flaw::none || content.hidden_count > 0) return;
+      size = static_cast<std::uint32_t>(content.size);
+    } else {
+      messages_->add(data, size);
+    }
     thread_local std::minstd_rand dice{1};
     if (dice() % 100 >= loss_) next->OnDataReceived(data, size, local, remote);
   }
@@ -52,6 +61,7 @@ class Tap final : public transport::ChainingTransport {
   std::shared_ptr<transport::TransportDescriptorInterface> below_;
   std::shared_ptr<Messages> messages_;
   unsigned loss_;
+  dds::SequenceGuard guard_;
 };
 
 struct TapDescriptor final : transport::ChainingTransportDescriptor {
@@ -153,6 +163,9 @@ void RtpsTap::join() {
     qos.liveliness().announcement_period = {0, 300'000'000};
     if (auto* writer = publisher_->create_datawriter(topic_of(wanted), qos)) writers_.push_back(writer);
   }
+}
+
+void RtpsTap::write() {
   std::vector<std::byte> sample(64);
   sample[1] = std::byte{1};
   for (auto* writer : writers_) writer->write(&sample);

@@ -1,9 +1,10 @@
-// RtpsTap: a participant of Fast DDS, without the filter, that keeps the messages it sends and receives.
+// RtpsTap: a participant of Fast DDS, at first without the filter, that keeps the messages it sends and receives.
 #pragma once
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -11,6 +12,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -23,6 +25,7 @@ class Messages {
  public:
   void add(const void* data, std::size_t size);
   [[nodiscard]] std::vector<Message> all() const;
+  std::atomic<bool> guarded{false};  // the tap takes only what the filter lets through
 
  private:
   mutable std::mutex mutex_;
@@ -38,8 +41,12 @@ class RtpsTap final : private eprosima::fastdds::dds::DomainParticipantListener 
           std::uint32_t largest = 65'500);
   ~RtpsTap() override;
 
-  /// Creates the readers and writers that discovery has called for since the last call, and writes a sample of each topic.
+  /// Creates the readers and writers that discovery has called for since the last call.
   void join();
+  /// From now on it takes only what the filter lets through, and keeps nothing more.
+  void guard() { messages_->guarded = true; }
+  /// Writes 64 octets that mean nothing on each topic.
+  void write();
   [[nodiscard]] std::vector<Message> messages() const { return messages_->all(); }
   /// Ports at which others hear discovery and data.
   [[nodiscard]] std::vector<std::uint16_t> ports() const;

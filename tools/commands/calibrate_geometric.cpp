@@ -16,6 +16,7 @@
 #include "tools/geometric/field_points.hpp"
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/live/terminal.hpp"
 #include "tools/positive.hpp"
 
 namespace invar::tools {
@@ -44,10 +45,11 @@ void calibrate(const Options& options) {
   const bool watched = isatty(STDERR_FILENO) != 0;
   if (watched)
     how.progress = [](double part, const std::string& what) {
-      std::cerr << "\r\033[K" << static_cast<int>(100.0 * part) << " % " << what << std::flush;
+      steer(std::cerr, clear_line);
+      std::cerr << static_cast<int>(100.0 * part) << " % " << what << std::flush;
     };
   result.found = metrology::identify(result.machine, result.input.lines, how);
-  if (watched) std::cerr << "\r\033[K" << std::flush;
+  if (watched) steer(std::cerr, clear_line);
   evaluate(result);
   if (options.study) study_intervals(result);
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/fault.hpp"
+#include "core/config/quotes.hpp"
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/line_search.hpp"
 #include "core/recording/table.hpp"
@@ -20,6 +21,7 @@
 #include "tools/commands/calibrate.hpp"
 #include "tools/geometric/lines_file.hpp"
 #include "tools/geometric/measuring_plan.hpp"
+#include "tools/live/terminal.hpp"
 #include "tools/positive.hpp"
 
 namespace invar::tools {
@@ -83,12 +85,12 @@ void write_job(const PlanChoice& choice, const metrology::Machine& machine, cons
   };
   std::string text =
       "# One of the `jobs` of the component `calibration`; add `verify`: lines that are not fitted.\n";
-  text += "- name: calibrate-geometry\n  machine: " + options.machine.string() +
+  text += "- name: calibrate-geometry\n  machine: " + config::in_quotes(options.machine.string()) +
           "\n  interval: " + report::number(choice.effort.interval, 6) +
           "\n  cycles: " + std::to_string(choice.effort.passes / 2) + "\n  lines:\n";
   for (const PlannedLine& line : choice.lines)
-    text +=
-        "    - {name: \"" + line.name + "\", from: " + place(line.from) + ", to: " + place(line.to) + "}\n";
+    text += "    - {name: " + config::in_quotes(line.name) + ", from: " + place(line.from) +
+            ", to: " + place(line.to) + "}\n";
   std::ofstream file{options.output};
   file << text;
   if (!file.flush())
@@ -136,14 +138,14 @@ void weigh(MeasuringPlan& plan, bool search) {
   for (int level = 0; level < 3 && search; ++level) {
     const bool watched = isatty(STDERR_FILENO) != 0;
     const auto progress = [&](double part) {
-      if (watched)
-        std::cerr << "\r\033[K" << static_cast<int>(100.0 * (level + part) / 3.0) << " % searching lines"
-                  << std::flush;
+      if (!watched) return;
+      steer(std::cerr, clear_line);
+      std::cerr << static_cast<int>(100.0 * (level + part) / 3.0) << " % searching lines" << std::flush;
     };
     sets.push_back(
         {true, metrology::search_lines(machine, metrology::recipe_lines(machine, level),
                                        {longest / 20.0, 6, plan.noise}, plan.prior, plan.misfit, progress)});
-    if (watched) std::cerr << "\r\033[K" << std::flush;
+    if (watched) steer(std::cerr, clear_line);
   }
   for (const Set& set : sets) {
     for (const double pieces : {10.0, 20.0, 40.0}) {

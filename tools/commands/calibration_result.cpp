@@ -6,15 +6,16 @@
 #include <iostream>
 
 #include "core/base/new_file.hpp"
+#include "tools/live/terminal.hpp"
 
 namespace invar::tools {
 
 Progress::Progress(const std::string& what) {
-  if (isatty(STDERR_FILENO) != 0) std::cerr << what << " ...\r" << std::flush;
+  if (isatty(STDERR_FILENO) != 0) std::cerr << what << " ..." << std::flush;
 }
 
 Progress::~Progress() {
-  if (isatty(STDERR_FILENO) != 0) std::cerr << "\x1b[2K" << std::flush;
+  if (isatty(STDERR_FILENO) != 0) steer(std::cerr, clear_line);
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "core/base/name.hpp"
 #include "tools/cell/drives.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/command.hpp"
@@ -39,11 +40,11 @@ int check(const Options& options) {
       report["unchecked"].push_back({{"where", note.where}, {"what", note.what}, {"mend", note.mend}});
     std::cout << report.dump(2) << '\n';
   } else {
-    for (const Fault& fault : faults) std::cerr << fault.line() << '\n';
+    for (const Fault& fault : faults) std::cerr << printable(fault.line()) << '\n';
     if (faults.empty())
       std::cout << options.file.string() << ": sound (" << components << " components in " << processes
                 << " processes)\n";
-    for (const Fault& note : notes) std::cout << note.line() << '\n';
+    for (const Fault& note : notes) std::cout << printable(note.line()) << '\n';
   }
   return faults.empty() ? 0 : 2;
 }

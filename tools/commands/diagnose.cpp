@@ -21,6 +21,7 @@
 #include "tools/diagnose/report_folder.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/patience.hpp"
+#include "tools/live/terminal.hpp"
 #include "tools/other_file.hpp"
 
 namespace invar::tools {
@@ -46,11 +47,12 @@ class ProgressLine {
     constexpr int width = 24;
     std::string bar(width, '-');
     std::fill_n(bar.begin(), static_cast<std::ptrdiff_t>(share * width), '#');
-    std::cerr << "\r\033[K[" << bar << "] " << std::setw(3) << static_cast<int>(100.0 * share) << " %  "
-              << what << std::flush;
+    steer(std::cerr, clear_line);
+    std::cerr << "[" << bar << "] " << std::setw(3) << static_cast<int>(100.0 * share) << " %  " << what
+              << std::flush;
   }
   void clear() const {
-    if (is_seen_) std::cerr << "\r\033[K" << std::flush;
+    if (is_seen_) steer(std::cerr, clear_line);
   }
 
  private:

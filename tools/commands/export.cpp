@@ -37,11 +37,11 @@ int export_(const Options& options) {
   for (const auto& topic : report.topics) {
     if (!topic.file.empty()) std::cout << topic.file.string() << ": " << topic.rows << " rows\n";
     for (const std::string& path : topic.shortened)
-      std::cerr << topic.topic << ": only the first " << options.elements << " elements of `" << path
-                << "` are written; see --elements\n";
+      std::cerr << options.recording.string() << ": " << topic.topic << ": only the first "
+                << options.elements << " elements of `" << path << "` are written; see --elements\n";
     if (topic.problem.empty()) continue;
     complete = false;
-    std::cerr << topic.topic << ": ";
+    std::cerr << options.recording.string() << ": " << topic.topic << ": ";
     if (topic.undecodable > 0)
       std::cerr << topic.undecodable << " messages cannot be read (";
     else

@@ -6,6 +6,7 @@
 #include "core/dds/profile.hpp"
 #include "tools/live/commands.hpp"
 #include "tools/live/text_table.hpp"
+#include "tools/report/escaped.hpp"
 
 namespace invar::tools {
 
@@ -27,7 +28,7 @@ std::string seconds(Duration time, const char* indent, const char* tag) {
 /// What the 2.x parser of Fast DDS takes; each policy once, in the order of its schema.
 void write_fast_end(const dds::Profile& p, const char* end, std::ostream& out) {
   const bool writes = std::string{end} == "data_writer";
-  out << "    <" << end << " profile_name=\"" << p.name << "\">\n"
+  out << "    <" << end << " profile_name=\"" << report::escaped(p.name) << "\">\n"
       << "      <topic>\n"
       << "        <historyQos><kind>" << (p.keep_all ? "KEEP_ALL" : "KEEP_LAST") << "</kind><depth>"
       << p.depth << "</depth></historyQos>\n"
@@ -123,7 +124,7 @@ void write_omg(const dds::Profiles& profiles, std::ostream& out) {
          "<dds xmlns=\"http://www.omg.org/spec/DDS-XML\">\n"
          "  <qos_library name=\"invar\">\n";
   for (const auto& [name, profile] : profiles) {
-    out << "    <qos_profile name=\"" << name << "\">\n";
+    out << "    <qos_profile name=\"" << report::escaped(name) << "\">\n";
     write_omg_end(profile, "datareader_qos", out);
     write_omg_end(profile, "datawriter_qos", out);
     out << "    </qos_profile>\n";

@@ -1,6 +1,7 @@
 // `invar run`: brings a cell up, keeps it running, runs a job, stops it in a safe order.
 #include <signal.h>
 
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -13,6 +14,7 @@
 #include <optional>
 #include <sstream>
 
+#include "core/base/name.hpp"
 #include "core/base/temporary_folder.hpp"
 #include "tools/cell/launcher.hpp"
 #include "tools/cell/process.hpp"
@@ -56,8 +58,27 @@ int run_one(const Options& options) {
   return status;
 }
 
+/// The text of a notice: names in it come over DDS, and nothing in them may steer a terminal.
+class PrintableText final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm&, spdlog::memory_buf_t& out) override {
+    const std::string text = printable_lines({message.payload.data(), message.payload.size()});
+    out.append(text.data(), text.data() + text.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return spdlog::details::make_unique<PrintableText>();
+  }
+};
+
+std::unique_ptr<spdlog::formatter> log_lines() {
+  auto lines = std::make_unique<spdlog::pattern_formatter>();
+  lines->add_flag<PrintableText>('*').set_pattern("[%Y-%m-%d %H:%M:%S.%e] [%n] [%^%l%$] %*");
+  return lines;
+}
+
 int run(Options& options) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("run"));  // stdout is the summary's
+  spdlog::set_formatter(log_lines());
   options.launch.quiet = options.launch.quiet || options.json;
   if (options.launch.quiet) spdlog::set_level(spdlog::level::warn);
   struct sigaction action {};

@@ -12,6 +12,7 @@
 #include "tools/live/interrupt.hpp"
 #include "tools/live/live_cell.hpp"
 #include "tools/live/status_view.hpp"
+#include "tools/live/terminal.hpp"
 #include "tools/live/text_table.hpp"
 #include "tools/live/topic_watch.hpp"
 
@@ -140,13 +141,15 @@ int top(Options& options) {
       std::ostringstream text;
       show(status, now, !options.no_topics, text);
       // Home, the text, and what is left of an earlier longer one cleared line by line: no flicker.
-      std::string page = text.str();
-      if (screen) {
-        for (std::size_t at = 0; (at = page.find('\n', at)) != std::string::npos; at += 4)
-          page.replace(at, 1, "\x1b[K\n");
-        page = "\x1b[H" + page + "\x1b[J";
+      if (screen) steer(std::cout, go_home);
+      std::istringstream lines{text.str()};
+      for (std::string line; std::getline(lines, line);) {
+        std::cout << line;
+        if (screen) steer(std::cout, clear_to_line_end);
+        std::cout << '\n';
       }
-      std::cout << page << (screen || options.once ? "" : "\n") << std::flush;
+      if (screen) steer(std::cout, clear_below);
+      std::cout << (screen || options.once ? "" : "\n") << std::flush;
     }
     watch.look();
   } while (!options.once && !interrupted());

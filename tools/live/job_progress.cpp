@@ -1,4 +1,5 @@
 #include "tools/live/job_progress.hpp"
+#include "tools/live/terminal.hpp"
 
 #include <sys/ioctl.h>
 #include <unistd.h>
@@ -29,7 +30,7 @@ void JobProgress::show(double fraction, const std::string& text) {
   if (news == last_) return;
   last_ = news;
   if (screen)
-    std::cerr << "\r\x1b[K" << fitted(line) << std::flush;
+    steer(std::cerr, clear_line), std::cerr << fitted(line) << std::flush;
   else
     std::cerr << line + '\n' << std::flush;
   open_ = screen;

@@ -8,33 +8,11 @@
 #include <sstream>
 
 #include "core/base/new_file.hpp"
+#include "tools/report/escaped.hpp"
 
 namespace invar::report {
 
 namespace {
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      default:
-        out += c;
-    }
-  }
-  return out;
-}
 
 std::string base64(const std::vector<unsigned char>& bytes) {
   static constexpr char alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -123,8 +101,8 @@ void Page::plots(std::vector<Plot> plots, const std::string& caption) {
 
 void Page::image(const std::vector<unsigned char>& bytes, const std::string& mime,
                  const std::string& caption) {
-  html("<figure><img alt=\"" + escaped(caption) + "\" src=\"data:" + mime + ";base64," + base64(bytes) +
-       "\"><figcaption>" + escaped(caption) + "</figcaption></figure>");
+  html("<figure><img alt=\"" + escaped(caption) + "\" src=\"data:" + escaped(mime) + ";base64," +
+       base64(bytes) + "\"><figcaption>" + escaped(caption) + "</figcaption></figure>");
 }
 
 std::string Page::text() const {

@@ -1,17 +1,25 @@
 #include "tools/report/plot.hpp"
 
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 
+#include "core/base/contract.hpp"
+#include "core/base/name.hpp"
 #include "core/base/temporary_folder.hpp"
+#include "tools/report/escaped.hpp"
 
 namespace invar::report {
 
@@ -21,13 +29,61 @@ constexpr std::array palette{"#1f6fb4", "#d1495b", "#2a9d5c", "#e09f1f",
                              "#7d5ba6", "#4d4d4d", "#17a2b8", "#8c564b"};
 constexpr std::size_t most_points = 4000;
 
-std::string quoted(const std::string& text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') out += '\\';
-    out += c == '\n' ? ' ' : c;
+/// Texts of a plot. gnuplot never sees one: its script has a mark of as many characters in its place, so that the key is
+/// laid out as wide as the text, and the text is written into the SVG afterwards, escaped.
+class Texts {
+ public:
+  /// The mark of a text, quoted for the script.
+  std::string mark(const std::string& text) {
+    if (text.empty()) return "''";
+    texts_.push_back(text);
+    return "'" + mark_of(texts_.size() - 1) + "'";
   }
-  return out + "\"";
+  /// The SVG with each text in the place of its mark.
+  [[nodiscard]] std::string written_into(const std::string& svg) const {
+    std::string out;
+    std::size_t at = 0;
+    for (std::size_t next; (next = svg.find(lead, at)) != std::string::npos;) {
+      out.append(svg, at, next - at);
+      const std::size_t number = number_at(svg, next);
+      if (number < texts_.size() && svg.compare(next, mark_of(number).size(), mark_of(number)) == 0) {
+        out += escaped(texts_[number]);
+        at = next + mark_of(number).size();
+      } else {
+        out += svg[next];
+        at = next + 1;
+      }
+    }
+    return out.append(svg, at);
+  }
+
+ private:
+  /// A character of plane 15, which is for private use, says which text it is; dots follow up to the text's length.
+  static constexpr char lead = static_cast<char>(0xF3);
+  [[nodiscard]] std::string mark_of(std::size_t number) const {
+    const auto part = [&](unsigned shift) { return static_cast<char>(0x80U | (number >> shift & 0x3FU)); };
+    const auto letters = std::count_if(texts_[number].begin(), texts_[number].end(), [](char c) {
+      return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U;
+    });
+    return std::string{lead, static_cast<char>(0xB0U | (number >> 12U & 0xFU)), part(6), part(0)}.append(
+        static_cast<std::size_t>(std::max<std::ptrdiff_t>(letters, 1) - 1), '.');
+  }
+  static std::size_t number_at(const std::string& svg, std::size_t at) {
+    std::size_t number = 0;
+    for (std::size_t i = 1; i < 4; ++i)
+      number = number << 6U | (static_cast<unsigned char>(at + i < svg.size() ? svg[at + i] : 0) & 0x3FU);
+    return number & 0xFFFFU;
+  }
+
+  std::vector<std::string> texts_;
+};
+
+/// A colour is ours, never a text from outside: it stands in the script as it is.
+const std::string& checked_colour(const std::string& colour) {
+  const bool good = colour.size() == 7 && colour[0] == '#' &&
+                    colour.find_first_not_of("0123456789abcdefABCDEF", 1) == std::string::npos;
+  INVAR_EXPECTS(good, colour);
+  return colour;
 }
 
 /// The rows to draw of a long line: in each bucket the lowest and the highest, in order.
@@ -84,8 +140,8 @@ void write_data(std::ostream& script, const std::string& name, const Series& ser
   script << "EOD\n";
 }
 
-std::string drawing(const Series& series, const std::string& name, const std::string& colour) {
-  const std::string title = series.label.empty() ? "notitle" : "title " + quoted(series.label);
+std::string drawing(const Series& series, const std::string& name, const std::string& colour, Texts& texts) {
+  const std::string title = series.label.empty() ? "notitle" : "title " + texts.mark(series.label);
   const std::string with = "$" + name + " using ";
   switch (series.style) {
     case Series::Style::line:
@@ -110,14 +166,29 @@ std::string drawing(const Series& series, const std::string& name, const std::st
   return {};
 }
 
-void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
-                const std::filesystem::path& file) {
+bool is_range(const std::optional<Range>& r) {
+  return r && std::isfinite(r->lower) && std::isfinite(r->upper) && r->lower < r->upper;
+}
+
+/// Whether a row of the series is to be seen: gnuplot refuses a plot without one.
+bool has_point(const Series& series, const Plot& plot) {
+  for (std::size_t i = 0; i < std::min(series.x.size(), series.y.size()); ++i) {
+    const double x = series.x[i], y = series.y[i];
+    const bool seen = !is_range(plot.x_range) || plot.x_range->contains(x);
+    if (seen && std::isfinite(x) && std::isfinite(y) && (!plot.log_x || x > 0.0) && (!plot.log_y || y > 0.0))
+      return true;
+  }
+  return false;
+}
+
+void write_plot(std::ostream& script, const Plot& plot, std::size_t number, const std::string& file,
+                Texts& texts) {
   for (std::size_t s = 0; s < plot.series.size(); ++s)
     write_data(script, "d" + std::to_string(number) + "_" + std::to_string(s), plot.series[s]);
   script << "set terminal svg size " << plot.width << "," << plot.height
          << " dynamic noenhanced font 'Helvetica,12' background rgb 'white'\nset output "
-         << quoted(file.string()) << "\nset title " << quoted(plot.title) << "\nset xlabel "
-         << quoted(plot.x_label) << " offset 0,0.4\nset ylabel " << quoted(plot.y_label)
+         << "'" << file << "'\nset title " << texts.mark(plot.title) << "\nset xlabel "
+         << texts.mark(plot.x_label) << " offset 0,0.4\nset ylabel " << texts.mark(plot.y_label)
          << "\nset grid lc rgb '#dddddd'\nset border 3 lc rgb '#888888'\nset tics nomirror\n"
          << "set key outside bottom center horizontal samplen 2 height 0.8\nset boxwidth 0.9 relative\n"
          << (plot.equal_axes ? "set size ratio -1\n" : "set size noratio\n")
@@ -126,7 +197,7 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
          << "set palette defined (-1 '#2166ac', 0 '#f7f7f7', 1 '#b2182b')\n";
   const auto range = [&](char axis, const std::optional<Range>& r) {
     script << "set " << axis << "range [";
-    if (r)
+    if (is_range(r))
       script << r->lower << ":" << r->upper;
     else
       script << "*:*";
@@ -139,17 +210,19 @@ void write_plot(std::ostream& script, const Plot& plot, std::size_t number,
   const bool heat = std::any_of(plot.series.begin(), plot.series.end(),
                                 [](const Series& s) { return s.style == Series::Style::heat; });
   if (heat && !plot.x_range && !plot.y_range) script << "set autoscale xfix\nset autoscale yfix\n";
+  const bool any_point = std::any_of(plot.series.begin(), plot.series.end(),
+                                     [&](const Series& series) { return has_point(series, plot); });
+  if (!any_point) script << "set xrange [0.1:1]\nset yrange [0.1:1]\n";  // an empty frame needs ranges
   script << "plot ";
   std::size_t colour = 0;
   bool any = false;
   for (std::size_t s = 0; s < plot.series.size(); ++s) {
     const Series& series = plot.series[s];
-    const bool drawable =
-        std::any_of(series.y.begin(), series.y.end(), [](double y) { return std::isfinite(y); });
-    if (!drawable) continue;
-    const std::string rgb = series.colour.empty() ? palette[colour++ % palette.size()] : series.colour;
+    if (!has_point(series, plot)) continue;
+    const std::string rgb =
+        series.colour.empty() ? palette[colour++ % palette.size()] : checked_colour(series.colour);
     script << (any ? ", " : "")
-           << drawing(series, "d" + std::to_string(number) + "_" + std::to_string(s), rgb);
+           << drawing(series, "d" + std::to_string(number) + "_" + std::to_string(s), rgb, texts);
     any = true;
   }
   script << (any ? "\n" : "NaN notitle\n") << "unset output\n";
@@ -200,40 +273,68 @@ Series histogram(const std::vector<double>& values, double width, double unit) {
   return bars;
 }
 
+namespace {
+
+std::string content_of(const std::filesystem::path& file) {
+  std::ifstream stream{file, std::ios::binary};
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// gnuplot on `script` in the folder, its complaints in `errors` there: no shell, none of the user's start files, and names of
+/// ours alone. False where it is missing or fails.
+bool run_gnuplot(const std::filesystem::path& folder) {
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
+  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "errors", O_WRONLY | O_CREAT | O_TRUNC, 0600);
+  std::array<std::string, 3> words{"gnuplot", "--default-settings", "script"};
+  std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t child = 0;
+  const int error = posix_spawnp(&child, "gnuplot", &actions, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (error != 0) return false;
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+/// Several drawings share one page: gnuplot's marker names must not clash.
+void make_names_unique(std::string& svg, std::size_t number) {
+  for (const std::string name : {"gpDot", "gpPt", "hline", "gnuplot_plot_", "gnuplot_canvas", "greybox"}) {
+    const std::string unique = "p" + std::to_string(number) + "_" + name;
+    for (std::size_t at = 0; (at = svg.find(name, at)) != std::string::npos; at += unique.size())
+      svg.replace(at, name.size(), unique);
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> draw(const std::vector<Plot>& plots) {
   if (plots.empty()) return {};
   const TemporaryFolder folder{"invar-plots"};
-  const auto file = [&](std::size_t i) { return folder / (std::to_string(i) + ".svg"); };
+  const auto file = [&](std::size_t i) { return std::to_string(i) + ".svg"; };
+  std::vector<Texts> texts(plots.size());
   {
     std::ofstream script{folder / "script"};
-    script << std::setprecision(9);
-    for (std::size_t i = 0; i < plots.size(); ++i) write_plot(script, plots[i], i, file(i));
+    script << std::setprecision(9) << "set encoding utf8\n";
+    for (std::size_t i = 0; i < plots.size(); ++i) write_plot(script, plots[i], i, file(i), texts[i]);
   }
-  const std::string call =
-      "gnuplot '" + (folder / "script").string() + "' 2> '" + (folder / "errors").string() + "'";
-  const int status = std::system(call.c_str());  // NOLINT: the path is ours
+  if (!run_gnuplot(folder.path()))
+    throw std::runtime_error{"gnuplot failed: " + printable(content_of(folder / "errors")) +
+                             " (is gnuplot-nox installed?)"};
   std::vector<std::string> drawings;
-  for (std::size_t i = 0; i < plots.size() && status == 0; ++i) {
-    std::ifstream stream{file(i)};
-    std::ostringstream svg;
-    svg << stream.rdbuf();
-    std::string text = svg.str();
-    const auto begin = text.find("<svg");
-    text = begin == std::string::npos ? "" : text.substr(begin);
-    // Several drawings share one page: gnuplot's marker names must not clash.
-    for (const std::string name : {"gpDot", "gpPt", "hline", "gnuplot_plot_", "gnuplot_canvas", "greybox"}) {
-      const std::string unique = "p" + std::to_string(i) + "_" + name;
-      for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += unique.size())
-        text.replace(at, name.size(), unique);
-    }
-    drawings.push_back(std::move(text));
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    std::string svg = content_of(folder / file(i));
+    const auto begin = svg.find("<svg");
+    svg = begin == std::string::npos ? "" : svg.substr(begin);
+    make_names_unique(svg, i);
+    drawings.push_back(texts[i].written_into(svg));
   }
-  std::string errors;
-  if (status != 0) {
-    std::ifstream stream{folder / "errors"};
-    std::getline(stream, errors, '\0');
-  }
-  if (status != 0) throw std::runtime_error{"gnuplot failed: " + errors + " (is gnuplot-nox installed?)"};
   return drawings;
 }
 

@@ -4,6 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/base/name.hpp"
+#include "core/base/temporary_folder.hpp"
+#include "tools/report/escaped.hpp"
 
 namespace invar::report {
 namespace {
@@ -45,6 +54,105 @@ TEST(Plots, ShowNumbersOneCanRead) {
   in_handy_units(plot);
   EXPECT_EQ(plot.y_label, "exponent");
   EXPECT_DOUBLE_EQ(plot.series[1].y[0], -400.0);
+}
+
+/// Words that steer a shell, gnuplot, a page or a terminal; each that can would make the file `made`.
+std::vector<std::string> hostile_names(const std::string& made) {
+  const std::string touch = "touch " + made;
+  return {"`" + touch + "`",
+          "$(" + touch + ")",
+          "'; system('" + touch + "') #",
+          "\"; system(\"" + touch + "\") #",
+          "' . system('" + touch + "') . '",
+          "a\n!" + touch + "\nb",
+          "EOD\n!" + touch,
+          "\\\"; !" + touch,
+          "@HOME ^{x} _y {/Symbol a} %c &{b}",
+          "</script><script>alert(1)</script>",
+          "<svg onload=\"x\">",
+          "'\"`\\",
+          "\x1b]0;x\x07\x1b[2J",
+          std::string("a\0b", 3),
+          "\xF3\xB0\x80\x80",
+          "\xC2\xB5m \xC2\xB0\x43"};
+}
+
+Plot plot_of(const std::string& name) {
+  Plot plot;
+  plot.title = plot.x_label = plot.y_label = name;
+  plot.series.resize(2);
+  for (Series& series : plot.series) {
+    series.label = name;
+    series.x = {0.0, 1.0};
+    series.y = {0.0, 2.0};
+  }
+  return plot;
+}
+
+TEST(Plots, RunNothingThatStandsInAName) {
+  const TemporaryFolder folder{"invar-test-plots"};
+  const auto made = folder / "made";
+  std::vector<Plot> plots;
+  for (const auto& name : hostile_names(made.string())) plots.push_back(plot_of(name));
+  const auto drawings = draw(plots);
+  EXPECT_FALSE(std::filesystem::exists(made));
+  ASSERT_EQ(drawings.size(), plots.size());
+  for (std::size_t i = 0; i < plots.size(); ++i) {
+    const std::string text = escaped(plots[i].title);
+    std::size_t times = 0;
+    for (std::size_t at = 0; (at = drawings[i].find(text, at)) != std::string::npos; at += text.size())
+      ++times;
+    EXPECT_EQ(times, 5u) << text;  // title, two axes, two keys
+    EXPECT_EQ(drawings[i].find("<script"), std::string::npos);
+    EXPECT_EQ(drawings[i].find('\x1b'), std::string::npos);
+    EXPECT_FALSE(flaw_of_text(drawings[i])) << flaw_of_text(drawings[i])->what;
+  }
+}
+
+TEST(Plots, TakeAFolderForTemporaryFilesWithAnyName) {
+  const TemporaryFolder folder{"invar-test-plots"};
+  const auto strange = folder / "a'`touch made`\" b";
+  std::filesystem::create_directory(strange);
+  const char* before = std::getenv("TMPDIR");
+  const std::string kept = before == nullptr ? "" : before;
+  setenv("TMPDIR", strange.c_str(), 1);
+  EXPECT_EQ(draw({plot_of("a")}).size(), 1u);
+  if (before == nullptr)
+    unsetenv("TMPDIR");
+  else
+    setenv("TMPDIR", kept.c_str(), 1);
+}
+
+TEST(Plots, AreDrawnWhateverTheNumbers) {
+  const double nan = std::nan(""), infinite = std::numeric_limits<double>::infinity();
+  Plot empty = plot_of("empty"), logarithmic = plot_of("negative"), nowhere = plot_of("nowhere"),
+       point = plot_of("point");
+  empty.series.clear();
+  logarithmic.log_y = logarithmic.log_x = true;
+  for (Series& series : logarithmic.series) series.y = {-1.0, 0.0};
+  for (Series& series : nowhere.series) series.x = {nan, infinite};
+  point.x_range = Range{1.0, 1.0};
+  point.y_range = Range{nan, infinite};
+  EXPECT_EQ(draw({empty, logarithmic, nowhere, point}).size(), 4u);
+}
+
+TEST(Pages, ShowNamesAsLetters) {
+  const TemporaryFolder folder{"invar-test-page"};
+  for (const auto& name : hostile_names("made")) {
+    Page page{name, name};
+    page.heading(name);
+    page.paragraph(name);
+    page.callout(name, name);
+    page.table({name}, {{name}});
+    page.bars(name, {{name, 1.0, name, name}});
+    page.preformatted(name);
+    page.image({1, 2, 3}, name, name);
+    const std::string text = page.text();
+    EXPECT_EQ(text.find("<script"), std::string::npos);
+    EXPECT_EQ(text.find("<svg onload"), std::string::npos);
+    EXPECT_FALSE(flaw_of_text(text)) << flaw_of_text(text)->what;
+    EXPECT_NE(text.find("<p>" + escaped(name) + "</p>"), std::string::npos);
+  }
 }
 
 }  // namespace

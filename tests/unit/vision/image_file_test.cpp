@@ -55,6 +55,27 @@ TEST_F(ImageFile, EachFaultIsSaidWithTheFilesName) {
   EXPECT_THAT(fault_of(write("tiny.png", bytes_of(".png", 8))), HasSubstr("only 8 x 8 pixels"));
 }
 
+TEST_F(ImageFile, AHugePictureIsRefusedByItsHead) {
+  const auto with = [&](const std::string& name, std::string bytes, std::size_t at, const std::string& size) {
+    bytes.replace(at, size.size(), size);
+    return fault_of(write(name, bytes));
+  };
+  using namespace std::string_literals;
+  EXPECT_THAT(with("a.png", bytes_of(".png"), 16, "\0\0\x80\0\0\0\x80\0"s),
+              HasSubstr("a.png: says that it has 32768 x 32768 pixels"));
+  EXPECT_THAT(with("a.bmp", bytes_of(".bmp"), 18, "\0\0\1\0\0\0\1\0"s), HasSubstr("65536 x 65536 pixels"));
+  const std::string jpeg = bytes_of(".jpg");
+  EXPECT_THAT(with("a.jpg", jpeg, jpeg.find("\xff\xc0") + 5, "\xff\xff\xff\xff"),
+              HasSubstr("65535 x 65535 pixels"));
+  EXPECT_THAT(fault_of(write("a.pgm", "P5\n# c\n1000000 1000000\n255\n")),
+              HasSubstr("1000000 x 1000000 pixels"));
+  EXPECT_THAT(fault_of(write("a.tif",
+                             "II*\0\x08\0\0\0\2\0\0\1\4\0\1\0\0\0\0\0\1\0\1\1\4\0\1\0\0\0\0\0\1\0\0\0\0\0"s)),
+              HasSubstr("65536 x 65536 pixels"));
+  EXPECT_THAT(fault_of(write("a.webp", "RIFF\x20\0\0\0WEBPVP8 "s)),
+              HasSubstr("give a PNG, JPEG, TIFF, BMP or PGM file"));
+}
+
 TEST_F(ImageFile, ACameraIsReadAsItWasWritten) {
   CameraModel camera;
   camera.width = 1200;
