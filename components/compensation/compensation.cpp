@@ -104,6 +104,7 @@ void Compensation::cleanup() noexcept {
 void Compensation::activate() {
   if (transaction_ != 0) active_ = transaction_start_;  // its owner is told by the status
   transaction_ = 0;
+  handles_models_ = true;
   temperatures_.forget();
   condition_ = TEMPERATURE_UNUSED;
   set_states();
@@ -158,6 +159,7 @@ const char* Compensation::why_not_above(const LiveModel& model, const Stack& sta
 }
 
 void Compensation::use(const Stack& stack) noexcept {
+  handles_models_ = true;
   ease([&] {
     active_ = stack;
     for (LiveModel* model : active_.thermal)
@@ -171,6 +173,7 @@ void Compensation::use(const Stack& stack) noexcept {
 void Compensation::take_loaded() noexcept {
   ModelLoader<LiveModel>::Loaded loaded;
   while (loader_.take(loaded)) {
+    handles_models_ = true;
     const LiveModel& model = *loaded.model;
     const char* why = model.refusal.empty() ? why_not_above(model, active_) : model.refusal.c_str();
     if (why == nullptr) staged_ = loaded.model;
@@ -179,7 +182,10 @@ void Compensation::take_loaded() noexcept {
   }
 }
 
-void Compensation::end_transaction() noexcept { transaction_ = 0; }
+void Compensation::end_transaction() noexcept {
+  transaction_ = 0;
+  transaction_start_ = {};
+}
 
 void Compensation::obey(const ModelCommand& command) noexcept {
   if (transaction_ != 0 && command.transaction() != transaction_) {
@@ -278,7 +284,17 @@ void Compensation::watch_transaction(const Tick& tick) noexcept {
   publish_status();
 }
 
+/// Says which models are still in use; one that is in no place any more is given back.
+void Compensation::say_in_use() noexcept {
+  const auto& a = active_;
+  const auto& b = before_;
+  const auto& t = transaction_start_;
+  loader_.use({staged_, a.geometric, a.thermal[0], a.thermal[1], a.thermal[2], b.geometric, b.thermal[0],
+               b.thermal[1], b.thermal[2], t.geometric, t.thermal[0], t.thermal[1], t.thermal[2]});
+}
+
 void Compensation::step(const Tick& tick) noexcept {
+  if (std::exchange(handles_models_, false)) say_in_use();
   if (begins_) {
     begins_ = false;
     answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");

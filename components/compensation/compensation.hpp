@@ -70,7 +70,9 @@ class Compensation final : public Component {
   struct Axis {
     Axis(Compensation& owner, std::size_t number)
         : state{owner, std::string{"state_"} + "xyz"[number]},
-          correction{owner, std::string{"correction_"} + "xyz"[number]} {}
+          correction{owner, std::string{"correction_"} + "xyz"[number]} {
+      state.key = correction.key = static_cast<std::uint32_t>(number);
+    }
     Input<stage::AxisState> state;
     Output<AxisCorrection> correction;
   };
@@ -94,6 +96,7 @@ class Compensation final : public Component {
   void take_loaded() noexcept;
   [[nodiscard]] static const char* why_not_above(const LiveModel& model, const Stack& stack) noexcept;
   void use(const Stack& stack) noexcept;
+  void say_in_use() noexcept;
   void end_transaction() noexcept;
   void watch_transaction(const Tick& tick) noexcept;
   void answer(std::uint64_t command, ModelState state, const LiveModel* model, const char* text) noexcept;
@@ -166,6 +169,7 @@ class Compensation final : public Component {
   KeptModels kept_{*this};
   ModelLoader<LiveModel> loader_;  // its thread writes what is to be kept
   bool keeps_ = true;
+  bool handles_models_ = false;  // something was loaded or changed
   bool begins_ = false;       // the first step says what stands
   std::string kept_refusal_;  // why the kept models are not in use
 };

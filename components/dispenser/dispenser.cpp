@@ -147,7 +147,7 @@ std::string Dispenser::fill(const PatternCommand& command, TriggerPattern& patte
   if (found == patterns_.end())
     return "`" + std::string{command.name().c_str()} + "` is no pattern of this dispenser";
   const double height = command.height();
-  if (!(height > 0.0)) return "the height is not positive";
+  if (!(height > 0.0) || !std::isfinite(height)) return "the height is not a positive number";
   metrology::DropletTrajectory path;
   if (const Staged::Model* model = model_.active(); model != nullptr) {
     path = model->content;

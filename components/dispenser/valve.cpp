@@ -133,7 +133,7 @@ std::optional<Valve::Refusal> Valve::refusal(std::int64_t pulse_ns, std::int64_t
 void Valve::jet(const TriggerPoint& point, const Motion& at, std::int64_t open_ns, Range velocity,
                 const Tick& tick) noexcept {
   const std::int64_t pulse_ns =
-      point.pulse_ns() > 0 ? point.pulse_ns() : Duration::seconds(parameters_.pulse).ns;
+      point.pulse_ns() != 0 ? point.pulse_ns() : Duration::seconds(parameters_.pulse).ns;
   if (const auto why = refusal(pulse_ns, open_ns, tick)) {
     refuse(point.droplet(), *why);
     return;

@@ -102,7 +102,11 @@ Fusion::Fusion(const Parameters& parameters)
     sources_.push_back(std::make_unique<Source>(*this, sensors_[i], i));
     from_feedback = from_feedback || sources_.back()->reading == nullptr;
   }
-  if (from_feedback) feedback_ = std::make_unique<Input<stage::AxisFeedback>>(*this, "feedback");
+  if (from_feedback) {
+    feedback_ = std::make_unique<Input<stage::AxisFeedback>>(*this, "feedback");
+    feedback_->key = static_cast<std::uint32_t>(parameters.axis);
+  }
+  fused_.key = static_cast<std::uint32_t>(parameters.axis);
 }
 
 Fusion::~Fusion() = default;

@@ -24,7 +24,7 @@ void Interferometer::step(const Tick&) noexcept {
     if (tool == nullptr) continue;
     const auto& d = command.beam_direction();
     const double norm = std::hypot(d[0], d[1], d[2]);
-    if (!(norm > 0.0)) continue;  // no direction, no beam: the reading stays as it is
+    if (!(norm > 0.0) || !std::isfinite(norm)) continue;  // no direction, no beam: the reading stays as it is
     for (std::size_t i = 0; i < 3; ++i) direction_[i] = d[i] / norm;
     start_ = command.beam_start();
     zero_ = length(*tool);

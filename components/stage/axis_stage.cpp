@@ -8,6 +8,7 @@
 #include <numbers>
 #include <utility>
 
+#include "components/stage/command_check.hpp"
 #include "core/compensation/model_file.hpp"
 #include "core/model/model_file.hpp"
 
@@ -42,6 +43,9 @@ Stage::Stage(const Parameters& parameters)
   released.enabled(false);
   released.axis(static_cast<std::uint32_t>(parameters.axis));
   motor_.set_safe_value(released);
+  for (Port* port : {static_cast<Port*>(&feedback_), static_cast<Port*>(&fused_), static_cast<Port*>(&correction_),
+                     static_cast<Port*>(&command_), static_cast<Port*>(&motor_), static_cast<Port*>(&state_)})
+    port->key = static_cast<std::uint32_t>(parameters.axis);
 }
 
 std::vector<Component::Claim> Stage::claims() const {
@@ -170,7 +174,30 @@ bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
   return true;
 }
 
+/// Answers a command that is not carried out. The same reason is told once a second at most: whoever sends commands in a loop
+/// must not fill the log.
+void Stage::refuse(const AxisCommand& command, const char* why, const Tick& tick) noexcept {
+  sample_.command_id(command.id());
+  sample_.command_refused(true);
+  sample_.command_done(true);
+  if (why == refused_because_ && tick.now - refused_at_ < Duration::seconds(1.0)) return;
+  refused_because_ = why;
+  refused_at_ = tick.now;
+  const NumberFault number = fault_in(command);
+  std::array<char, 300> text{};
+  if (number.member != nullptr)
+    std::snprintf(text.data(), text.size(), "%s (command %llu) is refused: its %s is %g; send %s",
+                  kind_text(command.kind()), static_cast<unsigned long long>(command.id()), number.member,
+                  number.value, number.want);
+  else
+    std::snprintf(text.data(), text.size(), "%s (command %llu) is refused: %s", kind_text(command.kind()),
+                  static_cast<unsigned long long>(command.id()), why);
+  notices_.say(event::SEVERITY_WARNING, text.data());
+}
+
 void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
+  if (const NumberFault number = fault_in(command); number.member != nullptr)
+    return refuse(command, number.member, tick);
   bool accepted = true;
   bool done = true;
   in_vain_ = false;
@@ -211,8 +238,9 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       blind_ = false;
       break;
   }
+  if (!accepted) return refuse(command, why_refused(command, mode_, homed_, parameters_.travel), tick);
   sample_.command_id(command.id());
-  sample_.command_refused(!accepted);
+  sample_.command_refused(false);
   sample_.command_done(done);
 }
 
@@ -324,9 +352,8 @@ void Stage::step(const Tick& tick) noexcept {
     if ((seeing && !leaving_) || command.kind() == AXIS_COMMAND_DISABLE) {
       obey(command, tick);
     } else {
-      sample_.command_id(command.id());
-      sample_.command_refused(true);
-      sample_.command_done(true);
+      refuse(command,
+             leaving_ ? "the axis is being deactivated" : "the axis has no feedback that it could go by", tick);
     }
   }
 

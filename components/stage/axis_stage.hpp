@@ -139,6 +139,7 @@ class Stage final : public Component {
   [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
   void read_position(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void obey(const AxisCommand& command, const Tick& tick) noexcept;
+  void refuse(const AxisCommand& command, const char* why, const Tick& tick) noexcept;
   [[nodiscard]] bool start_sine(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_homing(const Tick& tick) noexcept;
@@ -199,7 +200,9 @@ class Stage final : public Component {
   double following_error_ = 0.0;
   bool settled_ = false;
   std::uint64_t received_ = 0;  // samples of feedback so far
-  Instant outside_at_;          // when the following error was last outside the settling window
+  const char* refused_because_ = nullptr;  // as told last
+  Instant refused_at_;
+  Instant outside_at_;  // when the following error was last outside the settling window
 };
 
 }  // namespace invar::stage

@@ -10,6 +10,7 @@
 #include "components/vision/ruler_file.hpp"
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
+#include "core/component/cell_folders.hpp"
 
 namespace invar::vision {
 
@@ -102,6 +103,12 @@ void Vision::start(const image::VisionCommand& command) {
     return;
   }
   sample_.id(command.id());
+  picture_.reset();
+  if (command.picture_path().size() > 0) {
+    picture_ = command.picture_path().c_str();
+    if (folders) picture_ = folders->picture(*picture_);
+    if (!picture_) return report(job::JOB_FAILED, std::string{CellFolders::no_picture});
+  }
   if (command.wanted() == image::VISION_MEASURE && !camera_)
     return report(job::JOB_FAILED,
                   "the camera is not calibrated: show it the ruler and ask for a calibration");
@@ -256,10 +263,10 @@ void Vision::publish(const image::Frame& frame, const Droplets& found, std::uint
   droplets_.write(measured_);
 }
 
-bool Vision::wants_picture() const { return running_ && running_->picture_path().size() > 0; }
+bool Vision::wants_picture() const { return running_ && picture_; }
 
 void Vision::write_picture(const std::vector<unsigned char>& png) const {
-  const std::filesystem::path file = running_->picture_path().c_str();
+  const std::filesystem::path file = *picture_;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
   std::ofstream out{file, std::ios::binary};
   out.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));

@@ -73,6 +73,7 @@ class Vision final : public Component {
   std::vector<double> radii_;          // m, of the ruler's circles
   std::optional<CameraModel> camera_;  // as loaded or calibrated
   std::optional<image::VisionCommand> running_;
+  std::optional<std::filesystem::path> picture_;  // to be written for it
   int attempts_ = 0;
   bool reported_ = false;
   Instant asked_;

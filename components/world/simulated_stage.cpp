@@ -29,7 +29,9 @@ struct SimulatedStage::Device {
         feedback{owner, "feedback_" + letter(axis_number)},
         index{owner, "index_" + letter(axis_number)},
         truth{owner, "truth_" + letter(axis_number)},
-        ends{axis_parameters.ends, travel} {}
+        ends{axis_parameters.ends, travel} {
+    motor.key = feedback.key = index.key = truth.key = static_cast<std::uint32_t>(axis_number);
+  }
 
   static physics::AxisPlant plant_of(const Axis& axis, const std::filesystem::path& file) {
     if (file.empty())

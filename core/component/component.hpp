@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +14,7 @@
 
 namespace invar {
 
+class CellFolders;
 class Port;
 class InputPort;
 
@@ -103,6 +105,8 @@ class Component {
   /// Numeric identity of the cell and of this component, for the keys of its samples. Set before configure.
   std::uint32_t cell = 0;
   std::uint32_t id = 0;
+  /// Where files lie that a command may name; null: everywhere, as in a test. Set before configure.
+  std::shared_ptr<const CellFolders> folders;
   /// Time is simulated: whatever waits for the outside must do so inside `step` (a Modbus exchange), so that runs repeat.
   bool simulated_time = false;
 

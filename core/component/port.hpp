@@ -2,8 +2,10 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <typeindex>
@@ -38,6 +40,9 @@ class Port {
   /// The full topic, "cell/<cell>/<component>/<port>" or what the deployment connects it to; empty:
   /// unconnected.
   std::string topic;
+  /// The axis, node, sensor or component that its samples are of: the member of their key beside `cell`. Nothing: the
+  /// component's own id, and of an axis nothing is known. Declared by the component.
+  std::optional<std::uint32_t> key;
 
  private:
   Component& owner_;
@@ -66,6 +71,10 @@ class InputPort : public Port {
   }
 
   [[nodiscard]] const InputOptions& options() const { return options_; }
+  /// Samples of which keys are taken, beside that of the cell; empty: every one. Set by the deployment.
+  std::vector<std::uint32_t> keys;
+  /// The topic is the plant's and not of this cell alone: samples of cell 0 are for every cell. Set by the deployment.
+  bool is_of_plant = false;
   /// When the newest sample arrived, in the clock of the owner's executor; Instant{INT64_MIN} before the
   /// first. Any thread.
   [[nodiscard]] Instant arrived() const noexcept { return {arrived_ns_.load(std::memory_order_acquire)}; }
@@ -77,7 +86,8 @@ class InputPort : public Port {
   void add_source(const Port& output) { sources_.push_back(&output); }
   /// Lets go of what waits in an inbox: a component that becomes active does not obey what it was told before. Real-time.
   virtual void discard() noexcept {}
-  /// A sample came that is not obeyed: its writer does not own the topic, or it is too old. Any thread.
+  /// A sample came that is not taken: its writer does not own the topic, it is too old, of another key, or no number.
+  /// Any thread.
   void refuse() noexcept { refused_.fetch_add(1, std::memory_order_relaxed); }
   /// Samples refused. Any thread.
   [[nodiscard]] virtual std::uint64_t lost() const noexcept {
@@ -203,9 +213,7 @@ class Output final : public OutputPort {
   void write(const T& sample) noexcept;
   /// Set-up: what is written when the component fails or is deactivated (zero force, heater off).
   void set_safe_value(const T& sample) { safe_ = std::make_unique<T>(sample); }
-  void write_safe_value() noexcept override {
-    if (safe_) write(*safe_);
-  }
+  void write_safe_value() noexcept override;
 
   bool connect(InputPort& input) override {
     if (input.type() != type()) return false;
@@ -231,6 +239,14 @@ class Output final : public OutputPort {
 #include "core/component/component.hpp"
 
 namespace invar {
+
+template <class T>
+void Output<T>::write_safe_value() noexcept {
+  if (!safe_) return;
+  if constexpr (requires { safe_->cell(owner().cell); })
+    safe_->cell(owner().cell);  // a receiver takes no sample of another cell
+  write(*safe_);
+}
 
 template <class T>
 void Output<T>::write(const T& sample) noexcept {

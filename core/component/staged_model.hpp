@@ -60,6 +60,8 @@ class StagedModel {
 
   /// Takes commands; true when another model, or none, is active from now on. Real-time.
   bool update() noexcept {
+    // Said a step later, when the component too has let go of what was before.
+    if (std::exchange(handles_models_, false)) loader_.use({active_, staged_, previous_});
     bool changed = false;
     if (std::exchange(begins_, false))
       answer(0, active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE, active_, "");
@@ -86,6 +88,7 @@ class StagedModel {
   void take_loaded() noexcept {
     typename ModelLoader<Model>::Loaded loaded;
     while (loader_.take(loaded)) {
+      handles_models_ = true;
       if (!loaded.model->refusal.empty()) {
         answer(loaded.command, compensation::MODEL_REFUSED, loaded.model, loaded.model->refusal.c_str());
         continue;
@@ -95,6 +98,7 @@ class StagedModel {
     }
   }
   bool obey(const compensation::ModelCommand& command) noexcept {
+    handles_models_ = true;
     switch (command.kind()) {
       case compensation::MODEL_STAGE:
         reply_.path(command.path());
@@ -138,6 +142,7 @@ class StagedModel {
   Model* staged_ = nullptr;
   Model* previous_ = nullptr;
   bool begins_ = false;
+  bool handles_models_ = false;  // something was loaded or changed
   compensation::ModelStatus reply_;
 };
 

@@ -168,8 +168,16 @@ Cell read_cell(const Yaml& yaml) {
     if (node.is_scalar()) check_file(node, path);
     return path;
   };
+  const auto folder_beside = [&](const Node& node) {
+    std::filesystem::path path = node.as_text();
+    if (path.is_relative()) path = cell.file.parent_path() / path;
+    if (node.is_scalar() && !std::filesystem::is_directory(path))
+      node.fault("`" + clipped(node.as_text()) + "` is no folder", "name a folder from which models may be loaded");
+    return path;
+  };
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);
   for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
+  for (const Node& folder : root["models"].list()) cell.models.push_back(folder_beside(folder));
   const Node hosts = root.required("hosts");
   for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));
   if (hosts.is_map() && cell.hosts.empty())

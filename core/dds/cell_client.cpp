@@ -1,8 +1,10 @@
 #include "core/dds/cell_client.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <random>
 
+#include "core/dds/clock_offset.hpp"
 #include "core/dds/simulated_clock.hpp"
 
 namespace invar::dds {
@@ -24,6 +26,8 @@ ServiceTopics::ServiceTopics(const std::string& cell) {
   lifecycle_reply = base + "lifecycle_reply";
   parameter_request = base + "parameter_request";
   parameter_reply = base + "parameter_reply";
+  model_request = base + "model_request";
+  model_reply = base + "model_reply";
 }
 
 CellClient::CellClient(Node& node, const std::string& cell)
@@ -31,14 +35,20 @@ CellClient::CellClient(Node& node, const std::string& cell)
       lifecycle_{
           node.writer<lifecycle::LifecycleRequest>(topics_of(node, cell).lifecycle_request, "request")},
       parameter_{
-          node.writer<lifecycle::ParameterRequest>(topics_of(node, cell).parameter_request, "request")} {
+          node.writer<lifecycle::ParameterRequest>(topics_of(node, cell).parameter_request, "request")},
+      model_{node.writer<transfer::ModelRequest>(topics_of(node, cell).model_request, "request")} {
   const ServiceTopics topics = topics_of(node, cell);
   readers_.push_back(listen(node, topics.lifecycle_reply, lifecycle_replies_));
   readers_.push_back(listen(node, topics.parameter_reply, parameter_replies_));
-  readers_.push_back(
-      node.reader<lifecycle::ProcessStatus>(topics.process_status, "state", [this](const auto& status) {
+  readers_.push_back(listen(node, topics.model_reply, model_replies_));
+  readers_.push_back(node.timed_reader<lifecycle::ProcessStatus>(
+      topics.process_status, node.profile("state"), [this](const auto& status, Instant sent) {
         const std::lock_guard lock{mutex_};
-        processes_[status.process_name().c_str()] = status;
+        const std::string process = status.process_name().c_str();
+        const Duration age = system_now() - sent;
+        const auto [known, first] = ages_.try_emplace(process, age);
+        known->second = std::min(known->second, age);
+        processes_[process] = status;
       }));
   readers_.push_back(
       node.reader<lifecycle::ComponentStatus>(topics.component_status, "state", [this](const auto& status) {
@@ -65,7 +75,8 @@ std::unique_ptr<Connection> CellClient::listen(Node& node, const std::string& to
 
 template <class Request, class Reply>
 std::optional<Reply> CellClient::call(Writer<Request>& writer, std::map<std::uint64_t, Reply>& replies,
-                                      Request request, const std::string& process, Duration patience) {
+                                      Request request, const std::string& process, Duration patience,
+                                      Duration interval) {
   std::unique_lock lock{mutex_};
   request.client(client_);
   request.request(++requests_);
@@ -76,7 +87,7 @@ std::optional<Reply> CellClient::call(Writer<Request>& writer, std::map<std::uin
     writer.write(request);  // again, where the process was not yet connected or its reply went astray
     lock.lock();
     const auto has_reply = [&] { return replies.contains(request.request()); };
-    if (news_.wait_for(lock, std::chrono::milliseconds{50}, has_reply)) {
+    if (news_.wait_for(lock, std::chrono::nanoseconds{interval.ns}, has_reply)) {
       auto reply = replies.extract(request.request());
       return std::move(reply.mapped());
     }
@@ -107,6 +118,15 @@ std::optional<lifecycle::ParameterReply> CellClient::parameter(const std::string
   return call(parameter_, parameter_replies_, std::move(request), process, patience);
 }
 
+std::optional<transfer::ModelReply> CellClient::model(const std::string& process,
+                                                      const std::string& component, const std::string& text,
+                                                      Duration patience) {
+  transfer::ModelRequest request;
+  request.component_name(component);
+  request.text().assign(text.begin(), text.end());
+  return call(model_, model_replies_, std::move(request), process, patience, Duration::milliseconds(500));
+}
+
 std::vector<lifecycle::ProcessStatus> CellClient::processes() const {
   const std::lock_guard lock{mutex_};
   std::vector<lifecycle::ProcessStatus> out;
@@ -126,6 +146,15 @@ std::vector<event::Notice> CellClient::take_notices() {
   std::vector<event::Notice> out{notices_.begin(), notices_.end()};
   notices_.clear();
   return out;
+}
+
+std::string CellClient::clocks_apart(const std::string& process) const {
+  const std::lock_guard lock{mutex_};
+  const auto found = ages_.find(process);
+  // A first status may have waited for a whole interval; more than that is the clocks'.
+  constexpr Duration noticed = Duration::milliseconds(1000);
+  if (found == ages_.end() || (found->second < noticed && found->second > -noticed)) return {};
+  return dds::clocks_apart("this PC", found->second, "the PC of process `" + process + "`");
 }
 
 std::string CellClient::process_of(const std::string& component) const {

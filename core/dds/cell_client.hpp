@@ -13,6 +13,7 @@
 #include "core/dds/node.hpp"
 #include "idl/event.h"
 #include "idl/lifecycle.h"
+#include "idl/transfer.h"
 
 namespace invar::dds {
 
@@ -21,6 +22,7 @@ struct ServiceTopics {
   explicit ServiceTopics(const std::string& cell);
   std::string process_status, component_status, notices;
   std::string lifecycle_request, lifecycle_reply, parameter_request, parameter_reply;
+  std::string model_request, model_reply;
 };
 
 /// Any thread.
@@ -34,6 +36,9 @@ class CellClient {
   [[nodiscard]] std::vector<lifecycle::ComponentStatus> components() const;
   /// Notices since the last call, oldest first; the first call gives those that the cell still keeps.
   [[nodiscard]] std::vector<event::Notice> take_notices();
+  /// That the clock of this PC and that of a process are so far apart that commands may be taken for old ones; empty: they
+  /// are not, as far as its status says.
+  [[nodiscard]] std::string clocks_apart(const std::string& process) const;
   /// The process in which a component runs; empty: not heard of.
   [[nodiscard]] std::string process_of(const std::string& component) const;
 
@@ -45,11 +50,16 @@ class CellClient {
                                                      lifecycle::ParameterAction action,
                                                      const std::string& path, const std::string& value,
                                                      Duration patience);
+  /// Brings a model's text to the process of a component; the reply names the file that the component may stage.
+  std::optional<transfer::ModelReply> model(const std::string& process, const std::string& component,
+                                            const std::string& text, Duration patience);
 
  private:
+  /// The request is sent again after each `interval` without a reply.
   template <class Request, class Reply>
   std::optional<Reply> call(Writer<Request>& writer, std::map<std::uint64_t, Reply>& replies, Request request,
-                            const std::string& process, Duration patience);
+                            const std::string& process, Duration patience,
+                            Duration interval = Duration::milliseconds(50));
   template <class Reply>
   std::unique_ptr<Connection> listen(Node& node, const std::string& topic,
                                      std::map<std::uint64_t, Reply>& replies);
@@ -60,11 +70,14 @@ class CellClient {
   std::uint64_t requests_ = 0;
   std::map<std::string, lifecycle::ProcessStatus> processes_;
   std::map<std::string, lifecycle::ComponentStatus> components_;
+  std::map<std::string, Duration> ages_;  // of the statuses of a process: the least, by the clocks of the two PCs
   std::deque<event::Notice> notices_;
   std::map<std::uint64_t, lifecycle::LifecycleReply> lifecycle_replies_;
   std::map<std::uint64_t, lifecycle::ParameterReply> parameter_replies_;
+  std::map<std::uint64_t, transfer::ModelReply> model_replies_;
   Writer<lifecycle::LifecycleRequest> lifecycle_;
   Writer<lifecycle::ParameterRequest> parameter_;
+  Writer<transfer::ModelRequest> model_;
   std::vector<std::unique_ptr<Connection>> readers_;  // last: nothing arrives before all else stands
 };
 

@@ -1,61 +1,85 @@
 #include "core/dds/command_gate.hpp"
 
-#include <chrono>
+#include <algorithm>
 
 #include "core/base/clock.hpp"
-#include "core/base/shown.hpp"
+#include "core/dds/clock_offset.hpp"
 
 namespace invar::dds {
 
 namespace {
 constexpr Duration between_alarms = Duration::milliseconds(5000);
+constexpr std::size_t most_told = 1000;  // writers of which it is remembered what was told
 
-std::string seconds(Duration time) { return shown(time.in_seconds(), 2) + " s"; }
-
-/// The clock of the middleware's stamps, not the slewed one of ours.
-Instant system_now() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
-}
+std::string seconds(Duration time) { return seconds_text(time); }
 }  // namespace
 
 CommandGate::CommandGate(std::string topic, const Profile& profile, Discovery& discovery,
                          std::function<void()> refused)
     : topic_{std::move(topic)},
+      exclusive_{profile.exclusive},
       lifespan_{profile.lifespan},
       discovery_{discovery},
       refused_{std::move(refused)},
-      ownership_{profile.lease, static_cast<std::size_t>(profile.max_instances),
+      ownership_{profile.lease,
                  [&discovery](const Claimant& owner) { return discovery.is_gone(owner.participant); }} {}
 
-bool CommandGate::passes(const Ownership::Instance& instance, const std::string& writer, Instant sent) {
+/// Refuses what is older than the lifespan, by the clock of the sender less what that one is ahead.
+bool CommandGate::is_too_late(const Claimant& who, Duration age) {
+  if (lifespan_.ns <= 0) return false;
+  if (age > lifespan_) {
+    tell(who, "it was sent " + seconds(age) + " before it arrived, and is not obeyed after " +
+                  seconds(lifespan_) + " (lifespan); " +
+                  clocks_apart("the sender's PC", Duration{} - age, "this one") +
+                  ", or look for what holds samples up");
+    return true;
+  }
+  if (age >= -lifespan_) return false;
+  if (ahead_.size() >= most_told && !ahead_.contains(who.writer)) ahead_.clear();
+  const auto [known, first] = ahead_.try_emplace(who.writer, Duration{} - age);
+  if (first)
+    raise("a sample of `" + discovery_.name_of(who.participant) + "` on `" + topic_ +
+          "` was sent in the future and is taken; " +
+          clocks_apart("the sender's PC", Duration{} - age, "this one"));
+  known->second = std::max(known->second, Duration{} - age);
+  const Duration late = age + known->second;
+  if (late <= lifespan_) return false;
+  tell(who, "it came " + seconds(late) + " later after it was sent than others of this sender, and is not obeyed after " +
+                seconds(lifespan_) + " (lifespan)");
+  return true;
+}
+
+bool CommandGate::passes(const std::string& writer, Instant sent) {
   const std::lock_guard lock{mutex_};
   const Claimant who = discovery_.claimant(writer);
-  const Duration age = system_now() - sent;
-  if (lifespan_.ns > 0 && age > lifespan_) {
-    tell(who, "it was sent " + seconds(age) + " before it arrived, and is not obeyed after " +
-                  seconds(lifespan_) + " (lifespan); do the clocks of the PCs agree?");
-    return false;
-  }
+  if (is_too_late(who, system_now() - sent)) return false;
+  if (!exclusive_) return true;
   const Instant now = monotonic_now();
-  const Claimant* owner = ownership_.claim(instance, who, now);
+  const Claimant* owner = ownership_.claim(who, now);
   if (owner == nullptr) return true;
   tell(who, "`" + discovery_.name_of(owner->participant) + "` commands there, with ownership strength " +
-                std::to_string(owner->strength) + ", last " + seconds(now - ownership_.last(instance)) +
+                std::to_string(owner->strength) + ", last " + seconds(now - ownership_.last()) +
                 " ago; this one has strength " + std::to_string(who.strength) +
                 ": end the other, or give more to the one that shall win");
   return false;
+}
+
+void CommandGate::refuse(const std::string& writer, const std::string& why) {
+  const std::lock_guard lock{mutex_};
+  tell(discovery_.claimant(writer), why);
 }
 
 void CommandGate::gone(const std::string& writer) {
   const std::lock_guard lock{mutex_};
   ownership_.release(writer);
   told_.erase(writer);
+  ahead_.erase(writer);
 }
 
 void CommandGate::tell(const Claimant& who, const std::string& why) {
   ++refusals_;
   if (refused_) refused_();
+  if (told_.size() >= most_told && !told_.contains(who.writer)) told_.clear();
   Told& told = told_[who.writer];
   const Instant now = monotonic_now();
   if (now - told.at < between_alarms) {
@@ -63,11 +87,11 @@ void CommandGate::tell(const Claimant& who, const std::string& why) {
     return;
   }
   const std::string more = told.since == 0 ? "" : " (and " + std::to_string(told.since) + " before)";
-  discovery_.raise({topic_,
-                    "a command of `" + discovery_.name_of(who.participant) + "` on `" + topic_ +
-                        "` was not obeyed" + more + ": " + why,
-                    false});
+  raise(std::string{exclusive_ ? "a command" : "a sample"} + " of `" + discovery_.name_of(who.participant) +
+        "` on `" + topic_ + "` was not " + (exclusive_ ? "obeyed" : "taken") + more + ": " + why);
   told = {now, 0};
 }
+
+void CommandGate::raise(const std::string& text) { discovery_.raise({topic_, text, false}); }
 
 }  // namespace invar::dds

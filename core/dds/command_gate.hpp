@@ -1,4 +1,4 @@
-// CommandGate: which samples of a topic with exclusive ownership are obeyed; whoever is not is told so.
+// CommandGate: which samples of a topic are taken; whoever sends another is told so.
 #pragma once
 
 #include <atomic>
@@ -15,23 +15,31 @@
 namespace invar::dds {
 
 /// Between a reader and what takes its samples. Beside ownership it holds the lifespan, by the stamps of the middleware:
-/// Fast DDS would drop what is too old in silence, and all commands of a PC whose clock is behind. Any thread.
+/// Fast DDS would drop what is too old in silence, and all commands of a PC whose clock is behind. A sender whose clock is
+/// ahead is obeyed, and its late samples are known by the earliest one that came. Any thread.
 class CommandGate {
  public:
-  /// `refused` is called for every sample that is not obeyed. The discovery must outlive it.
+  /// `refused` is called for every sample that is not taken. The discovery must outlive it.
   CommandGate(std::string topic, const Profile& profile, Discovery& discovery,
               std::function<void()> refused = {});
 
+  /// Whether ownership or lifespan bound this topic, so that `passes` is to be asked of every sample.
+  [[nodiscard]] bool is_asked_of_all() const { return exclusive_ || lifespan_.ns > 0; }
   /// `writer`: GUID as text; `sent` by its clock (UTC).
-  bool passes(const Ownership::Instance& instance, const std::string& writer, Instant sent);
+  bool passes(const std::string& writer, Instant sent);
+  /// Counts a sample that is not taken and tells why, now and then.
+  void refuse(const std::string& writer, const std::string& why);
   /// The writer took its leave, or its lease ran out.
   void gone(const std::string& writer);
   [[nodiscard]] std::uint64_t refused() const { return refusals_; }
 
  private:
+  bool is_too_late(const Claimant& who, Duration age);
   void tell(const Claimant& who, const std::string& why);
+  void raise(const std::string& text);
 
   std::string topic_;
+  bool exclusive_;
   Duration lifespan_;
   Discovery& discovery_;
   std::function<void()> refused_;
@@ -42,7 +50,8 @@ class CommandGate {
     Instant at{INT64_MIN / 2};
     std::uint64_t since = 0;  // refused without a word since then
   };
-  std::map<std::string, Told> told_;
+  std::map<std::string, Told> told_;       // by writer
+  std::map<std::string, Duration> ahead_;  // how far the clock of a writer is ahead, of those that are beyond the lifespan
 };
 
 }  // namespace invar::dds

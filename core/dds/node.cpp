@@ -36,13 +36,6 @@ bool is_kept(const Profile& profile) {
   return profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
 }
 
-/// None where everybody is heard.
-std::shared_ptr<CommandGate> gate_of(const std::string& topic, const Profile& profile, Discovery& discovery,
-                                     std::function<void()> refused = {}) {
-  if (!profile.exclusive) return nullptr;
-  return std::make_shared<CommandGate>(topic, profile, discovery, std::move(refused));
-}
-
 struct BoundOutput {
   std::unique_ptr<WriterConnection> connection;
   std::unique_ptr<Outlet> outlet;
@@ -87,7 +80,7 @@ struct Node::Parts {
     LocalExchange* found = exchange_of(qos);
     if (found == nullptr) return nullptr;
     auto local = found->reader([to = inlet.get(), clock = std::move(clock)](std::span<const std::byte> cdr) {
-      (void)to->deliver(cdr, clock());
+      (void)to->deliver(cdr, clock(), "of this PC");
     });
     inlet->prefer(local);
     return local;
@@ -154,8 +147,9 @@ void Node::bind(InputPort& port, Clock clock) {
   const Profile& qos = profile(port.profile);
   const WireType& type = wire_type_of(port.type(), port.topic);
   std::shared_ptr<Inlet> inlet = type.attach(port, is_kept(qos));
-  const auto gate = gate_of(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
-  inlet->guard(gate);
+  const auto gate =
+      std::make_shared<CommandGate>(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
+  inlet->guard(gate, expected_keys(port));
   auto local = parts_->local_reader(qos, inlet, clock);
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
@@ -210,12 +204,20 @@ std::unique_ptr<Connection> Node::make_writer(const std::string& topic, std::typ
                                             wire_type_of(type, topic), profile);
 }
 
+ExpectedKeys expected_keys(const InputPort& port) {
+  ExpectedKeys expected{port.owner().cell, port.is_of_plant, port.keys};
+  if (expected.parts.empty() && port.key) expected.parts = {*port.key};
+  return expected;
+}
+
 std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::type_index type,
-                                              const Profile& profile, std::function<void(const void*)> take) {
+                                              const Profile& profile,
+                                              std::function<void(const void*, Instant)> take) {
   const WireType& wire = wire_type_of(type, topic);
-  std::shared_ptr<Inlet> inlet =
-      wire.attach([take = std::move(take)](const void* sample, Instant) { take(sample); }, is_kept(profile));
-  const auto gate = gate_of(topic, profile, parts_->discovery);
+  std::shared_ptr<Inlet> inlet = wire.attach(std::move(take), is_kept(profile));
+  // Others than commands are heard however old they seem: who asks decides.
+  const auto gate =
+      profile.exclusive ? std::make_shared<CommandGate>(topic, profile, parts_->discovery) : nullptr;
   inlet->guard(gate);
   auto local = parts_->local_reader(profile, inlet, utc_now);
   return std::make_unique<ReaderConnection>(

@@ -16,6 +16,7 @@
 #include "core/component/port.hpp"
 #include "core/dds/discovery.hpp"
 #include "core/dds/profile.hpp"
+#include "core/dds/sample_key.hpp"
 
 namespace invar::dds {
 
@@ -86,6 +87,9 @@ class Writer {
   std::unique_ptr<Connection> connection_;
 };
 
+/// Whose samples a port takes: of its owner's cell, and of the keys that the deployment or the component says.
+[[nodiscard]] ExpectedKeys expected_keys(const InputPort& port);
+
 class Node {
  public:
   Node(NodeOptions options, Profiles profiles);
@@ -131,8 +135,14 @@ class Node {
   template <class T>
   [[nodiscard]] std::unique_ptr<Connection> reader(const std::string& topic, const Profile& profile,
                                                    std::function<void(const T&)> take) {
-    return make_reader(topic, typeid(T), profile, [take = std::move(take)](const void* sample) {
-      take(*static_cast<const T*>(sample));
+    return timed_reader<T>(topic, profile, [take = std::move(take)](const T& sample, Instant) { take(sample); });
+  }
+  /// `take` is also told when the sample was sent, by the sender's clock (UTC).
+  template <class T>
+  [[nodiscard]] std::unique_ptr<Connection> timed_reader(const std::string& topic, const Profile& profile,
+                                                         std::function<void(const T&, Instant sent)> take) {
+    return make_reader(topic, typeid(T), profile, [take = std::move(take)](const void* sample, Instant sent) {
+      take(*static_cast<const T*>(sample), sent);
     });
   }
   /// Bytes as they travel, whatever the type; for recorders and for looking at foreign topics. Uses a
@@ -157,7 +167,8 @@ class Node {
   std::unique_ptr<Connection> make_writer(const std::string& topic, std::type_index type,
                                           const Profile& profile);
   std::unique_ptr<Connection> make_reader(const std::string& topic, std::type_index type,
-                                          const Profile& profile, std::function<void(const void*)> take);
+                                          const Profile& profile,
+                                          std::function<void(const void*, Instant)> take);
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };

@@ -11,11 +11,15 @@
 
 #include "core/base/clock.hpp"
 #include "core/base/shown.hpp"
+#include "core/dds/clock_offset.hpp"
 #include "core/dds/simulated_clock.hpp"
 
 namespace invar::dds {
 
 namespace {
+
+constexpr std::size_t most_waiting = 1000;  // requests: a flood takes no more memory
+constexpr Duration between_told = Duration::seconds(5.0);
 
 lifecycle::Percentiles on_wire(const Percentiles& p) {
   lifecycle::Percentiles out;
@@ -93,13 +97,17 @@ ProcessService::ProcessService(Node& node, ProcessControl& control, Options opti
       lifecycle_{node.writer<lifecycle::LifecycleReply>(ServiceTopics{node.options().cell}.lifecycle_reply,
                                                         "request")},
       parameter_{node.writer<lifecycle::ParameterReply>(ServiceTopics{node.options().cell}.parameter_reply,
-                                                        "request")} {
+                                                        "request")},
+      model_{node.writer<transfer::ModelReply>(ServiceTopics{node.options().cell}.model_reply, "request")},
+      models_{options_.models} {
   const ServiceTopics topics{node.options().cell};
-  const auto take = [this](const auto& request) {
-    if (request.process_id() == number_) enqueue(request);
+  const auto take = [this](const auto& request, Instant sent) {
+    if (request.process_id() == number_) enqueue({request, system_now() - sent});
   };
-  readers_.push_back(node.reader<lifecycle::LifecycleRequest>(topics.lifecycle_request, "request", take));
-  readers_.push_back(node.reader<lifecycle::ParameterRequest>(topics.parameter_request, "request", take));
+  const Profile& qos = node.profile("request");
+  readers_.push_back(node.timed_reader<lifecycle::LifecycleRequest>(topics.lifecycle_request, qos, take));
+  readers_.push_back(node.timed_reader<lifecycle::ParameterRequest>(topics.parameter_request, qos, take));
+  readers_.push_back(node.timed_reader<transfer::ModelRequest>(topics.model_request, qos, take));
   thread_ = std::thread{[this] { run(); }};
 }
 
@@ -117,6 +125,7 @@ ProcessService::~ProcessService() {
 
 void ProcessService::enqueue(Request request) {
   const std::lock_guard lock{mutex_};
+  if (requests_.size() == most_waiting) requests_.pop_front();  // its client asks again
   requests_.push_back(std::move(request));
   news_.notify_all();
 }
@@ -130,7 +139,8 @@ void ProcessService::run() {
     std::deque<Request> requests;
     requests.swap(requests_);
     lock.unlock();
-    for (const auto& request : requests) std::visit([this](const auto& r) { serve(r); }, request);
+    for (const auto& request : requests)
+      std::visit([&](const auto& message) { serve(message, request.age); }, request.message);
     publish_news();
     if (std::chrono::steady_clock::now() >= next || !requests.empty()) {
       follow_clock();
@@ -264,12 +274,33 @@ void ProcessService::publish_status() {
   }
 }
 
-void ProcessService::serve(const lifecycle::LifecycleRequest& request) {
+/// Replies carry no lifespan at their reader, so that whoever asks hears what became of it whatever its clock says.
+std::string ProcessService::too_late(Duration age) const {
+  const Duration lifespan = node_.profile("request").lifespan;
+  if (lifespan.ns <= 0 || age <= lifespan) return {};
+  return "not carried out: the request was sent " + seconds_text(age) + " before it arrived, by its clock; " +
+         clocks_apart("the PC that asks", Duration{} - age, "the PC of process `" + node_.options().process + "`");
+}
+
+void ProcessService::tell_clocks(Duration age) {
+  const Duration lifespan = node_.profile("request").lifespan;
+  const Instant now = monotonic_now();
+  if (lifespan.ns <= 0 || age >= -lifespan || (told_clocks_ && now - *told_clocks_ < between_told)) return;
+  told_clocks_ = now;
+  publish(event::SEVERITY_WARNING, node_.options().process,
+          "a request was sent in the future and is carried out; " +
+              clocks_apart("the PC that asks", Duration{} - age, "this one"));
+}
+
+void ProcessService::serve(const lifecycle::LifecycleRequest& request, Duration age) {
   lifecycle::LifecycleReply reply;
   reply.client(request.client());
   reply.process_id(number_);
   reply.request(request.request());
-  if (const auto transition = from_wire(request.wanted())) {
+  tell_clocks(age);
+  if (const std::string why = too_late(age); !why.empty()) {
+    reply.text(why);
+  } else if (const auto transition = from_wire(request.wanted())) {
     // Repeated requests are known by their id and not carried out again.
     const std::uint64_t id = request.client() ^ (request.request() * 0x9E3779B97F4A7C15U);
     const Outcome outcome = control_.request(request.component_name().c_str(), *transition, id);
@@ -287,21 +318,48 @@ void ProcessService::serve(const lifecycle::LifecycleRequest& request) {
   lifecycle_.write(reply);
 }
 
-void ProcessService::serve(const lifecycle::ParameterRequest& request) {
+void ProcessService::serve(const lifecycle::ParameterRequest& request, Duration age) {
   for (const auto& known : answered_)
     if (known.client() == request.client() && known.request() == request.request()) {
       parameter_.write(known);
       return;
     }
-  lifecycle::ParameterReply reply = answer(request);
+  tell_clocks(age);
+  const bool sets = request.action() == lifecycle::PARAMETER_SET;
+  const std::string why = sets ? too_late(age) : "";  // to look harms nobody
+  lifecycle::ParameterReply reply;
+  if (why.empty())
+    reply = answer(request);
+  else
+    reply.text(why);
   reply.client(request.client());
   reply.process_id(number_);
   reply.request(request.request());
   reply.at(stamp());
   parameter_.write(reply);
-  if (request.action() != lifecycle::PARAMETER_SET) return;
+  if (!sets || !why.empty()) return;
   answered_.push_back(std::move(reply));
   if (answered_.size() > 64) answered_.pop_front();
+}
+
+/// To keep the same text twice is to keep it once, so that a request that comes again needs no memory.
+void ProcessService::serve(const transfer::ModelRequest& request, Duration age) {
+  transfer::ModelReply reply;
+  reply.client(request.client());
+  reply.process_id(number_);
+  reply.request(request.request());
+  std::string why = too_late(age);
+  if (why.empty() && !control_.executor().find(request.component_name().c_str()))
+    why = "process `" + node_.options().process + "` has no such component";
+  if (why.empty()) {
+    const ReceivedModels::Kept kept = models_.keep(request.text());
+    reply.path(kept.file.string());
+    why = kept.refusal;
+  }
+  reply.done(why.empty());
+  reply.text(why);
+  reply.at(stamp());
+  model_.write(reply);
 }
 
 lifecycle::ParameterReply ProcessService::answer(const lifecycle::ParameterRequest& request) {

@@ -4,9 +4,11 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -14,6 +16,7 @@
 
 #include "core/dds/cell_client.hpp"
 #include "core/dds/node.hpp"
+#include "core/dds/received_models.hpp"
 #include "core/executor/process_control.hpp"
 
 namespace invar::dds {
@@ -25,6 +28,8 @@ class ProcessService {
     std::uint32_t cell = 0;                           // number of the cell, for keys
     std::string host;                                 // name of the host in the cell file
     Duration interval = Duration::milliseconds(500);  // between two status samples
+    /// Where models go that are sent to this process; empty: none is taken.
+    std::filesystem::path models;
     /// Called when somebody asks the process to stop; on the service's thread.
     std::function<void()> stop_process;
   };
@@ -39,14 +44,23 @@ class ProcessService {
   void publish_status();
 
  private:
-  using Request = std::variant<lifecycle::LifecycleRequest, lifecycle::ParameterRequest>;
+  using Message =
+      std::variant<lifecycle::LifecycleRequest, lifecycle::ParameterRequest, transfer::ModelRequest>;
+  struct Request {
+    Message message;
+    Duration age;  // by the clocks of the two PCs: what it took to come, and by how much they disagree
+  };
   void enqueue(Request request);
   void run();
   void publish_news();
   void follow_clock();
   void publish_late(const ProcessStatus& status);
-  void serve(const lifecycle::LifecycleRequest& request);
-  void serve(const lifecycle::ParameterRequest& request);
+  void serve(const lifecycle::LifecycleRequest& request, Duration age);
+  void serve(const lifecycle::ParameterRequest& request, Duration age);
+  void serve(const transfer::ModelRequest& request, Duration age);
+  /// Why a request of that age is not carried out; empty: it is.
+  [[nodiscard]] std::string too_late(Duration age) const;
+  void tell_clocks(Duration age);
   [[nodiscard]] lifecycle::ParameterReply answer(const lifecycle::ParameterRequest& request);
   [[nodiscard]] base::Stamp stamp() const;
 
@@ -59,11 +73,14 @@ class ProcessService {
   Writer<event::Notice> notice_;
   Writer<lifecycle::LifecycleReply> lifecycle_;
   Writer<lifecycle::ParameterReply> parameter_;
+  Writer<transfer::ModelReply> model_;
+  ReceivedModels models_;
   std::mutex mutex_;
   std::condition_variable news_;
   std::deque<Request> requests_;
   bool stopping_ = false;
   std::map<std::string, std::uint64_t> told_late_;  // declared latencies not kept, as told so far
+  std::optional<Instant> told_clocks_;  // when a client's clock was told to be ahead
   bool told_apart_ = false;  // the host's clock was set, and the stamps are not there yet
   std::deque<lifecycle::ParameterReply> answered_;  // repeated requests get the same answer
   std::vector<std::unique_ptr<Connection>> readers_;

@@ -93,8 +93,8 @@ fdds::DataReaderQos reader_qos(const Profile& p) {
   fdds::DataReaderQos qos;
   set_common(qos, p);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = {0, 1'000'000};
-  // CommandGate refuses what is too old, and says so.
-  if (p.exclusive) qos.lifespan().duration = eprosima::fastrtps::c_TimeInfinite;
+  // Fast DDS would drop in silence what the clock of another PC makes old: CommandGate refuses it, and says so.
+  qos.lifespan().duration = eprosima::fastrtps::c_TimeInfinite;
   return qos;
 }
 

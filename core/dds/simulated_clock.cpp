@@ -16,6 +16,7 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 constexpr std::size_t part_size = 1U << 20U;  // the bound of samples in one message
+constexpr std::size_t most_outside = 4096;    // samples from outside in one window: a flood takes no more memory
 
 SteadyTime after(Duration patience) {
   return std::chrono::steady_clock::now() + std::chrono::nanoseconds{patience.ns};
@@ -238,8 +239,13 @@ void SimulatedClockClient::bind(InputPort& port) {
   const WireType* type = WireTypes::all().find(port.type());
   if (type == nullptr)
     throw InputError{"topic `" + port.topic + "`", "carries a type that no IDL describes", "add it to idl/"};
-  inputs_.push_back({port.topic, type->attach(port, false), type->name(), port.profile,
-                     port.direction() == Port::Direction::inbox});
+  const Profile& profile = node_.profile(port.profile);
+  const auto refused = [&port] { port.refuse(); };
+  Binding input{port.topic, type->attach(port, false), type->name(), port.profile, &port, {}, {}};
+  input.gate = std::make_shared<CommandGate>(port.topic, profile, node_.discovery(), refused);
+  input.probe = type->attach([](const void*, Instant) {}, false);
+  for (const auto& inlet : {input.inlet, input.probe}) inlet->guard(input.gate, expected_keys(port));
+  inputs_.push_back(std::move(input));
   membership_.wanted.push_back(port.topic);
 }
 
@@ -248,23 +254,27 @@ void SimulatedClockClient::listen_outside() {
   std::set<std::string> heard;
   const std::string own = "invar/" + node_.options().cell + "/";
   for (const auto& input : inputs_) {
-    if (!input.is_inbox || !heard.insert(input.topic).second) continue;
-    const Profile& profile = node_.profile(input.profile);
-    auto gate =
-        profile.exclusive ? std::make_shared<CommandGate>(input.topic, profile, node_.discovery()) : nullptr;
-    outside_readers_.push_back(node_.raw_reader(
-        input.topic, input.type, profile, [this, topic = input.topic, own, gate](const RawSample& sample) {
-          const std::string writer{sample.writer};
-          Discovery& discovery = node_.discovery();
-          if (discovery.participant_name(discovery.claimant(writer).participant).starts_with(own)) return;
-          if (gate && !gate->passes({}, writer, {sample.sent_ns})) return;
-          const std::lock_guard lock{mutex_};
-          for (const auto& one : inputs_)
-            if (one.topic == topic)
-              outside_.push_back(
-                  {std::string{sample.writer}, one.inlet.get(), {sample.cdr.begin(), sample.cdr.end()}});
-        }));
+    if (input.port->direction() != Port::Direction::inbox || !heard.insert(input.topic).second) continue;
+    outside_readers_.push_back(
+        node_.raw_reader(input.topic, input.type, node_.profile(input.profile),
+                         [this, topic = input.topic, own](const RawSample& sample) {
+                           Discovery& discovery = node_.discovery();
+                           const auto who = discovery.claimant(std::string{sample.writer});
+                           if (discovery.participant_name(who.participant).starts_with(own)) return;
+                           for (const auto& one : inputs_)
+                             if (one.topic == topic) take_outside(one, sample);
+                         }));
   }
+}
+
+/// Keeps what this input takes until the next window; what is malformed is a stranger's.
+void SimulatedClockClient::take_outside(const Binding& input, const RawSample& sample) {
+  const std::string writer{sample.writer};
+  if (input.probe->deliver(sample.cdr, {}, writer) != Inlet::Delivery::taken) return;
+  if (input.gate->is_asked_of_all() && !input.gate->passes(writer, {sample.sent_ns})) return;
+  const std::lock_guard lock{mutex_};
+  if (outside_.size() == most_outside) return input.port->refuse();
+  outside_.push_back({writer, input.inlet.get(), {sample.cdr.begin(), sample.cdr.end()}});
 }
 
 void SimulatedClockClient::deliver_outside(Instant at) {
@@ -274,7 +284,7 @@ void SimulatedClockClient::deliver_outside(Instant at) {
     came.swap(outside_);
   }
   for (const auto& sample : came)
-    (void)sample.inlet->deliver(sample.cdr, at);  // what is malformed is a stranger's
+    (void)sample.inlet->deliver(sample.cdr, at, sample.writer);
 }
 
 void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) {
@@ -354,7 +364,8 @@ bool SimulatedClockClient::deliver(std::uint32_t process, std::span<const std::u
       good = false;
       return;
     }
-    for (Inlet* inlet : peer.inlets[number]) good &= inlet->deliver(cdr, at);
+    for (Inlet* inlet : peer.inlets[number])
+      good &= inlet->deliver(cdr, at, peer.name) != Inlet::Delivery::malformed;
     ++peer.counts[number];
     if (tap_) tap_({peer.name, peer.topics[number], peer.counts[number], at, cdr});
   });

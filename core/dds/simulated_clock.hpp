@@ -139,7 +139,9 @@ class SimulatedClockClient {
     std::string topic;
     std::shared_ptr<Inlet> inlet;
     std::string type, profile;
-    bool is_inbox = false;
+    InputPort* port = nullptr;
+    std::shared_ptr<CommandGate> gate;  // of what comes from outside
+    std::shared_ptr<Inlet> probe;       // whether what comes from outside is what the port takes
   };
   /// A sample that came by DDS.
   struct FromOutside {
@@ -165,6 +167,7 @@ class SimulatedClockClient {
   void answer(const lockstep::TimeGrant& grant, const std::vector<std::uint8_t>& samples, bool finished,
               const std::string& failure);
   void learn(std::uint32_t process, const Membership& membership);
+  void take_outside(const Binding& input, const RawSample& sample);
   void deliver_outside(Instant at);
   /// False: malformed.
   bool deliver(std::uint32_t process, std::span<const std::uint8_t> bundle, Instant at);

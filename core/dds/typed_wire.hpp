@@ -1,12 +1,13 @@
 // TypedWire: the WireType of one C++ type and its generated type support. Only where types are registered.
 #pragma once
 
+#include <fastdds/dds/core/LoanableSequence.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 
-#include <algorithm>
 #include <mutex>
+#include <string>
 
 #include "core/dds/command_gate.hpp"
 #include "core/dds/endpoint_id.hpp"
@@ -108,21 +109,33 @@ class DirectOutlet final : public Outlet {
   std::atomic<std::uint64_t> refused_{0};
 };
 
+/// What a sink is told beside a sample.
+enum class SinkTime { arrival, sending };
+
 /// Several threads of the middleware (one a transport) may call; the port wants one at a time.
 template <class T, class B>
 class TypedInlet final : public Inlet {
  public:
-  TypedInlet(Sink<T> sink, bool keep) : sink_{std::move(sink)}, keep_{keep} {}
+  TypedInlet(Sink<T> sink, bool keep, SinkTime time = SinkTime::arrival)
+      : sink_{std::move(sink)}, keep_{keep}, time_{time} {}
 
   void receive(fdds::DataReader& reader, Instant now) override {
     const std::lock_guard lock{mutex_};
     fdds::SampleInfo info;
     while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
-           ReturnCode_t::RETCODE_OK)
-      if (info.valid_data && !came_locally(info) && is_obeyed(info)) sink_(sample_, now);
+           ReturnCode_t::RETCODE_OK) {
+      if (!info.valid_data) continue;
+      if (came_locally(info)) {
+        if (keep_ && expected_ && !has_expected_key(sample_, *expected_)) drop(reader, info);  // told already
+      } else if (is_obeyed(info)) {
+        sink_(sample_, time_ == SinkTime::arrival ? now : Instant{info.source_timestamp.to_ns()});
+      } else if (keep_) {
+        drop(reader, info);
+      }
+    }
   }
 
-  bool deliver(std::span<const std::byte> cdr, Instant now) override {
+  Delivery deliver(std::span<const std::byte> cdr, Instant now, const std::string& writer) override {
     const std::lock_guard lock{mutex_};
     eprosima::fastrtps::rtps::SerializedPayload_t payload;
     payload.data =
@@ -130,8 +143,10 @@ class TypedInlet final : public Inlet {
     payload.length = payload.max_size = static_cast<std::uint32_t>(cdr.size());
     const bool good = type_.deserialize(&payload, &sample_);
     payload.data = nullptr;  // not ours to free
-    if (good) sink_(sample_, now);
-    return good;
+    if (!good) return Delivery::malformed;
+    if (!is_sound([&writer] { return writer; })) return Delivery::refused;
+    sink_(sample_, now);
+    return Delivery::taken;
   }
 
  private:
@@ -139,19 +154,39 @@ class TypedInlet final : public Inlet {
     return local_ && local_->serves(endpoint_id(info.sample_identity.writer_guid()));
   }
 
+  /// Its key is one that is expected, and its numbers are numbers. `writer` is asked only where not.
+  template <class Writer>
+  bool is_sound(Writer writer) {
+    if (!expected_) return true;
+    if (!has_expected_key(sample_, *expected_)) {
+      gate_->refuse(writer(), told_key(sample_, *expected_));
+      return false;
+    }
+    if (const char* member = idl::not_finite(sample_); member != nullptr) {
+      gate_->refuse(writer(), std::string{"its `"} + member + "` is no finite number: send one");
+      return false;
+    }
+    return true;
+  }
   bool is_obeyed(const fdds::SampleInfo& info) {
-    if (!gate_) return true;
-    eprosima::fastrtps::rtps::InstanceHandle_t handle;
-    (void)type_.getKey(&sample_, &handle, false);
-    Ownership::Instance instance;
-    std::copy_n(&handle.value[0], instance.size(), instance.begin());
-    return gate_->passes(instance, guid_text(info.sample_identity.writer_guid()),
-                         {info.source_timestamp.to_ns()});
+    const auto writer = [&info] { return guid_text(info.sample_identity.writer_guid()); };
+    if (!is_sound(writer)) return false;
+    return !gate_ || !gate_->is_asked_of_all() ||
+           gate_->passes(writer(), Instant{info.source_timestamp.to_ns()});
+  }
+  /// A refused sample that stayed would keep its instance, and so many foreign keys leave no room for the right one.
+  static void drop(fdds::DataReader& reader, const fdds::SampleInfo& info) {
+    fdds::LoanableSequence<T> samples;
+    fdds::SampleInfoSeq infos;
+    if (reader.take_instance(samples, infos, fdds::LENGTH_UNLIMITED, info.instance_handle) ==
+        ReturnCode_t::RETCODE_OK)
+      (void)reader.return_loan(samples, infos);
   }
 
   std::mutex mutex_;
   Sink<T> sink_;
   bool keep_;
+  SinkTime time_;
   T sample_;
   Type<B> type_;
 };
@@ -165,6 +200,10 @@ class TypedWire final : public WireType {
     return requires(const T& sample) { sample.at().time_ns(); };
   }
   [[nodiscard]] std::size_t largest_sample() const override { return Type<B>{}.m_typeSize; }
+  [[nodiscard]] std::string key_part() const override {
+    const char* name = dds::key_part(T{}).first;
+    return name == nullptr ? "" : name;
+  }
   [[nodiscard]] fdds::TopicDataType* make_support() const override {
     auto* type = new Type<B>;            // NOLINT: Fast DDS takes it over
     type->auto_fill_type_object(false);  // Cyclone DDS would refuse the endpoint
@@ -204,7 +243,8 @@ class TypedWire final : public WireType {
   }
   [[nodiscard]] std::unique_ptr<Inlet> attach(SampleSink sink, bool keep) const override {
     return std::make_unique<TypedInlet<T, B>>(
-        [sink = std::move(sink)](const T& sample, Instant now) { sink(&sample, now); }, keep);
+        [sink = std::move(sink)](const T& sample, Instant sent) { sink(&sample, sent); }, keep,
+        SinkTime::sending);
   }
   bool write(fdds::DataWriter& writer, const void* sample) const override {
     return write_sample(writer, *static_cast<const T*>(sample));
@@ -212,7 +252,7 @@ class TypedWire final : public WireType {
 };
 
 /// For an out-of-tree library with IDL of its own: add_wire_type<plant::Thing, plant::ThingPubSubType>().
-/// within_bounds must be found for T, as list_types.py writes it.
+/// within_bounds and not_finite must be found for T, as list_types.py writes them.
 template <class T, class B>
 void add_wire_type() {
   WireTypes::all().add(std::make_unique<TypedWire<T, B>>());

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <typeindex>
@@ -13,6 +14,7 @@
 
 #include "core/base/time.hpp"
 #include "core/component/port.hpp"
+#include "core/dds/sample_key.hpp"
 
 namespace eprosima::fastdds::dds {
 class DataReader;
@@ -44,22 +46,29 @@ class Inlet {
   virtual ~Inlet() = default;
   /// Hands over all new samples of the reader. On a thread of the middleware.
   virtual void receive(eprosima::fastdds::dds::DataReader& reader, Instant now) = 0;
-  /// Hands over one sample in CDR (with encapsulation); false when it is malformed.
-  virtual bool deliver(std::span<const std::byte> cdr, Instant now) = 0;
-  /// Set-up only: what a reader hands over passes it first.
-  void guard(std::shared_ptr<CommandGate> gate) { gate_ = std::move(gate); }
+  enum class Delivery { taken, refused, malformed };
+  /// Hands over one sample in CDR (with encapsulation) that `writer` sent. The gate is asked for its key and its numbers
+  /// only.
+  virtual Delivery deliver(std::span<const std::byte> cdr, Instant now, const std::string& writer = {}) = 0;
+  /// Set-up only: what a reader hands over passes it first. With `expected`, a sample of another key, or with a number that
+  /// is none, is refused.
+  void guard(std::shared_ptr<CommandGate> gate, std::optional<ExpectedKeys> expected = {}) {
+    gate_ = std::move(gate);
+    expected_ = std::move(expected);
+  }
   /// Set-up only: samples of writers that `local` serves are left out of what a reader hands over.
   void prefer(std::shared_ptr<const LocalReader> local) { local_ = std::move(local); }
 
  protected:
   std::shared_ptr<CommandGate> gate_;
+  std::optional<ExpectedKeys> expected_;
   std::shared_ptr<const LocalReader> local_;
 };
 
 /// Takes the CDR (with encapsulation) of each sample that an output writes, on the writer's thread.
 using CdrSink = std::function<void(std::span<const std::byte> cdr)>;
-/// Takes a received sample; it lives until the call returns.
-using SampleSink = std::function<void(const void* sample, Instant now)>;
+/// Takes a received sample and when it was sent, by the sender's clock; it lives until the call returns.
+using SampleSink = std::function<void(const void* sample, Instant sent)>;
 
 class WireType {
  public:
@@ -70,6 +79,8 @@ class WireType {
   [[nodiscard]] virtual bool is_stamped() const = 0;
   /// Bytes of the largest sample on the wire.
   [[nodiscard]] virtual std::size_t largest_sample() const = 0;
+  /// The member of its key beside `cell`: axis, node, sensor or component_id; empty: none.
+  [[nodiscard]] virtual std::string key_part() const = 0;
   /// A type support to register; the caller owns it.
   [[nodiscard]] virtual eprosima::fastdds::dds::TopicDataType* make_support() const = 0;
 

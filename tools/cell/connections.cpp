@@ -224,6 +224,41 @@ void check_latencies(const LoadedCell& loaded) {
       }
 }
 
+/// The keys that an input's samples carry: those of the outputs of this cell that write its topic; of an inbox, of whoever
+/// is told there.
+void set_keys(LoadedCell& loaded) {
+  const auto each_port = [&loaded](auto visit) {
+    for (const LoadedProcess& process : loaded.processes)
+      for (const LoadedComponent& member : process.components)
+        if (member.component)
+          for (Port* port : member.component->ports()) visit(*port);
+  };
+  const auto own_topic = [&loaded](const Port& port) {
+    return loaded.cell->topic(port.owner().name, port.name());
+  };
+  each_port([&](Port& port) {
+    if (port.direction() == Port::Direction::output || port.topic.empty()) return;
+    auto& input = static_cast<InputPort&>(port);
+    const bool has_axis = dds::WireTypes::all().find(port.type()) != nullptr &&
+                          dds::WireTypes::all().find(port.type())->key_part() == "axis";
+    input.keys.clear();
+    input.is_of_plant = !port.topic.starts_with("cell/" + loaded.cell->name + "/");
+    bool unknown = false, told = false;
+    each_port([&](const Port& other) {
+      const bool writes = other.direction() == Port::Direction::output && other.topic == port.topic;
+      const bool is_told = other.direction() == Port::Direction::inbox && own_topic(other) == port.topic;
+      if (!writes && !is_told) return;
+      told = told || is_told;
+      if (is_told && !has_axis) input.keys.push_back(0);  // nobody in particular: who listens there
+      if (other.key || !has_axis)
+        input.keys.push_back(other.key.value_or(other.owner().id));
+      else
+        unknown = true;  // of which axis its samples are, such as those of a plugin or of a job of several axes
+    });
+    if (unknown && !told) input.keys.clear();
+  });
+}
+
 }  // namespace
 
 void connect_ports(LoadedCell& loaded) {
@@ -233,6 +268,7 @@ void connect_ports(LoadedCell& loaded) {
       check_port_keys(member);
       for (Port* port : member.component->ports()) connect_port(loaded, member, *port);
     }
+  set_keys(loaded);
   check_owners(loaded);
   check_drives(loaded);
   check_claims(loaded);

@@ -61,6 +61,25 @@ std::vector<std::string> job_names(const LoadedComponent& member) {
   return names;
 }
 
+/// The last word of a parameter's path: `out` of `jobs[0].out`.
+std::string last_word(const std::string& path) { return path.substr(path.find_last_of('.') + 1); }
+
+/// What the cell file itself names is what a command may name: the file's own folder, the folders of `models`, where the
+/// components write results or keep their state, and each model that is named for a component or a job.
+void find_places(LoadedCell& loaded) {
+  loaded.model_places = loaded.cell->models;
+  loaded.model_places.push_back(std::filesystem::absolute(loaded.cell->file).parent_path());
+  for (const LoadedProcess& process : loaded.processes)
+    for (const LoadedComponent& member : process.components)
+      for (const ParameterInfo& info : member.prepared.infos) {
+        const std::string name = last_word(info.path);
+        const bool is_result = name == "out", is_named = name == "state" || name == "apply" || info.type == "file";
+        if (info.otherwise.empty() || info.path.find("[]") != std::string::npos) continue;
+        if (is_result) loaded.result_places.emplace_back(info.otherwise);
+        if (is_result || is_named) loaded.model_places.emplace_back(info.otherwise);
+      }
+}
+
 /// Every job of the cell must be one of the component that is to run it.
 void check_jobs(const LoadedCell& loaded) {
   for (const LoadedProcess& process : loaded.processes)
@@ -110,7 +129,7 @@ Port* LoadedCell::port(const std::string& component, const std::string& name) {
 }
 
 LoadedCell load_cell(const std::filesystem::path& file) {
-  LoadedCell loaded{config::Yaml::load(file), nullptr, std::make_shared<Registry>(), {}};
+  LoadedCell loaded{config::Yaml::load(file), nullptr, std::make_shared<Registry>(), {}, {}, {}};
   loaded.cell = std::make_unique<config::Cell>(config::read_cell(loaded.yaml));
   add_all_components(*loaded.registry);
   const bool types_known = load_plugins(*loaded.cell, *loaded.registry, loaded.yaml.root());
@@ -121,6 +140,7 @@ LoadedCell load_cell(const std::filesystem::path& file) {
   connect_ports(loaded);
   check_qos(loaded);
   check_jobs(loaded);
+  find_places(loaded);
   loaded.yaml.finish();
   return loaded;
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/component/cell_folders.hpp"
 #include "core/component/registry.hpp"
 #include "core/config/cell.hpp"
 
@@ -29,6 +30,8 @@ struct LoadedCell {
   std::unique_ptr<config::Cell> cell;
   std::shared_ptr<Registry> registry;  // keeps plugins loaded
   std::vector<LoadedProcess> processes;
+  /// Where a command may name a model to read, and a result to write.
+  CellFolders::Places model_places, result_places;
 
   [[nodiscard]] LoadedProcess* process(const std::string& name);
   [[nodiscard]] std::vector<std::string> process_names() const;

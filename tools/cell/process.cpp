@@ -64,6 +64,9 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of,
   return options;
 }
 
+/// Where models go that `invar job apply` sends, beside the black boxes.
+constexpr const char* received_models = "out/models";
+
 /// What one process is made of while it runs.
 class RunningProcess {
  public:
@@ -74,8 +77,12 @@ class RunningProcess {
         executor_{executor_options(file_, options.simulated)},
         control_{executor_},
         node_{node_options(loaded, process, options.simulated), dds::load_profiles(loaded.cell->profiles)} {
+    CellFolders::Places models = loaded.model_places;
+    models.emplace_back(received_models);
+    const auto folders = std::make_shared<const CellFolders>(std::move(models), loaded.result_places);
     for (LoadedComponent& member : process.components) {
       member.component->simulated_time = options.simulated;
+      member.component->folders = folders;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
       if (auto* found = dynamic_cast<supervisor::Supervisor*>(member.component.get())) supervisor_ = found;
       executor_.add(std::move(member.component), {.type = member.file->type,
@@ -91,7 +98,8 @@ class RunningProcess {
     service_ = std::make_unique<dds::ProcessService>(
         node_, control_,
         dds::ProcessService::Options{
-            .cell = loaded.cell->id, .host = file_.host, .stop_process = [this] { asked_to_stop_ = true; }});
+            .cell = loaded.cell->id, .host = file_.host, .models = received_models,
+            .stop_process = [this] { asked_to_stop_ = true; }});
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 

@@ -186,7 +186,7 @@ class Replayed {
     fed.insert(message.channel->topic);
     const std::span cdr{reinterpret_cast<const std::byte*>(message.data.data()), message.data.size()};
     for (const auto& inlet : found->second)
-      if (inlet->deliver(cdr, message.log_time)) ++report.fed;
+      if (inlet->deliver(cdr, message.log_time) == dds::Inlet::Delivery::taken) ++report.fed;
   }
 
   const config::CellProcess& file_;

@@ -164,7 +164,7 @@ class ModelPort {
                                                  const std::string& path) {
     std::random_device random;
     compensation::ModelCommand command;
-    if (cell_.file() != nullptr) command.cell(cell_.file()->id);
+    command.cell(cell_.cell_id());
     command.id(((std::uint64_t{random()} << 32U) | random()) | 1U);
     command.kind(kind);
     command.path(path);
@@ -191,6 +191,24 @@ class ModelPort {
   std::optional<compensation::ModelStatus> status_;
   std::array<std::unique_ptr<dds::Connection>, 2> readers_;  // last: nothing arrives before all else stands
 };
+
+/// Brings the file's text to the component's process, which may be on another PC, and returns where it lies there; nothing: it
+/// was refused, and said so.
+std::optional<std::string> send_model(LiveCell& cell, const std::string& command, const std::string& component,
+                                      const std::filesystem::path& file) {
+  constexpr std::size_t most = 4U << 20U;  // of a ModelRequest
+  const std::string text = config::Yaml::load(file).text();
+  if (text.size() > most)
+    throw InputError{file.string(), "has more than 4 MiB", "a component takes no larger model"};
+  const std::string process = cell.process_of(component);
+  const auto reply = cell.client().model(process, component, text, cell.patience());
+  if (reply && reply->done()) return reply->path().c_str();
+  std::cerr << command << ": process `" << process << "` "
+            << (reply ? std::string{"refused the model: "} + reply->text().c_str()
+                      : "does not answer" + cell.clocks_apart(process))
+            << '\n';
+  return std::nullopt;
+}
 
 std::string state_text(compensation::ModelState state) {
   constexpr std::array words{"none", "staged", "active", "refused"};
@@ -244,7 +262,9 @@ int apply(Options& options) {
     if (answer && answer->state() != compensation::MODEL_REFUSED) return false;
     if (options.json && answer) say(*answer, "");
     std::cerr << options.call.command << ": `" << component << "` "
-              << (answer ? std::string{"refused: "} + answer->text().c_str() : "does not answer") << '\n';
+              << (answer ? std::string{"refused: "} + answer->text().c_str()
+                      : "does not answer" + cell.clocks_apart(cell.process_of(component)))
+              << '\n';
     return true;
   };
   if (options.rollback || options.none) {
@@ -255,7 +275,9 @@ int apply(Options& options) {
         answer->state() == compensation::MODEL_NONE ? "no model any more" : "the model before is active");
     return 0;
   }
-  if (refused(port.order(compensation::MODEL_STAGE, file.string()))) return 1;
+  const auto sent = send_model(cell, options.call.command, component, file);
+  if (!sent) return 1;
+  if (refused(port.order(compensation::MODEL_STAGE, *sent))) return 1;
   const auto active = port.order(compensation::MODEL_ACTIVATE, "");
   if (refused(active)) return 1;
   say(*active, file.string() + " is active");

@@ -105,6 +105,10 @@ class Jobs {
     const auto found = statuses_.find(component);
     return found == statuses_.end() ? std::nullopt : std::optional{found->second};
   }
+  /// Follows on that a component does not answer.
+  std::string clocks_apart(const std::string& component) {
+    return cell_.clocks_apart(cell_.process_of(component));
+  }
   /// False: the component did not connect in time.
   bool send(const std::string& component, job::JobCommandKind kind, std::uint64_t id, const std::string& name,
             const std::string& arguments) {
@@ -121,7 +125,7 @@ class Jobs {
       if (Clock::now() > end || !sleep_for(Duration::milliseconds(20))) return false;
     sleep_for(Duration::milliseconds(100));  // the reader's side of the match
     job::JobCommand command;
-    if (cell_.file() != nullptr) command.cell(cell_.file()->id);
+    command.cell(cell_.cell_id());
     command.id(id);
     command.kind(kind);
     command.name(name);
@@ -225,7 +229,7 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
       std::cerr << options.call.command << ": `" << component << "` does not take the job"
                 << (status && status->phase() == job::JOB_RUNNING ? std::string{": "} + status->text().c_str()
                                                                   : "; is it active?")
-                << '\n';
+                << jobs.clocks_apart(component) << '\n';
       return 1;
     } else if (Clock::now() - last_sent > std::chrono::seconds{1}) {
       last_sent = Clock::now();  // the same id is carried out once
@@ -239,7 +243,8 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
       last_sent = Clock::now();
     }
     if (cancelling && Clock::now() - last_sent > std::chrono::duration<double>{options.call.patience}) {
-      std::cerr << options.call.command << ": `" << component << "` does not confirm that it stopped\n";
+      std::cerr << options.call.command << ": `" << component << "` does not confirm that it stopped"
+                << jobs.clocks_apart(component) << '\n';
       return 1;
     }
     const timespec pause{0, 20'000'000};

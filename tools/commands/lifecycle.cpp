@@ -33,7 +33,10 @@ Asked ask(LiveCell& cell, const std::string& process, const std::string& compone
           lifecycle::Transition transition) {
   Asked asked{process, component, false, "", "no answer"};
   const auto reply = cell.client().request(process, component, transition, cell.patience());
-  if (!reply) return asked;
+  if (!reply) {
+    asked.text += cell.clocks_apart(process);
+    return asked;
+  }
   return {process, component, reply->done(), state_text(reply->state()), reply->text().c_str()};
 }
 

@@ -79,7 +79,8 @@ int call(Options& options, lifecycle::ParameterAction action) {
   for (const auto& process : processes) {
     const auto reply = cell.client().parameter(process, component, action, path, value, cell.patience());
     if (!reply) {
-      std::cerr << options.call.command << ": process `" << process << "` does not answer\n";
+      std::cerr << options.call.command << ": process `" << process << "` does not answer"
+                << cell.clocks_apart(process) << '\n';
       return 1;
     }
     if (!reply->done()) {

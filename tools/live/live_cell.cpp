@@ -247,6 +247,18 @@ std::string LiveCell::process_of(const std::string& component) {
   return client_->process_of(component);
 }
 
+std::uint32_t LiveCell::cell_id() {
+  if (cell_) return cell_->id;
+  wait_until(patience_, [&] { return client_ && !client_->processes().empty(); });
+  const auto processes = client_ ? client_->processes() : std::vector<lifecycle::ProcessStatus>{};
+  return processes.empty() ? 0 : processes.front().cell();
+}
+
+std::string LiveCell::clocks_apart(const std::string& process) const {
+  const std::string apart = client_ ? client_->clocks_apart(process) : "";
+  return apart.empty() ? "" : "; " + apart;
+}
+
 void LiveCell::say_not_found(const std::string& command) const {
   if (client_ && !client_->processes().empty()) {
     std::cerr << command << ": the cell " << name_ << " runs, but no component of it answers to this\n";

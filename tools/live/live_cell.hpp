@@ -78,6 +78,11 @@ class LiveCell {
   /// Whose process a component is in: by the file, or by what the cell says. Empty: nobody has it.
   std::string process_of(const std::string& component);
 
+  /// The cell's number, by its file or by what its processes say: a component takes no command of another cell.
+  [[nodiscard]] std::uint32_t cell_id();
+  /// Follows on "... does not answer": that the clocks of the two PCs may be why. Empty: they agree.
+  [[nodiscard]] std::string clocks_apart(const std::string& process) const;
+
   /// Says on stderr that no cell answered and where it was looked for.
   void say_not_found(const std::string& command) const;
 

@@ -21,7 +21,6 @@ using testing::eventually;
 using ::testing::HasSubstr;
 using testing::local;
 
-constexpr Ownership::Instance axis_1{1}, axis_2{2};
 Instant at(double seconds) { return Instant{} + Duration::seconds(seconds); }
 Claimant of(const std::string& process, std::int64_t strength, const std::string& writer = "1") {
   return {process + "|" + writer, process, strength};
@@ -29,12 +28,9 @@ Claimant of(const std::string& process, std::int64_t strength, const std::string
 
 class Owners : public ::testing::Test {
  protected:
-  bool obeys(const Claimant& who, double seconds, const Ownership::Instance& instance = axis_1) {
-    return ownership.claim(instance, who, at(seconds)) == nullptr;
-  }
+  bool obeys(const Claimant& who, double seconds) { return ownership.claim(who, at(seconds)) == nullptr; }
   std::set<std::string> gone;
-  Ownership ownership{Duration::seconds(2.0), 3,
-                      [this](const Claimant& owner) { return gone.contains(owner.participant); }};
+  Ownership ownership{Duration::seconds(2.0), [this](const Claimant& owner) { return gone.contains(owner.participant); }};
 };
 
 TEST_F(Owners, TheGreaterStrengthCommandsUntilItEnds) {
@@ -67,16 +63,6 @@ TEST_F(Owners, WritersOfOneProcessAreOneMaster) {
   EXPECT_TRUE(obeys(of("a", 10, "2"), 0.1));
   ownership.release("a|1");
   EXPECT_FALSE(obeys(of("b", 10), 0.2)) << "its other writer commanded last";
-}
-
-TEST_F(Owners, EachInstanceHasItsOwnAndTheLongestIdleIsForgotten) {
-  EXPECT_TRUE(obeys(of("a", 10), 0.0, axis_1));
-  EXPECT_TRUE(obeys(of("b", 10), 0.1, axis_2));
-  EXPECT_FALSE(obeys(of("a", 10), 0.2, axis_2));
-  EXPECT_TRUE(obeys(of("c", 10), 0.3, {3}));
-  EXPECT_TRUE(obeys(of("c", 10), 0.4, {4}));
-  EXPECT_EQ(ownership.last(axis_1), Instant{INT64_MIN});
-  EXPECT_EQ(ownership.last(axis_2), at(0.1));
 }
 
 /// A socket of the loopback on which somebody receives, and its address.
@@ -129,8 +115,8 @@ TEST(CommandGate, RefusesWhatIsTooOldAndSaysSo) {
   CommandGate gate{"cell/test/c", standard_profiles().at("command"), discovery, [&] { ++refused; }};
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const Instant sent{std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
-  EXPECT_FALSE(gate.passes(axis_1, "p|1", sent - Duration::seconds(3.0)));
-  EXPECT_TRUE(gate.passes(axis_1, "p|1", sent));
+  EXPECT_FALSE(gate.passes("p|1", sent - Duration::seconds(3.0)));
+  EXPECT_TRUE(gate.passes("p|1", sent));
   EXPECT_EQ(refused, 1);
   const auto alarms = discovery.take_alarms();
   ASSERT_EQ(alarms.size(), 1U);
@@ -142,7 +128,7 @@ TEST(CommandGate, RefusesWhatIsTooOldAndSaysSo) {
 TEST(CommandGate, TellsOfMoreRefusalsNowAndThen) {
   Discovery discovery;
   CommandGate gate{"cell/test/c", standard_profiles().at("command"), discovery};
-  for (int i = 0; i < 100; ++i) EXPECT_FALSE(gate.passes(axis_1, "p|1", Instant{}));
+  for (int i = 0; i < 100; ++i) EXPECT_FALSE(gate.passes("p|1", Instant{}));
   EXPECT_EQ(gate.refused(), 100U);
   EXPECT_EQ(discovery.take_alarms().size(), 1U);
 }
