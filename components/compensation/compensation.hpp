@@ -170,8 +170,8 @@ class Compensation final : public Component {
   ModelLoader<LiveModel> loader_;  // its thread writes what is to be kept
   bool keeps_ = true;
   bool handles_models_ = false;  // something was loaded or changed
-  bool begins_ = false;       // the first step says what stands
-  std::string kept_refusal_;  // why the kept models are not in use
+  bool begins_ = false;          // the first step says what stands
+  std::string kept_refusal_;     // why the kept models are not in use
 };
 
 void Compensation::Parameters::describe(auto& p) {

@@ -67,10 +67,11 @@ bool Recorder::is_wanted(const std::string& topic) const {
                      [&](const std::string& part) { return topic.find(part) != std::string::npos; });
 }
 
-void Recorder::record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant at,
-                      std::span<const std::byte> cdr) {
+void Recorder::record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant sent,
+                      Instant received, std::span<const std::byte> cdr) {
   const std::scoped_lock lock{mutex_};
   if (!writer_) return;
+  newest_ = std::max(newest_, received);  // of two threads the later may come first
   auto [channel, is_new] = channels_.try_emplace({source.topic, writer}, std::uint16_t{0});
   if (is_new)
     channel->second = writer_->add_channel({.topic = source.topic,
@@ -79,7 +80,7 @@ void Recorder::record(const Source& source, const std::string& writer, std::uint
                                             .qos = source.profile,
                                             .partitions = "",
                                             .more = {{"writer", writer}}});
-  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), at, at,
+  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), newest_, sent,
                  {reinterpret_cast<const std::uint8_t*>(cdr.data()), cdr.size()});
 }
 

@@ -55,8 +55,8 @@ class Recorder final : public Component {
   [[nodiscard]] bool is_wanted(const std::string& topic) const;
   /// Any thread: one sample of one writer. `sequence` counts that writer's samples from 1. Nothing is written unless the
   /// component is configured.
-  void record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant at,
-              std::span<const std::byte> cdr);
+  void record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant sent,
+              Instant received, std::span<const std::byte> cdr);
   /// Set-up, after configure: a file that belongs to the recording.
   void attach(const std::filesystem::path& file);
 
@@ -67,6 +67,7 @@ class Recorder final : public Component {
   Instant look_at_;
   std::mutex mutex_;
   std::unique_ptr<recording::RecordingWriter> writer_;
+  Instant newest_;                                                         // when the last sample was taken
   std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;  // by topic and writer
 };
 

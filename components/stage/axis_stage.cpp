@@ -43,8 +43,9 @@ Stage::Stage(const Parameters& parameters)
   released.enabled(false);
   released.axis(static_cast<std::uint32_t>(parameters.axis));
   motor_.set_safe_value(released);
-  for (Port* port : {static_cast<Port*>(&feedback_), static_cast<Port*>(&fused_), static_cast<Port*>(&correction_),
-                     static_cast<Port*>(&command_), static_cast<Port*>(&motor_), static_cast<Port*>(&state_)})
+  for (Port* port :
+       {static_cast<Port*>(&feedback_), static_cast<Port*>(&fused_), static_cast<Port*>(&correction_),
+        static_cast<Port*>(&command_), static_cast<Port*>(&motor_), static_cast<Port*>(&state_)})
     port->key = static_cast<std::uint32_t>(parameters.axis);
 }
 
@@ -353,7 +354,8 @@ void Stage::step(const Tick& tick) noexcept {
       obey(command, tick);
     } else {
       refuse(command,
-             leaving_ ? "the axis is being deactivated" : "the axis has no feedback that it could go by", tick);
+             leaving_ ? "the axis is being deactivated" : "the axis has no feedback that it could go by",
+             tick);
     }
   }
 

@@ -199,7 +199,7 @@ class Stage final : public Component {
   double current_ = 0.0;
   double following_error_ = 0.0;
   bool settled_ = false;
-  std::uint64_t received_ = 0;  // samples of feedback so far
+  std::uint64_t received_ = 0;             // samples of feedback so far
   const char* refused_because_ = nullptr;  // as told last
   Instant refused_at_;
   Instant outside_at_;  // when the following error was last outside the settling window

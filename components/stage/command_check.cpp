@@ -37,7 +37,8 @@ const char* why_refused(const AxisCommand& command, AxisMode mode, bool homed, c
   if (mode != AXIS_MODE_HOLDING) return "the axis moves: wait until it holds, or stop it first";
   if (command.kind() != AXIS_COMMAND_HOME && !homed) return "the axis is not homed: home it first";
   if (command.kind() == AXIS_COMMAND_SINE)
-    return "the sine leaves the travel, takes for ever, or is faster than the axis's limits: make it smaller or slower";
+    return "the sine leaves the travel, takes for ever, or is faster than the axis's limits: make it smaller "
+           "or slower";
   if (command.kind() == AXIS_COMMAND_MOVE && !travel.contains(command.position()))
     return "the target is outside the axis's travel: choose one inside";
   return "its limits are so small that it would not end: raise them, or send 0 for the axis's own";

@@ -23,7 +23,8 @@ class CellFolders {
   [[nodiscard]] std::optional<std::filesystem::path> picture(const std::filesystem::path& named) const;
 
   static constexpr std::string_view no_model =
-      "no model file of that name is in the folders of this cell: name its folder in `models` of the cell file, or give it "
+      "no model file of that name is in the folders of this cell: name its folder in `models` of the cell "
+      "file, or give it "
       "by `invar job apply`";
   static constexpr std::string_view no_picture =
       "a picture is written as .png below a folder `out` of this cell, and nowhere else";

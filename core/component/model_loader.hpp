@@ -158,13 +158,13 @@ class ModelLoader {
 
   const Component& owner_;
   Load load_;
-  Ring<Request> requests_{8};                   // loop to thread
-  Ring<Loaded> loaded_{8};                      // thread to loop
-  Latest<InUse> in_use_;                        // loop to thread
-  std::vector<Held> models_;                    // the thread's
+  Ring<Request> requests_{8};                    // loop to thread
+  Ring<Loaded> loaded_{8};                       // thread to loop
+  Latest<InUse> in_use_;                         // loop to thread
+  std::vector<Held> models_;                     // the thread's
   std::uint64_t last_id_ = 0, handed_over_ = 0;  // the thread's
-  std::uint64_t taken_ = 0;                     // the loop's
-  std::uint64_t start_ = 0;                     // counts those of the component
+  std::uint64_t taken_ = 0;                      // the loop's
+  std::uint64_t start_ = 0;                      // counts those of the component
   std::atomic<bool> ending_{false};
   std::thread thread_;
 };

@@ -172,7 +172,8 @@ Cell read_cell(const Yaml& yaml) {
     std::filesystem::path path = node.as_text();
     if (path.is_relative()) path = cell.file.parent_path() / path;
     if (node.is_scalar() && !std::filesystem::is_directory(path))
-      node.fault("`" + clipped(node.as_text()) + "` is no folder", "name a folder from which models may be loaded");
+      node.fault("`" + clipped(node.as_text()) + "` is no folder",
+                 "name a folder from which models may be loaded");
     return path;
   };
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);

@@ -67,7 +67,8 @@ struct Cell {
   Duration window = Duration::milliseconds(20);  // of simulated time: how late another process sees a sample
   bool shared_memory = true;
   std::filesystem::path profiles;
-  std::vector<std::filesystem::path> models;   // folders from which a command may load a model, beside the usual
+  std::vector<std::filesystem::path>
+      models;  // folders from which a command may load a model, beside the usual
   std::vector<std::filesystem::path> plugins;  // shared libraries with further component types
   std::vector<CellHost> hosts;
   std::vector<CellProcess> processes;

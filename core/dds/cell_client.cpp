@@ -148,13 +148,18 @@ std::vector<event::Notice> CellClient::take_notices() {
   return out;
 }
 
-std::string CellClient::clocks_apart(const std::string& process) const {
+std::optional<Duration> CellClient::clock_ahead(const std::string& process) const {
   const std::lock_guard lock{mutex_};
   const auto found = ages_.find(process);
+  return found == ages_.end() ? std::nullopt : std::optional{found->second};
+}
+
+std::string CellClient::clocks_apart(const std::string& process) const {
+  const auto ahead = clock_ahead(process);
   // A first status may have waited for a whole interval; more than that is the clocks'.
   constexpr Duration noticed = Duration::milliseconds(1000);
-  if (found == ages_.end() || (found->second < noticed && found->second > -noticed)) return {};
-  return dds::clocks_apart("this PC", found->second, "the PC of process `" + process + "`");
+  if (!ahead || (*ahead<noticed&& * ahead> - noticed)) return {};
+  return dds::clocks_apart("this PC", *ahead, "the PC of process `" + process + "`");
 }
 
 std::string CellClient::process_of(const std::string& component) const {

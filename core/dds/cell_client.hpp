@@ -36,6 +36,8 @@ class CellClient {
   [[nodiscard]] std::vector<lifecycle::ComponentStatus> components() const;
   /// Notices since the last call, oldest first; the first call gives those that the cell still keeps.
   [[nodiscard]] std::vector<event::Notice> take_notices();
+  /// How far the clock of this PC is ahead of that of a process, at most, by its statuses; nothing: none came.
+  [[nodiscard]] std::optional<Duration> clock_ahead(const std::string& process) const;
   /// That the clock of this PC and that of a process are so far apart that commands may be taken for old ones; empty: they
   /// are not, as far as its status says.
   [[nodiscard]] std::string clocks_apart(const std::string& process) const;
@@ -70,7 +72,8 @@ class CellClient {
   std::uint64_t requests_ = 0;
   std::map<std::string, lifecycle::ProcessStatus> processes_;
   std::map<std::string, lifecycle::ComponentStatus> components_;
-  std::map<std::string, Duration> ages_;  // of the statuses of a process: the least, by the clocks of the two PCs
+  std::map<std::string, Duration>
+      ages_;  // of the statuses of a process: the least, by the clocks of the two PCs
   std::deque<event::Notice> notices_;
   std::map<std::uint64_t, lifecycle::LifecycleReply> lifecycle_replies_;
   std::map<std::uint64_t, lifecycle::ParameterReply> parameter_replies_;

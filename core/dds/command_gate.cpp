@@ -44,7 +44,8 @@ bool CommandGate::is_too_late(const Claimant& who, Duration age) {
   known->second = std::max(known->second, Duration{} - age);
   const Duration late = age + known->second;
   if (late <= lifespan_) return false;
-  tell(who, "it came " + seconds(late) + " later after it was sent than others of this sender, and is not obeyed after " +
+  tell(who, "it came " + seconds(late) +
+                " later after it was sent than others of this sender, and is not obeyed after " +
                 seconds(lifespan_) + " (lifespan)");
   return true;
 }

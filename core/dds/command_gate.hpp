@@ -50,8 +50,9 @@ class CommandGate {
     Instant at{INT64_MIN / 2};
     std::uint64_t since = 0;  // refused without a word since then
   };
-  std::map<std::string, Told> told_;       // by writer
-  std::map<std::string, Duration> ahead_;  // how far the clock of a writer is ahead, of those that are beyond the lifespan
+  std::map<std::string, Told> told_;  // by writer
+  std::map<std::string, Duration>
+      ahead_;  // how far the clock of a writer is ahead, of those that are beyond the lifespan
 };
 
 }  // namespace invar::dds

@@ -135,7 +135,8 @@ class Node {
   template <class T>
   [[nodiscard]] std::unique_ptr<Connection> reader(const std::string& topic, const Profile& profile,
                                                    std::function<void(const T&)> take) {
-    return timed_reader<T>(topic, profile, [take = std::move(take)](const T& sample, Instant) { take(sample); });
+    return timed_reader<T>(topic, profile,
+                           [take = std::move(take)](const T& sample, Instant) { take(sample); });
   }
   /// `take` is also told when the sample was sent, by the sender's clock (UTC).
   template <class T>

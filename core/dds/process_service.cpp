@@ -279,7 +279,8 @@ std::string ProcessService::too_late(Duration age) const {
   const Duration lifespan = node_.profile("request").lifespan;
   if (lifespan.ns <= 0 || age <= lifespan) return {};
   return "not carried out: the request was sent " + seconds_text(age) + " before it arrived, by its clock; " +
-         clocks_apart("the PC that asks", Duration{} - age, "the PC of process `" + node_.options().process + "`");
+         clocks_apart("the PC that asks", Duration{} - age,
+                      "the PC of process `" + node_.options().process + "`");
 }
 
 void ProcessService::tell_clocks(Duration age) {

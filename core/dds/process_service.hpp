@@ -80,7 +80,7 @@ class ProcessService {
   std::deque<Request> requests_;
   bool stopping_ = false;
   std::map<std::string, std::uint64_t> told_late_;  // declared latencies not kept, as told so far
-  std::optional<Instant> told_clocks_;  // when a client's clock was told to be ahead
+  std::optional<Instant> told_clocks_;              // when a client's clock was told to be ahead
   bool told_apart_ = false;  // the host's clock was set, and the stamps are not there yet
   std::deque<lifecycle::ParameterReply> answered_;  // repeated requests get the same answer
   std::vector<std::unique_ptr<Connection>> readers_;

@@ -56,7 +56,8 @@ std::string told_key(const T& sample, const ExpectedKeys& expected) {
       if (!list.empty()) taken += std::string{", "} + name + " " + list;
     }
   }
-  return "its key is " + came + ", and this input takes " + taken + ": mend the key, or write to the other topic";
+  return "its key is " + came + ", and this input takes " + taken +
+         ": mend the key, or write to the other topic";
 }
 
 }  // namespace invar::dds

@@ -16,7 +16,8 @@ namespace {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 constexpr std::size_t part_size = 1U << 20U;  // the bound of samples in one message
-constexpr std::size_t most_outside = 4096;    // samples from outside in one window: a flood takes no more memory
+constexpr std::size_t most_outside =
+    4096;  // samples from outside in one window: a flood takes no more memory
 
 SteadyTime after(Duration patience) {
   return std::chrono::steady_clock::now() + std::chrono::nanoseconds{patience.ns};
@@ -283,8 +284,7 @@ void SimulatedClockClient::deliver_outside(Instant at) {
     const std::lock_guard lock{mutex_};
     came.swap(outside_);
   }
-  for (const auto& sample : came)
-    (void)sample.inlet->deliver(sample.cdr, at, sample.writer);
+  for (const auto& sample : came) (void)sample.inlet->deliver(sample.cdr, at, sample.writer);
 }
 
 void SimulatedClockClient::tap(std::function<void(const LockstepSample&)> sink) {

@@ -49,6 +49,7 @@ struct Topic {
   TypePointer type;
   std::optional<Columns> columns;
   std::unique_ptr<Output> output;
+  Instant newest{0};  // sending of the rows so far, where the samples have no stamp
 };
 
 std::string file_name(const std::string& topic) {
@@ -66,22 +67,25 @@ void append_number(std::string& line, auto value) {
   line.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
 }
 
-/// When a sample was made: its stamp, an invar::base::Stamp. Nothing: its type has none, or nobody filled it.
-std::optional<Instant> made(const Value& value) {
+constexpr Instant year_2000{946'684'800'000'000'000};
+bool is_simulated(Instant time) { return time < year_2000; }
+
+/// When a sample was made: its stamp, an invar::base::Stamp. Nothing: its type has none, or nobody filled it; simulated time
+/// begins with 0.
+std::optional<Instant> made(const Value& value, Instant received) {
   const Value* stamp = value.at("at");
   const Value* time = stamp == nullptr ? nullptr : stamp->at("time_ns");
   const auto* ns = time == nullptr ? nullptr : std::get_if<std::int64_t>(&time->content);
-  return ns == nullptr || *ns == 0 ? std::nullopt : std::optional{Instant{*ns}};
+  return ns == nullptr || (*ns == 0 && !is_simulated(received)) ? std::nullopt : std::optional{Instant{*ns}};
 }
 
 Instant sent(const RecordedMessage& message) {
   return message.publish_time.ns == 0 ? message.log_time : message.publish_time;
 }
 
-/// Stamps of simulated time in a recording that was made by the wall clock count from the start of the cell, as they are.
-double seconds_since(Instant start, Instant made) {
-  constexpr Instant year_2000{946'684'800'000'000'000};
-  return (made < year_2000 && start >= year_2000 ? made - Instant{} : made - start).in_seconds();
+/// Simulated time counts from the start of the cell, as it is; also in a recording that was made by the wall clock.
+double seconds_since(Instant start, Instant time) {
+  return (is_simulated(time) ? time - Instant{} : time - start).in_seconds();
 }
 
 class Exporter {
@@ -239,11 +243,13 @@ class Exporter {
     return line + "\n";
   }
 
-  void append_row(std::string& line, const Topic& topic, const RecordedMessage& message, const Value& value) {
+  void append_row(std::string& line, Topic& topic, const RecordedMessage& message, const Value& value) {
     const Instant start = recording_.statistics().start;
-    append_number(line, seconds_since(start, made(value).value_or(sent(message))));
+    // Without a stamp the sender's clock counts, which somebody may have set back.
+    topic.newest = std::max(topic.newest, sent(message));
+    append_number(line, seconds_since(start, made(value, message.log_time).value_or(topic.newest)));
     line += ',';
-    append_number(line, (message.log_time - start).in_seconds());
+    append_number(line, seconds_since(start, message.log_time));
     line += ',';
     append_number(line, message.log_time.ns);
     line += ',';

@@ -253,7 +253,8 @@ void set_keys(LoadedCell& loaded) {
       if (other.key || !has_axis)
         input.keys.push_back(other.key.value_or(other.owner().id));
       else
-        unknown = true;  // of which axis its samples are, such as those of a plugin or of a job of several axes
+        unknown =
+            true;  // of which axis its samples are, such as those of a plugin or of a job of several axes
     });
     if (unknown && !told) input.keys.clear();
   });

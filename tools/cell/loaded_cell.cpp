@@ -73,7 +73,8 @@ void find_places(LoadedCell& loaded) {
     for (const LoadedComponent& member : process.components)
       for (const ParameterInfo& info : member.prepared.infos) {
         const std::string name = last_word(info.path);
-        const bool is_result = name == "out", is_named = name == "state" || name == "apply" || info.type == "file";
+        const bool is_result = name == "out",
+                   is_named = name == "state" || name == "apply" || info.type == "file";
         if (info.otherwise.empty() || info.path.find("[]") != std::string::npos) continue;
         if (is_result) loaded.result_places.emplace_back(info.otherwise);
         if (is_result || is_named) loaded.model_places.emplace_back(info.otherwise);

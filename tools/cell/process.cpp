@@ -98,8 +98,9 @@ class RunningProcess {
     service_ = std::make_unique<dds::ProcessService>(
         node_, control_,
         dds::ProcessService::Options{
-            .cell = loaded.cell->id, .host = file_.host, .models = received_models,
-            .stop_process = [this] { asked_to_stop_ = true; }});
+            .cell = loaded.cell->id, .host = file_.host, .models = received_models, .stop_process = [this] {
+              asked_to_stop_ = true;
+            }});
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 
@@ -292,7 +293,8 @@ class RunningProcess {
       clock.tap([this](const dds::LockstepSample& sample) {
         if (!recorder_->is_wanted(sample.topic.topic)) return;
         recorder_->record(source(sample.topic.topic, sample.topic.type, "simulated"),
-                          std::string{sample.process}, sample.sequence, sample.window, sample.cdr);
+                          std::string{sample.process}, sample.sequence, sample.window, sample.window,
+                          sample.cdr);
       });
     node_.start();
     const bool up = bring_up();
@@ -416,7 +418,7 @@ class RunningProcess {
     topics_.push_back(
         node_.raw_reader(port.topic, from.type, profile, [this, from](const dds::RawSample& sample) {
           recorder_->record(from, std::string{sample.writer}, sample.sequence, Instant{sample.sent_ns},
-                            sample.cdr);
+                            utc_now(), sample.cdr);
         }));
   }
 

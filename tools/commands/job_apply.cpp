@@ -194,8 +194,8 @@ class ModelPort {
 
 /// Brings the file's text to the component's process, which may be on another PC, and returns where it lies there; nothing: it
 /// was refused, and said so.
-std::optional<std::string> send_model(LiveCell& cell, const std::string& command, const std::string& component,
-                                      const std::filesystem::path& file) {
+std::optional<std::string> send_model(LiveCell& cell, const std::string& command,
+                                      const std::string& component, const std::filesystem::path& file) {
   constexpr std::size_t most = 4U << 20U;  // of a ModelRequest
   const std::string text = config::Yaml::load(file).text();
   if (text.size() > most)
@@ -246,6 +246,10 @@ int apply(Options& options) {
     return 1;
   }
   const std::string& component = options.call.word(0);
+  if (const auto why = cell.too_far_behind(cell.process_of(component)); !why.empty()) {
+    std::cerr << options.call.command << ": " << why << '\n';
+    return 1;
+  }
   ModelPort port{cell, component};
   if (!port.connect()) {
     std::cerr << options.call.command << ": `" << component
@@ -263,7 +267,7 @@ int apply(Options& options) {
     if (options.json && answer) say(*answer, "");
     std::cerr << options.call.command << ": `" << component << "` "
               << (answer ? std::string{"refused: "} + answer->text().c_str()
-                      : "does not answer" + cell.clocks_apart(cell.process_of(component)))
+                         : "does not answer" + cell.clocks_apart(cell.process_of(component)))
               << '\n';
     return true;
   };

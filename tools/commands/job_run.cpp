@@ -105,6 +105,12 @@ class Jobs {
     const auto found = statuses_.find(component);
     return found == statuses_.end() ? std::nullopt : std::optional{found->second};
   }
+  /// Says so where the component would not obey, for the clock of this PC is behind.
+  bool is_too_far_behind(const std::string& component, const std::string& command) {
+    const std::string why = cell_.too_far_behind(cell_.process_of(component));
+    if (!why.empty()) std::cerr << command << ": " << why << '\n';
+    return !why.empty();
+  }
   /// Follows on that a component does not answer.
   std::string clocks_apart(const std::string& component) {
     return cell_.clocks_apart(cell_.process_of(component));
@@ -269,6 +275,7 @@ int run(Options& options) {
               << std::lround(before->progress() * 100.0) << " %); wait for it or cancel it\n";
     return 1;
   }
+  if (jobs.is_too_far_behind(component, options.call.command)) return 1;
   std::random_device random;
   const std::uint64_t id = ((std::uint64_t{random()} << 32U) | random()) | 1U;
   if (!jobs.send(component, job::JOB_RUN, id, name, options.arguments)) {
@@ -336,6 +343,7 @@ int cancel(Options& options) {
     if (!status || status->phase() != job::JOB_RUNNING) continue;
     if (!name.empty() && name != status->name().c_str()) continue;
     if (!options.component.empty() && component != options.component) continue;
+    if (jobs.is_too_far_behind(component, options.call.command)) return 1;
     if (!jobs.send(component, job::JOB_CANCEL, status->id(), status->name().c_str(), "")) return 1;
     const auto end = Clock::now() + std::chrono::nanoseconds{cell.patience().ns};
     while (Clock::now() < end && jobs.status(component)->phase() == job::JOB_RUNNING)

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 
+#include "core/base/clock.hpp"
 #include "core/recording/recording_writer.hpp"
 #include "core/recording/type_book.hpp"
 #include "tools/live/commands.hpp"
@@ -60,10 +61,8 @@ class Channels {
                                            .partitions = partitions,
                                            .more = {{"writer", std::string{sample.writer}}}});
     }
-    timespec now{};
-    clock_gettime(CLOCK_REALTIME, &now);
-    file_.write(channel->second, static_cast<std::uint32_t>(sample.sequence),
-                Instant{now.tv_sec * 1'000'000'000 + now.tv_nsec}, Instant{sample.sent_ns},
+    file_.write(channel->second, static_cast<std::uint32_t>(sample.sequence), utc_now(),
+                Instant{sample.sent_ns},
                 {reinterpret_cast<const std::uint8_t*>(sample.cdr.data()), sample.cdr.size()});
   }
 

@@ -254,6 +254,16 @@ std::uint32_t LiveCell::cell_id() {
   return processes.empty() ? 0 : processes.front().cell();
 }
 
+std::string LiveCell::too_far_behind(const std::string& process) {
+  if (!client_) return {};
+  wait_until(patience_, [&] { return client_->clock_ahead(process).has_value(); });
+  const auto ahead = client_->clock_ahead(process);
+  const Duration lifespan = node_->profile("command").lifespan;
+  if (!ahead || lifespan.ns <= 0 || *ahead > -lifespan) return {};
+  return "not carried out: " + client_->clocks_apart(process) +
+         ", or commands from here are taken for old ones";
+}
+
 std::string LiveCell::clocks_apart(const std::string& process) const {
   const std::string apart = client_ ? client_->clocks_apart(process) : "";
   return apart.empty() ? "" : "; " + apart;

@@ -80,6 +80,9 @@ class LiveCell {
 
   /// The cell's number, by its file or by what its processes say: a component takes no command of another cell.
   [[nodiscard]] std::uint32_t cell_id();
+  /// Why a process would take every command of this PC for an old one: the clock here is behind by more than a command's
+  /// lifespan. Empty: it would not. Waits for the process to say how it is.
+  std::string too_far_behind(const std::string& process);
   /// Follows on "... does not answer": that the clocks of the two PCs may be why. Empty: they agree.
   [[nodiscard]] std::string clocks_apart(const std::string& process) const;
 

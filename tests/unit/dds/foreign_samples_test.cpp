@@ -93,7 +93,8 @@ TEST_F(ForeignSamples, AKeyOfAnotherCellOrAxisCommandsNothingWhateverItsStrength
       writer.write(order(7, 0, 2));
       writer.write(order(1, 1, 3));
       return servo.command.lost() >= before + 2;
-    })) << "refusals are counted, strength " << strength;
+    })) << "refusals are counted, strength "
+        << strength;
     (void)writer.connection().wait_for_acknowledgments(Duration::seconds(5.0));
     EXPECT_TRUE(servo.take().empty()) << "strength " << strength;
   }
@@ -123,7 +124,8 @@ TEST_F(ForeignSamples, TenThousandRandomKeysDisturbNoOwnerAndTakeNoMemory) {
         return servo.command.lost() > before;
       }));
       for (std::uint64_t k = 0; k < keys_a_writer; ++k)
-        writer.write(order(2U + static_cast<std::uint32_t>(random() % 1000000U), static_cast<std::uint32_t>(random()), 9));
+        writer.write(order(2U + static_cast<std::uint32_t>(random() % 1000000U),
+                           static_cast<std::uint32_t>(random()), 9));
       ASSERT_TRUE(eventually([&] { return servo.command.lost() >= before + keys_a_writer; }));
     }
   };

@@ -30,7 +30,8 @@ class Owners : public ::testing::Test {
  protected:
   bool obeys(const Claimant& who, double seconds) { return ownership.claim(who, at(seconds)) == nullptr; }
   std::set<std::string> gone;
-  Ownership ownership{Duration::seconds(2.0), [this](const Claimant& owner) { return gone.contains(owner.participant); }};
+  Ownership ownership{Duration::seconds(2.0),
+                      [this](const Claimant& owner) { return gone.contains(owner.participant); }};
 };
 
 TEST_F(Owners, TheGreaterStrengthCommandsUntilItEnds) {

@@ -42,7 +42,8 @@ TEST(Recorder, ADiskThatTakesNoMoreIsAnErrorOfTheComponent) {
   const auto feed = [&](bool until_error) {
     for (std::uint64_t i = 1; i < 3000 && (recorder.failure() == nullptr || !until_error); ++i) {
       for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
-      recorder.record({"a", "t", "state", ""}, "writer", i, Instant{static_cast<std::int64_t>(i)}, noise);
+      recorder.record({"a", "t", "state", ""}, "writer", i, Instant{static_cast<std::int64_t>(i)},
+                      Instant{static_cast<std::int64_t>(i)}, noise);
       recorder.step({Instant{static_cast<std::int64_t>(i) * 20'000'000}, 0.02, i});
       std::this_thread::sleep_for(std::chrono::milliseconds{1});
       if (!until_error && i == 100) return;

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/base/fault.hpp"
@@ -124,6 +125,51 @@ module test {
   EXPECT_THAT(laser.in("time", "s"), Pointwise(DoubleNear(1e-12), made));
   EXPECT_THAT(laser.in("received", "s"), Pointwise(DoubleNear(1e-12), received));
   EXPECT_THAT(Table::read(report.topics.at(1).file).in("time", "s"), ElementsAre(12.5));
+}
+
+// A first sample is made at 0 and delivered with the window after: its row must not stand before the beginning.
+TEST_F(ExportTest, SimulatedTimeIsCountedFromTheStartOfTheCell) {
+  constexpr const char* stamped = R"(
+module test {
+  @final struct Stamp { int64 time_ns; uint64 cycle; };
+  @final struct Reading { Stamp at; @unit("m") double x; };
+};)";
+  const auto type = parse_idl(stamped, "s.idl").find("test::Reading");
+  {
+    RecordingWriter writer{folder / "simulated.mcap"};
+    const auto channel = writer.add_channel({"laser", "test::Reading", stamped, "", "", {}});
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      Value value = Value::zero(*type);
+      value.at("at.time_ns")->content = std::int64_t{i} * 1'000'000;
+      const Instant window = Instant{} + Duration::milliseconds(20);
+      writer.write(channel, i + 1, window, window, encode(value));
+    }
+    EXPECT_TRUE(writer.close());
+  }
+  const auto report = export_recording(Recording::open(folder / "simulated.mcap"), folder / "out");
+  const auto rows = Table::read(report.topics.at(0).file).in("time", "s");
+  EXPECT_DOUBLE_EQ(rows.at(0), 0.0);
+  EXPECT_DOUBLE_EQ(rows.at(1), 0.001);
+  EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end()));
+}
+
+TEST_F(ExportTest, TimesOfSendingThatGoBackMakeNoRowsThatDo) {
+  const auto type =
+      parse_idl("module test { @final struct Bare { double x; }; };", "b.idl").find("test::Bare");
+  {
+    RecordingWriter writer{folder / "back.mcap"};
+    const auto channel = writer.add_channel(
+        {"bare", "test::Bare", "module test { @final struct Bare { double x; }; };", "", "", {}});
+    for (std::uint32_t i = 0; i < 4; ++i)  // the sender's clock is set back by an hour after two samples
+      writer.write(channel, i + 1, start + Duration::seconds(i),
+                   start + Duration::seconds(i < 2 ? i : i - 3600.0), encode(Value::zero(*type)));
+    EXPECT_TRUE(writer.close());
+  }
+  const auto report = export_recording(Recording::open(folder / "back.mcap"), folder / "out");
+  const auto table = Table::read(report.topics.at(0).file);
+  const auto rows = table.in("time", "s");
+  EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end()));
+  EXPECT_LT(table.in("publish_time", "ns").at(3), table.in("publish_time", "ns").at(0)) << "kept";
 }
 
 TEST_F(ExportTest, WritesOnlyWhatWasSelected) {

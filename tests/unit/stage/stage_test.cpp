@@ -242,6 +242,34 @@ TEST(Stage, RefusesMovesOutsideItsSoftLimitsAndWhileMoving) {
   EXPECT_TRUE(bench.state.latest()->command_refused());
 }
 
+TEST(Stage, RefusesNumbersThatAreNoneWithAReasonAndStandsStill) {
+  Bench bench;
+  bench.enable();
+  const double stands = bench.position;
+  std::uint64_t id = 50;
+  for (const double value : {std::nan(""), -0.1, std::numeric_limits<double>::infinity()}) {
+    AxisCommand move;
+    move.kind(AXIS_COMMAND_MOVE);
+    move.position(0.1);
+    move.velocity(value);
+    move.id(++id);
+    bench.command.write(move);
+    ASSERT_TRUE(bench.run_until([&](const AxisState& s) { return s.command_id() == id; }, 5));
+    EXPECT_TRUE(bench.state.latest()->command_refused()) << value;
+    EXPECT_TRUE(bench.state.latest()->command_done());
+    const std::string why = bench.notices.latest()->text().c_str();
+    EXPECT_NE(why.find("its velocity is"), std::string::npos) << why;
+    EXPECT_NE(why.find("send a positive number, or 0 for the axis's own"), std::string::npos) << why;
+    for (int i = 0; i < 1000; ++i) bench.cycle_once();  // the same reason is told once a second
+  }
+  EXPECT_NEAR(bench.position, stands, 1e-6);
+  bench.send(AXIS_COMMAND_MOVE, 0.3);
+  ASSERT_TRUE(
+      bench.run_until([](const AxisState& s) { return s.command_refused() && s.command_id() < 50; }, 5));
+  EXPECT_NE(std::string{bench.notices.latest()->text().c_str()}.find("outside the axis's travel"),
+            std::string::npos);
+}
+
 TEST(Stage, FollowsASineAndRefusesOneBeyondItsLimits) {
   Bench bench;
   bench.enable();
