@@ -123,7 +123,7 @@ TEST(CommandGate, RefusesWhatIsTooOldAndSaysSo) {
   ASSERT_EQ(alarms.size(), 1U);
   EXPECT_FALSE(alarms[0].fault);
   EXPECT_THAT(alarms[0].text, AllOf(HasSubstr("a command of `plant` on `cell/test/c` was not obeyed"),
-                                    HasSubstr("sent 3"), HasSubstr("lifespan"), HasSubstr("clocks")));
+                                    HasSubstr("sent 3"), HasSubstr("lifespan"), HasSubstr("clock of the sender")));
 }
 
 TEST(CommandGate, TellsOfMoreRefusalsNowAndThen) {
