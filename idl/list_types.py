@@ -10,6 +10,7 @@ import sys
 # Where a number that is none says something, or the component that takes the sample answers to it in its own state.
 NOT_ASKED = {
     "invar::sensing::AxisReading": "not a number where it does not measure that",
+    "invar::stage::IndexPulse": "no pulse yet; homing asks whether it is a number",
     "invar::sensing::FusedPosition": "`valid` says whether it is one; the stage brakes on it",
     "invar::compensation::AxisCorrection": "nothing known is an infinite sigma; the stage brakes on a correction that is none",
     "invar::thermal::NodeTemperature.temperature": "not a number before the first reading",

@@ -43,9 +43,9 @@ Stage::Stage(const Parameters& parameters)
   released.enabled(false);
   released.axis(static_cast<std::uint32_t>(parameters.axis));
   motor_.set_safe_value(released);
-  for (Port* port :
-       {static_cast<Port*>(&feedback_), static_cast<Port*>(&fused_), static_cast<Port*>(&correction_),
-        static_cast<Port*>(&command_), static_cast<Port*>(&motor_), static_cast<Port*>(&state_)})
+  for (Port* port : {static_cast<Port*>(&index_), static_cast<Port*>(&feedback_), static_cast<Port*>(&fused_),
+                     static_cast<Port*>(&correction_), static_cast<Port*>(&command_),
+                     static_cast<Port*>(&motor_), static_cast<Port*>(&state_)})
     port->key = static_cast<std::uint32_t>(parameters.axis);
 }
 
@@ -239,7 +239,11 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       blind_ = false;
       break;
   }
-  if (!accepted) return refuse(command, why_refused(command, mode_, homed_, parameters_.travel), tick);
+  if (!accepted)
+    return refuse(command,
+                  without_correction_ ? "the correction that the axis needs has stopped coming"
+                                      : why_refused(command, mode_, homed_, parameters_.travel),
+                  tick);
   sample_.command_id(command.id());
   sample_.command_refused(false);
   sample_.command_done(done);
