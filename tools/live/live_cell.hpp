@@ -49,6 +49,9 @@ class CellCall {
   std::vector<std::string> words_;  // one more than described: CELL comes first
 };
 
+/// The structure of a cell file only: what its components ask for is no matter here. Throws InputError.
+[[nodiscard]] std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file);
+
 class LiveCell {
  public:
   /// Takes part in the domain of the cell. Without a file, waits for the one cell that is there. Throws InputError for a
@@ -97,6 +100,7 @@ class LiveCell {
   std::unique_ptr<dds::CellClient> client_;
   Duration patience_;
   std::string where_;
+  std::string ports_;  // of its domain, for a firewall
 };
 
 /// A profile that takes all that `writers` of one topic send: reads as reliably and as late as the weakest of them allows.
