@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "core/compensation/droplet_model.hpp"
 #include "core/compensation/trajectory_file.hpp"
@@ -13,52 +14,86 @@ namespace invar::dispenser {
 
 using namespace dispensing;
 
+namespace {
+
+event::Severity severity_of(modbus::HealthChange::Level level) {
+  using Level = modbus::HealthChange::Level;
+  if (level == Level::note) return event::SEVERITY_NOTE;
+  return level == Level::warning ? event::SEVERITY_WARNING : event::SEVERITY_FAULT;
+}
+
+}  // namespace
+
+const modbus::RegisterContract& Dispenser::registers() {
+  using enum modbus::RegisterNeed::Access;
+  using enum modbus::RegisterNeed::Need;
+  static const modbus::RegisterContract contract{
+      {"pressure", "Pa", write, needed, "setpoint of the reservoir over ambient"},
+      {"actual_pressure", "Pa", read, needed, "of the reservoir over ambient"},
+      {"enable", "flag", write, optional, "opens the supply; without it pressure 0 shuts it"},
+      {"purge_pressure", "Pa", write, optional, "setpoint of the purge line; without it none is purged"},
+      {"purge", "flag", write, optional, "opens the purge valve; without it purge pressure 0 shuts it"},
+      {"actual_purge_pressure", "Pa", read, optional, "of the purge line"},
+      {"band", "Pa", write, optional, "half width of the band around the setpoint"},
+      {"in_band", "flag", read, optional, "enabled, and the reservoir within `band` of the setpoint"},
+      {"supply_low", "flag", read, optional, "supply below what the setpoint needs"},
+      {"over_pressure", "flag", read, optional, "it has latched: both lines are let go"},
+      {"sensor_fault", "flag", read, optional, "a pressure sensor is broken: both lines are let go"},
+      {"comm_lost", "flag", read, optional, "the device's watchdog has shut it"},
+      {"reset_alarms", "flag", write, optional, "set to 1 to clear its latches"}};
+  return contract;
+}
+
 Dispenser::Dispenser(const Parameters& parameters)
     : parameters_{parameters},
+      map_{modbus::load_map_of(parameters.modbus.map, "modbus.map", "pneumatic controller")},
+      device_{parameters.modbus.device(map_)},
       model_{*this,
              [this](const std::filesystem::path& file, Staged::Model& model) { return load(file, model); },
              "model", "status"} {
-  const auto map = modbus::load_map_of(parameters.modbus.map, "modbus.map", "pneumatic controller",
-                                       {{"pressure", "Pa", true},
-                                        {"purge_pressure", "Pa", true},
-                                        {"band", "Pa", true},
-                                        {"enable", "1", true},
-                                        {"purge", "1", true},
-                                        {"reset_alarms", "1", true},
-                                        {"enable"},
-                                        {"purge"},
-                                        {"actual_pressure", "Pa"},
-                                        {"actual_purge_pressure", "Pa"},
-                                        {"in_band"},
-                                        {"supply_low"},
-                                        {"over_pressure"},
-                                        {"sensor_fault"},
-                                        {"comm_lost"}});
-  modbus::must_take(map, "pressure", {parameters.pressure, parameters.pressure}, "pressure");
-  modbus::must_take(map, "purge_pressure", {parameters.purge_pressure, parameters.purge_pressure},
-                    "purge_pressure");
-  device_ = parameters.modbus.device(map);
-  modbus::must_let_go(map, "modbus.map", {"enable", "pressure"});
-  modbus::must_let_go(map, "modbus.map", {"purge", "purge_pressure"});
-  modbus::must_take(map, "band", {parameters.band, parameters.band}, "band");
-  const auto taken = [&](const char* reg) {
-    const Range range = map.registers[map.find(reg).value()].range;
+  modbus::MapCheck check{map_, "modbus.map", "pneumatic controller"};
+  check.fits(registers());
+  check.takes("pressure", {parameters.pressure, parameters.pressure}, "pressure");
+  check.takes("purge_pressure", {parameters.purge_pressure, parameters.purge_pressure}, "purge_pressure");
+  check.takes("band", {parameters.band, parameters.band}, "band");
+  check.takes("reset_alarms", {1.0, 1.0}, "modbus.map");
+  check.lets_go({"enable", "pressure"});
+  check.lets_go({"purge", "purge_pressure"});
+  // A line without a valve is shut by the setpoint 0.
+  check.takes(map_.find("enable") ? "enable" : "pressure", {0.0, map_.find("enable") ? 1.0 : 0.0},
+              "modbus.map");
+  check.takes(map_.find("purge") ? "purge" : "purge_pressure", {0.0, map_.find("purge") ? 1.0 : 0.0},
+              "modbus.map");
+  check.finish();
+  reservoir_ = {map_.find("pressure"), map_.find("enable"), map_.find("actual_pressure")};
+  purge_line_ = {map_.find("purge_pressure"), map_.find("purge"), map_.find("actual_purge_pressure")};
+  flags_ = {map_.find("in_band"), map_.find("supply_low"), map_.find("over_pressure"),
+            map_.find("sensor_fault"), map_.find("comm_lost")};
+  band_ = map_.find("band");
+  reset_alarms_ = map_.find("reset_alarms");
+  const auto taken = [&](std::optional<std::size_t> reg) {
+    if (!reg) return Range{0.0, 0.0};
+    const Range range = map_.registers[*reg].range;
     return Range{std::max(range.lower, settable.lower), std::min(range.upper, settable.upper)};
   };
-  pressures_ = taken("pressure");
-  purge_pressures_ = taken("purge_pressure");
+  pressures_ = taken(reservoir_.setpoint);
+  purge_pressures_ = taken(purge_line_.setpoint);
   for (const Pattern& pattern : parameters.patterns) patterns_[pattern.name] = targets(pattern);
   if (patterns_.size() != parameters.patterns.size())
     throw InputError{"patterns", "two have one name", "rename one of them"};
 }
 
 std::vector<Component::Claim> Dispenser::claims() const {
-  return {{device_, "modbus", parameters_.modbus.is_on_this_pc()}};
+  const bool here = parameters_.modbus.is_on_this_pc();
+  std::vector<Claim> all{{device_, "modbus", here}};
+  if (!parameters_.modbus.several_masters)
+    all.push_back({parameters_.modbus.connection(), "modbus", here, true});
+  return all;
 }
 
 void Dispenser::configure() {
   model_.open(parameters_.model, "look at the head before raising `bound`");
-  client_.open(parameters_.modbus, simulated_time);
+  client_.open(parameters_.modbus, map_, simulated_time);
 }
 
 void Dispenser::cleanup() noexcept {
@@ -82,18 +117,25 @@ void Dispenser::deactivate() noexcept {
   client_.send(now());
 }
 
-bool Dispenser::flag(const char* reg) const {
-  const modbus::Reading reading = client_.device().value(reg);
-  return !reading.stale && reading.value != 0.0;
+/// Whether the line is open, as far as the device shows it.
+bool Dispenser::is_open(const Line& line, bool told) const {
+  if (!line.valve) return told;
+  return map_.registers[*line.valve].readable ? client_.flag(line.valve) : told;
+}
+
+void Dispenser::drive(const Line& line, double setpoint, bool open) noexcept {
+  if (!line.setpoint) return;
+  // Out of the map's range but for the last digit cannot be: parameters and commands were checked against it.
+  const double wanted = open || line.valve ? setpoint : 0.0;
+  (void)client_.write(line.setpoint, map_.registers[*line.setpoint].range.clamp(wanted));
+  (void)client_.write(line.valve, open ? 1.0 : 0.0);
 }
 
 void Dispenser::drive(bool enable) noexcept {
-  // Out of the map's range cannot be: parameters and commands were checked against it.
-  (void)client_.device().write("pressure", setpoint_);
-  (void)client_.device().write("purge_pressure", purge_setpoint_);
-  (void)client_.device().write("band", parameters_.band);
-  (void)client_.device().write("purge", enable && purge_ ? 1.0 : 0.0);
-  (void)client_.device().write("enable", enable ? 1.0 : 0.0);
+  driven_ = enable;
+  if (band_) (void)client_.write(band_, map_.registers[*band_].range.clamp(parameters_.band));
+  drive(purge_line_, purge_setpoint_, enable && purge_);
+  drive(reservoir_, setpoint_, enable);
 }
 
 void Dispenser::obey(const PressureCommand& command) noexcept {
@@ -114,11 +156,14 @@ void Dispenser::obey(const PressureCommand& command) noexcept {
     notices_.say(event::SEVERITY_WARNING, text.data());
   }
   wanted_ = command.enabled();
-  purge_ = command.purge();
+  purge_ = command.purge() && purge_line_.setpoint;
+  if (command.purge() && !purge_)
+    notices_.say(event::SEVERITY_WARNING,
+                 "a command to purge is refused: the controller's map has no `purge_pressure`");
   if (!command.reset_alarms()) return;
   latched_ = false;
   reset_at_ = now();
-  (void)client_.device().write("reset_alarms", 1.0);
+  (void)client_.write(reset_alarms_, 1.0);
 }
 
 /// Why this model must not move targets; empty: it may.
@@ -180,23 +225,27 @@ void Dispenser::answer(const PatternCommand& command) {
 }
 
 void Dispenser::publish() noexcept {
-  const modbus::Reading actual = client_.device().value("actual_pressure");
-  const modbus::Reading enabled = client_.device().value("enable");
+  const modbus::Reading actual = client_.device().value(*reservoir_.actual);
+  const bool valve_shown = reservoir_.valve && map_.registers[*reservoir_.valve].readable;
+  const bool sound =
+      actual.is_sound() && (!valve_shown || client_.device().value(*reservoir_.valve).is_sound());
   PressureState state;
   stamp(state);
   state.node(id);
   state.pressure(actual.value);
   state.setpoint(setpoint_);
-  state.purge_pressure(client_.device().value("actual_purge_pressure").value);
-  state.enabled(flag("enable") && !client_.refuses());
-  state.purging(flag("purge"));
-  state.supply_low(flag("supply_low"));
-  state.over_pressure(latched_ || flag("over_pressure"));
-  state.sensor_fault(flag("sensor_fault"));
-  state.comm_lost(flag("comm_lost"));
-  state.stale(!actual.is_sound() || !enabled.is_sound());
+  const auto purged = client_.reading(purge_line_.actual);
+  state.purge_pressure(purged ? purged->value : std::numeric_limits<double>::quiet_NaN());
+  state.enabled(is_open(reservoir_, driven_) && !client_.refuses());
+  state.purging(is_open(purge_line_, driven_ && purge_));
+  state.supply_low(client_.flag(flags_.supply_low));
+  state.over_pressure(latched_ || client_.flag(flags_.over_pressure));
+  state.sensor_fault(client_.flag(flags_.sensor_fault));
+  state.comm_lost(client_.flag(flags_.comm_lost));
+  state.stale(!sound);
   // Both must find it there: the controller may still hold the band of an older setpoint.
-  state.in_band(!state.stale() && !client_.refuses() && flag("in_band") && !state.supply_low() &&
+  const bool found = flags_.in_band ? client_.flag(flags_.in_band) : state.enabled();
+  state.in_band(!state.stale() && !client_.refuses() && found && !state.supply_low() &&
                 std::abs(actual.value - setpoint_) <= parameters_.band);
   pressure_.write(state);
 }
@@ -210,14 +259,16 @@ void Dispenser::step(const Tick& tick) noexcept {
 
   client_.receive(tick.now);
   for (const modbus::HealthChange& change : client_.look(tick.now))
-    notices_.say(change.well ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, change.text.c_str());
+    notices_.say(severity_of(change.level), change.text.c_str());
   // A controller that refuses to be shut is left to its watchdog.
   if (!client_.refuses()) client_.device().refresh();
   // A reset takes a few polls to show; the controller itself stays shut until it has accepted it.
   constexpr Duration grace = Duration::milliseconds(500);
-  if ((flag("over_pressure") || flag("sensor_fault")) && tick.now - reset_at_ > grace) latched_ = true;
+  if ((client_.flag(flags_.over_pressure) || client_.flag(flags_.sensor_fault)) &&
+      tick.now - reset_at_ > grace)
+    latched_ = true;
   drive(wanted_ && !latched_ && !client_.refuses() &&
-        !client_.device().value("actual_pressure").out_of_range);
+        !client_.device().value(*reservoir_.actual).out_of_range);
   client_.send(tick.now);
   publish();
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "core/component/parameters.hpp"
 #include "core/component/staged_model.hpp"
 #include "core/metrology/droplet_trajectory.hpp"
+#include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "idl/dispensing.h"
 
@@ -53,6 +55,8 @@ class Dispenser final : public Component {
     }
   };
 
+  /// What its device's map must and may hold.
+  static const modbus::RegisterContract& registers();
   explicit Dispenser(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
   void configure() override;
@@ -68,11 +72,16 @@ class Dispenser final : public Component {
   void answer(const dispensing::PatternCommand& command);
   [[nodiscard]] std::string fill(const dispensing::PatternCommand& command,
                                  dispensing::TriggerPattern& pattern);
+  /// Registers of a line, as far as the map has them.
+  struct Line {
+    std::optional<std::size_t> setpoint, valve, actual;
+  };
   void drive(bool enable) noexcept;
+  void drive(const Line& line, double setpoint, bool open) noexcept;
+  [[nodiscard]] bool is_open(const Line& line, bool told) const;
   void publish() noexcept;
   /// What a command or parameter may ask for [Pa].
   static constexpr Range settable{1.0, 7e5};
-  [[nodiscard]] bool flag(const char* reg) const;
 
   const Parameters& parameters_;
   Inbox<dispensing::PressureCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
@@ -81,7 +90,13 @@ class Dispenser final : public Component {
   Output<dispensing::TriggerPattern> pattern_{*this, "pattern", "command"};
 
   Notices notices_{*this};
+  modbus::RegisterMap map_;
   std::string device_;  // in words
+  Line reservoir_, purge_line_;
+  struct {
+    std::optional<std::size_t> in_band, supply_low, over_pressure, sensor_fault, comm_lost;
+  } flags_;
+  std::optional<std::size_t> band_, reset_alarms_;
   modbus::Client client_;
   Range pressures_, purge_pressures_;  // that the map and `settable` both take
   std::map<std::string, std::vector<Eigen::Vector2d>> patterns_;
@@ -90,6 +105,7 @@ class Dispenser final : public Component {
   double purge_setpoint_ = 0.0;
   bool wanted_ = false;
   bool purge_ = false;
+  bool driven_ = false;   // told to hold its pressure
   bool latched_ = false;  // by an alarm, until a command resets it
   Instant reset_at_;
   std::uint64_t next_droplet_ = 1;

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/base/unit.hpp"
+
 namespace invar::thermal {
 
 namespace {
@@ -14,40 +16,99 @@ metrology::Thermistor equation_of(const Thermal::Thermistor& parameters) {
   return {parameters.resistance, parameters.base_temperature, parameters.coefficient_percent};
 }
 
+event::Severity severity_of(modbus::HealthChange::Level level) {
+  using Level = modbus::HealthChange::Level;
+  if (level == Level::note) return event::SEVERITY_NOTE;
+  return level == Level::warning ? event::SEVERITY_WARNING : event::SEVERITY_FAULT;
+}
+
+}  // namespace
+
+const modbus::RegisterContract& Thermal::registers() {
+  using enum modbus::RegisterNeed::Access;
+  using enum modbus::RegisterNeed::Need;
+  static const modbus::RegisterContract contract{
+      {"power", "W or %", write, needed, "setpoint of the pad's power; % of the parameter `rated_power`"},
+      {"slide_resistance", "ohm", read, either, "thermistor of the slide"},
+      {"slide_temperature", "degC", read, either, "of the slide; used where there is no `slide_resistance`"},
+      {"enable", "flag", write, optional, "lets the pad heat; without it power 0 is off"},
+      {"delivered_power", "W or %", read, optional, "that flows in fact: tells a relay that sticks"},
+      {"comm_lost", "flag", read, optional, "the device's watchdog has switched it off"},
+      {"sensor_fault", "flag", read, optional, "a sensor is open or short: the heater is let go"},
+      {"over_temperature", "flag", read, optional, "the device has latched at its own limit"},
+      {"reset_alarms", "flag", write, optional, "set to 1 to clear its latches"}};
+  return contract;
+}
+
+namespace {
+
+modbus::RegisterContract registers_of_zone(const std::string& zone) {
+  using enum modbus::RegisterNeed::Access;
+  using enum modbus::RegisterNeed::Need;
+  return {{zone + "_resistance", "ohm", read, either, "thermistor of the zone"},
+          {zone + "_temperature", "degC", read, either, "of the zone"}};
+}
+
+bool is_relative(const modbus::Register& reg) { return conversion(reg.unit, "1").has_value(); }
+
 }  // namespace
 
 Thermal::Thermal(const Parameters& parameters)
-    : parameters_{parameters}, thermistor_{equation_of(parameters.thermistor)} {
-  const auto map = modbus::load_map_of(parameters.modbus.map, "modbus.map", "heater",
-                                       {{"power", "W", true},
-                                        {"enable", "1", true},
-                                        {"slide_resistance", "ohm"},
-                                        {"delivered_power", "W"},
-                                        {"comm_lost"}});
-  modbus::must_take(map, "power", {0.0, parameters.power_limit}, "power_limit");
-  device_ = parameters.modbus.device(map);
-  if (map.heartbeat) lets_go_ = map.heartbeat->timeout.in_seconds();
-  modbus::must_let_go(map, "modbus.map", {"enable", "power"});
-  has_fault_bit_ = map.find("sensor_fault").has_value();
-  has_latch_bit_ = map.find("over_temperature").has_value();
-  has_reset_ = map.find("reset_alarms").has_value();
-  if (has_reset_) modbus::must_have(map, "modbus.map", "heater", {"reset_alarms", "1", true});
-  for (const Zone& zone : parameters.zones) {
-    if (!map.find(zone.name + "_resistance"))
-      throw InputError{"zones", "the map has no register `" + zone.name + "_resistance`",
-                       "name the zone as its register does"};
-    modbus::must_have(map, "modbus.map", "heater", {zone.name + "_resistance", "ohm"});
-    zones_.push_back({zone.name + "_resistance", equation_of(zone.thermistor),
+    : parameters_{parameters},
+      map_{modbus::load_map_of(parameters.modbus.map, "modbus.map", "heater")},
+      device_{parameters.modbus.device(map_)} {
+  if (map_.heartbeat) lets_go_ = map_.heartbeat->timeout.in_seconds();
+  modbus::MapCheck check{map_, "modbus.map", "heater"};
+  check.fits(registers());
+  for (const Zone& zone : parameters.zones) check.fits(registers_of_zone(zone.name));
+  check.lets_go({"enable", "power"});
+  check.takes("enable", {0.0, 1.0}, "modbus.map");
+  check.takes("reset_alarms", {1.0, 1.0}, "modbus.map");
+  const auto power = map_.find("power");
+  const auto delivered = map_.find("delivered_power");
+  const bool relative = (power && is_relative(map_.registers[*power])) ||
+                        (delivered && is_relative(map_.registers[*delivered]));
+  if (relative && parameters.rated_power <= 0.0)
+    check.fault("rated_power", "missing, and the map counts power in parts of it",
+                "say how many watts 100 % are");
+  else if (power && is_relative(map_.registers[*power]))
+    check.takes("power", {0.0, parameters.power_limit / parameters.rated_power}, "power_limit");
+  else
+    check.takes("power", {0.0, parameters.power_limit}, "power_limit");
+  check.finish();
+  find_registers();
+}
+
+void Thermal::find_registers() {
+  power_register_ = map_.find("power").value();
+  enable_ = map_.find("enable");
+  delivered_ = map_.find("delivered_power");
+  comm_lost_ = map_.find("comm_lost");
+  sensor_fault_ = map_.find("sensor_fault");
+  over_temperature_ = map_.find("over_temperature");
+  reset_alarms_ = map_.find("reset_alarms");
+  if (is_relative(map_.registers[power_register_])) power_scale_ = parameters_.rated_power;
+  if (delivered_ && is_relative(map_.registers[*delivered_])) delivered_scale_ = parameters_.rated_power;
+  slide_ = sensor("slide", parameters_.thermistor);
+  for (const Zone& zone : parameters_.zones)
+    zones_.push_back({sensor(zone.name, zone.thermistor),
                       std::make_unique<Output<NodeTemperature>>(*this, "temperature_" + zone.name, "state"),
                       unknown});
-  }
+}
+
+Thermal::Sensor Thermal::sensor(const std::string& of, const Thermistor& thermistor) const {
+  return {map_.find(of + "_resistance"), map_.find(of + "_temperature"), equation_of(thermistor)};
 }
 
 std::vector<Component::Claim> Thermal::claims() const {
-  return {{device_, "modbus", parameters_.modbus.is_on_this_pc()}};
+  const bool here = parameters_.modbus.is_on_this_pc();
+  std::vector<Claim> all{{device_, "modbus", here}};
+  if (!parameters_.modbus.several_masters)
+    all.push_back({parameters_.modbus.connection(), "modbus", here, true});
+  return all;
 }
 
-void Thermal::configure() { client_.open(parameters_.modbus, simulated_time); }
+void Thermal::configure() { client_.open(parameters_.modbus, map_, simulated_time); }
 
 void Thermal::cleanup() noexcept { client_.close(); }
 
@@ -84,15 +145,16 @@ double Thermal::control(double temperature, double period) noexcept {
 
 /// False when the power is none that the register takes: the heater is then off, and does not keep its last power.
 bool Thermal::drive(double power, bool enable) noexcept {
-  modbus::Device& device = client_.device();
   power_ = enable ? power : 0.0;
-  const bool taken = device.write("power", power_).ok();
+  // The map takes every power up to the limit but for the last digit: checked when the component was made.
+  const Range taken_powers = map_.registers[power_register_].range;
+  const bool taken = client_.write(power_register_, taken_powers.clamp(power_ / power_scale_));
   if (!taken) {
     power_ = integral_ = 0.0;
     primed_ = false;
-    (void)device.write("power", 0.0);  // the map takes it: checked when the component was made
+    (void)client_.write(power_register_, 0.0);
   }
-  (void)device.write("enable", enable && taken ? 1.0 : 0.0);
+  (void)client_.write(enable_, enable && taken ? 1.0 : 0.0);
   return taken;
 }
 
@@ -105,7 +167,7 @@ void Thermal::obey(const ThermalCommand& command) noexcept {
       latched_ = false;
       watch_.reset();
       reset_at_ = now();
-      if (has_reset_) (void)client_.device().write("reset_alarms", 1.0);
+      (void)client_.write(reset_alarms_, 1.0);
     }
     return;
   }
@@ -120,23 +182,21 @@ void Thermal::obey(const ThermalCommand& command) noexcept {
 }
 
 /// The temperature [degC] by this register; nothing where it cannot be trusted.
-std::optional<double> Thermal::measured(const std::string& reg,
-                                        const metrology::Thermistor& thermistor) const noexcept {
-  const modbus::Device& device = client_.device();
-  const modbus::Reading resistance = device.value(reg);
-  if (!resistance.is_sound() || !(resistance.value > 0.0)) return {};
-  if (has_fault_bit_ && device.value("sensor_fault").value != 0.0) return {};
-  const double temperature = thermistor.temperature(resistance.value);
+std::optional<double> Thermal::measured(const Sensor& sensor) const noexcept {
+  const modbus::Reading reading = client_.device().value(sensor.reg());
+  if (!reading.is_sound() || (sensor.resistance && !(reading.value > 0.0))) return {};
+  if (const auto fault = client_.reading(sensor_fault_); fault && fault->value != 0.0) return {};
+  const double temperature = sensor.resistance ? sensor.thermistor.temperature(reading.value) : reading.value;
   return parameters_.measurable.contains(temperature) ? std::optional{temperature} : std::nullopt;
 }
 
 /// What the device's health is, and whether its sensor can be.
 void Thermal::tell(bool sound, const Tick& tick) noexcept {
   for (const modbus::HealthChange& change : client_.look(tick.now))
-    notices_.say(change.well ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, change.text.c_str());
-  const modbus::Reading resistance = client_.device().value("slide_resistance");
+    notices_.say(severity_of(change.level), change.text.c_str());
+  const modbus::Reading shown = client_.device().value(slide_.reg());
   // What is stale or outside the map's range was said above.
-  const bool impossible = !sound && resistance.is_sound();
+  const bool impossible = !sound && shown.is_sound();
   if (!impossible) unsound_since_.reset();
   if (impossible && !unsound_since_) unsound_since_ = tick.now;
   constexpr Duration patience = Duration::milliseconds(500);
@@ -145,11 +205,11 @@ void Thermal::tell(bool sound, const Tick& tick) noexcept {
     std::array<char, 200> text{};
     std::snprintf(
         text.data(), text.size(),
-        "the slide's thermistor at %g ohm is open or short, or the map reads it wrongly: the heater is off",
-        resistance.value);
+        "the slide's sensor at %g %s is open or short, or the map reads it wrongly: the heater is off",
+        shown.value, slide_.resistance ? "ohm" : "degC");
     notices_.say(event::SEVERITY_FAULT, text.data());
   } else if (sound && std::exchange(told_unsound_, false)) {
-    notices_.say(event::SEVERITY_NOTE, "the slide's thermistor is sound again");
+    notices_.say(event::SEVERITY_NOTE, "the slide's sensor is sound again");
   }
 }
 
@@ -157,8 +217,7 @@ void Thermal::tell(bool sound, const Tick& tick) noexcept {
 void Thermal::latch(bool sound, const Tick& tick) noexcept {
   constexpr Duration grace = Duration::milliseconds(500);  // until a reset shows
   const bool hot = sound && temperature_ > parameters_.over_temperature;
-  const bool device = has_latch_bit_ && client_.device().value("over_temperature").value != 0.0 &&
-                      !client_.device().value("over_temperature").stale && tick.now - reset_at_ > grace;
+  const bool device = client_.flag(over_temperature_) && tick.now - reset_at_ > grace;
   if (!(hot || device) || std::exchange(latched_, true)) return;
   std::array<char, 200> text{};
   if (hot)
@@ -176,9 +235,10 @@ void Thermal::latch(bool sound, const Tick& tick) noexcept {
 
 /// A relay that sticks, or another master: the heater is on, and this loop cannot help it.
 void Thermal::look_at_delivery(const Tick& tick) noexcept {
-  const modbus::Reading delivered = client_.device().value("delivered_power");
-  const bool stuck =
-      power_ == 0.0 && delivered.is_sound() && delivered.value > 0.01 * parameters_.power_limit;
+  if (!delivered_) return;
+  const modbus::Reading delivered = client_.device().value(*delivered_);
+  const double watts = delivered.value * delivered_scale_;
+  const bool stuck = power_ == 0.0 && delivered.is_sound() && watts > 0.01 * parameters_.power_limit;
   if (!stuck) stuck_since_.reset();
   if (stuck && !stuck_since_) stuck_since_ = tick.now;
   constexpr Duration patience = Duration::seconds(2.0);
@@ -189,7 +249,7 @@ void Thermal::look_at_delivery(const Tick& tick) noexcept {
         text.data(), text.size(),
         "the heater gets %.4g W though it was told to be off: cut its supply, and look at its relay and for "
         "another master",
-        delivered.value);
+        watts);
     notices_.say(event::SEVERITY_TRIP, text.data());
   } else if (!stuck && delivered.is_sound() && std::exchange(told_stuck_, false)) {
     notices_.say(event::SEVERITY_NOTE, "the heater is off as it was told");
@@ -239,7 +299,7 @@ void Thermal::step(const Tick& tick) noexcept {
   while (command_.take(command)) obey(command);
   if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
   client_.receive(tick.now);
-  const auto measured_now = measured("slide_resistance", thermistor_);
+  const auto measured_now = measured(slide_);
   tell(measured_now.has_value(), tick);
   const bool sound = watch_.trusts(watched(), measured_now, tick.now) && measured_now.has_value();
   // A device that refuses to be switched off is left to its watchdog.
@@ -268,15 +328,14 @@ void Thermal::step(const Tick& tick) noexcept {
   sample.heater_power(power_);
   sample.enabled(enable);
   sample.over_temperature(latched_);
-  const modbus::Reading lost = client_.device().value("comm_lost");
-  sample.watchdog_tripped(!lost.stale && lost.value != 0.0);
+  sample.watchdog_tripped(client_.flag(comm_lost_));
   sample.stale(!sound);
   state_.write(sample);
   for (ZoneSensor& zone : zones_) publish_zone(zone);
 }
 
 void Thermal::publish_zone(ZoneSensor& zone) noexcept {
-  const auto measured_now = measured(zone.resistance, zone.thermistor);
+  const auto measured_now = measured(zone.sensor);
   if (measured_now) zone.temperature = *measured_now;
   NodeTemperature sample;
   stamp(sample);

@@ -14,6 +14,7 @@
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/thermistor.hpp"
+#include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "idl/thermal.h"
 
@@ -70,7 +71,7 @@ class Thermal final : public Component {
         "a change of the reading beyond it within a second is a fault of the thermistor", while_running);
     }
   };
-  /// A further thermistor of the controller: register <name>_resistance.
+  /// A further sensor of the controller: register <name>_resistance or <name>_temperature.
   struct Zone {
     std::string name;
     Thermistor thermistor;
@@ -86,6 +87,7 @@ class Thermal final : public Component {
     std::vector<Zone> zones;
     double setpoint = 30.0;
     double power_limit = 60.0;
+    double rated_power = 0.0;
     double over_temperature = 60.0;
     Response response;
     Range measurable{-40.0, 250.0};
@@ -97,6 +99,8 @@ class Thermal final : public Component {
       p(zones, "zones", "further thermistors, read and published but not controlled");
       p(setpoint, "setpoint", "degC", setpoints, "wanted at the start; a command changes it", while_running);
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
+      p(rated_power, "rated_power", "W", Range{0.0, 1e5},
+        "at 100 %, for a map whose `power` is in %; 0: not known");
       p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0},
         "the latch lets go of the heater above it");
       p(response, "response", "of the thermistor to full power");
@@ -107,6 +111,8 @@ class Thermal final : public Component {
     }
   };
 
+  /// What its device's map must and may hold; of a zone `slide` is the zone's name.
+  static const modbus::RegisterContract& registers();
   explicit Thermal(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
   void configure() override;
@@ -118,8 +124,15 @@ class Thermal final : public Component {
  private:
   [[nodiscard]] double control(double temperature, double period) noexcept;
   void obey(const ThermalCommand& command) noexcept;
-  [[nodiscard]] std::optional<double> measured(const std::string& reg,
-                                               const metrology::Thermistor& thermistor) const noexcept;
+  /// A temperature that the device measures: by a thermistor's resistance, or as it converts it itself.
+  struct Sensor {
+    std::optional<std::size_t> resistance, temperature;  // registers; one at least
+    metrology::Thermistor thermistor;
+    [[nodiscard]] std::size_t reg() const { return resistance ? *resistance : *temperature; }
+  };
+  [[nodiscard]] Sensor sensor(const std::string& name, const Thermistor& thermistor) const;
+  void find_registers();
+  [[nodiscard]] std::optional<double> measured(const Sensor& sensor) const noexcept;
   [[nodiscard]] bool drive(double power, bool enable) noexcept;
   void tell(bool sound, const Tick& tick) noexcept;
   void latch(bool sound, const Tick& tick) noexcept;
@@ -132,10 +145,10 @@ class Thermal final : public Component {
   Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Output<NodeTemperature> state_{*this, "state", "state"};
   Notices notices_{*this};
-  metrology::Thermistor thermistor_;
+  modbus::RegisterMap map_;
+  Sensor slide_;
   struct ZoneSensor {
-    std::string resistance;  // name of its register
-    metrology::Thermistor thermistor;
+    Sensor sensor;
     std::unique_ptr<Output<NodeTemperature>> output;
     double temperature = unknown;
   };
@@ -152,9 +165,11 @@ class Thermal final : public Component {
   bool primed_ = false;
   bool wanted_ = true;
   bool latched_ = false;
-  bool has_fault_bit_ = false;  // the map has `sensor_fault`
-  bool has_latch_bit_ = false;  // ... `over_temperature`
-  bool has_reset_ = false;      // ... `reset_alarms`
+  std::size_t power_register_ = 0;
+  double power_scale_ = 1.0;  // of the power registers: W of one SI unit
+  double delivered_scale_ = 1.0;
+  /// Registers that the map may lack.
+  std::optional<std::size_t> enable_, delivered_, comm_lost_, sensor_fault_, over_temperature_, reset_alarms_;
   Instant reset_at_{INT64_MIN / 2};
   bool told_unsound_ = false;
   bool told_undriven_ = false;

@@ -2,15 +2,55 @@
 
 #include <utility>
 
+#include "core/base/unit.hpp"
+
 namespace invar::world {
 
-SimulatedHeater::SimulatedHeater(const Parameters& parameters) : parameters_{parameters} {
-  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "heater", {});
-  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
+const modbus::RegisterContract& SimulatedHeater::registers() {
+  using enum modbus::RegisterNeed::Access;
+  using enum modbus::RegisterNeed::Need;
+  static const modbus::RegisterContract contract{
+      {"power", "W or %", read, needed, "setpoint of the pad's power; % of the parameter `rated_power`"},
+      {"enable", "flag", read, optional, "lets the pad heat; without it every power does"},
+      {"reset_alarms", "flag", read, optional, "clears the latches; the device takes it back"},
+      {"over_temperature_limit", "degC", read, optional, "pad temperature that trips the latch"},
+      {"slide_resistance", "ohm", read, optional, "thermistor of the slide"},
+      {"base_resistance", "ohm", read, optional, "thermistor of the base"},
+      {"slide_temperature", "degC", read, optional, "of the slide"},
+      {"base_temperature", "degC", read, optional, "of the base"},
+      {"pad_temperature", "degC", read, optional, "of the pad"},
+      {"delivered_power", "W or %", read, optional, "that flows in fact"},
+      {"heating", "flag", read, optional, "current flows"},
+      {"over_temperature", "flag", read, optional, "latched until `reset_alarms`"},
+      {"ready", "flag", read, optional, "powered up and without alarm"}};
+  return contract;
+}
+
+SimulatedHeater::SimulatedHeater(const Parameters& parameters)
+    : parameters_{parameters}, map_{modbus::load_map_of(parameters.modbus.map, "map", "heater")} {
+  modbus::MapCheck check{map_, "map", "heater"};
+  check.fits(registers());
+  check.finish();
+  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map_);
+}
+
+double SimulatedHeater::written(const char* reg, double otherwise) const {
+  const auto index = map_.find(reg);
+  return index ? server_->value(*index) : otherwise;
+}
+
+void SimulatedHeater::show(const char* reg, double value) {
+  if (const auto index = map_.find(reg)) server_->set(*index, value);
+}
+
+/// W of one SI unit of a register for power, which may count parts of the rated one.
+double SimulatedHeater::power_scale(const char* reg) const {
+  const auto index = map_.find(reg);
+  return index && conversion(map_.registers[*index].unit, "1") ? parameters_.rated_power : 1.0;
 }
 
 void SimulatedHeater::configure() {
-  server_ = modbus::serve(parameters_.modbus);
+  server_ = modbus::serve(parameters_.modbus, map_);
   const Parameters& p = parameters_;
   plant_.emplace(
       std::vector<physics::ThermalNode>{
@@ -41,31 +81,32 @@ void SimulatedHeater::publish(Output<thermal::NodeTemperature>& output, Node nod
 }
 
 void SimulatedHeater::step(const Tick& tick) noexcept {
-  modbus::Server& registers = *server_;
   // Once a step: what the last one computed becomes visible, what masters wrote since arrives, and a lost master has by now
   // switched the pad off.
-  registers.exchange(tick.now);
-  if (registers.value("reset_alarms") != 0.0) {
+  server_->exchange(tick.now);
+  if (written("reset_alarms", 0.0) != 0.0) {
     over_temperature_ = false;
-    registers.set("reset_alarms", 0.0);
+    show("reset_alarms", 0.0);
   }
-  if (plant_->temperature(pad) > registers.value("over_temperature_limit")) over_temperature_ = true;
-  const bool on = registers.value("enable") != 0.0 && !over_temperature_;
-  const double power = on ? registers.value("power") : 0.0;
+  if (plant_->temperature(pad) > written("over_temperature_limit", parameters_.over_temperature_limit))
+    over_temperature_ = true;
+  const bool on = written("enable", 1.0) != 0.0 && !over_temperature_;
+  const double asked = written("power", 0.0) * power_scale("power");
+  const double power = on && asked > 0.0 ? asked : 0.0;
   const std::array<double, 1> powers{power};
   plant_->step({.powers = powers, .ambient = parameters_.ambient}, tick.period);
 
   const double slide_reading = plant_->reading(slide) + parameters_.noise * normal_(random_);
   const double base_reading = plant_->reading(base) + parameters_.noise * normal_(random_);
-  registers.set("slide_resistance", thermistor_.resistance(slide_reading));
-  registers.set("base_resistance", thermistor_.resistance(base_reading));
-  registers.set("slide_temperature", slide_reading);
-  registers.set("base_temperature", base_reading);
-  registers.set("pad_temperature", plant_->reading(pad));
-  registers.set("delivered_power", power);
-  registers.set("heating", power > 0.0 ? 1.0 : 0.0);
-  registers.set("over_temperature", over_temperature_ ? 1.0 : 0.0);
-  registers.set("ready", over_temperature_ ? 0.0 : 1.0);
+  show("slide_resistance", thermistor_.resistance(slide_reading));
+  show("base_resistance", thermistor_.resistance(base_reading));
+  show("slide_temperature", slide_reading);
+  show("base_temperature", base_reading);
+  show("pad_temperature", plant_->reading(pad));
+  show("delivered_power", power / power_scale("delivered_power"));
+  show("heating", power > 0.0 ? 1.0 : 0.0);
+  show("over_temperature", over_temperature_ ? 1.0 : 0.0);
+  show("ready", over_temperature_ ? 0.0 : 1.0);
   publish(slide_, slide);
   publish(base_, base);
 }

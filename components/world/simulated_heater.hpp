@@ -12,6 +12,7 @@
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
 #include "core/metrology/thermistor.hpp"
+#include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "core/physics/thermal_plant.hpp"
 #include "idl/thermal.h"
@@ -19,7 +20,8 @@
 namespace invar::world {
 
 /// Serves the register map on a TCP port of its own; the device's watchdog and over-temperature latch are part of it, so that
-/// a dead master finds the heater off.
+/// a dead master finds the heater off. Registers that the map lacks are not played; those that it has beyond the contract keep
+/// their initial value.
 class SimulatedHeater final : public Component {
  public:
   struct Parameters {
@@ -33,6 +35,8 @@ class SimulatedHeater final : public Component {
     double slide_loss = 1.0;
     double base_loss = 8.0;
     double noise = 0.003;
+    double rated_power = 200.0;
+    double over_temperature_limit = 80.0;
     std::int64_t seed = 3;
     void describe(auto& p) {
       modbus.describe(p);
@@ -45,9 +49,14 @@ class SimulatedHeater final : public Component {
       p(slide_loss, "slide_loss", "W/K", Range{0.0, 1e4}, "slide to the air");
       p(base_loss, "base_loss", "W/K", Range{0.0, 1e4}, "base to the air");
       p(noise, "noise", "K", Range{0.0, 1.0}, "1 sigma of the thermistors");
+      p(rated_power, "rated_power", "W", Range{0.0, 1e5}, "at 100 %, for a map whose power is in %");
+      p(over_temperature_limit, "over_temperature_limit", "degC", Range{0.0, 1000.0},
+        "of the pad, for a map without a register for it");
       p(seed, "seed", 0, 1'000'000'000, "of the noise");
     }
   };
+  /// What its map must and may hold.
+  static const modbus::RegisterContract& registers();
   explicit SimulatedHeater(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override {
     return {{"the port " + parameters_.modbus.host + ":" + std::to_string(parameters_.modbus.port), "port",
@@ -61,8 +70,13 @@ class SimulatedHeater final : public Component {
  private:
   enum Node : std::size_t { pad, slide, base };
   void publish(Output<thermal::NodeTemperature>& output, Node node) noexcept;
+  /// What masters wrote to the register, or `otherwise` where the map has none.
+  [[nodiscard]] double written(const char* reg, double otherwise) const;
+  void show(const char* reg, double value);
+  [[nodiscard]] double power_scale(const char* reg) const;
 
   const Parameters& parameters_;
+  modbus::RegisterMap map_;
   // The truth: for the simulated stage and for tests, for no controller.
   Output<thermal::NodeTemperature> slide_{*this, "slide", "state"};
   Output<thermal::NodeTemperature> base_{*this, "base", "state"};

@@ -6,18 +6,46 @@
 
 namespace invar::world {
 
-SimulatedPneumatics::SimulatedPneumatics(const Parameters& parameters) : parameters_{parameters} {
-  const auto map = modbus::load_map_of(parameters.modbus.map, "map", "pneumatic controller",
-                                       {{"pressure", "Pa"},
-                                        {"enable"},
-                                        {"actual_pressure", "Pa"},
-                                        {"in_band"},
-                                        {"over_pressure"},
-                                        {"sensor_fault"}});
-  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map);
+const modbus::RegisterContract& SimulatedPneumatics::registers() {
+  using enum modbus::RegisterNeed::Access;
+  using enum modbus::RegisterNeed::Need;
+  static const modbus::RegisterContract contract{
+      {"pressure", "Pa", read, needed, "setpoint of the reservoir over ambient"},
+      {"enable", "flag", read, optional, "opens the supply; without it every pressure does"},
+      {"purge_pressure", "Pa", read, optional, "setpoint of the purge line"},
+      {"purge", "flag", read, optional, "opens the purge valve; without it every purge pressure does"},
+      {"band", "Pa", read, optional, "half width of the band around the setpoint"},
+      {"reset_alarms", "flag", read, optional, "clears the latches; the device takes it back"},
+      {"actual_pressure", "Pa", read, optional, "of the reservoir over ambient"},
+      {"actual_purge_pressure", "Pa", read, optional, "of the purge line"},
+      {"supply_pressure", "Pa", read, optional, "compressed air before the regulator"},
+      {"in_band", "flag", read, optional, "enabled, and the reservoir within `band` of the setpoint"},
+      {"supply_low", "flag", read, optional, "supply below what the setpoint needs"},
+      {"over_pressure", "flag", read, optional, "latched until `reset_alarms`"},
+      {"sensor_fault", "flag", read, optional, "a pressure sensor is out of its range"},
+      {"ready", "flag", read, optional, "powered up and without alarm"}};
+  return contract;
 }
 
-void SimulatedPneumatics::configure() { server_ = modbus::serve(parameters_.modbus); }
+SimulatedPneumatics::SimulatedPneumatics(const Parameters& parameters)
+    : parameters_{parameters},
+      map_{modbus::load_map_of(parameters.modbus.map, "map", "pneumatic controller")} {
+  modbus::MapCheck check{map_, "map", "pneumatic controller"};
+  check.fits(registers());
+  check.finish();
+  if (!parameters.modbus.faults.empty()) (void)modbus::load_faults(parameters.modbus.faults, map_);
+}
+
+double SimulatedPneumatics::written(const char* reg, double otherwise) const {
+  const auto index = map_.find(reg);
+  return index ? server_->value(*index) : otherwise;
+}
+
+void SimulatedPneumatics::show(const char* reg, double value) {
+  if (const auto index = map_.find(reg)) server_->set(*index, value);
+}
+
+void SimulatedPneumatics::configure() { server_ = modbus::serve(parameters_.modbus, map_); }
 
 void SimulatedPneumatics::cleanup() noexcept { server_.reset(); }
 
@@ -29,35 +57,34 @@ void SimulatedPneumatics::activate() {
 }
 
 void SimulatedPneumatics::step(const Tick& tick) noexcept {
-  modbus::Server& registers = *server_;
   // Once a step: what the last one computed becomes visible, what masters wrote since arrives, and a lost master has by
   // now shut the supply.
-  registers.exchange(tick.now);
-  if (registers.value("reset_alarms") != 0.0) {
+  server_->exchange(tick.now);
+  if (written("reset_alarms", 0.0) != 0.0) {
     over_pressure_ = false;
-    registers.set("reset_alarms", 0.0);
+    show("reset_alarms", 0.0);
   }
   if (pressure_ > parameters_.over_pressure) over_pressure_ = true;
-  const double setpoint = registers.value("pressure");
-  const bool on = registers.value("enable") != 0.0 && !over_pressure_;
-  const bool purging = registers.value("purge") != 0.0 && !over_pressure_;
+  const double setpoint = written("pressure", 0.0);
+  const bool on = written("enable", setpoint > 0.0 ? 1.0 : 0.0) != 0.0 && !over_pressure_;
+  const double purge_setpoint = written("purge_pressure", 0.0);
+  const bool purging = written("purge", purge_setpoint > 0.0 ? 1.0 : 0.0) != 0.0 && !over_pressure_;
   const double regulated = std::min(setpoint + parameters_.leak_through, parameters_.supply);
   const double share = -std::expm1(-tick.period / parameters_.lag);
   pressure_ += share * ((on ? regulated : 0.0) - pressure_);
   purge_pressure_ +=
-      share *
-      ((purging ? std::min(registers.value("purge_pressure"), parameters_.supply) : 0.0) - purge_pressure_);
+      share * ((purging ? std::min(purge_setpoint, parameters_.supply) : 0.0) - purge_pressure_);
 
   const double reading = pressure_ + parameters_.noise * normal_(random_);
   const bool supply_low = on && parameters_.supply < setpoint;
-  registers.set("actual_pressure", reading);
-  registers.set("actual_purge_pressure", purge_pressure_ + parameters_.noise * normal_(random_));
-  registers.set("supply_pressure", parameters_.supply);
-  registers.set("in_band", on && std::abs(reading - setpoint) <= registers.value("band") ? 1.0 : 0.0);
-  registers.set("supply_low", supply_low ? 1.0 : 0.0);
-  registers.set("over_pressure", over_pressure_ ? 1.0 : 0.0);
-  registers.set("sensor_fault", parameters_.sensor_fault ? 1.0 : 0.0);
-  registers.set("ready", over_pressure_ || parameters_.sensor_fault ? 0.0 : 1.0);
+  show("actual_pressure", reading);
+  show("actual_purge_pressure", purge_pressure_ + parameters_.noise * normal_(random_));
+  show("supply_pressure", parameters_.supply);
+  show("in_band", on && std::abs(reading - setpoint) <= written("band", parameters_.band) ? 1.0 : 0.0);
+  show("supply_low", supply_low ? 1.0 : 0.0);
+  show("over_pressure", over_pressure_ ? 1.0 : 0.0);
+  show("sensor_fault", parameters_.sensor_fault ? 1.0 : 0.0);
+  show("ready", over_pressure_ || parameters_.sensor_fault ? 0.0 : 1.0);
 
   dispensing::PressureState sample;
   stamp(sample);
@@ -70,7 +97,7 @@ void SimulatedPneumatics::step(const Tick& tick) noexcept {
   sample.supply_low(supply_low);
   sample.over_pressure(over_pressure_);
   sample.sensor_fault(parameters_.sensor_fault);
-  sample.comm_lost(registers.comm_lost());
+  sample.comm_lost(server_->comm_lost());
   actual_.write(sample);
 }
 

@@ -9,6 +9,7 @@
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "idl/dispensing.h"
 
@@ -16,7 +17,7 @@ namespace invar::world {
 
 /// Serves the register map on a TCP port of its own. The regulator follows its setpoint with a lag, as far as the supply
 /// reaches, and vents when it is not enabled: by its owner, by the device's own watchdog when the owner is gone, or by the
-/// latched over-pressure alarm. The reservoir's true pressure is the port `actual`.
+/// latched over-pressure alarm. The reservoir's true pressure is the port `actual`. Registers that the map lacks are not played.
 class SimulatedPneumatics final : public Component {
  public:
   struct Parameters {
@@ -27,6 +28,7 @@ class SimulatedPneumatics final : public Component {
     double noise = 20.0;
     double leak_through = 0.0;
     bool sensor_fault = false;
+    double band = 500.0;
     std::int64_t seed = 5;
     void describe(auto& p) {
       modbus.describe(p);
@@ -38,9 +40,12 @@ class SimulatedPneumatics final : public Component {
       p(leak_through, "leak_through", "Pa", Range{0.0, 1.6e6}, "what a worn regulator adds to its setpoint",
         while_running);
       p(sensor_fault, "sensor_fault", "a pressure sensor says that it is broken");
+      p(band, "band", "Pa", Range{0.0, 1e5}, "of `in_band`, for a map without a register `band`");
       p(seed, "seed", 0, 1'000'000'000, "of the noise");
     }
   };
+  /// What its map must and may hold.
+  static const modbus::RegisterContract& registers();
   explicit SimulatedPneumatics(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override {
     return {{"the port " + parameters_.modbus.host + ":" + std::to_string(parameters_.modbus.port), "port",
@@ -52,7 +57,12 @@ class SimulatedPneumatics final : public Component {
   void step(const Tick& tick) noexcept override;
 
  private:
+  /// What masters wrote to the register, or `otherwise` where the map has none.
+  [[nodiscard]] double written(const char* reg, double otherwise) const;
+  void show(const char* reg, double value);
+
   const Parameters& parameters_;
+  modbus::RegisterMap map_;
   Output<dispensing::PressureState> actual_{*this, "actual", "state"};
   std::unique_ptr<modbus::Server> server_;
   double pressure_ = 0.0;

@@ -84,9 +84,10 @@ class Component {
 
   /// Something of the plant that only one component of a cell may have: the drive of an axis, a device, a port.
   struct Claim {
-    std::string what;         // "the drive of axis 0"
-    std::string parameter;    // that chose it
-    bool of_this_pc = false;  // another PC has one of the same name: a loopback address, a file
+    std::string what;                // "the drive of axis 0"
+    std::string parameter;           // that chose it
+    bool of_this_pc = false;         // another PC has one of the same name: a loopback address, a file
+    bool shared_in_process = false;  // the components of one process may share it: a connection
   };
   /// Set-up: what is this component's alone; two that claim the same are a fault of the deployment.
   [[nodiscard]] virtual std::vector<Claim> claims() const { return {}; }

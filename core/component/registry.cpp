@@ -16,6 +16,11 @@ const std::string& Registry::description(const std::string& type) const {
   return types_.at(type).description;
 }
 
+const std::vector<RegisterInfo>& Registry::registers(const std::string& type) const {
+  INVAR_EXPECTS(has(type), type);
+  return types_.at(type).registers;
+}
+
 Prepared Registry::prepare(const std::string& type, const config::Node& node,
                            const std::filesystem::path& folder) const {
   INVAR_EXPECTS(has(type), type);

@@ -21,11 +21,16 @@ struct Prepared {
   std::function<std::unique_ptr<Component>()> make;
 };
 
+/// One row of the contract of a component with its device's register map, as text.
+struct RegisterInfo {
+  std::string name, unit, access, need, description;
+};
+
 class Registry {
  public:
   /// `Type` has a described `Type::Parameters` and a constructor from `const Parameters&` without side
   /// effects: devices and files are opened in `configure`, so that `invar check` can make a component to look
-  /// at its ports.
+  /// at its ports. A `Type` that keeps or plays a Modbus device declares its registers: `static ... registers()`.
   template <class Type>
   void add(const std::string& name, const std::string& description) {
     types_[name] = {description,
@@ -50,12 +55,15 @@ class Registry {
                       parameters.describe(lister);
                       for (ParameterInfo& info : infos) info.number = nullptr;
                       return infos;
-                    }};
+                    },
+                    registers_of<Type>()};
   }
 
   [[nodiscard]] bool has(const std::string& type) const { return types_.contains(type); }
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] const std::string& description(const std::string& type) const;
+  /// What a register map must and may hold for it; nothing for a type that has no device.
+  [[nodiscard]] const std::vector<RegisterInfo>& registers(const std::string& type) const;
   /// Reads the parameters from `node`; faults go to its document, so make the component only when there are
   /// none. A type that describes a parameter in what is no unit is a fault of its own, and nothing is prepared.
   /// Relative paths count from `folder`. Precondition: has(type).
@@ -63,10 +71,19 @@ class Registry {
                                  const std::filesystem::path& folder) const;
 
  private:
+  template <class Type>
+  static std::vector<RegisterInfo> registers_of() {
+    std::vector<RegisterInfo> infos;
+    if constexpr (requires { Type::registers(); })
+      for (const auto& row : Type::registers())
+        infos.push_back({row.name, row.unit, row.access_word(), row.need_word(), row.description});
+    return infos;
+  }
   struct Entry {
     std::string description;
     std::function<Prepared(const config::Node&, const std::filesystem::path&)> prepare;
     std::function<std::vector<ParameterInfo>()> infos;  // of the defaults
+    std::vector<RegisterInfo> registers;
   };
   std::map<std::string, Entry> types_;
 };

@@ -5,7 +5,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <map>
 #include <system_error>
+#include <utility>
 
 #include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
@@ -28,16 +30,31 @@ Bus::~Bus() {
 }
 
 Device& Bus::add(RegisterMap map) {
-  INVAR_EXPECTS(!thread_.joinable() && !polled_);
+  const std::lock_guard io{io_mutex_};
   devices_.push_back(std::make_unique<Device>(std::move(map)));
   Device& device = *devices_.back();
   ios_.push_back(std::make_unique<DeviceIo>(device, Backoff{options_.first_retry, options_.longest_retry},
                                             options_.answer_timeout.value_or(device.map().answer_timeout)));
+  const std::lock_guard lock{device.mutex_};
+  device.threaded_ = is_started();
+  device.wake_ = wake_;
   return device;
+}
+
+void Bus::remove(Device& device) {
+  const std::lock_guard io{io_mutex_};
+  const auto found =
+      std::find_if(devices_.begin(), devices_.end(), [&](const auto& one) { return one.get() == &device; });
+  INVAR_EXPECTS(found != devices_.end());
+  if (connected_ && !polled_) round(monotonic_now(), Part::writes_only, &device);
+  ios_.erase(ios_.begin() + (found - devices_.begin()));
+  devices_.erase(found);
+  first_ = 0;
 }
 
 void Bus::start() {
   INVAR_EXPECTS(!thread_.joinable() && !polled_);
+  const std::lock_guard io{io_mutex_};
   for (const auto& device : devices_) {
     const std::lock_guard lock{device->mutex_};
     device->threaded_ = true;
@@ -55,14 +72,16 @@ void Bus::stop() {
   thread_.join();
 }
 
-bool Bus::exchange(Instant now) {
-  set_polled(now);
-  return round(now, Part::all);
+bool Bus::exchange(Instant now, const Device* only) {
+  const std::lock_guard io{io_mutex_};
+  set_polled(now, only);
+  return round(now, Part::all, only);
 }
 
-bool Bus::send(Instant now) {
-  set_polled(now);
-  return round(now, Part::writes_only);
+bool Bus::send(Instant now, const Device* only) {
+  const std::lock_guard io{io_mutex_};
+  set_polled(now, only);
+  return round(now, Part::writes_only, only);
 }
 
 LinkCounters Bus::counters() const {
@@ -70,50 +89,50 @@ LinkCounters Bus::counters() const {
   return counters_;
 }
 
-void Bus::set_polled(Instant now) {
+void Bus::set_polled(Instant now, const Device* only) {
   INVAR_EXPECTS(!thread_.joinable());
   polled_ = true;
   for (const auto& device : devices_) {
+    if (only != nullptr && device.get() != only) continue;
     const std::lock_guard lock{device->mutex_};
     device->polled_now_ = now;
   }
 }
 
-bool Bus::connect(Instant now) {
-  if (!link_backoff_.may_try(now)) return false;
+Outcome Bus::connect(Instant now) {
+  if (!link_backoff_.may_try(now)) return unconnected_;
   const auto failed = link_.open(options_.connect_timeout);
   connected_ = !failed;
   if (failed)
     link_backoff_.failed(polled_ ? now : monotonic_now());
   else
     link_backoff_.succeeded();
-  const std::lock_guard lock{counters_mutex_};
-  if (!failed)
-    ++counters_.connects;
-  else if (failed->cause == Cause::refused)
-    ++counters_.refused;
-  else
-    ++counters_.unreachable;
-  return !failed;
+  if (failed) unconnected_ = *failed;
+  return failed;
 }
 
-bool Bus::round(Instant now, Part part) {
+bool Bus::round(Instant now, Part part, const Device* only) {
   const Clock clock = [this, now] { return polled_ ? now : monotonic_now(); };
   bool all_answered = true;
-  for (const auto& io : ios_) io->take_in(now);
+  const auto is_meant = [&](const DeviceIo& io) { return only == nullptr || &io.device() == only; };
+  for (const auto& io : ios_)
+    if (is_meant(*io)) io->take_in(now);
   const std::size_t begin = first_;
   for (std::size_t i = 0; i < ios_.size(); ++i) {
     const std::size_t which = (begin + i) % ios_.size();
     DeviceIo& io = *ios_[which];
+    if (!is_meant(io)) continue;
     if (part == Part::due && !io.has_something_to_do(now)) continue;
     if (!io.may_try(now)) {
       all_answered = false;
       continue;
     }
-    if (!link_.is_open() && !connect(now)) {
-      io.offline();
-      all_answered = false;
-      continue;
+    if (!link_.is_open()) {
+      if (const auto failed = connect(now)) {
+        io.offline(*failed);
+        all_answered = false;
+        continue;
+      }
     }
     const auto reads = part == Part::all   ? DeviceIo::Reads::now
                        : part == Part::due ? DeviceIo::Reads::if_due
@@ -121,27 +140,31 @@ bool Bus::round(Instant now, Part part) {
     const auto done = io.exchange(link_, clock, reads);
     all_answered = all_answered && done == DeviceIo::Done::all;
     if (done != DeviceIo::Done::failed) continue;
-    link_.close();
-    connected_ = false;
+    connected_ = link_.is_open();
     first_ = (which + 1) % ios_.size();  // its neighbours go before it next time
-    const std::lock_guard lock{counters_mutex_};
-    ++counters_.losses;
   }
+  const std::lock_guard lock{counters_mutex_};
+  counters_ = link_.counters();
   return all_answered;
 }
 
 void Bus::run() {
-  while (!stopping_) {
-    round(monotonic_now(), Part::due);
-    const Instant now = monotonic_now();
-    Instant due = now + Duration::seconds(1);
-    for (const auto& io : ios_) due = std::min(due, io->next_due(now));
-    // With no connection nothing is polled; wake all the same to drop writes at their deadlines.
-    if (!link_.is_open())
-      due = std::max(due, std::min(link_backoff_.retry_at(), now + Duration::milliseconds(50)));
-    wait_until(due);
-  }
-  if (link_.is_open()) round(monotonic_now(), Part::writes_only);
+  while (!stopping_) wait_until(work());
+  const std::lock_guard io{io_mutex_};
+  if (connected_) round(monotonic_now(), Part::writes_only);
+}
+
+/// What is due now; gives when to look again.
+Instant Bus::work() {
+  const std::lock_guard io{io_mutex_};
+  round(monotonic_now(), Part::due);
+  const Instant now = monotonic_now();
+  Instant due = now + Duration::seconds(1);
+  for (const auto& io_of : ios_) due = std::min(due, io_of->next_due(now));
+  // With no connection nothing is polled; wake all the same to drop writes at their deadlines.
+  if (!link_.is_open())
+    due = std::max(due, std::min(link_backoff_.retry_at(), now + Duration::milliseconds(50)));
+  return due;
 }
 
 void Bus::wait_until(Instant when) const {
@@ -151,6 +174,19 @@ void Bus::wait_until(Instant when) const {
   if (ppoll(&woken, 1, &span, nullptr) <= 0) return;
   std::uint64_t count = 0;
   [[maybe_unused]] const auto ignored = ::read(wake_, &count, sizeof count);
+}
+
+std::shared_ptr<Bus> shared_bus(const BusOptions& options, bool stepped) {
+  static std::mutex mutex;
+  static std::map<std::pair<std::string, std::uint16_t>, std::weak_ptr<Bus>> buses;
+  const std::lock_guard lock{mutex};
+  auto& known = buses[{options.host == "localhost" ? "127.0.0.1" : options.host, options.port}];
+  std::shared_ptr<Bus> bus = known.lock();
+  if (bus) return bus;
+  bus = std::make_shared<Bus>(options);
+  if (!stepped) bus->start();
+  known = bus;
+  return bus;
 }
 
 }  // namespace invar::modbus

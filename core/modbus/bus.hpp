@@ -1,5 +1,7 @@
 // A Modbus TCP connection and the devices behind it, kept alive through faults.
 //
+// A process has one bus for each host and port (`shared_bus`): many gateways take one connection, and serve several units on it.
+//
 // Two ways to drive it, chosen once:
 // - `start()`: one I/O thread polls every device at its map's period, sends writes as they come and the
 //   heartbeat while its owner refreshes it. Time is CLOCK_MONOTONIC. For wall-clock cells.
@@ -10,7 +12,7 @@
 //
 // Reconnecting: a connection that cannot be made, and a device that does not answer, are each left alone for
 // `first_retry`, then twice as long, up to `longest_retry`; a silent unit behind a gateway does not hold up
-// its neighbours. Any failure but an exception answer closes the connection.
+// its neighbours. link.hpp says which failures close the connection.
 #pragma once
 
 #include <atomic>
@@ -40,14 +42,6 @@ struct BusOptions {
   std::optional<Duration> answer_timeout = {};
 };
 
-/// What happened with the connection since the start, by cause.
-struct LinkCounters {
-  std::uint64_t connects = 0;
-  std::uint64_t refused = 0;
-  std::uint64_t unreachable = 0;
-  std::uint64_t losses = 0;  // connections closed because a request failed
-};
-
 class Bus {
  public:
   explicit Bus(BusOptions options);
@@ -55,38 +49,43 @@ class Bus {
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
 
-  /// A device on this bus; lives as long as the bus. Set-up only, before `start` and `exchange`.
+  /// A device on this bus; lives as long as the bus, or until it is removed. Waits for a round that is under way.
   Device& add(RegisterMap map);
+  /// Sends what is still queued for it if the connection stands, then lets go of it. Precondition: it is of this bus.
+  void remove(Device& device);
 
   /// Starts the I/O thread. Precondition: `exchange` was never called.
   void start();
+  [[nodiscard]] bool is_started() const { return thread_.joinable(); }
   /// Sends what is still queued if the connection stands, then ends the thread; waits at most about one
   /// answer timeout a device. The heartbeat stops with it.
   void stop();
 
   /// One round with every device that is not backing off. True when every request of every device was
   /// answered without exception. Blocks at most for the timeouts. Precondition: not started, `now` never goes
-  /// back.
-  bool exchange(Instant now);
+  /// back. `only`: with this device alone.
+  bool exchange(Instant now, const Device* only = nullptr);
   /// Only the due heartbeats and the queued writes, no reads: what was computed from this step's readings
   /// arrives in this step.
-  bool send(Instant now);
+  bool send(Instant now, const Device* only = nullptr);
 
   [[nodiscard]] bool is_connected() const { return connected_.load(); }
   [[nodiscard]] LinkCounters counters() const;
 
  private:
   enum class Part { writes_only, all, due };
-  bool round(Instant now, Part part);
-  bool connect(Instant now);
-  void set_polled(Instant now);
-  [[nodiscard]] Instant clock(Instant now) const;
+  bool round(Instant now, Part part, const Device* only = nullptr);
+  Outcome connect(Instant now);
+  void set_polled(Instant now, const Device* only);
   void run();
+  Instant work();
   void wait_until(Instant when) const;
 
   BusOptions options_;
+  std::mutex io_mutex_;  // guards link and devices; held for a round
   Link link_;
   Backoff link_backoff_;
+  Failure unconnected_{Cause::unreachable};  // why there was no connection the last time
   std::vector<std::unique_ptr<Device>> devices_;
   std::vector<std::unique_ptr<DeviceIo>> ios_;
   std::size_t first_ = 0;  // the device that a round begins with
@@ -98,5 +97,9 @@ class Bus {
   mutable std::mutex counters_mutex_;
   LinkCounters counters_;
 };
+
+/// The bus of this process to that host and port, made and, unless the caller steps it, started if there is none yet. Any
+/// thread. Precondition: all callers of a process step it, or none does.
+[[nodiscard]] std::shared_ptr<Bus> shared_bus(const BusOptions& options, bool stepped);
 
 }  // namespace invar::modbus

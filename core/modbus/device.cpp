@@ -8,6 +8,7 @@
 
 #include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
+#include "core/modbus/read_back.hpp"
 
 namespace invar::modbus {
 
@@ -34,8 +35,22 @@ Reading Device::value(std::size_t reg) const {
   const std::lock_guard lock{mutex_};
   const Sample& sample = samples_[reg];
   if (!sample.seen) return {sample.value, Duration{std::numeric_limits<std::int64_t>::max()}, true, false};
-  const Duration age = (threaded_ ? monotonic_now() : polled_now_) - sample.stamp;
-  return {sample.value, age, age > map_.registers[reg].stale_after, sample.out_of_range};
+  const Duration since = age(sample);
+  return {sample.value, since, since > map_.registers[reg].stale_after, sample.out_of_range};
+}
+
+Duration Device::age(const Sample& sample) const {
+  return (threaded_ ? monotonic_now() : polled_now_) - sample.stamp;
+}
+
+/// A device whose requests take longer than its poll has no time for what it shows already.
+bool Device::is_needed(std::size_t reg, double value) const {
+  const WriteReport& last = writes_[reg].report;
+  if (round_ <= map_.poll || last.state != WriteState::confirmed || last.wanted != value) return true;
+  const std::size_t by = *map_.registers[reg].read_back;
+  const Sample& shown = samples_[by];
+  return age(shown) > map_.registers[by].stale_after ||
+         !shows(map_.registers[reg], value, map_.registers[by], shown.value);
 }
 
 Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value) {
@@ -43,9 +58,13 @@ Result<std::uint64_t, WriteRefusal> Device::write(std::size_t reg, double value)
   if (!map_.registers[reg].range.contains(value)) return WriteRefusal::out_of_range;
   const std::lock_guard lock{mutex_};
   Pending& slot = writes_[reg];
+  if (!is_needed(reg, value)) {
+    ++counters_.writes_unneeded;
+    return slot.report.number;
+  }
   if (slot.report.state == WriteState::queued) ++counters_.writes_superseded;
   const auto unshown_since = value == slot.report.wanted ? slot.unshown_since : std::nullopt;
-  slot = {{++written_, WriteState::queued, value, 0}, {}, false, unshown_since};
+  slot = {{++written_, WriteState::queued, value, 0}, {}, false, unshown_since, slot.busy_since};
   has_queued_ = true;
   if (threaded_) {
     const std::uint64_t one = 1;
@@ -73,6 +92,16 @@ bool Device::is_online() const {
 DeviceCounters Device::counters() const {
   const std::lock_guard lock{mutex_};
   return counters_;
+}
+
+std::optional<Failure> Device::last_failure() const {
+  const std::lock_guard lock{mutex_};
+  return last_failure_;
+}
+
+Duration Device::round() const {
+  const std::lock_guard lock{mutex_};
+  return round_;
 }
 
 }  // namespace invar::modbus

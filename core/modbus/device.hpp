@@ -12,9 +12,10 @@
 // (takes a short lock, never held over I/O). A name that the map does not have is a broken contract: look
 // names that come from users up with `map().find` first.
 //
-// A write is sent once and never repeated. When its answer is lost nobody knows whether the device did it:
-// the write is `uncertain` until the read-back shows what came of it. What to do then is the owner's
-// decision.
+// A write is sent once. It is repeated only where the device said that it has not carried it out: it was busy (exception
+// 6), or has no function for one value (exception 1, then by function 15 or 16). When an answer is lost nobody knows
+// whether the device did it: the write is `uncertain` until the read-back shows what came of it. What to do then
+// is the owner's decision.
 #pragma once
 
 #include <array>
@@ -27,6 +28,7 @@
 
 #include "core/base/result.hpp"
 #include "core/base/time.hpp"
+#include "core/modbus/link.hpp"
 #include "core/modbus/map.hpp"
 
 namespace invar::modbus {
@@ -75,11 +77,15 @@ struct DeviceCounters {
   std::uint64_t resets = 0;
   std::uint64_t short_answers = 0;
   std::uint64_t malformed = 0;
-  std::array<std::uint64_t, 12> exceptions{};  // by code 1 to 11; [0] unused
+  std::uint64_t unconnected = 0;               // requests for which no connection could be made
+  std::array<std::uint64_t, 12> exceptions{};  // by code 1 to 11; [0] the others
+  std::uint64_t asked_again = 0;               // after an answer that the device is busy
+  std::uint64_t splits = 0;                    // reads that were refused (exceptions 2 and 3) and parted
   std::uint64_t polls = 0;                     // complete rounds of reads
   std::uint64_t heartbeats = 0;                // acknowledged
   std::uint64_t writes = 0;                    // sent
   std::uint64_t writes_superseded = 0;         // replaced unsent by a newer value for the same register
+  std::uint64_t writes_unneeded = 0;           // not sent: the device is slow, and shows the value already
   std::uint64_t writes_expired = 0;
   std::uint64_t writes_refused = 0;
   std::uint64_t writes_uncertain = 0;
@@ -121,6 +127,10 @@ class Device {
   /// The last request was answered, and none has failed since.
   [[nodiscard]] bool is_online() const;
   [[nodiscard]] DeviceCounters counters() const;
+  /// Why the last request that failed did; nothing before the first.
+  [[nodiscard]] std::optional<Failure> last_failure() const;
+  /// How long the last round of heartbeat, writes and all reads took.
+  [[nodiscard]] Duration round() const;
 
  private:
   friend class DeviceIo;
@@ -136,8 +146,12 @@ class Device {
     Instant due;           // the deadline of the state it is in
     bool stamped = false;  // `due` is set: the I/O side has seen it
     std::optional<Instant>
-        unshown_since;  // acknowledged then, and not read back since, however often repeated
+        unshown_since;                  // acknowledged then, and not read back since, however often repeated
+    std::optional<Instant> busy_since;  // the device is too busy to take it, however often it is asked
   };
+
+  [[nodiscard]] Duration age(const Sample& sample) const;
+  [[nodiscard]] bool is_needed(std::size_t reg, double value) const;
 
   const RegisterMap map_;
   mutable std::mutex mutex_;  // guards all below
@@ -148,6 +162,8 @@ class Device {
   bool refreshed_ = false;
   bool online_ = false;
   DeviceCounters counters_;
+  std::optional<Failure> last_failure_;
+  Duration round_;
   Instant polled_now_;     // the clock of `Bus::exchange`; unused once threaded
   bool threaded_ = false;  // ages count on CLOCK_MONOTONIC
   int wake_ = -1;          // eventfd of the I/O thread

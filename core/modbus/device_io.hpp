@@ -25,19 +25,27 @@ class DeviceIo {
   /// When to look again if nobody asks for anything.
   [[nodiscard]] Instant next_due(Instant now) const;
 
-  /// What went wrong: nothing, only exception answers (the link is sound), or the link failed.
+  /// What went wrong: nothing, only exception answers, or the device cannot be reached (the link may be closed).
   enum class Done { all, refused, failed };
   enum class Reads { none, if_due, now };
-  /// Heartbeat if due, queued writes, then the reads. Precondition: the link is open.
+  /// Heartbeat if due, queued writes, then the reads. Precondition: the link was open once.
   Done exchange(Link& link, const Clock& clock, Reads reads);
   /// The link could not be opened.
-  void offline();
+  void offline(const Failure& why);
+  [[nodiscard]] const Device& device() const { return device_; }
 
  private:
   Outcome counted(Outcome outcome, Instant now);
-  Outcome beat(Link& link, Instant now);
+  void count(const Failure& failure);
+  Outcome put(Link& link, const Register& reg, std::span<const std::uint16_t> words, const Clock& clock);
+  Outcome beat(Link& link, const Clock& clock);
   Outcome write_next(Link& link, const Clock& clock);
-  Outcome read_all(Link& link, const Clock& clock, bool& refused);
+  Outcome read_pending(Link& link, const Clock& clock, bool& refused);
+  void take_answer(std::size_t request, std::span<const std::uint16_t> words, Instant now);
+  bool ask_again(std::size_t request, int exception, Instant now);
+  void part_refused();
+  void plan(std::vector<ReadRequest> requests);
+  void learn_delay(const Link& link);
   void judge_read_backs(Instant now);
   [[nodiscard]] bool beats(Instant now) const;
 
@@ -51,8 +59,15 @@ class DeviceIo {
     std::size_t reg = 0;
     Range shown;  // what the device may show: the register's range and its rounding
   };
+  std::vector<ReadRequest> whole_plan_;  // before any request was parted
   std::vector<ReadRequest> plan_;
   std::vector<std::vector<Field>> fields_;    // by request
+  std::vector<bool> pending_;                 // by request: to be read in this poll
+  std::vector<std::size_t> refused_;          // requests of this poll that the device calls illegal
+  Instant busy_until_{INT64_MIN};             // it said so: nothing is asked again before
+  unsigned busy_answers_ = 0;                 // in this poll
+  bool multiple_ = false;                     // it has no function for one value
+  std::uint64_t late_ = 0;                    // answers that this device has learnt from
   std::vector<std::uint16_t> words_;          // of one answer
   std::uint64_t round_ = 0;                   // of reads
   std::vector<std::uint64_t> read_in_round_;  // by register: the last round that brought it

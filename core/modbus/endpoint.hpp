@@ -3,8 +3,8 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <initializer_list>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,13 +20,18 @@ struct Endpoint {
   std::string host = "127.0.0.1";
   std::int64_t port = 502;
   std::filesystem::path map;
+  bool several_masters = false;
   void describe(auto& p) {
     p(host, "host", "name or address of the device's controller");
     p(port, "port", 1, 65535, "TCP port");
     p(map, "map", "register map");
+    p(several_masters, "several_masters",
+      "it takes a connection of each process; otherwise those that share it must be in one process");
   }
   /// "the device at 10.0.0.5:502, unit 1", which can have one master only.
   [[nodiscard]] std::string device(const RegisterMap& registers) const;
+  /// "the connection to 10.0.0.5:502", which one process keeps for all its devices there.
+  [[nodiscard]] std::string connection() const;
   [[nodiscard]] bool is_on_this_pc() const { return host == "localhost" || host.starts_with("127."); }
 };
 
@@ -44,38 +49,33 @@ struct ServedEndpoint {
   }
 };
 
-/// A register that a component works with: what it measures, by any unit of that kind, and whether it is commanded.
-struct Needed {
-  std::string name;
-  const char* unit = "1";
-  bool written = false;
-};
-
-/// The map that the parameter `key` names. Throws InputError when it names none, when the file is wrong, and when a register in
-/// `needed` is missing, measures something else, or cannot be read or written; `device` is what the map is of, for the message.
+/// The map that the parameter `key` names, of a `device` in words. Throws InputError when it names none or the file is wrong.
 [[nodiscard]] RegisterMap load_map_of(const std::filesystem::path& file, const std::string& key,
-                                      const std::string& device, std::initializer_list<Needed> needed);
-/// The same for one register of a map at hand.
-void must_have(const RegisterMap& map, const std::string& key, const std::string& device,
-               const Needed& needed);
-/// Throws InputError when the register does not take all `values` [SI] that the parameter `key` lets the component write.
-void must_take(const RegisterMap& map, const std::string& reg, Range values, const std::string& key);
-/// Throws InputError when none of the registers is set to 0 at comm loss: the device would go on when its master is dead.
-void must_let_go(const RegisterMap& map, const std::string& key,
-                 std::initializer_list<const char*> registers);
+                                      const std::string& device);
 
-/// The device that these parameters describe, listening from now on. Throws InputError as `load_map` and `Server` do.
-[[nodiscard]] std::unique_ptr<Server> serve(const ServedEndpoint& parameters);
+/// The device with this map that these parameters describe, listening from now on. Throws InputError as `load_faults` and `Server`
+/// do.
+[[nodiscard]] std::unique_ptr<Server> serve(const ServedEndpoint& parameters, const RegisterMap& map);
 
-/// One device on a bus of its own. In simulated time the caller's step moves the bus (`receive` before it reads, `send` after it
-/// wrote); by the wall clock the bus's thread does, and both do nothing.
+/// One device on the process's bus to its host and port. In simulated time the caller's step moves the device (`receive` before
+/// it reads, `send` after it wrote); by the wall clock the bus's thread does, and both do nothing.
 class Client {
  public:
-  void open(const Endpoint& endpoint, bool simulated_time);
+  Client() = default;
+  ~Client() { close(); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+  void open(const Endpoint& endpoint, RegisterMap map, bool simulated_time);
   void close() noexcept;
   [[nodiscard]] bool is_open() const { return bus_ != nullptr; }
   /// Precondition: open.
   [[nodiscard]] Device& device() const { return *device_; }
+  /// Of a register that the map may lack: then nothing.
+  [[nodiscard]] std::optional<Reading> reading(std::optional<std::size_t> reg) const;
+  /// A flag that is shown, fresh and not 0.
+  [[nodiscard]] bool flag(std::optional<std::size_t> reg) const;
+  /// Nothing happens where the map lacks it; false where the register does not take the value.
+  bool write(std::optional<std::size_t> reg, double value);
   void receive(Instant now);
   void send(Instant now);
   /// Once a cycle, after `receive`: what its owner should say of the device now. Sets the device's watchdog, too, where that shows
@@ -87,7 +87,7 @@ class Client {
  private:
   void keep_watchdog();
 
-  std::unique_ptr<Bus> bus_;
+  std::shared_ptr<Bus> bus_;
   Device* device_ = nullptr;
   Health health_;
   bool was_online_ = false;

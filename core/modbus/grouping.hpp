@@ -16,14 +16,13 @@ struct ReadRequest {
   std::vector<std::size_t> registers;
 };
 
-/// What one request may ask for (Modbus application protocol V1.1b3, 6.1 and 6.3).
-inline constexpr unsigned largest_word_read = 125;
-inline constexpr unsigned largest_bit_read = 2000;
-
 /// The reads that bring every readable register once. A 32-bit value is never split over two requests (it
-/// could tear). Where the map says `gaps: readable`, a request runs across unnamed addresses when that saves
+/// could tear), and none asks for more than the map's `max_registers` and `max_bits`. Where the map says `gaps: readable`, a request runs across unnamed addresses when that saves
 /// a request: a round trip costs more than the 250 bytes it could carry. Otherwise it holds named ones only.
 /// Set-up only; O(n^2).
 [[nodiscard]] std::vector<ReadRequest> plan_reads(const RegisterMap& map);
+
+/// The request in two parts, at its widest gap or else near its middle, no value split; itself where it cannot be parted.
+[[nodiscard]] std::vector<ReadRequest> parted(const RegisterMap& map, const ReadRequest& request);
 
 }  // namespace invar::modbus

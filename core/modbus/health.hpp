@@ -1,6 +1,7 @@
 // What the owner of a device should say of it: that it is lost, shows nonsense or refuses writes, and that it is well again.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -12,7 +13,8 @@
 namespace invar::modbus {
 
 struct HealthChange {
-  bool well = false;  // over, not begun
+  enum class Level { note, warning, fault };  // over; readings still come; the device is lost, or refuses
+  Level level = Level::note;
   std::string text;
 };
 
@@ -36,13 +38,25 @@ class Health {
     bool begins(bool holds, Instant now, Duration patience);
     bool ends(bool holds);
   };
+  /// Something that happens now and then while readings still come: told when it is a habit.
+  struct Habit {
+    std::uint64_t begun = 0;  // the count when it began
+    Instant since{INT64_MIN};
+    Instant quiet_until{INT64_MIN};
+  };
   void look_at_readings(const Device& device, const LinkCounters& link, Instant now);
   void look_at_writes(const Device& device, Instant now);
-  void say(bool well, const std::string& text) { changes_.push_back({well, text}); }
+  void look_at_habits(const Device& device, const LinkCounters& link, Instant now);
+  void tell_habit(Habit& habit, std::uint64_t count, std::uint64_t enough, Instant now,
+                  const std::string& text);
+  void say(HealthChange::Level level, const std::string& text) { changes_.push_back({level, text}); }
+  [[nodiscard]] std::string subject(const Device& device) const;
 
   std::string where_;
   Lasting lost_;
   Lasting outside_;
+  Lasting slow_;
+  std::array<Habit, 9> habits_{};
   bool was_well_ = false;
   bool told_refusal_ = false;
   bool refuses_ = false;

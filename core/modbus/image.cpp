@@ -85,6 +85,7 @@ double Image::value(std::size_t index) const {
 
 void Image::set(std::size_t index, double value) {
   const Register& reg = map_.registers[index];
+  if (reg.type != Type::float32 && std::isnan(value)) return;  // no count stands for it: it shows what it did
   const unsigned at = reg.address - spans_[number(reg.kind)].begin;
   const Words words = encode(reg, value);
   if (reg.is_bit()) {
@@ -146,7 +147,7 @@ std::uint8_t Image::refusal(const Request& wanted, std::span<const std::uint8_t>
   if (!ours) return MODBUS_EXCEPTION_ILLEGAL_FUNCTION;
   const bool bits = wanted.kind == Kind::coil || wanted.kind == Kind::discrete;
   const unsigned limit = wanted.is_write ? (bits ? MODBUS_MAX_WRITE_BITS : MODBUS_MAX_WRITE_REGISTERS)
-                                         : (bits ? largest_bit_read : largest_word_read);
+                                         : (bits ? map_.max_bits : map_.max_registers);
   if (wanted.count == 0 || wanted.count > limit) return MODBUS_EXCEPTION_ILLEGAL_DATA_VALUE;
   if (wanted.is_write) return refusal_of_write(wanted, request);
   const Span span = spans_[number(wanted.kind)];

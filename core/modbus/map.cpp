@@ -346,6 +346,9 @@ RegisterMap read(const config::Yaml& yaml) {
   if (map.unit > 247 && map.unit != 255)
     root["unit"].fault("is no unit of a device", "use 1 to 247, or 255 where it has none");
   map.gaps_readable = root.choice("gaps", {"refused", "readable"}, "refused") == "readable";
+  map.max_registers =
+      static_cast<unsigned>(root.integer("max_registers", 1, largest_word_read, largest_word_read));
+  map.max_bits = static_cast<unsigned>(root.integer("max_bits", 1, largest_bit_read, largest_bit_read));
   const std::string order = root.choice("word_order", {"abcd", "cdab", "badc", "dcba"}, "abcd");
   map.poll = span(root, "poll", 0.1);
   const Node timeouts = root["timeouts"];
@@ -377,6 +380,10 @@ RegisterMap read(const config::Yaml& yaml) {
   if (registers.is_map() && map.registers.empty())
     registers.fault("no registers", "write `name: {address: 0, kind: holding, type: uint16, access: read}`");
   check_overlaps(registers, map, sound);
+  for (const Register& reg : map.registers)
+    if (reg.width() > map.max_registers)
+      root["max_registers"].fault("`" + reg.name + "` stands in two registers, which must be read at once",
+                                  "allow 2, or name two 16-bit registers");
   read_read_backs(registers, map, sound);
   const bool reads_back = std::any_of(map.registers.begin(), map.registers.end(),
                                       [](const Register& reg) { return reg.read_back.has_value(); });

@@ -20,6 +20,10 @@
 
 namespace invar::modbus {
 
+/// What one request may ask for (Modbus application protocol V1.1b3, 6.1 and 6.3).
+inline constexpr unsigned largest_word_read = 125;
+inline constexpr unsigned largest_bit_read = 2000;
+
 enum class Kind { coil, discrete, input, holding };
 enum class Type { boolean, int16, uint16, int32, uint32, float32 };
 /// Where the bytes A (highest) to D of a 32-bit value stand in its two registers: abcd is the
@@ -89,6 +93,8 @@ struct RegisterMap {
   std::string description;
   std::uint8_t unit = 1;
   bool gaps_readable = false;  // whether a read may run across addresses that the map does not name
+  unsigned max_registers = largest_word_read;  // in one read: many devices allow fewer than the protocol
+  unsigned max_bits = largest_bit_read;
   Duration poll;
   Duration answer_timeout;
   Duration write_deadline;      // a queued write older than this is dropped, and said so

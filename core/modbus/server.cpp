@@ -1,6 +1,7 @@
 #include "core/modbus/server.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/contract.hpp"
 #include "core/modbus/listener.hpp"
@@ -94,9 +95,12 @@ void Server::watch(Instant now) {
     last_beat_ = now;
     lost_ = false;
   }
-  const Duration timeout = heartbeat.timeout_setting
-                               ? Duration::seconds(image_.value(*heartbeat.timeout_setting))
-                               : heartbeat.timeout;
+  // A master may have written anything that the register holds.
+  constexpr Range any_timeout{0.0, 1e6};
+  const double setting =
+      heartbeat.timeout_setting ? image_.value(*heartbeat.timeout_setting) : heartbeat.timeout.in_seconds();
+  const Duration timeout =
+      std::isnan(setting) ? heartbeat.timeout : Duration::seconds(any_timeout.clamp(setting));
   if (now - last_beat_ > timeout) lost_ = true;
   if (map_.comm_loss.flag && !is_frozen(*map_.comm_loss.flag))
     image_.set(*map_.comm_loss.flag, lost_ ? 1.0 : 0.0);

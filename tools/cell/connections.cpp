@@ -151,17 +151,33 @@ void check_owners(const LoadedCell& loaded) {
 
 /// Two components that want the same of the plant for themselves.
 void check_claims(const LoadedCell& loaded) {
-  std::map<std::string, std::string> owner;
+  struct Owner {
+    std::string component;
+    const config::CellProcess* process;
+  };
+  std::map<std::string, Owner> owner;
   for (const LoadedProcess& process : loaded.processes)
     for (const LoadedComponent& member : process.components) {
       if (!member.component) continue;
+      bool told = false;  // who takes another's device takes its connection, too
       for (const Component::Claim& claim : member.component->claims()) {
         const std::string pc = claim.of_this_pc ? process.file->host : "";
-        const auto [known, added] = owner.emplace(pc + " " + claim.what, member.file->name);
-        if (added) continue;
+        const auto [known, added] =
+            owner.emplace(pc + " " + claim.what, Owner{member.file->name, process.file});
+        const Owner& first = known->second;
+        if (added || (claim.shared_in_process && (told || first.process == process.file))) continue;
+        told = true;
         const Node at = member.file->node;
+        if (claim.shared_in_process) {
+          (at.has(claim.parameter) ? at[claim.parameter] : at)
+              .fault("takes " + claim.what + ", which `" + first.component + "` of process `" +
+                         first.process->name + "` takes already",
+                     "put both into one process, where they share it; or say `several_masters: true` where "
+                     "the device allows it");
+          continue;
+        }
         (at.has(claim.parameter) ? at[claim.parameter] : at)
-            .fault("takes " + claim.what + ", which is `" + known->second + "`'s already",
+            .fault("takes " + claim.what + ", which is `" + first.component + "`'s already",
                    "give one of them another `" + claim.parameter + "`");
       }
     }

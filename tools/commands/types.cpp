@@ -31,6 +31,7 @@ struct Options {
 struct Type {
   std::string name, description;
   std::vector<ParameterInfo> parameters;
+  std::vector<RegisterInfo> registers;
   const Component* example = nullptr;  // with the ports that it shows
   std::string why_no_ports;
   std::unique_ptr<Component> made;
@@ -46,7 +47,7 @@ const Component* example_in(const LoadedCell& cell, const std::string& type) {
 }
 
 Type look_at(const Registry& registry, const std::string& name, const LoadedCell* cell) {
-  Type type{name, registry.description(name), {}, nullptr, "", nullptr, nullptr};
+  Type type{name, registry.description(name), {}, registry.registers(name), nullptr, "", nullptr, nullptr};
   const auto nothing = config::Yaml::parse("{}", name);
   Prepared prepared = registry.prepare(name, nothing.root(), {});
   type.parameters = std::move(prepared.infos);
@@ -152,6 +153,13 @@ nlohmann::ordered_json json_of(const Type& type) {
                                   {"while_running", info.changeable},
                                   {"description", info.description}});
   }
+  if (!type.registers.empty()) json["registers"] = nlohmann::ordered_json::array();
+  for (const RegisterInfo& info : type.registers)
+    json["registers"].push_back({{"name", info.name},
+                                 {"unit", info.unit},
+                                 {"access", info.access},
+                                 {"need", info.need},
+                                 {"description", info.description}});
   return json;
 }
 
@@ -184,6 +192,14 @@ void print(const Type& type) {
     std::cout << "no parameters\n";
   else
     parameters.print(std::cout);
+  if (!type.registers.empty()) {
+    TextTable registers{{"register of its map", "unit", "access", "need", "what"}};
+    for (const RegisterInfo& info : type.registers)
+      registers.add({info.name, info.unit, info.access, info.need, info.description});
+    std::cout << '\n';
+    registers.print(std::cout);
+    std::cout << "(any unit that measures the same will do: degF for degC, mW for W)\n";
+  }
   for (const std::string& name : data) {
     const auto fields = fields_of(name);
     if (fields.empty()) continue;

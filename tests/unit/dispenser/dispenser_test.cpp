@@ -261,5 +261,44 @@ TEST(Dispenser, TwoRunsAgreeBitForBit) {
   EXPECT_EQ(run(), run());
 }
 
+TEST(Dispenser, WorksWithAControllerThatHasNothingButAPressureAndItsReading) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.parameters.modbus.map = bench.device_parameters.modbus.map = folder.write(
+      "plain.yaml",
+      "invar_modbus_map: 1\n"
+      "device: regulator\n"
+      "poll: {value: 50, unit: ms}\n"
+      "timeouts: {stale: 0.3}\n"
+      "heartbeat: {register: life, timeout: 1}\n"
+      "comm_loss: {set: {pressure: 0}}\n"
+      "registers:\n"
+      "  pressure: {address: 0, kind: holding, type: uint16, scale: 0.1, unit: kPa, access: read_write,\n"
+      "             role: actuator, read_back: self}\n"
+      "  life: {address: 1, kind: holding, type: uint16, access: read_write, role: setting}\n"
+      "  actual_pressure: {address: 2, kind: input, type: uint16, scale: 0.1, unit: mbar, access: read}\n");
+  bench.device_parameters.noise = 0.0;
+  bench.bring_up();
+  PressureState state = bench.run_for(2.0);
+  EXPECT_TRUE(state.enabled());
+  EXPECT_TRUE(state.in_band());
+  EXPECT_NEAR(state.pressure(), 67.2e3, 100.0);
+  EXPECT_TRUE(std::isnan(state.purge_pressure()));
+  EXPECT_TRUE(bench.jets());
+  PressureCommand command;
+  command.enabled(true);
+  command.purge(true);
+  bench.command.write(command);
+  EXPECT_FALSE(bench.run_for(0.5).purging());
+  EXPECT_THAT(bench.said(), ::testing::ElementsAre(::testing::HasSubstr("has no `purge_pressure`")));
+  command.enabled(false);
+  command.purge(false);
+  bench.command.write(command);
+  state = bench.run_for(2.0);
+  EXPECT_FALSE(state.enabled());
+  EXPECT_FALSE(state.in_band());
+  EXPECT_LT(state.pressure(), 500.0);  // off without a valve: the setpoint is 0
+}
+
 }  // namespace
 }  // namespace invar::dispenser

@@ -82,8 +82,6 @@ TEST_P(FaultOnARead, IsCountedUnderItsCauseAndOvercome) {
 INSTANTIATE_TEST_SUITE_P(Bus, FaultOnARead,
                          ::testing::Values(Expected{"do: drop", &DeviceCounters::resets},
                                            Expected{"do: lose_answer", &DeviceCounters::resets},
-                                           Expected{"do: delay, by: 3", &DeviceCounters::timeouts,
-                                                    Duration::milliseconds(500)},
                                            Expected{"do: garbage", &DeviceCounters::malformed},
                                            Expected{"do: cut_short", &DeviceCounters::short_answers,
                                                     Duration::milliseconds(500)}));
@@ -97,6 +95,20 @@ TEST(Faults, AnExceptionIsCountedByItsCodeAndLeavesTheLinkAlone) {
   EXPECT_EQ(cell.valve.value("setting").age.ns, 0);
   EXPECT_EQ(cell.valve.value("flow").age, Duration::milliseconds(100));
   EXPECT_TRUE(cell.step());
+}
+
+TEST(Faults, ALateAnswerIsDroppedOnTheSameConnection) {
+  Cell cell{"  - {at: 0.9, for: 0.05, on: reads, do: delay, by: 3}\n", Duration::milliseconds(2000)};
+  cell.run_until(0.9);
+  EXPECT_FALSE(cell.step());
+  EXPECT_EQ(cell.valve.counters().timeouts, 1U);
+  EXPECT_FALSE(cell.valve.is_online());
+  cell.step();
+  EXPECT_TRUE(cell.step());
+  EXPECT_NEAR(cell.valve.value("flow").value, cell.now.in_seconds(), 1e-6);
+  EXPECT_EQ(cell.bus.counters().late, 1U);
+  EXPECT_EQ(cell.bus.counters().losses, 0U);
+  EXPECT_EQ(cell.bus.counters().connects, 1U);
 }
 
 TEST(Faults, ADelayWithinTheTimeoutIsNoFault) {

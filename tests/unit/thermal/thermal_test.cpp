@@ -282,7 +282,7 @@ TEST(Thermal, RefusesAMapThatCannotTakeItsPowerOrMeasuresSomethingElse) {
   EXPECT_THAT(fault({}, 500.0), AllOf(HasSubstr("power_limit: asks register `power` for 500 W"),
                                       HasSubstr("range is 0 to 200"), HasSubstr("stay inside")));
   EXPECT_THAT(fault({{"scale: 0.01, unit: W", "scale: 0.01, unit: m"}}),
-              HasSubstr("register `power` is in `m`, and is needed in a unit like `W`"));
+              HasSubstr("register `power` is in `m`, and is needed in a unit like `W or %`"));
   EXPECT_EQ(fault({{"scale: 0.01, unit: W, range: [0, 200]", "scale: 10, unit: mW, range: [0, 200000]"}}),
             "(no fault)");
   EXPECT_THAT(fault({{"scale: 0.001, unit: ohm", "scale: 0.001, unit: V"}}), HasSubstr("`slide_resistance`"));
@@ -355,6 +355,71 @@ TEST(Thermal, DeviceThatIsLostIsSaidOnceAndOnceAgainWhenItIsBack) {
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("does not answer")));
   bench.run_for(25.0);
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("answers again")));
+}
+
+/// A controller of another make: degrees instead of ohm, power in percent, no relay of its own and no alarms.
+constexpr const char* plain_map =
+    "invar_modbus_map: 1\n"
+    "device: controller\n"
+    "poll: {value: 100, unit: ms}\n"
+    "timeouts: {stale: 0.5}\n"
+    "heartbeat: {register: life, timeout: 1}\n"
+    "comm_loss: {set: {power: 0}}\n"
+    "registers:\n"
+    "  power: {address: 0, kind: holding, type: uint16, scale: 0.1, unit: \"%\", range: [0, 100], access: "
+    "read_write,\n"
+    "          role: actuator, read_back: self}\n"
+    "  life: {address: 1, kind: holding, type: uint16, access: read_write, role: setting}\n"
+    "  slide_temperature: {address: 2, kind: input, type: int16, scale: 0.1, unit: degF, access: read}\n"
+    "  base_temperature: {address: 3, kind: input, type: int16, scale: 0.1, unit: degF, access: read}\n";
+
+TEST(Thermal, HeatsByAControllerThatReportsDegreesAndTakesPercentAndHasNoEnable) {
+  const invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.thermal_parameters.modbus.map = bench.heater_parameters.modbus.map =
+      folder.write("plain.yaml", plain_map);
+  bench.thermal_parameters.rated_power = bench.heater_parameters.rated_power = 120.0;
+  bench.bring_up();
+  EXPECT_EQ(bench.run_for(10.0).heater_power(), 120.0);
+  const NodeTemperature state = bench.run_for(1200.0);
+  EXPECT_NEAR(state.temperature(), 30.0, 0.1);
+  EXPECT_FALSE(state.watchdog_tripped());
+  EXPECT_NEAR(bench.base.latest()->temperature(), bench.true_base.latest()->temperature(), 0.06);
+  EXPECT_THAT(bench.said(), IsEmpty());
+  bench.ask(30.0, false);  // off without a relay: the power is 0
+  EXPECT_LT(bench.run_for(600.0).temperature(), 29.0);
+}
+
+TEST(Thermal, TellsAllThatAMapLacks) {
+  const invar::testing::TemporaryFolder folder;
+  Thermal::Parameters parameters;
+  parameters.zones = {{"nozzle", {}}};
+  parameters.modbus.map = folder.write("bare.yaml",
+                                       "invar_modbus_map: 1\ndevice: bare\nregisters:\n"
+                                       "  enable: {address: 0, kind: coil, type: bool, access: read}\n"
+                                       "  delivered_power: {address: 0, kind: input, type: uint16, unit: "
+                                       "V, access: read}\n");
+  try {
+    const Thermal thermal{parameters};
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    std::string lines;
+    for (const Fault& fault : error.faults()) lines += fault.line() + "\n";
+    EXPECT_THAT(lines, HasSubstr("has no register `power` [W or %], `slide_resistance` [ohm] or "
+                                 "`slide_temperature` [degC], `nozzle_resistance` [ohm] or "
+                                 "`nozzle_temperature` [degC]; add"));
+    EXPECT_THAT(lines, HasSubstr("register `enable` cannot be written"));
+    EXPECT_THAT(lines, HasSubstr("register `delivered_power` is in `V`"));
+    EXPECT_THAT(lines, HasSubstr("does not switch the device off"));
+  }
+  parameters.zones.clear();
+  parameters.modbus.map = folder.write("plain.yaml", plain_map);
+  try {
+    const Thermal thermal{parameters};
+    FAIL() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("rated_power: missing, and the map counts power in parts of it"));
+  }
 }
 
 }  // namespace
