@@ -50,9 +50,7 @@ int run(int argc, char** argv) {
     std::cerr << "invar: " << invar::tools::wrong_call(program, {argv + 1, argv + argc}, error) << '\n';
     return 2;
   } catch (const invar::InputError& error) {
-    std::cerr << error.what();
-    if (const auto more = error.faults().size() - 1; more > 0) std::cerr << " (and " << more << " more)";
-    std::cerr << '\n';
+    for (const auto& fault : error.faults()) std::cerr << fault.line() << '\n';
     return 2;
   } catch (const std::filesystem::filesystem_error& error) {
     std::cerr << error.path1().string() << ": " << error.code().message()

@@ -38,7 +38,10 @@ CellClient::CellClient(Node& node, const std::string& cell)
   readers_.push_back(
       node.reader<lifecycle::ProcessStatus>(topics.process_status, "state", [this](const auto& status) {
         const std::lock_guard lock{mutex_};
-        processes_[status.process_name().c_str()] = status;
+        lifecycle::ProcessStatus& known = processes_[status.process_name().c_str()];
+        // Who says in its place that it ended keeps that for late comers: the process may live again.
+        if (status.pid() == 0 && status.at().time_ns() < known.at().time_ns()) return;
+        known = status;
       }));
   readers_.push_back(
       node.reader<lifecycle::ComponentStatus>(topics.component_status, "state", [this](const auto& status) {
