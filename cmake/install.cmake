@@ -9,12 +9,14 @@ install(TARGETS ${INVAR_PACKAGE} EXPORT invar
   FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/idl/generated/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar
   FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+install(FILES ${CMAKE_BINARY_DIR}/core/abi_names.txt cmake/abi_stamp.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)
 # For programs on another DDS, which make their types of them.
 install(DIRECTORY idl/ DESTINATION ${CMAKE_INSTALL_DATADIR}/invar/idl FILES_MATCHING PATTERN "*.idl")
 install(TARGETS invar RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(EXPORT invar NAMESPACE invar:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar FILE invar-targets.cmake)
 configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/invar-config.cmake.in ${CMAKE_BINARY_DIR}/invar-config.cmake
-  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar PATH_VARS CMAKE_INSTALL_INCLUDEDIR)
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/invar-config-version.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/invar-config.cmake ${CMAKE_BINARY_DIR}/invar-config-version.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)

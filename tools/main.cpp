@@ -56,9 +56,7 @@ int run(int argc, char** argv) {
               << invar::printable(invar::tools::wrong_call(program, {argv + 1, argv + argc}, error)) << '\n';
     return 2;
   } catch (const invar::InputError& error) {
-    std::cerr << error.what();
-    if (const auto more = error.faults().size() - 1; more > 0) std::cerr << " (and " << more << " more)";
-    std::cerr << '\n';
+    for (const auto& fault : error.faults()) std::cerr << fault.line() << '\n';
     return 2;
   } catch (const std::bad_alloc&) {
     const std::string file = invar::last_input();

@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "core/base/new_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/ripple_identification.hpp"
 
@@ -131,7 +132,7 @@ Task AxisTrial::run(const RippleJob& job) {
   for (const auto& term : physics::ripple_terms(fit)) model.terms.push_back(term);
   const auto patched = folder / "patched.yaml";
   {
-    std::ofstream file{patched};
+    std::ofstream file = new_stream(patched);
     file << model::patched(yaml, model);
     if (!file.flush()) throw std::runtime_error{patched.string() + " cannot be written"};
   }

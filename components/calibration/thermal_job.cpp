@@ -9,6 +9,7 @@
 
 #include "components/calibration/calibration.hpp"
 #include "components/calibration/identify.hpp"
+#include "core/base/new_file.hpp"
 
 namespace invar::calibration {
 
@@ -35,7 +36,7 @@ double square_mean(const recording::Table& table, const char* model) {
 
 /// One line each: what was tried, how it meets passes that were not fitted, and why it was or was not taken.
 void write_models_tried(const metrology::ThermalFit& fit, const std::filesystem::path& file) {
-  std::ofstream out{file};
+  std::ofstream out = new_stream(file);
   for (const auto& tried : fit.candidates) {
     std::array<char, 60> lag{};
     if (tried.lag > 0.0) std::snprintf(lag.data(), lag.size(), " by %.3g s", tried.lag);

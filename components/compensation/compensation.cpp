@@ -297,7 +297,7 @@ void Compensation::step(const Tick& tick) noexcept {
   if (std::exchange(handles_models_, false)) say_in_use();
   if (begins_) {
     begins_ = false;
-    answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, "");
+    answer(0, active_.empty() ? MODEL_NONE : MODEL_ACTIVE, nullptr, kept_refusal_.c_str());
     if (!kept_refusal_.empty()) notify(event::SEVERITY_FAULT, kept_refusal_.c_str());
   }
   if (kept_.failed())

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 #include "core/compensation/model_file.hpp"
 
 namespace invar::compensation {
@@ -53,7 +54,7 @@ void KeptModels::write(const std::filesystem::path& folder, const Selection& mod
     if (kept.empty()) list.open_list("models");
     const std::string digits = digits_of(models[place]->checksum);
     const std::filesystem::path file = folder / file_name(place, digits);
-    std::ofstream copy{file, std::ios::binary};
+    std::ofstream copy = new_stream(file);
     copy << models[place]->text;
     copy.close();
     if (!copy) throw InputError{file.string(), "cannot be written", "check the folder and the space left"};

@@ -6,27 +6,14 @@
 
 namespace invar::recorder {
 
-namespace {
-
-/// An earlier recording of that name, of a run before or of a recorder that was killed, is never overwritten.
-void keep_earlier(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) return;
-  std::filesystem::path kept;
-  int number = 1;
-  do {
-    kept = file.parent_path() /
-           (file.stem().string() + "-" + std::to_string(number++) + file.extension().string());
-  } while (std::filesystem::exists(kept));
-  std::filesystem::rename(file, kept);
-}
-
-}  // namespace
-
 void Recorder::configure() {
   std::filesystem::create_directories(parameters_.out);
-  keep_earlier(file());
+  recording::keep_earlier(file());
   const std::scoped_lock lock{mutex_};
-  writer_ = std::make_unique<recording::RecordingWriter>(file());
+  constexpr std::uint64_t megabyte = 1'000'000;
+  writer_ = std::make_unique<recording::RecordingWriter>(
+      file(), recording::RecordingOptions{.reserve_bytes =
+                                              megabyte * static_cast<std::uint64_t>(parameters_.reserve_mb)});
   channels_.clear();
 }
 
@@ -50,6 +37,13 @@ void Recorder::step(const Tick& tick) noexcept {
   if (writer_->status().failed)
     return fail(
         "the disk takes no more: the recording has ended; make room, then reset, configure and activate");
+  if (writer_->status().at_reserve) {
+    writer_->close();  // a whole file, at once: who comes for it finds what was recorded
+    writer_.reset();
+    return fail(
+        "the disk has its reserve for black boxes left and no more: the recording has ended; make room, "
+        "then reset, configure and activate");
+  }
   if (tick.now < look_at_) return;
   look_at_ = tick.now + Duration::seconds(10.0);
   const std::uint64_t lost = writer_->ledger().total().lost;

@@ -26,7 +26,8 @@ struct Source {
 };
 
 /// Writes samples as they travel, in CDR. The process that runs it knows the cell's topics and hands the samples over:
-/// `is_wanted` says which, `record` takes one. A disk that takes no more is an error of the component; what is lost because it
+/// `is_wanted` says which, `record` takes one. A disk that takes no more is an error of the component, and so is
+/// one whose free space falls to the reserve: the recording ends whole, and black boxes still find room. What is lost because it
 /// is slower than the cell is said in a notice, at most every ten seconds. Not real-time.
 class Recorder final : public Component {
  public:
@@ -34,10 +35,13 @@ class Recorder final : public Component {
     std::string out = "out";
     std::string name = "recording.mcap";
     std::vector<std::string> topics;
+    std::int64_t reserve_mb = 64;  // some thirty black boxes of a loop at 1 kHz
     void describe(auto& p) {
       p(out, "out", "folder for the file, created; relative to where the cell was started");
       p(name, "name", "of the file");
       p(topics, "topics", "only topics that contain one of these texts; none: all of the cell");
+      p(reserve_mb, "reserve_mb", 0, 1'000'000,
+        "free space [MB] at which recording ends, left on the disk for black boxes");
     }
   };
   explicit Recorder(const Parameters& parameters) : parameters_{parameters} {}

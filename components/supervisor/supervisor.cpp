@@ -1,6 +1,7 @@
 #include "components/supervisor/supervisor.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/base/shown.hpp"
 
@@ -31,17 +32,32 @@ void Supervisor::activate() {
   last_heard_.clear();
   lost_.clear();
   failed_.clear();
-  began_ = now();
+  began_ = last_step_ = now();
 }
 
 void Supervisor::step(const Tick& tick) noexcept {
   if (simulated_time || !view_.heard) return;  // in simulated time a process that is lost stops time itself
   try {
+    forgive_own_gap(tick);
     watch_processes(tick);
     watch_components();
   } catch (const std::exception&) {
     fail("the supervisor lost its view of the cell");
   }
+}
+
+/// Who was stopped (a debugger, a PC that slept, a starved host) heard nobody meanwhile: it waits anew before it judges.
+void Supervisor::forgive_own_gap(const Tick& tick) {
+  const Duration gap = tick.now - last_step_;
+  last_step_ = tick.now;
+  // To deactivate takes what the others take to answer, and those are heard meanwhile.
+  if (std::exchange(acted_, false) || gap <= Duration::seconds(0.5 * parameters_.timeout)) return;
+  began_ = tick.now;
+  for (auto& [process, heard] : last_heard_)
+    if (!lost_.contains(process)) heard = tick.now;
+  view_.notify(
+      false, name,
+      "the supervisor itself was stopped for " + shown(gap.in_seconds(), 3) + " s: it waits anew for all");
 }
 
 void Supervisor::watch_processes(const Tick& tick) {
@@ -83,6 +99,7 @@ void Supervisor::make_safe(const std::set<std::string>& failed) {
   for (const std::string& component : downstream(view_.dependents, failed)) {
     const auto home = view_.process_of.find(component);
     if (home == view_.process_of.end() || lost_.contains(home->second)) continue;
+    acted_ = true;
     const std::string refusal = view_.deactivate(component);
     view_.notify(!refusal.empty(), component,
                  refusal.empty()

@@ -33,6 +33,7 @@ struct CellView {
 /// A process that is not heard of for `timeout`, or a component in error: everything that needs its outputs, directly
 /// or through others, is deactivated, downstream first, and notices say so. The devices' own watchdogs and the
 /// components' deadlines have acted long before; this keeps the rest of the cell from going on as if nothing were.
+/// A step that comes later than half of `timeout` after the one before begins all waiting anew.
 class Supervisor final : public Component {
  public:
   struct Parameters {
@@ -55,13 +56,15 @@ class Supervisor final : public Component {
   void connect(CellView view) { view_ = std::move(view); }
 
  private:
+  void forgive_own_gap(const Tick& tick);
   void watch_processes(const Tick& tick);
   void watch_components();
   void make_safe(const std::set<std::string>& failed);
 
   const Parameters& parameters_;
   CellView view_;
-  Instant began_;
+  Instant began_, last_step_;
+  bool acted_ = false;                         // in the step before
   std::map<std::string, Instant> last_heard_;  // only those that were
   std::set<std::string> lost_;
   std::set<std::string> failed_;

@@ -10,6 +10,7 @@
 #include "components/vision/ruler_file.hpp"
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 #include "core/component/cell_folders.hpp"
 
 namespace invar::vision {
@@ -202,7 +203,7 @@ void Vision::calibrate(const PixelsView& picture) {
   }
   const std::filesystem::path folder = parameters_.out;
   std::filesystem::create_directories(folder);
-  std::ofstream out{folder / "camera.yaml"};
+  std::ofstream out = new_stream(folder / "camera.yaml");
   out << camera_yaml(fit->camera);
   out.close();
   if (!out) throw std::runtime_error{(folder / "camera.yaml").string() + " cannot be written"};
@@ -268,7 +269,7 @@ bool Vision::wants_picture() const { return running_ && picture_; }
 void Vision::write_picture(const std::vector<unsigned char>& png) const {
   const std::filesystem::path file = *picture_;
   if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-  std::ofstream out{file, std::ios::binary};
+  std::ofstream out = new_stream(file);
   out.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
   out.close();
   if (!out) throw std::runtime_error{file.string() + " cannot be written"};

@@ -1,5 +1,8 @@
 #include "core/base/new_file.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <fstream>
 
 #include "core/base/fault.hpp"
@@ -7,6 +10,14 @@
 namespace invar {
 
 namespace fs = std::filesystem;
+
+std::ofstream new_stream(const fs::path& file) {
+  // A stream would make it readable, and under a lax umask writable, by everybody.
+  if (const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NONBLOCK, new_file_mode);
+      made >= 0)
+    ::close(made);
+  return std::ofstream{file, std::ios::binary};
+}
 
 NewFile::NewFile(const fs::path& name) : name_{name}, target_{name} {
   std::error_code none;
@@ -21,6 +32,8 @@ NewFile::NewFile(const fs::path& name) : name_{name}, target_{name} {
     target_ = target_.parent_path() / fs::read_symlink(target_, none);
   path_ = target_;
   path_ += ".part";
+  fs::remove(path_, none);  // of one that was killed, with whatever mode
+  (void)new_stream(path_);
 }
 
 NewFile::~NewFile() {

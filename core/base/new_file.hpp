@@ -2,9 +2,17 @@
 #pragma once
 
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 namespace invar {
+
+/// Of every file that Invar makes, less what the umask takes: its owner writes, its group reads, for recordings, models and
+/// reports tell of a plant.
+inline constexpr unsigned new_file_mode = 0640;
+
+/// A stream that writes `file` anew, made with `new_file_mode` where it is not there yet. Look at the stream before use.
+[[nodiscard]] std::ofstream new_stream(const std::filesystem::path& file);
 
 class NewFile {
  public:
@@ -14,7 +22,7 @@ class NewFile {
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
-  /// Where to write until it is finished.
+  /// Where to write until it is finished; it is there, empty.
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// Throws InputError where the name cannot be given.
   void finish();

@@ -45,10 +45,14 @@ CellClient::CellClient(Node& node, const std::string& cell)
       topics.process_status, node.profile("state"), [this](const auto& status, Instant sent) {
         const std::lock_guard lock{mutex_};
         const std::string process = status.process_name().c_str();
+        lifecycle::ProcessStatus& known = processes_[process];
+        // Who says in its place that it ended keeps that for late comers: the process may live again.
+        if (status.pid() == 0 && status.at().time_ns() < known.at().time_ns()) return;
+        known = status;
+        if (status.pid() == 0) return;  // not sent by the process itself
         const Duration age = system_now() - sent;
-        const auto [known, first] = ages_.try_emplace(process, age);
-        known->second = std::min(known->second, age);
-        processes_[process] = status;
+        const auto [least, first] = ages_.try_emplace(process, age);
+        least->second = std::min(least->second, age);
       }));
   readers_.push_back(
       node.reader<lifecycle::ComponentStatus>(topics.component_status, "state", [this](const auto& status) {

@@ -181,13 +181,14 @@ void ProcessService::publish(event::Severity level, const std::string& source, c
   notice.level(level);
   notice.source(source);
   notice.text(text);
+  if (options_.on_notice) options_.on_notice(notice);
   notice_.write(notice);
 }
 
 void ProcessService::publish_news() {
   for (const auto& alarm : node_.take_alarms())
     publish(alarm.fault ? event::SEVERITY_FAULT : event::SEVERITY_WARNING, node_.options().process,
-            alarm.text);
+            alarm.topic + ": " + alarm.text);
   for (StateChange change; control_.executor().take_change(change);) {
     const std::string name = control_.executor().component(change.component).name;
     const bool failed = change.to == LifecycleState::error;
@@ -221,7 +222,9 @@ void ProcessService::publish_late(const ProcessStatus& status) {
 }
 
 void ProcessService::publish_status() {
+  const std::lock_guard turn{status_turn_};
   const ProcessStatus status = control_.status();
+  const Recent recent = recent_.look(control_.executor(), monotonic_now());
   lifecycle::ProcessStatus process;
   process.cell(options_.cell);
   process.process_id(number_);
@@ -245,6 +248,12 @@ void ProcessService::publish_status() {
   process.late(status.counters.late);
   process.lost(node_.lost());
   process.endpoints(own_endpoints(node_));
+  process.restarts(options_.restarts);
+  process.last_end(options_.last_end);
+  process.window_ns(recent.window.ns);
+  process.recent_wake_up(on_wire(recent.wake_up));
+  process.recent_compute(on_wire(recent.compute));
+  process.recent_latency(on_wire(recent.latency));
   process_.write(process);
 
   for (std::size_t i = 0; i < status.components.size(); ++i) {
@@ -270,6 +279,8 @@ void ProcessService::publish_status() {
       age.age(on_wire(input.age));
       out.inputs().push_back(age);
     }
+    if (options_.fault_of) out.fault(options_.fault_of(i));
+    out.recent_compute(on_wire(recent.steps[i]));
     component_.write(out);
   }
 }

@@ -18,6 +18,7 @@
 #include "core/dds/node.hpp"
 #include "core/dds/received_models.hpp"
 #include "core/executor/process_control.hpp"
+#include "core/executor/recent.hpp"
 
 namespace invar::dds {
 
@@ -32,6 +33,13 @@ class ProcessService {
     std::filesystem::path models;
     /// Called when somebody asks the process to stop; on the service's thread.
     std::function<void()> stop_process;
+    /// What is wrong with the component of this index though it is stepped; empty: nothing. Any thread.
+    std::function<std::string(std::size_t component)> fault_of;
+    /// Every notice in this process's name, once; on the thread that publishes it.
+    std::function<void(const event::Notice&)> on_notice;
+    /// How often the process was started again, and how its last life ended.
+    std::uint32_t restarts = 0;
+    std::string last_end;
   };
   ProcessService(Node& node, ProcessControl& control, Options options);
   ~ProcessService();
@@ -79,6 +87,8 @@ class ProcessService {
   std::condition_variable news_;
   std::deque<Request> requests_;
   bool stopping_ = false;
+  std::mutex status_turn_;  // two threads may publish the status
+  RecentStatistics recent_;
   std::map<std::string, std::uint64_t> told_late_;  // declared latencies not kept, as told so far
   std::optional<Instant> told_clocks_;              // when a client's clock was told to be ahead
   bool told_apart_ = false;  // the host's clock was set, and the stamps are not there yet

@@ -1,6 +1,7 @@
 #include "core/recording/mcap_file_writer.hpp"
 
 #include <fcntl.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 
 namespace invar::recording {
 
@@ -16,7 +18,7 @@ using mcap::Opcode;
 
 McapFileWriter::McapFileWriter(const std::filesystem::path& file, const ChunkOptions& options)
     : options_{options}, packer_{options.compression, options.level} {
-  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, new_file_mode);
   if (descriptor_ < 0)
     throw InputError{file.string(), std::string{"cannot be created: "} + std::strerror(errno),
                      "check the folder, its permissions and the space left"};
@@ -24,6 +26,12 @@ McapFileWriter::McapFileWriter(const std::filesystem::path& file, const ChunkOpt
   put(out_, ByteView{mcap::magic});
   mcap::append(out_, mcap::Header{"", "invar"});
   put_on_disk(out_);
+}
+
+std::uint64_t McapFileWriter::free_bytes() const {
+  struct statvfs disk {};
+  if (fstatvfs(descriptor_, &disk) != 0) return UINT64_MAX;
+  return std::uint64_t{disk.f_bavail} * disk.f_frsize;
 }
 
 McapFileWriter::~McapFileWriter() {

@@ -46,6 +46,8 @@ class McapFileWriter {
   bool close();
 
   [[nodiscard]] bool failed() const { return failed_; }
+  /// On its disk, for who is not root; very many where nobody knows.
+  [[nodiscard]] std::uint64_t free_bytes() const;
   [[nodiscard]] std::uint64_t bytes_written() const { return position_; }
   /// True when messages wait in the chunk being filled.
   [[nodiscard]] bool has_open_chunk() const { return !chunk_.empty(); }

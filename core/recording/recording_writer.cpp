@@ -7,6 +7,18 @@
 
 namespace invar::recording {
 
+std::filesystem::path keep_earlier(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) return {};
+  std::filesystem::path kept;
+  int number = 1;
+  do {
+    kept = file.parent_path() /
+           (file.stem().string() + "-" + std::to_string(number++) + file.extension().string());
+  } while (std::filesystem::exists(kept));
+  std::filesystem::rename(file, kept);
+  return kept;
+}
+
 namespace {
 // The thread looks into the queue this often by itself; callers wake it only when the queue is half full, so
 // that a write costs no system call.
@@ -53,7 +65,7 @@ bool RecordingWriter::write(std::uint16_t channel, std::uint32_t sequence, Insta
     known.follower.observe(sequence, known.ledger);
     const std::size_t before = filling_.size();
     const std::size_t after = before + mcap::record_head + 22 + payload.size();
-    if (after > options_.queue_bytes || status_.failed || closing_) {
+    if (after > options_.queue_bytes || status_.failed || status_.at_reserve || closing_) {
       ++known.ledger.lost;
       return false;
     }
@@ -109,6 +121,7 @@ void RecordingWriter::run() {
     }
     const auto now = Clock::now();
     if (!file_.has_open_chunk()) chunk_began = now;
+    if (is_at_reserve(emptying.size())) emptying.clear();
     write_all(emptying);
     emptying.clear();
     if (file_.has_open_chunk() && now - chunk_began > std::chrono::nanoseconds{options_.chunk_age.ns}) {
@@ -124,6 +137,14 @@ void RecordingWriter::run() {
     noted_losses = losses;
     noted_at = now;
   }
+}
+
+/// Once there, for ever: room that comes back would leave a hole in the recording.
+bool RecordingWriter::is_at_reserve(std::size_t more) {
+  const std::lock_guard lock{mutex_};
+  if (options_.reserve_bytes > 0 && more > 0 && !status_.at_reserve)
+    status_.at_reserve = file_.free_bytes() < options_.reserve_bytes + more;
+  return status_.at_reserve;
 }
 
 void RecordingWriter::write_all(ByteView batch) {

@@ -17,6 +17,10 @@
 
 namespace invar::recording {
 
+/// An earlier file of that name, of a run before or of a recorder that was killed, is never overwritten: it is called
+/// `name-1.mcap`, or the next free number, from now on. Returns that name; empty: there was none, or it is a device or a pipe.
+std::filesystem::path keep_earlier(const std::filesystem::path& file);
+
 /// One stream of samples: a topic as one writer sends it. Two writers of one topic are two channels, so that
 /// each has its own sequence numbers.
 struct ChannelInfo {
@@ -33,12 +37,15 @@ struct RecordingOptions {
   std::size_t queue_bytes = 64U << 20U;  // twice this is reserved: one half fills while the other empties
   Duration chunk_age =
       Duration::milliseconds(500);  // a chunk older than this goes to disk though it is not full
+  std::uint64_t reserve_bytes =
+      0;  // of the disk: what is left free, and what it is left for is the caller's to say
 };
 
 struct RecordingStatus {
   std::uint64_t bytes_written = 0;  // on disk
   std::uint64_t queue_peak = 0;     // most bytes that waited at once
   bool failed = false;              // the disk refused; everything since counts as lost
+  bool at_reserve = false;  // the disk has its reserve left and no more; everything since counts as lost
 };
 
 /// Thread-safe. write() copies under a short lock and neither allocates nor touches the disk; not for the
@@ -79,6 +86,7 @@ class RecordingWriter {
 
   void put_record(const auto& record);
   void run();
+  bool is_at_reserve(std::size_t more);
   void write_all(ByteView batch);
   void settle_accounts();
 

@@ -50,4 +50,45 @@ for t in sorted(raw):
 print(f"{n} samples, largest difference from the closed form {worst:.3g} m")
 sys.exit(0 if n > 800 and worst < 1e-12 else 1)
 P
+
+# A library of another build is refused before anything of it runs: each of these would leave a file when it is loaded.
+refused() {  # refused LIBRARY WORDS
+  local status=0
+  "$invar" types --plugin "$1" >said 2>&1 || status=$?
+  cat said
+  [[ $status == 2 && $(wc -l <said) == 1 ]] && grep -q -- "$2" said || { echo "$1 was not refused with: $2"; exit 1; }
+  [[ ! -e ran ]] || { echo "something of $1 ran"; exit 1; }
+}
+cat >../other.cpp <<'C'
+#include "core/component/plugin.hpp"
+#include <cstdio>
+static const int ran = std::fclose(std::fopen("ran", "w"));
+INVAR_PLUGIN(registry) { (void)registry; (void)ran; }
+C
+flags=(-std=c++20 -shared -fPIC -I "$folder/installed/include/invar")
+c++ "${flags[@]}" ../other.cpp -o same.so
+"$invar" types --plugin "$PWD/same.so" >/dev/null && [[ -e ran ]] || { echo "one of the same build is not loaded"; exit 1; }
+rm ran
+c++ "${flags[@]}" -DINVAR_ABI_HEADERS='"0123456789abcdef"' ../other.cpp -o other.so
+refused other.so "built against another Invar (headers 0123456789abcdef, here [0-9a-f]*); build it again with this installation"
+c++ "${flags[@]}" -D_GLIBCXX_USE_CXX11_ABI=0 ../other.cpp -o strings.so
+refused strings.so "string-abi 0, here 1"
+printf '#include <stdio.h>\n__attribute__((constructor)) static void f(void) { fclose(fopen("ran", "w")); }\n' >../foreign.c
+cc -shared -fPIC ../foreign.c -o foreign.so
+refused foreign.so "carries no stamp of Invar"
+echo "no library" >text.so; refused text.so "it is no shared library"
+: >empty.so; refused empty.so "it is no shared library"
+head -c 2000 same.so >cut.so; refused cut.so "carries no stamp of Invar"
+ln -s nowhere.so link.so; refused link.so "a link to a file that does not exist"
+refused nothing.so "no such file"
+mkdir folder.so; refused folder.so "no such file"
+# Headers that were changed after the installation: find_package sees it.
+echo "// changed" >>"$folder/installed/include/invar/core/component/port.hpp"
+cmake -S "$source/examples/low_pass" -B "$folder/changed" -G Ninja -DCMAKE_PREFIX_PATH="$folder/installed" >/dev/null
+ninja -C "$folder/changed" >/dev/null
+refused "$folder/changed/liblow_pass.so" "built against another Invar (headers"
+sed -i "s|liblow_pass.so|$folder/changed/liblow_pass.so|" cell.yaml
+status=0; "$invar" check cell.yaml >said 2>&1 || status=$?
+cat said
+[[ $status == 2 ]] && grep -q "cell.yaml:[0-9]*: plugins" said && grep -q "build it again" said || { echo "check does not say it"; exit 1; }
 echo "passed"

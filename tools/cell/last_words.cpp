@@ -1,4 +1,5 @@
 #include "tools/cell/last_words.hpp"
+#include "core/base/new_file.hpp"
 
 #include <spdlog/spdlog.h>
 
@@ -17,7 +18,7 @@ void write_whole(const std::filesystem::path& file, const nlohmann::json& json) 
   try {
     std::filesystem::path part = file;
     part += ".part";
-    std::ofstream stream{part};
+    std::ofstream stream = new_stream(part);
     stream << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
     stream.close();
     if (stream) return std::filesystem::rename(part, file);
@@ -28,21 +29,23 @@ void write_whole(const std::filesystem::path& file, const nlohmann::json& json) 
 }
 
 nlohmann::json loop_outcome(const ProcessStatus& status, Duration period) {
-  nlohmann::json json{{"process", status.process},
+  const auto percentiles = [](const Percentiles& p) -> nlohmann::json {
+    return {{"p50_ns", p.p50.ns}, {"p99_ns", p.p99.ns}, {"p999_ns", p.p999.ns}, {"max_ns", p.max.ns}};
+  };
+  nlohmann::json json{{"name", status.process},
+                      {"rate_hz", 1.0 / period.in_seconds()},
+                      {"simulated", status.simulated},
                       {"cycles", status.counters.executed},
                       {"overruns", status.counters.overruns},
                       {"skipped", status.counters.skipped},
-                      {"rate", 1.0 / period.in_seconds()},
-                      {"compute_p50_ns", status.compute.p50.ns},
-                      {"compute_p99_ns", status.compute.p99.ns},
-                      {"wake_up_p50_ns", status.wake_up.p50.ns},
-                      {"wake_up_p99_ns", status.wake_up.p99.ns},
+                      {"trip_reason", status.trip_reason},
+                      {"latency_limit_ns", status.latency_limit ? status.latency_limit->ns : 0},
+                      {"late", status.counters.late},
+                      {"wake_up", percentiles(status.wake_up)},
+                      {"compute", percentiles(status.compute)},
+                      {"latency", percentiles(status.latency)},
                       {"not_granted", status.not_granted},
                       {"late_inputs", nlohmann::json::array()}};
-  if (status.latency_limit) {
-    json["latency_limit_ns"] = status.latency_limit->ns;
-    json["late"] = status.counters.late;
-  }
   for (const ComponentStatus& component : status.components)
     for (const InputAge& input : component.ages)
       json["late_inputs"].push_back({{"input", component.name + "." + input.port},

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <thread>
@@ -24,6 +25,8 @@
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
+#include "tools/cell/restart_news.hpp"
+#include "tools/cell/restarts.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
 
@@ -44,12 +47,15 @@ struct Child {
   pid_t pid = -1;
   bool running = true;
   int status = 0;
-  int restarts = 0;
+  Clock::time_point began = Clock::now(), ended{};
+  Restarts restarts{};
+  std::optional<Clock::time_point> next_start{};  // after it ended by itself
 
   void poll(bool wait) {
     int raw = 0;
     if (!running || waitpid(pid, &raw, wait ? 0 : WNOHANG) != pid) return;
     running = false;
+    ended = Clock::now();
     status = WIFEXITED(raw) ? WEXITSTATUS(raw) : 128 + WTERMSIG(raw);
   }
 };
@@ -60,7 +66,8 @@ std::filesystem::path outcome_of(const std::string& process, const std::filesyst
 }
 
 Child spawn(const LaunchOptions& options, const std::string& process, bool simulated,
-            const std::filesystem::path& folder) {
+            const std::filesystem::path& folder, const Restarts& restarts = {},
+            const std::string& last_end = "") {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
   std::vector<std::string> words{program,
                                  "run",
@@ -76,6 +83,8 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   std::filesystem::remove(progress_file(outcome_of(process, folder)));
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
   if (options.quiet) words.emplace_back("--quiet");
+  if (restarts.count() > 0)
+    words.insert(words.end(), {"--restarts", std::to_string(restarts.count()), "--last-end", last_end});
   if (simulated && options.pace > 0.0) words.insert(words.end(), {"--pace", std::to_string(options.pace)});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -91,6 +100,7 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   for (const int signal : {SIGTERM, SIGUSR1}) sigaddset(&orders, signal);
   posix_spawnattr_setsigmask(&attributes, &orders);
   Child child{process};
+  child.restarts = restarts;
   const int error = posix_spawn(&child.pid, program.c_str(), nullptr, &attributes, arguments.data(), environ);
   posix_spawnattr_destroy(&attributes);
   if (error != 0) throw std::runtime_error{"process `" + process + "` cannot be started"};
@@ -130,19 +140,25 @@ void stop_in_order(std::vector<Child>& children, const std::filesystem::path& fo
   }
 }
 
-/// Starts a process again that was killed or failed: at most `most_restarts` times, so that one that cannot live does
-/// not burn the PC. True while the cell goes on.
-bool keep_alive(std::vector<Child>& children, const LaunchOptions& options,
-                const std::filesystem::path& folder) {
-  constexpr int most_restarts = 10;
+/// Starts a process again that was killed or failed, after a pause where it ends again and again. True while the cell goes on:
+/// one that says by its status that its input is wrong would say so again.
+bool keep_alive(std::vector<Child>& children, const LaunchOptions& options, const config::Cell& cell,
+                const std::filesystem::path& folder, RestartNews& news) {
   for (Child& child : children) {
     child.poll(false);
     if (child.running) continue;
-    if (child.status == 0 || child.status == 2 || child.restarts == most_restarts) return false;
-    spdlog::warn("process `{}` ended with status {}; starting it again", child.name, child.status);
-    const int restarts = child.restarts + 1;
-    child = spawn(options, child.name, false, folder);
-    child.restarts = restarts;
+    if (child.status == 0 || child.status == 2) return false;
+    const std::string how = "status " + std::to_string(child.status);
+    if (!child.next_start) {
+      const Duration pause =
+          child.restarts.ended_after({std::chrono::nanoseconds{child.ended - child.began}.count()});
+      child.next_start = child.ended + std::chrono::nanoseconds{pause.ns};
+      for (const auto& process : cell.processes)
+        if (process.name == child.name)
+          news.tell(process, {.how = how, .restarts = child.restarts.count(), .pause = pause});
+    }
+    if (Clock::now() >= *child.next_start)
+      child = spawn(options, child.name, false, folder, child.restarts, how);
   }
   return true;
 }
@@ -263,7 +279,7 @@ void announce(const std::set<std::string>& hosts, const config::Cell& cell, bool
     std::string& list = hosts.contains(process.host) ? names : others;
     list += (list.empty() ? "" : ", ") + process.name;
   }
-  spdlog::info("cell `{}` runs {} in {}{}; Ctrl-C stops it in order", cell.name, names,
+  spdlog::info("invar {}: cell `{}` runs {} in {}{}; Ctrl-C stops it in order", INVAR_VERSION, cell.name, names,
                simulated ? "simulated time" : "real time",
                others.empty() ? "" : " (" + others + " on other PCs)");
 }
@@ -288,6 +304,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
 
   const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
   JobNews news{options, cell, folder.path()};
+  RestartNews restart_news{cell};
   std::vector<Child> children;
   for (const auto& process : cell.processes)
     if (hosts.contains(process.host))
@@ -299,7 +316,8 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
     outcome.failure = keep_simulated_time(options, cell, children, stop, begin, news, outcome);
   } else {
     while (!stop && (options.duration <= 0.0 || seconds_since(begin) < options.duration) &&
-           (options.job.empty() ? keep_alive(children, options, folder.path()) : !any_ended(children))) {
+           (options.job.empty() ? keep_alive(children, options, cell, folder.path(), restart_news)
+                                : !any_ended(children))) {
       news.look();
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }

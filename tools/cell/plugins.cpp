@@ -2,9 +2,12 @@
 
 #include <dlfcn.h>
 
+#include "tools/cell/plugin_stamp.hpp"
+
 namespace invar::tools {
 
 Fault load_plugin(const std::filesystem::path& file, Registry& registry) {
+  if (Fault fault = why_not_a_plugin(file); !fault.what.empty()) return fault;
   void* library = dlopen(std::filesystem::absolute(file).c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr)
     return {file.string(), std::string{"cannot be loaded: "} + dlerror(),

@@ -30,8 +30,10 @@
 #include "idl/job.h"
 #include "idl/stage.h"
 #include "tools/cell/black_box_file.hpp"
+#include "tools/cell/component_faults.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/notice_log.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
 
@@ -98,13 +100,22 @@ class RunningProcess {
     }
     join_directly();
     fill_black_box();
+    each_port([&](std::size_t index, Port& port) {
+      faults_.watch(index, port);
+      log_.follow(port);
+    });
     watch_job();
     service_ = std::make_unique<dds::ProcessService>(
         node_, control_,
         dds::ProcessService::Options{
-            .cell = loaded.cell->id, .host = file_.host, .models = received_models, .stop_process = [this] {
-              asked_to_stop_ = true;
-            }});
+            .cell = loaded.cell->id,
+            .host = file_.host,
+            .models = received_models,
+            .stop_process = [this] { asked_to_stop_ = true; },
+            .fault_of = [this](std::size_t index) { return faults_.of(index, executor_.now()); },
+            .on_notice = [this](const event::Notice& notice) { log_.write(notice); },
+            .restarts = options.restarts,
+            .last_end = options.last_end});
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 
@@ -163,12 +174,30 @@ class RunningProcess {
     });
     executor_.black_box().on_trip([this](const BlackBoxRecord& record) {
       try {
-        spdlog::warn("{}: {}; the last cycles are in {}", file_.name, record.reason,
-                     write_black_box(record, "out").string());
+        say(event::SEVERITY_WARNING,
+            record.reason + "; the last cycles are in " + write_black_box(record, "out").string());
       } catch (const std::exception& error) {
-        spdlog::error("{}: the black box cannot be written: {}", file_.name, error.what());
+        say(event::SEVERITY_FAULT, std::string{"the black box cannot be written: "} + error.what());
       }
     });
+  }
+
+  /// In this process's name: into its log, and to the cell.
+  void say(event::Severity level, const std::string& text) { service_->publish(level, file_.name, text); }
+
+  /// What is wrong now, one line each.
+  std::vector<std::string> faults() {
+    std::vector<std::string> lines;
+    const ProcessStatus status = control_.status();
+    if (!status.trip_reason.empty()) lines.push_back(file_.name + ": tripped: " + status.trip_reason);
+    for (std::size_t i = 0; i < status.components.size(); ++i) {
+      const ComponentStatus& component = status.components[i];
+      if (component.state == LifecycleState::error)
+        lines.push_back(component.name + ": in error: " + component.failure);
+      if (const std::string fault = faults_.of(i, executor_.now()); !fault.empty())
+        lines.push_back(component.name + ": " + fault);
+    }
+    return lines;
   }
 
   /// Prepares the command that starts the job, for the inbox of the component that runs it once that is active, and follows
@@ -221,6 +250,8 @@ class RunningProcess {
 
   /// What others move on or read must be there until they rest, too: nobody leaves before it is told.
   void come_to_rest() {
+    // The others of the cell come to rest now, too: what is wrong later is so because they stop.
+    if (!resting_) faults_at_end_ = faults();
     if (!resting_) executor_.wind_down_all();
     resting_ = true;
     if (told_rest_ || !executor_.is_at_rest() || options_.outcome.empty()) return;
@@ -235,7 +266,7 @@ class RunningProcess {
     const Instant now = monotonic_now();
     if (!orphan_since_) {
       orphan_since_ = now;
-      spdlog::warn("{}: `invar run` is no more: coming to rest and stopping", file_.name);
+      say(event::SEVERITY_WARNING, "`invar run` is no more: coming to rest and stopping");
     }
     // Nobody says who notices first; who records leaves last, or the end of the others would be missing.
     const Duration lingers = recorder_ != nullptr ? Duration::seconds(1.0) : Duration{};
@@ -261,24 +292,33 @@ class RunningProcess {
                             (!job_ended_ || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (const std::string refused = memory_.look(); !refused.empty())
-        spdlog::warn("{}: {}", file_.name, refused);
+        say(event::SEVERITY_WARNING, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
       leave_progress();
       watch_address();
-      for (const dds::Alarm& alarm : node_.take_alarms()) {
-        spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
-        service_->publish(alarm.fault ? event::SEVERITY_FAULT : event::SEVERITY_WARNING, file_.name,
-                          alarm.topic + ": " + alarm.text);
-      }
+      log_.write_waiting();
     }
-    say_how_the_job_ended();
-    status_ = control_.status();
-    control_.stop();
-    write_outcome();
-    service_.reset();
+    take_down();
     topics_.clear();
     node_.stop();
-    return up && job_succeeded() ? 0 : 1;
+    return up && ended_well() ? 0 : 1;
+  }
+
+  void take_down() {
+    say_how_the_job_ended();
+    status_ = control_.status();
+    if (!resting_) faults_at_end_ = faults();
+    control_.stop();
+    log_.write_waiting();
+    write_outcome();
+    service_.reset();
+  }
+
+  /// Who started this process reads its faults in the outcome, and starts it again only where it failed itself.
+  bool ended_well() {
+    if (options_.launcher == 0)
+      for (const std::string& line : faults_at_end_) spdlog::error("at the end: {}", line);
+    return job_succeeded() && (options_.launcher != 0 || faults_at_end_.empty());
   }
 
   int run_simulated(const std::atomic<bool>& stop) {
@@ -311,17 +351,14 @@ class RunningProcess {
         },
         [&] {
           leave_progress();
+          log_.write_waiting();
           return !options_.job.empty() && (!runs_job_ || job_ended_.load());
         },
         stop);
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
-    say_how_the_job_ended();
-    status_ = control_.status();
-    control_.stop();
-    write_outcome();
-    service_.reset();
+    take_down();
     node_.stop();
-    return up && outcome.failure.empty() && job_succeeded() ? 0 : 1;
+    return up && outcome.failure.empty() && ended_well() ? 0 : 1;
   }
 
   /// Who feeds whom, and how to look and act by DDS.
@@ -353,7 +390,7 @@ class RunningProcess {
       std::set<std::string> heard{file_.name};
       for (const auto& status : client_->processes()) {
         auto& last = last_status_[status.process_name().c_str()];
-        if (status.at().time_ns() != last) heard.insert(status.process_name().c_str());
+        if (status.pid() != 0 && status.at().time_ns() != last) heard.insert(status.process_name().c_str());
         last = status.at().time_ns();
       }
       return heard;
@@ -372,7 +409,6 @@ class RunningProcess {
       return reply->done() ? "" : reply->text().c_str();
     };
     view.notify = [this](bool is_fault, const std::string& from, const std::string& text) {
-      spdlog::log(is_fault ? spdlog::level::warn : spdlog::level::info, text);
       service_->publish(is_fault ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, from, text);
     };
     return view;
@@ -387,7 +423,6 @@ class RunningProcess {
   void watch_address() {
     const auto news = address_.look();
     if (!news) return;
-    spdlog::warn("{}: {}", file_.name, news->text);
     service_->publish(news->is_back ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, file_.name, news->text);
   }
 
@@ -438,6 +473,7 @@ class RunningProcess {
   void write_outcome() {
     if (options_.outcome.empty()) return;
     nlohmann::json outcome = loop_outcome(status_, file_.period);
+    outcome["faults"] = faults_at_end_;
     if (recorder_ != nullptr && std::filesystem::exists(recorder_->file()))
       outcome["recording"] = std::filesystem::absolute(recorder_->file()).string();
     if (runs_job_) {
@@ -454,10 +490,13 @@ class RunningProcess {
   const ProcessOptions& options_;
   LoadedCell& loaded_;
   const config::CellProcess& file_;
+  ComponentFaults faults_;  // before the executor, whose components write into these two
+  NoticeLog log_{options_.simulated};
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
   AddressWatch address_{node_.options().addresses.empty() ? "127.0.0.1" : node_.options().addresses.front()};
+  std::vector<std::string> faults_at_end_;
   std::deque<stage::AxisState> axes_;  // newest state of each, the loop's; addresses stay
   std::unique_ptr<dds::ProcessService> service_;
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
@@ -494,6 +533,10 @@ int run_process(const ProcessOptions& options, const ProcessOrders& orders) {
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
                      mend_name(options.process, loaded.process_names())};
   const ProcessClaim claim{*loaded.cell, options.process};
+  if (options.launcher == 0)
+    spdlog::info("invar {}: process `{}` of cell `{}` ({}) starts in {}, pid {}", INVAR_VERSION,
+                 options.process, loaded.cell->name, options.cell.string(),
+                 options.simulated ? "simulated time" : "real time", getpid());
   if (!wait_for_address(*loaded.cell, process->file->host, orders.stop)) return 0;
   if (process->file->realtime) keep_memory_small();
   return RunningProcess{options, loaded, *process}.run(orders);

@@ -17,6 +17,8 @@ struct ProcessOptions {
   std::string job;     // started at once where this process has the component that runs it; ends with it
   std::filesystem::path outcome;  // file for what became of it, as JSON; empty: none
   pid_t launcher = 0;             // who started it, and may have ended before it can ask; 0: its parent
+  std::uint32_t restarts = 0;     // how often `launcher` started it again
+  std::string last_end;           // how its last life ended
 };
 
 /// What others ask of a process; signal handlers may set both.
@@ -30,7 +32,8 @@ struct ProcessOrders {
 
 /// Runs until `stop` is set, the job has ended, or in simulated time the master ends the run. Checks the whole cell first. One
 /// that `invar run` started (it has an outcome file) comes to rest and stops, too, when that is no more.
-/// Throws InputError. Exit status: 0 in order; 1 a component failed to come up, the job failed, or time stood still.
+/// Throws InputError. Exit status: 0 in order; 1 a component failed to come up, the job failed, time stood still, or, without a launcher
+/// that reads its outcome, something was wrong at the end.
 int run_process(const ProcessOptions& options, const ProcessOrders& orders);
 
 }  // namespace invar::tools

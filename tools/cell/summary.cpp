@@ -1,7 +1,6 @@
 #include "tools/cell/summary.hpp"
 
 #include <cmath>
-#include <iomanip>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -14,6 +13,7 @@
 #include "tools/cell/heat_summary.hpp"
 #include "tools/cell/motion_summary.hpp"
 #include "tools/cell/print_summary.hpp"
+#include "tools/live/text_table.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -147,22 +147,18 @@ nlohmann::ordered_json by_name(const std::string& lines) {
 /// What the processes left, as a table and for programs.
 struct Processes {
   inline static const std::vector<std::string> header{
-      "process", "rate", "cycles", "overruns", "late", "compute p50 / p99", "wake-up p50 / p99"};
+      "process", "rate", "cycles", "overruns", "late", "compute p50 / p99 [us]", "wake-up p50 / p99 [us]"};
 
   explicit Processes(const LaunchOutcome& outcome) {
     for (const ProcessOutcome& process : outcome.processes) add(process, outcome.simulated);
   }
 
   void print(std::ostream& out) const {
-    const std::vector<int> widths{16, 10, 10, 10, 10, 22, 22};
-    const auto row = [&](const std::vector<std::string>& cells) {
-      for (std::size_t i = 0; i < cells.size(); ++i) out << std::left << std::setw(widths[i]) << cells[i];
-      out << '\n';
-    };
-    row(header);
-    for (const auto& cells : rows) row(cells);
+    TextTable table{header};
+    for (const auto& cells : rows) table.add(cells);
+    table.print(out);
     out << '\n';
-    for (const std::string& line : notes) out << line << '\n';
+    for (const std::string& line : notes) print_wrapped(line, 16, out);
     if (!notes.empty()) out << '\n';
   }
 
@@ -171,6 +167,7 @@ struct Processes {
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   nlohmann::json job;
   std::vector<std::string> recordings;
+  std::vector<std::string> faults;  // what was wrong when the cell was asked to stop
 
  private:
   void add(const ProcessOutcome& process, bool simulated) {
@@ -178,16 +175,27 @@ struct Processes {
     if (report.is_discarded()) {
       rows.push_back(
           {process.process, "-", "-", "-", "-", "-", "ended with status " + std::to_string(process.status)});
-      json.push_back({{"process", process.process}, {"status", process.status}});
+      json.push_back({{"name", process.process}, {"status", process.status}});
       return;
     }
-    const auto us = [&](const char* key) { return number(report.value(key, 0.0) * 1e-3, 3) + " us"; };
-    rows.push_back({process.process, number(report.value("rate", 0.0), 4) + " Hz",
+    const auto half_and_tail = [&](const char* what) {
+      const auto us = [&](const char* key) {
+        return number(
+            report.value(nlohmann::json::json_pointer{std::string{"/"} + what + "/" + key}, 0.0) * 1e-3, 3);
+      };
+      return simulated ? "-" : us("p50_ns") + " / " + us("p99_ns");
+    };
+    rows.push_back({process.process, number(report.value("rate_hz", 0.0), 4) + " Hz",
                     std::to_string(report.value("cycles", 0ULL)),
                     std::to_string(report.value("overruns", 0ULL)),
-                    report.contains("late") && !simulated ? std::to_string(report.value("late", 0ULL)) : "-",
-                    simulated ? "-" : us("compute_p50_ns") + " / " + us("compute_p99_ns"),
-                    simulated ? "-" : us("wake_up_p50_ns") + " / " + us("wake_up_p99_ns")});
+                    report.value("latency_limit_ns", std::int64_t{0}) > 0 && !simulated
+                        ? std::to_string(report.value("late", 0ULL))
+                        : "-",
+                    half_and_tail("compute"), half_and_tail("wake_up")});
+    for (const auto& line : report.value("faults", std::vector<std::string>{})) {
+      faults.push_back(line);
+      notes.push_back("at the end      " + line);
+    }
     for (const auto& line : report.value("not_granted", std::vector<std::string>{}))
       notes.push_back("not granted     " + process.process + ": " + line);
     for (const auto& input : report.value("late_inputs", nlohmann::json::array()))
@@ -210,7 +218,9 @@ nlohmann::ordered_json summarise(const LaunchOutcome& outcome, std::ostream& out
                     outcome.simulated ? "in simulated time" : "by the wall clock"};
   Processes processes{outcome};
   processes.print(out);
-  nlohmann::ordered_json json{{"failure", outcome.failure},
+  nlohmann::ordered_json json{{"healthy", outcome.failure.empty() && processes.faults.empty()},
+                              {"failure", outcome.failure},
+                              {"faults", processes.faults},
                               {"simulated", outcome.simulated},
                               {"wall_seconds", outcome.wall_seconds},
                               {"processes", processes.json},

@@ -8,6 +8,7 @@
 #include "components/vision/camera_file.hpp"
 #include "components/vision/library.hpp"
 #include "components/vision/ruler_file.hpp"
+#include "core/base/new_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"
@@ -139,7 +140,7 @@ void write_camera_result(const std::filesystem::path& folder, const std::string&
     throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
   page.write(folder / "report.html");
   const auto write = [&](const char* name, const std::string& text) {
-    std::ofstream out{folder / name};
+    std::ofstream out = new_stream(folder / name);
     out << text << '\n';
     out.close();
     if (!out) throw InputError{(folder / name).string(), "cannot be written", "check the space left"};

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 
+#include "core/base/new_file.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
@@ -21,7 +22,7 @@ struct Options {
 };
 
 void write(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream stream{file, std::ios::binary};
+  std::ofstream stream = new_stream(file);
   stream << text;
   stream.close();
   if (!stream) throw InputError{file.string(), "cannot be written", "check the folder and the space left"};

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "core/base/fault.hpp"
+#include "core/base/new_file.hpp"
 #include "core/config/quotes.hpp"
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/line_search.hpp"
@@ -91,7 +92,7 @@ void write_job(const PlanChoice& choice, const metrology::Machine& machine, cons
   for (const PlannedLine& line : choice.lines)
     text += "    - {name: " + config::in_quotes(line.name) + ", from: " + place(line.from) +
             ", to: " + place(line.to) + "}\n";
-  std::ofstream file{options.output};
+  std::ofstream file = new_stream(options.output);
   file << text;
   if (!file.flush())
     throw InputError{options.output.string(), "cannot be written",

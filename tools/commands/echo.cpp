@@ -13,6 +13,7 @@
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/live_cell.hpp"
+#include "tools/live/text_table.hpp"
 
 namespace invar::tools {
 
@@ -56,22 +57,42 @@ class Queue {
 
 /// One field a line, indented by depth, with its unit.
 void print(const recording::Value& value, const std::string& name, const std::string& unit, int depth) {
-  std::cout << std::string(static_cast<std::size_t>(depth) * 2, ' ') << name << ':';
+  const std::string lead(static_cast<std::size_t>(depth) * 2, ' ');
   if (value.type->kind == recording::Kind::structure) {
-    std::cout << '\n';
+    std::cout << lead << name << ":\n";
     const auto& members = std::get<std::vector<recording::Value>>(value.content);
     for (std::size_t i = 0; i < members.size(); ++i)
       print(members[i], value.type->members[i].name, value.type->members[i].unit, depth + 1);
     return;
   }
-  std::cout << ' ' << recording::to_json_line(recording::to_json(value))
-            << (unit.empty() || unit == "1" ? "" : " " + unit) << '\n';
+  print_wrapped(lead + name + ": " + recording::to_json_line(recording::to_json(value)) +
+                    (unit.empty() || unit == "1" ? "" : " " + unit),
+                lead.size() + 2, std::cout);
 }
 
-void show(const Arrived& sample, const recording::Value& value, bool json) {
+/// The units of a type's fields, nested as its values are; only those that have one.
+nlohmann::ordered_json units_of(const recording::Type& type) {
+  const recording::Type* inner = &type;
+  while (inner->element) inner = inner->element.get();
+  auto units = nlohmann::ordered_json::object();
+  for (const auto& member : inner->members) {
+    if (auto below = units_of(*member.type); !below.empty())
+      units[member.name] = std::move(below);
+    else if (!member.unit.empty() && member.unit != "1")
+      units[member.name] = member.unit;
+  }
+  return units;
+}
+
+void show(const dds::Endpoint& writer, const nlohmann::ordered_json& units, const Arrived& sample,
+          const recording::Value& value, bool json) {
   if (json) {
-    nlohmann::ordered_json line{{"sent_ns", sample.sent_ns}, {"sequence", sample.sequence}};
+    nlohmann::ordered_json line{{"topic", writer.topic},
+                                {"type", writer.type},
+                                {"sent_ns", sample.sent_ns},
+                                {"sequence", sample.sequence}};
     line["value"] = recording::to_json(value);
+    line["units"] = units;
     std::cout << recording::to_json_line(line) << std::endl;
     return;
   }
@@ -106,6 +127,7 @@ int echo(Options& options) {
   const auto reader =
       cell.node().raw_reader(writers.front().topic, writers.front().type, reader_profile(writers),
                              [&](const dds::RawSample& sample) { queue.put(sample); });
+  const auto units = units_of(*known->type);
   std::size_t shown = 0;
   bool good = true;
   while (!interrupted() && (options.count == 0 || shown < options.count))
@@ -114,7 +136,7 @@ int echo(Options& options) {
       ++shown;
       const auto value = recording::decode(*known->type, {sample.cdr.data(), sample.cdr.size()});
       if (value.ok()) {
-        show(sample, value.value(), options.json);
+        show(writers.front(), units, sample, value.value(), options.json);
       } else {
         std::cerr << "sample " << sample.sequence << ": " << recording::sentence(value.error()) << '\n';
         good = false;

@@ -73,7 +73,7 @@ int latency_test(const Options& options) {
   constexpr double fractions[] = {0.5, 0.9, 0.99, 0.999, 0.9999};
   if (options.json) {
     nlohmann::ordered_json json{
-        {"rate", options.rate}, {"cycles", measured->cycles}, {"overruns", measured->overruns}};
+        {"rate_hz", options.rate}, {"cycles", measured->cycles}, {"overruns", measured->overruns}};
     for (const double fraction : fractions)
       json["lateness_ns"][number_text(fraction * 100.0, 6)] = copy.quantile(fraction).ns;
     json["lateness_ns"]["max"] = copy.max.ns;

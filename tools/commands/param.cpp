@@ -5,6 +5,7 @@
 
 #include "tools/live/commands.hpp"
 #include "tools/live/live_cell.hpp"
+#include "tools/live/parameter_json.hpp"
 #include "tools/live/text_table.hpp"
 
 namespace invar::tools {
@@ -18,14 +19,15 @@ struct Options {
 };
 
 nlohmann::ordered_json json_of(const lifecycle::Parameter& p) {
-  return {{"component", p.component_name().c_str()},
-          {"path", p.path().c_str()},
-          {"kind", p.kind().c_str()},
-          {"unit", p.unit_text().c_str()},
-          {"value", p.value().c_str()},
-          {"bounds", p.bounds().c_str()},
-          {"description", p.description().c_str()},
-          {"changeable", p.changeable()}};
+  return json_of(ShownParameter{.component = p.component_name().c_str(),
+                                .path = p.path().c_str(),
+                                .type = p.kind().c_str(),
+                                .unit = p.unit_text().c_str(),
+                                .value = p.value().c_str(),
+                                .otherwise = "",
+                                .range = range_of(p.bounds().c_str()),
+                                .while_running = p.changeable(),
+                                .description = p.description().c_str()});
 }
 
 int show(const std::vector<lifecycle::Parameter>& parameters, bool json) {
@@ -35,7 +37,7 @@ int show(const std::vector<lifecycle::Parameter>& parameters, bool json) {
     std::cout << list.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
     return 0;
   }
-  TextTable table{{"component", "parameter", "value>", "unit", "bounds", "while running", "what it is"}};
+  TextTable table{{"component", "parameter", "value", "unit", "bounds", "while running", "what"}};
   for (const auto& p : parameters)
     table.add({p.component_name().c_str(), p.path().c_str(), p.value().c_str(), p.unit_text().c_str(),
                p.bounds().c_str(), p.changeable() ? "yes" : "no", p.description().c_str()});

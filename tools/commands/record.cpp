@@ -27,6 +27,7 @@ struct Options {
   std::filesystem::path out;
   std::vector<std::string> topics;
   double duration = 0.0;
+  std::uint64_t reserve_mb = 64;
   bool all = false;
   bool json = false;
 };
@@ -115,7 +116,9 @@ int record(Options& options) {
   };
   std::error_code ignored;  // what cannot be created is said by the writer
   if (options.out.has_parent_path()) std::filesystem::create_directories(options.out.parent_path(), ignored);
-  recording::RecordingWriter file{options.out};
+  if (const auto kept = recording::keep_earlier(options.out); !kept.empty())
+    std::cerr << "the earlier " << options.out.string() << " is " << kept.string() << " now\n";
+  recording::RecordingWriter file{options.out, {.reserve_bytes = 1'000'000 * options.reserve_mb}};
   recording::LossLedger ledger;
   bool disk_good = false;
   {
@@ -137,16 +140,20 @@ int record(Options& options) {
       if (first && options.duration > 0.0 &&
           std::chrono::duration<double>(now - *first).count() > options.duration)
         break;
-      if (file.status().failed) break;
+      if (file.status().failed || file.status().at_reserve) break;
     }
   }
+  const bool at_reserve = file.status().at_reserve;
   disk_good = file.close();
   ledger = file.ledger();
   report(ledger, options);
+  if (at_reserve)
+    std::cerr << "invar record: the disk has " << options.reserve_mb
+              << " MB left, which are kept free for black boxes (--reserve-mb): the recording has ended\n";
   if (!disk_good) std::cerr << "invar record: the disk refused to take more\n";
   if (ledger.channels.empty())
     std::cerr << "invar record: no samples came; `invar topics` lists what there is\n";
-  return disk_good && !ledger.channels.empty() && ledger.total().lost == 0 ? 0 : 1;
+  return disk_good && !at_reserve && !ledger.channels.empty() && ledger.total().lost == 0 ? 0 : 1;
 }
 
 }  // namespace
@@ -156,11 +163,19 @@ void add_record(CLI::App& program) {
   command->footer(
       "Example: invar record deployment/xy-table.yaml --out run.mcap --topic stage_x --duration 10\n"
       "Ctrl-C ends it and closes the file. Look into it with `invar recording info`.\n"
-      "Exit status: 0 all that came is in the file; 1 nothing came, or something was lost here; 2 a fault of "
+      "Exit status: 0 all that came is in the file; 1 nothing came, something was lost here, or the disk is "
+      "full; 2 a fault of "
       "the "
       "call or the file");
   auto options = std::make_shared<Options>(*command);
-  command->add_option("--out", options->out, "the file to write (.mcap)")->required();
+  command
+      ->add_option("--out", options->out,
+                   "the file to write (.mcap); an earlier one is renamed: F-1.mcap, ...")
+      ->required();
+  command
+      ->add_option("--reserve-mb", options->reserve_mb,
+                   "end when the disk has no more than this free [MB] (64)")
+      ->check(CLI::Range(0, 1'000'000));
   command
       ->add_option("--topic", options->topics,
                    "only topics that contain this text, or component.port; may stand several times")

@@ -133,9 +133,10 @@ int replay(Options& options) {
   std::map<std::string, Channel> channels;
   cell.settle(std::chrono::seconds{3});  // on a busy PC a writer may be late to say that it is there
   if (const auto taken = written_already(cell, selection.topics); !taken.empty() && !options.beside) {
-    std::cerr << "invar replay: `" << taken.front() << "` is written already"
-              << (taken.size() > 1 ? " (and " + std::to_string(taken.size() - 1) + " more)" : "")
-              << ": a reader could not tell the two apart; stop that process, or add --beside\n";
+    for (const std::string& topic : taken)
+      std::cerr << "invar replay: `" << topic
+                << "` is written already: a reader could not tell the two apart; stop that process, or add "
+                   "--beside\n";
     return 1;
   }
   for (const auto& [id, channel] : file.channels())

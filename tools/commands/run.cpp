@@ -36,6 +36,8 @@ struct Options {
   std::string process;
   std::filesystem::path outcome;
   pid_t launcher = 0;
+  std::uint32_t restarts = 0;
+  std::string last_end;
   bool simulated = false;
   bool real_time = false;
   bool json = false;
@@ -52,7 +54,9 @@ int run_one(const Options& options) {
                                   .paced = options.launch.pace > 0.0,
                                   .job = options.launch.job,
                                   .outcome = outcome,
-                                  .launcher = options.launcher},
+                                  .launcher = options.launcher,
+                                  .restarts = options.restarts,
+                                  .last_end = options.last_end},
                                  orders);
   if (options.json) std::cout << std::ifstream{outcome}.rdbuf();
   return status;
@@ -102,8 +106,13 @@ int run(Options& options) {
   std::ostringstream unseen;
   const auto json = summarise(outcome, options.json ? unseen : std::cout);
   if (options.json) std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-  if (!outcome.failure.empty()) std::cerr << "invar run: " << outcome.failure << '\n';
-  return outcome.failure.empty() ? 0 : 1;
+  const bool well = json.at("healthy").get<bool>();
+  if (!outcome.failure.empty())
+    std::cerr << "invar run: " << outcome.failure << '\n';
+  else if (!well)
+    std::cerr << "invar run: not all was well at the end: " << json.at("faults").front().get<std::string>()
+              << '\n';
+  return well ? 0 : 1;
 }
 
 }  // namespace
@@ -117,7 +126,11 @@ void add_run(CLI::App& program) {
       "Ctrl-C stops the cell: all that moves comes to rest first, then process by process in the order of "
       "the "
       "file.\n"
-      "Exit status: 0 in order, 1 something failed, 2 the file has faults");
+      "Notices of the cell, from warning up, go to the error output, a line each.\n"
+      "Exit status: 0 all was well at the end; 1 it was not: a job failed, a process ended by itself, an "
+      "axis "
+      "was in\n"
+      "fault, a heater latched, a device silent, a model refused, a recording cut; 2 the file has faults");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");
@@ -136,7 +149,10 @@ void add_run(CLI::App& program) {
                     "print one JSON object at the end: processes, job, report, recordings; implies --quiet");
   command->add_flag("--quiet", options->launch.quiet, "no progress of the job, only what is wrong");
   command->add_option("--outcome", options->outcome, "with --process: leave what became of it here, as JSON");
-  command->add_option("--launcher", options->launcher, "its process id")->group("");  // for `invar run` alone
+  // For `invar run` alone.
+  command->add_option("--launcher", options->launcher, "its process id")->group("");
+  command->add_option("--restarts", options->restarts, "how often it started this process again")->group("");
+  command->add_option("--last-end", options->last_end, "how the last life of this process ended")->group("");
   command->callback([options] {
     if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);
   });

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <utility>
 
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
@@ -14,6 +15,7 @@
 #include "tools/live/status_view.hpp"
 #include "tools/live/terminal.hpp"
 #include "tools/live/text_table.hpp"
+#include "tools/live/topic_json.hpp"
 #include "tools/live/topic_watch.hpp"
 
 namespace invar::tools {
@@ -29,39 +31,6 @@ struct Options {
   bool once = false;
   bool json = false;
   bool no_topics = false;
-};
-
-struct Rate {
-  double samples = 0.0, bytes = 0.0;  // per second
-  std::uint64_t missing = 0;          // since the start
-};
-
-/// Rates from the counts of one look to the next.
-class Rates {
- public:
-  std::map<std::string, Rate> next(const TopicWatch& watch) {
-    const auto now = Clock::now();
-    const double span = std::chrono::duration<double>(now - at_).count();
-    at_ = now;
-    std::map<std::string, Rate> rates;
-    for (const auto& [topic, writers] : watch.flows()) {
-      Flow sum;
-      for (const auto& [writer, flow] : writers) {
-        sum.samples += flow.samples;
-        sum.bytes += flow.bytes;
-        sum.missing += flow.missing;
-      }
-      const Flow& before = before_[topic];
-      rates[topic] = {static_cast<double>(sum.samples - before.samples) / span,
-                      static_cast<double>(sum.bytes - before.bytes) / span, sum.missing};
-      before_[topic] = sum;
-    }
-    return rates;
-  }
-
- private:
-  Clock::time_point at_ = Clock::now();
-  std::map<std::string, Flow> before_;
 };
 
 /// A process whose status does not get newer for three seconds is silent.
@@ -84,14 +53,29 @@ class Silence {
   std::map<std::string, std::pair<std::pair<std::int64_t, std::uint64_t>, Clock::time_point>> last_;
 };
 
-void show(const CellStatus& status, const std::map<std::string, Rate>& rates, bool topics,
-          std::ostream& out) {
+/// Counts of one look and of the look before.
+struct Looks {
+  std::map<std::string, Flows> now, before;
+  std::int64_t now_ns = 0;
+
+  void next(const TopicWatch& watch) {
+    before = std::exchange(now, watch.flows());
+    now_ns = wall_clock_ns();
+  }
+};
+
+void show(const CellStatus& status, const Looks& looks, bool topics, std::ostream& out) {
   print(status, out);
   if (!topics) return;
   TextTable table{{"topic", "rate [Hz]>", "kB/s>", "missing>"}};
-  for (const auto& [topic, rate] : rates)
-    table.add(
-        {topic, number_text(rate.samples), number_text(rate.bytes * 1e-3), std::to_string(rate.missing)});
+  for (const auto& [topic, flows] : looks.now) {
+    const auto before = looks.before.find(topic);
+    const Flow::Rate rate =
+        rate_of(flows, before == looks.before.end() ? Flows{} : before->second, looks.now_ns);
+    std::uint64_t missing = 0;
+    for (const auto& [writer, flow] : flows) missing += flow.missing;
+    table.add({topic, number_text(rate.samples), number_text(rate.bytes * 1e-3), std::to_string(missing)});
+  }
   out << '\n';
   table.print(out);
 }
@@ -115,7 +99,7 @@ int top(Options& options) {
                    }};
   if (!options.no_topics) cell.settle();  // so that the first look finds all of them
   watch.look();
-  Rates rates;
+  Looks looks;
   Silence silence;
   const bool screen = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;
   do {
@@ -130,16 +114,17 @@ int top(Options& options) {
       return std::any_of(status.processes.begin(), status.processes.end(),
                          [&](const auto& p) { return name == p.process_name().c_str(); });
     });
-    const auto now = rates.next(watch);
+    looks.next(watch);
     if (options.json) {
       auto json = to_json(status);
-      for (const auto& [topic, rate] : now)
-        json["topics"][topic] = {
-            {"rate", rate.samples}, {"bytes_per_second", rate.bytes}, {"missing", rate.missing}};
+      json["topics"] = nlohmann::ordered_json::array();
+      const auto snapshot = cell.node().snapshot();
+      for (const auto& [topic, flows] : looks.now)
+        json["topics"].push_back(json_of(topic, snapshot, flows, looks.before[topic], looks.now_ns));
       std::cout << json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
     } else {
       std::ostringstream text;
-      show(status, now, !options.no_topics, text);
+      show(status, looks, !options.no_topics, text);
       // Home, the text, and what is left of an earlier longer one cleared line by line: no flicker.
       if (screen) steer(std::cout, go_home);
       std::istringstream lines{text.str()};
@@ -164,8 +149,9 @@ void add_top(CLI::App& program) {
   command->footer(
       "Example: invar top deployment/xy-table.yaml\n"
       "         invar top --domain 71 --once --no-topics\n"
-      "Ctrl-C ends it. Topic rates are counted by reading the topics, which costs the cell's network that "
-      "much.\n"
+      "Ctrl-C ends it. Rates are those of the time between two looks, by the times at which a topic's "
+      "writers "
+      "sent.\nThey are counted by reading the topics, which costs the cell's network that much.\n"
       "Exit status: 0; 1 no cell answers, or with --once something is not well; 2 a fault of the call or the "
       "file");
   auto options = std::make_shared<Options>(*command);

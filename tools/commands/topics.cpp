@@ -7,6 +7,7 @@
 #include "tools/live/commands.hpp"
 #include "tools/live/live_cell.hpp"
 #include "tools/live/text_table.hpp"
+#include "tools/live/topic_json.hpp"
 
 namespace invar::tools {
 
@@ -23,21 +24,6 @@ struct Topic {
   std::vector<dds::Endpoint> writers, readers;
   std::vector<std::string> problems;
 };
-
-std::string qos_text(const dds::Profile& qos) {
-  std::string text = qos.reliable ? "reliable" : "best effort";
-  if (qos.durability == dds::Durability::transient_local) text += ", transient local";
-  if (qos.durability > dds::Durability::transient_local) text += ", persistent";
-  if (qos.exclusive) text += ", exclusive (" + std::to_string(qos.strength) + ")";
-  const auto time = [&](const char* what, Duration value) {
-    if (value.ns != 0)
-      text += std::string{", "} + what + " " + number_text(static_cast<double>(value.ns) * 1e-6) + " ms";
-  };
-  time("deadline", qos.deadline);
-  time("lifespan", qos.lifespan);
-  time("lease", qos.lease);
-  return text;
-}
 
 std::map<std::string, Topic> topics_of(const dds::Snapshot& snapshot, bool all) {
   std::map<std::string, Topic> topics;
@@ -60,13 +46,6 @@ std::map<std::string, Topic> topics_of(const dds::Snapshot& snapshot, bool all) 
   return topics;
 }
 
-nlohmann::ordered_json json_of(const std::vector<dds::Endpoint>& ends) {
-  auto list = nlohmann::ordered_json::array();
-  for (const auto& end : ends)
-    list.push_back({{"participant", end.participant}, {"type", end.type}, {"qos", qos_text(end.qos)}});
-  return list;
-}
-
 int topics(Options& options) {
   options.call.resolve();
   LiveCell cell{options.call};
@@ -77,10 +56,8 @@ int topics(Options& options) {
   if (options.json) {
     auto json = nlohmann::ordered_json::array();
     for (const auto& [name, topic] : found) {
-      json.push_back({{"topic", name},
-                      {"writers", json_of(topic.writers)},
-                      {"readers", json_of(topic.readers)},
-                      {"problems", topic.problems}});
+      json.push_back(json_of(name, topic.writers, topic.readers));
+      json.back()["problems"] = topic.problems;
       good = good && topic.problems.empty();
     }
     std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
@@ -94,7 +71,7 @@ int topics(Options& options) {
     if (!table.empty()) table.print(std::cout);
     for (const auto& [name, topic] : found)
       for (const auto& problem : topic.problems) {
-        std::cout << "no samples flow on " << name << ": " << problem << '\n';
+        print_wrapped("no samples flow on " + name + ": " + problem, 2, std::cout);
         good = false;
       }
   }

@@ -14,6 +14,7 @@
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/cell/plugins.hpp"
 #include "tools/command.hpp"
+#include "tools/live/parameter_json.hpp"
 #include "tools/live/text_table.hpp"
 
 namespace invar::tools {
@@ -140,19 +141,16 @@ nlohmann::ordered_json json_of(const Type& type) {
                                {"deadline_ns", input != nullptr ? input->deadline.ns : 0},
                                {"fields", fields_of(data_of(*port))}});
     }
-  for (const ParameterInfo& info : type.parameters) {
-    const auto bound = [](double value) {
-      return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
-    };
-    json["parameters"].push_back({{"path", info.path},
-                                  {"type", info.type},
-                                  {"unit", info.unit},
-                                  {"lower", bound(info.range.lower)},
-                                  {"upper", bound(info.range.upper)},
-                                  {"default", info.otherwise},
-                                  {"while_running", info.changeable},
-                                  {"description", info.description}});
-  }
+  for (const ParameterInfo& info : type.parameters)
+    json["parameters"].push_back(json_of(ShownParameter{.component = "",
+                                                        .path = info.path,
+                                                        .type = info.type,
+                                                        .unit = info.unit,
+                                                        .value = "",
+                                                        .otherwise = info.otherwise,
+                                                        .range = info.range,
+                                                        .while_running = info.changeable,
+                                                        .description = info.description}));
   if (!type.registers.empty()) json["registers"] = nlohmann::ordered_json::array();
   for (const RegisterInfo& info : type.registers)
     json["registers"].push_back({{"name", info.name},
@@ -205,9 +203,10 @@ void print(const Type& type) {
     if (fields.empty()) continue;
     std::cout << '\n' << name << '\n';
     for (const auto& field : fields)
-      std::cout << "  " << field["name"].get<std::string>() << ": " << field["type"].get<std::string>()
-                << (field["unit"] == "" ? "" : " [" + field["unit"].get<std::string>() + "]")
-                << (field["key"] ? ", key" : "") << '\n';
+      print_wrapped("  " + field["name"].get<std::string>() + ": " + field["type"].get<std::string>() +
+                        (field["unit"] == "" ? "" : " [" + field["unit"].get<std::string>() + "]") +
+                        (field["key"] ? ", key" : ""),
+                    4, std::cout);
   }
 }
 

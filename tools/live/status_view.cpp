@@ -11,17 +11,12 @@ namespace invar::tools {
 
 namespace {
 
-std::string three(const lifecycle::Percentiles& p) {
-  if (p.max_ns() == 0) return "-";
-  return microseconds_text(p.p50_ns()) + " / " + microseconds_text(p.p99_ns()) + " / " +
-         microseconds_text(p.p999_ns());
-}
-
 nlohmann::ordered_json json_of(const lifecycle::Percentiles& p) {
   return {{"p50_ns", p.p50_ns()}, {"p99_ns", p.p99_ns()}, {"p999_ns", p.p999_ns()}, {"max_ns", p.max_ns()}};
 }
 
 std::string clock_text(const lifecycle::ProcessStatus& process) {
+  if (process.pid() == 0) return "ended";
   if (process.simulated()) return "simulated";
   if (!process.realtime_asked()) return "not asked";
   return process.realtime_granted() ? "granted" : "not granted";
@@ -43,15 +38,60 @@ std::string time_text(std::int64_t ns) {
   return {text.data(), std::strftime(text.data(), text.size(), "%F %T", &utc)};
 }
 
+/// Durations since the start beside those of the last seconds, so that an old outlier does not hide how it is now.
+void print_times(const CellStatus& status, std::ostream& out) {
+  std::int64_t window = 0;
+  for (const auto& p : status.processes) window = std::max(window, p.window_ns());
+  const std::string recent = " in " + std::to_string((window + 500'000'000) / 1'000'000'000) + " s>";
+  TextTable table{{"time of [us]", "p50>", "p99>", "p99.9>", "longest>", "p50" + recent, "p99" + recent,
+                   "p99.9" + recent}};
+  const auto add = [&](const std::string& what, const lifecycle::Percentiles& all,
+                       const lifecycle::Percentiles* now, std::int64_t limit) {
+    if (all.max_ns() == 0) return;
+    const auto text = [](std::int64_t ns) { return microseconds_text(ns); };
+    const bool any = now != nullptr && now->max_ns() > 0;
+    table.add({limit > 0 ? what + ", at most " + text(limit) : what, text(all.p50_ns()), text(all.p99_ns()),
+               text(all.p999_ns()), text(all.max_ns()), any ? text(now->p50_ns()) : "-",
+               any ? text(now->p99_ns()) : "-", any ? text(now->p999_ns()) : "-"});
+  };
+  for (const auto& p : status.processes) {
+    const std::string name = p.process_name().c_str();
+    add(name + " wake-up", p.wake_up(), &p.recent_wake_up(), 0);
+    add(name + " compute", p.compute(), &p.recent_compute(), 0);
+    add(name + " latency", p.latency(), &p.recent_latency(), p.latency_limit_ns());
+  }
+  for (const auto& c : status.components) {
+    const std::string name = c.component_name().c_str();
+    add(name + " step", c.compute(), &c.recent_compute(), 0);
+    for (const auto& input : c.inputs())
+      add(name + "." + input.port().c_str() + " age, " + std::to_string(input.late()) + " late", input.age(),
+          nullptr, input.limit_ns());
+  }
+  if (table.empty()) return;
+  out << '\n';
+  table.print(out);
+}
+
 }  // namespace
 
-bool CellStatus::healthy() const {
-  return missing.empty() && silent.empty() && !processes.empty() &&
-         std::none_of(components.begin(), components.end(),
-                      [](const auto& c) { return c.state() == lifecycle::STATE_ERROR; }) &&
-         std::all_of(processes.begin(), processes.end(),
-                     [](const auto& p) { return p.trip_reason().to_string().empty(); });
+std::vector<std::string> CellStatus::faults() const {
+  std::vector<std::string> lines;
+  for (const auto& name : missing) lines.push_back(name + ": does not answer");
+  for (const auto& p : processes) {
+    const std::string name = p.process_name().c_str();
+    if (p.pid() == 0) lines.push_back(name + ": ended with " + p.last_end().c_str());
+    if (silent.contains(name)) lines.push_back(name + ": has fallen silent");
+    if (!p.trip_reason().to_string().empty()) lines.push_back(name + ": tripped: " + p.trip_reason().c_str());
+  }
+  for (const auto& c : components) {
+    const std::string name = c.component_name().c_str();
+    if (c.state() == lifecycle::STATE_ERROR) lines.push_back(name + ": in error: " + c.failure().c_str());
+    if (!c.fault().to_string().empty()) lines.push_back(name + ": " + c.fault().c_str());
+  }
+  return lines;
 }
+
+bool CellStatus::healthy() const { return !processes.empty() && faults().empty(); }
 
 std::string state_text(lifecycle::ComponentState state) {
   constexpr std::array words{"unconfigured", "inactive", "active", "finalized", "error"};
@@ -60,47 +100,41 @@ std::string state_text(lifecycle::ComponentState state) {
 }
 
 void print(const CellStatus& status, std::ostream& out) {
-  TextTable processes{{"process", "host", "pid>", "rate [Hz]>", "real time", "cycles>", "overruns>",
-                       "skipped>", "late>", "wake-up p50/p99/p99.9 [us]>", "compute p50/p99/p99.9 [us]>",
-                       "lost>"}};
+  TextTable processes{{"process", "host", "pid>", "real time", "rate [Hz]>", "cycles>", "overruns>",
+                       "skipped>", "late>", "lost>", "restarts>"}};
   for (const auto& p : status.processes)
-    processes.add({p.process_name().c_str(), p.host().c_str(), std::to_string(p.pid()), number_text(p.rate()),
+    processes.add({p.process_name().c_str(), p.host().c_str(), p.pid() == 0 ? "-" : std::to_string(p.pid()),
                    status.silent.contains(p.process_name().c_str()) ? "silent" : clock_text(p),
-                   std::to_string(p.cycles()), std::to_string(p.overruns()), std::to_string(p.skipped()),
-                   p.latency_limit_ns() > 0 ? std::to_string(p.late()) : "-", three(p.wake_up()),
-                   three(p.compute()), std::to_string(p.lost())});
+                   number_text(p.rate()), std::to_string(p.cycles()), std::to_string(p.overruns()),
+                   std::to_string(p.skipped()), p.latency_limit_ns() > 0 ? std::to_string(p.late()) : "-",
+                   std::to_string(p.lost()), std::to_string(p.restarts())});
   for (const auto& name : status.missing)
-    processes.add({name, "", "-", "-", "no answer", "-", "-", "-", "-", "-", "-", "-"});
+    processes.add({name, "", "-", "no answer", "-", "-", "-", "-", "-", "-", "-"});
   processes.print(out);
 
-  TextTable components{
-      {"component", "process", "type", "state", "steps>", "step p50/p99/p99.9 [us]>", "lost>", "failure"}};
+  TextTable components{{"component", "process", "type", "state", "steps>", "lost>"}};
   for (const auto& c : status.components)
     components.add({c.component_name().c_str(), c.process_name().c_str(), c.component_type().c_str(),
-                    state_text(c.state()), std::to_string(c.steps()), three(c.compute()),
-                    std::to_string(c.lost()), c.failure().c_str()});
+                    state_text(c.state()), std::to_string(c.steps()), std::to_string(c.lost())});
   out << '\n';
   components.print(out);
+  print_times(status, out);
 
-  TextTable latencies{{"latency of", "declared [us]>", "late>", "p50/p99/p99.9 [us]>"}};
-  for (const auto& p : status.processes)
-    if (p.latency_limit_ns() > 0)
-      latencies.add({p.process_name().c_str(), microseconds_text(p.latency_limit_ns()),
-                     std::to_string(p.late()), three(p.latency())});
-  for (const auto& c : status.components)
-    for (const auto& input : c.inputs())
-      latencies.add({std::string{c.component_name().c_str()} + "." + input.port().c_str(),
-                     microseconds_text(input.limit_ns()), std::to_string(input.late()), three(input.age())});
-  if (!latencies.empty()) {
-    out << '\n';
-    latencies.print(out);
-  }
-
+  const auto faults = status.faults();
+  if (!faults.empty()) out << "\nnot well\n";
+  for (const auto& line : faults) print_wrapped(line, 2, out);
   for (const auto& p : status.processes) {
-    if (!p.trip_reason().to_string().empty())
-      out << '\n' << p.process_name().c_str() << ": tripped: " << p.trip_reason().c_str() << '\n';
-    if (p.realtime_asked() && !p.realtime_granted() && !p.simulated())
-      out << '\n' << p.process_name().c_str() << ": " << p.realtime_text().c_str() << '\n';
+    const std::string name = p.process_name().c_str();
+    if (p.realtime_asked() && !p.realtime_granted() && !p.simulated() && p.pid() != 0) {
+      out << '\n';
+      print_wrapped(name + ": " + p.realtime_text().c_str(), 2, out);
+    }
+    if (p.restarts() > 0 && p.pid() != 0) {
+      out << '\n';
+      print_wrapped(name + ": started again " + std::to_string(p.restarts()) +
+                        " times; its last life ended with " + p.last_end().c_str(),
+                    2, out);
+    }
   }
 
   auto warnings = status.notices;
@@ -108,58 +142,77 @@ void print(const CellStatus& status, std::ostream& out) {
   std::stable_sort(warnings.begin(), warnings.end(),
                    [](const auto& a, const auto& b) { return a.at().time_ns() < b.at().time_ns(); });
   constexpr std::size_t most = 5;
-  if (!warnings.empty()) out << "\nlast warnings\n";
+  TextTable last{{"last warnings", "", "source", "what"}};
   for (std::size_t i = warnings.size() > most ? warnings.size() - most : 0; i < warnings.size(); ++i)
-    out << time_text(warnings[i].at().time_ns()) << "  " << level_text(warnings[i].level()) << "  "
-        << warnings[i].source().c_str() << ": " << warnings[i].text().c_str() << '\n';
+    last.add({time_text(warnings[i].at().time_ns()), level_text(warnings[i].level()),
+              warnings[i].source().c_str(), warnings[i].text().c_str()});
+  if (last.empty()) return;
+  out << '\n';
+  last.print(out);
+}
+
+nlohmann::ordered_json json_of(const lifecycle::ProcessStatus& p, bool silent) {
+  return {{"name", p.process_name().c_str()},
+          {"host", p.host().c_str()},
+          {"pid", p.pid()},
+          {"rate_hz", p.rate()},
+          {"time_ns", p.at().time_ns()},
+          {"silent", silent},
+          {"simulated", p.simulated()},
+          {"realtime_asked", p.realtime_asked()},
+          {"realtime_granted", p.realtime_granted()},
+          {"realtime_text", p.realtime_text().c_str()},
+          {"cycles", p.cycles()},
+          {"overruns", p.overruns()},
+          {"skipped", p.skipped()},
+          {"trip_reason", p.trip_reason().c_str()},
+          {"latency_limit_ns", p.latency_limit_ns()},
+          {"late", p.late()},
+          {"lost", p.lost()},
+          {"restarts", p.restarts()},
+          {"last_end", p.last_end().c_str()},
+          {"wake_up", json_of(p.wake_up())},
+          {"compute", json_of(p.compute())},
+          {"latency", json_of(p.latency())},
+          {"recent",
+           {{"window_ns", p.window_ns()},
+            {"wake_up", json_of(p.recent_wake_up())},
+            {"compute", json_of(p.recent_compute())},
+            {"latency", json_of(p.recent_latency())}}}};
+}
+
+nlohmann::ordered_json json_of(const lifecycle::ComponentStatus& c) {
+  auto inputs = nlohmann::ordered_json::array();
+  for (const auto& input : c.inputs())
+    inputs.push_back({{"port", input.port().c_str()},
+                      {"limit_ns", input.limit_ns()},
+                      {"late", input.late()},
+                      {"age", json_of(input.age())}});
+  return {{"name", c.component_name().c_str()},
+          {"process", c.process_name().c_str()},
+          {"type", c.component_type().c_str()},
+          {"state", state_text(c.state())},
+          {"failure", c.failure().c_str()},
+          {"fault", c.fault().c_str()},
+          {"every", c.every()},
+          {"steps", c.steps()},
+          {"lost", c.lost()},
+          {"compute", json_of(c.compute())},
+          {"recent", {{"compute", json_of(c.recent_compute())}}},
+          {"inputs", std::move(inputs)}};
 }
 
 nlohmann::ordered_json to_json(const CellStatus& status) {
   nlohmann::ordered_json json{{"cell", status.cell},
                               {"healthy", status.healthy()},
+                              {"faults", status.faults()},
                               {"missing", status.missing},
                               {"processes", nlohmann::ordered_json::array()},
-                              {"components", nlohmann::ordered_json::array()}};
+                              {"components", nlohmann::ordered_json::array()},
+                              {"notices", nlohmann::ordered_json::array()}};
   for (const auto& p : status.processes)
-    json["processes"].push_back({{"name", p.process_name().c_str()},
-                                 {"host", p.host().c_str()},
-                                 {"pid", p.pid()},
-                                 {"rate", p.rate()},
-                                 {"time_ns", p.at().time_ns()},
-                                 {"silent", status.silent.contains(p.process_name().c_str())},
-                                 {"simulated", p.simulated()},
-                                 {"realtime_asked", p.realtime_asked()},
-                                 {"realtime_granted", p.realtime_granted()},
-                                 {"realtime_text", p.realtime_text().c_str()},
-                                 {"cycles", p.cycles()},
-                                 {"overruns", p.overruns()},
-                                 {"skipped", p.skipped()},
-                                 {"trip_reason", p.trip_reason().c_str()},
-                                 {"wake_up", json_of(p.wake_up())},
-                                 {"compute", json_of(p.compute())},
-                                 {"latency", json_of(p.latency())},
-                                 {"latency_limit_ns", p.latency_limit_ns()},
-                                 {"late", p.late()},
-                                 {"lost", p.lost()}});
-  for (const auto& c : status.components) {
-    auto inputs = nlohmann::ordered_json::array();
-    for (const auto& input : c.inputs())
-      inputs.push_back({{"port", input.port().c_str()},
-                        {"limit_ns", input.limit_ns()},
-                        {"late", input.late()},
-                        {"age", json_of(input.age())}});
-    json["components"].push_back({{"name", c.component_name().c_str()},
-                                  {"process", c.process_name().c_str()},
-                                  {"type", c.component_type().c_str()},
-                                  {"state", state_text(c.state())},
-                                  {"failure", c.failure().c_str()},
-                                  {"every", c.every()},
-                                  {"steps", c.steps()},
-                                  {"lost", c.lost()},
-                                  {"compute", json_of(c.compute())},
-                                  {"inputs", std::move(inputs)}});
-  }
-  json["notices"] = nlohmann::ordered_json::array();
+    json["processes"].push_back(json_of(p, status.silent.contains(p.process_name().c_str())));
+  for (const auto& c : status.components) json["components"].push_back(json_of(c));
   for (const auto& notice : status.notices)
     json["notices"].push_back({{"time_ns", notice.at().time_ns()},
                                {"level", level_text(notice.level())},

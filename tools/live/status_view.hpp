@@ -19,12 +19,17 @@ struct CellStatus {
   std::set<std::string> silent;        // processes that were there and fell silent
   std::vector<event::Notice> notices;  // what the cell said last, oldest first
 
-  /// Nothing is missing, silent, tripped or in error.
+  /// What is wrong now, one line each: missing, ended, silent, tripped, in error, or at fault though it goes on.
+  [[nodiscard]] std::vector<std::string> faults() const;
+  /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;
 };
 
 void print(const CellStatus& status, std::ostream& out);
 [[nodiscard]] nlohmann::ordered_json to_json(const CellStatus& status);
+/// The one shape of a process and of a component (docs/reference-json.md).
+[[nodiscard]] nlohmann::ordered_json json_of(const lifecycle::ProcessStatus& process, bool silent);
+[[nodiscard]] nlohmann::ordered_json json_of(const lifecycle::ComponentStatus& component);
 /// "active"
 [[nodiscard]] std::string state_text(lifecycle::ComponentState state);
 

@@ -1,4 +1,4 @@
-// Tables as plain text: columns as wide as what stands in them.
+// Tables as plain text: columns as wide as what stands in them, wrapped where the line would be longer than the terminal.
 #pragma once
 
 #include <cstdint>
@@ -8,20 +8,32 @@
 
 namespace invar::tools {
 
+/// What a line may hold: COLUMNS where it is set, else the terminal's width, else 80.
+[[nodiscard]] std::size_t line_width();
+
 class TextTable {
  public:
-  /// A heading that ends in `>` makes a column whose cells stand at its right edge.
+  /// A heading that ends in `>` makes a column of numbers: at its right edge, never wrapped.
   explicit TextTable(std::vector<std::string> headings);
   /// Precondition: one cell a column.
   void add(std::vector<std::string> cells);
   [[nodiscard]] bool empty() const { return rows_.empty(); }
-  void print(std::ostream& out) const;
+  void print(std::ostream& out, std::size_t width = line_width()) const;
 
  private:
+  using Row = std::vector<std::string>;
+  [[nodiscard]] std::vector<std::size_t> widths_within(std::size_t width) const;
+  void print_row(const Row& row, const std::vector<std::size_t>& widths, std::ostream& out) const;
+
   std::vector<std::string> headings_;
   std::vector<bool> right_;
-  std::vector<std::vector<std::string>> rows_;
+  std::vector<Row> rows_;
 };
+
+/// The text in lines of at most `width`: broken at spaces, within a long word behind a sign such as `/`, else anywhere.
+[[nodiscard]] std::vector<std::string> wrapped(const std::string& text, std::size_t width);
+/// In lines of the terminal; all but the first begin with `indent` spaces.
+void print_wrapped(const std::string& text, std::size_t indent, std::ostream& out);
 
 /// With `digits` significant ones.
 [[nodiscard]] std::string number_text(double value, int digits = 4);

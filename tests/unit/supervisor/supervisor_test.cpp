@@ -85,6 +85,25 @@ TEST(Supervisor, WhatNeedsALostProcessIsDeactivatedOnceAndItsReturnIsSaid) {
               ElementsAre(HasSubstr("lost"), HasSubstr("deactivated"), "process `motion` is back"));
 }
 
+TEST(Supervisor, OneThatWasStoppedItselfWaitsAnewForTheOthers) {
+  Cell cell;
+  cell.alive = {"motion", "jobs", "heat"};
+  cell.run(5.0);
+  // Ten seconds without a step, as by SIGSTOP: nothing of the others was read meanwhile, nor directly after.
+  cell.cycle += 200;
+  cell.alive.clear();
+  cell.run(1.9);
+  EXPECT_THAT(cell.told, ElementsAre(HasSubstr("the supervisor itself was stopped for 10")));
+  EXPECT_THAT(cell.deactivated, IsEmpty());
+  cell.alive = {"motion", "jobs", "heat"};
+  cell.run(60.0);
+  EXPECT_EQ(cell.told.size(), 1U);
+  // One that is lost indeed is still found.
+  cell.alive.erase("heat");
+  cell.run(2.5);
+  EXPECT_THAT(cell.told.back(), HasSubstr("! process `heat` is lost"));
+}
+
 TEST(Supervisor, AComponentInErrorTakesDownWhatNeedsItFurthestFirst) {
   Cell cell;
   cell.alive = {"motion", "jobs", "heat"};

@@ -1,0 +1,42 @@
+// Notices of a process as lines of its log, from warning up: for who watches a terminal or reads a journal.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "core/component/channel.hpp"
+#include "core/component/port.hpp"
+#include "idl/event.h"
+
+namespace invar::tools {
+
+class NoticeLog {
+ public:
+  /// `simulated`: lines name the time of the cell, which is not that of the log.
+  explicit NoticeLog(bool simulated) : simulated_{simulated} {}
+
+  /// Set-up: what a component says on this port; any other port is left alone.
+  void follow(Port& port);
+  /// Writes what the components have said since the last call. One thread.
+  void write_waiting();
+  /// Any thread. A text that its source says again within ten seconds is counted, and told with the next one.
+  void write(const event::Notice& notice);
+
+ private:
+  struct Said {
+    std::chrono::steady_clock::time_point at;
+    std::uint64_t more = 0;
+  };
+  bool simulated_;
+  std::deque<Ring<event::Notice>> waiting_;  // one a port, from its loop; addresses stay
+  std::uint64_t told_lost_ = 0;
+  std::mutex mutex_;
+  std::map<std::pair<std::string, std::string>, Said> said_;  // by source and text
+};
+
+}  // namespace invar::tools
