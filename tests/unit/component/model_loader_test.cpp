@@ -65,7 +65,9 @@ TEST_P(Loading, SixHundredModelsInTurnHoldNoMoreThanAFew) {
       loop.loader.use({active, before});
       most = std::max(most, Model::alive.load());
       EXPECT_EQ(active->payload, 42);
-      if (before != nullptr) EXPECT_EQ(before->payload, 42);
+      if (before != nullptr) {
+        EXPECT_EQ(before->payload, 42);
+      }
     }
     EXPECT_LE(most, 12);
     // A thread of its own looks every 5 ms.
