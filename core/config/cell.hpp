@@ -66,6 +66,7 @@ struct Cell {
   bool simulated_time = false;
   Duration window = Duration::milliseconds(20);  // of simulated time: how late another process sees a sample
   bool shared_memory = true;
+  Duration address_wait = Duration::seconds(60.0);  // how long a process waits for its host's address
   std::filesystem::path profiles;
   std::vector<std::filesystem::path> plugins;  // shared libraries with further component types
   std::vector<CellHost> hosts;

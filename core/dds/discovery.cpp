@@ -90,6 +90,17 @@ void Discovery::add_source(std::function<std::optional<Alarm>()> source) {
   sources_.push_back(std::move(source));
 }
 
+void Discovery::raise_slow_path(std::int32_t process, const std::string& name, const std::string& why) {
+  // A process has a participant for the loop's traffic beside the general one; one line says enough.
+  const std::string of = name.substr(0, name.rfind("/realtime"));
+  {
+    const std::lock_guard lock{mutex_};
+    if (!slow_.insert({process, of}).second) return;
+  }
+  raise(
+      {"shared memory", of + " (process " + std::to_string(process) + ") is reached by UDP: " + why, false});
+}
+
 Snapshot Discovery::snapshot() const {
   const std::lock_guard lock{mutex_};
   Snapshot out;

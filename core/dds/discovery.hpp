@@ -6,7 +6,9 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/time.hpp"
@@ -57,6 +59,8 @@ class Discovery {
   void raise(Alarm alarm);
   /// Something else that may have an alarm to raise; it is asked each time that somebody takes the alarms.
   void add_source(std::function<std::optional<Alarm>()> source);
+  /// A warning, once for each process and once for each of its names: a peer of this PC is reached by UDP only.
+  void raise_slow_path(std::int32_t process, const std::string& name, const std::string& why);
 
   [[nodiscard]] Snapshot snapshot() const;
   /// The alarms since the last call, oldest first.
@@ -86,6 +90,7 @@ class Discovery {
   std::map<std::string, Endpoint> endpoints_;
   std::deque<Alarm> alarms_;
   std::vector<std::function<std::optional<Alarm>()>> sources_;
+  std::set<std::pair<std::int32_t, std::string>> slow_;  // peers that were told
 };
 
 }  // namespace invar::dds

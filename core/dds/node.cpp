@@ -10,6 +10,7 @@
 #include "core/dds/connection.hpp"
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/local_exchange.hpp"
+#include "core/dds/middleware_log.hpp"
 #include "core/dds/publishing.hpp"
 #include "core/dds/raw_type.hpp"
 #include "core/dds/shared_memory.hpp"
@@ -194,7 +195,15 @@ std::unique_ptr<Connection> Node::raw_writer(const std::string& topic, const std
 }
 
 Snapshot Node::snapshot() const { return parts_->discovery.snapshot(); }
-std::vector<Alarm> Node::take_alarms() { return parts_->discovery.take_alarms(); }
+
+std::vector<Alarm> Node::take_alarms() {
+  auto alarms = parts_->discovery.take_alarms();
+  for (const auto& error : take_middleware_errors())
+    alarms.push_back(
+        {"middleware", "Fast DDS reports: " + error + "; `invar doctor` looks at this PC", false});
+  return alarms;
+}
+
 Discovery& Node::discovery() { return parts_->discovery; }
 
 std::uint64_t Node::lost() const {

@@ -26,6 +26,8 @@ struct NodeOptions {
   /// Addresses of this host that may carry the cell's traffic; empty: all of its interfaces.
   std::vector<std::string> addresses;
   bool shared_memory = true;
+  /// Of the cell on this PC; they share /dev/shm.
+  std::size_t processes = 1;
   /// Of the general participant [bytes]; a sample may take half of it.
   std::uint32_t segment_size = 16U << 20U;
   /// SCHED_FIFO priority of the middleware's threads that carry real-time traffic; 0: the usual scheduling.

@@ -3,7 +3,6 @@
 #include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
 #include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 #include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
@@ -13,20 +12,21 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <algorithm>
-#include <atomic>
-#include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <span>
-#include <sstream>
 #include <string_view>
 
 #include "core/base/clock.hpp"
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
 #include "core/dds/datagram_size.hpp"
+#include "core/dds/domain_ports.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/memory_plan.hpp"
+#include "core/dds/middleware_log.hpp"
+#include "core/dds/own_address.hpp"
 #include "core/dds/qos.hpp"
+#include "core/dds/reachable_memory.hpp"
 #include "core/dds/rtps_bytes.hpp"
 #include "core/dds/writer_keys.hpp"
 
@@ -36,9 +36,6 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::types::ReturnCode_t;
 
 namespace {
-
-/// Begins the user data of our participants; the process id follows.
-constexpr std::string_view pid_mark = "invar pid ";
 
 /// The library's threads inherit policy and priority of the thread that creates the participant.
 class Priority {
@@ -63,25 +60,6 @@ class Priority {
   sched_param parameters_{};
 };
 
-/// Whether the shared memory of a participant with this number is there, used or left behind.
-bool is_taken(std::uint32_t domain, std::int32_t number) {
-  const std::uint32_t first = 7400U + 250U * domain + 10U + 2U * static_cast<std::uint32_t>(number);
-  return std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(first)) ||
-         std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(first + 1));
-}
-
-/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed and
-/// started again has the ports it had before: others then go on writing into the shared memory of the dead one, and are not
-/// heard. So it is one that left no trace; where another process takes it in the same moment, the library shifts the ports.
-std::int32_t own_number(std::uint32_t domain) {
-  constexpr std::int32_t numbers = 110;
-  static std::atomic<std::int32_t> made{0};
-  const auto next = [] { return (getpid() * 4 + made++) % numbers; };
-  std::int32_t number = next();
-  for (std::int32_t tries = 0; tries < numbers && is_taken(domain, number); ++tries) number = next();
-  return number;
-}
-
 /// Not when it has ended and its parent does not know it yet.
 bool is_alive(std::int32_t pid) {
   std::ifstream stat{"/proc/" + std::to_string(pid) + "/stat"};
@@ -89,21 +67,6 @@ bool is_alive(std::int32_t pid) {
   std::getline(stat, text);
   const auto name_end = text.rfind(") ");
   return name_end != std::string::npos && text[name_end + 2] != 'Z' && text[name_end + 2] != 'X';
-}
-
-/// Process id of a participant of ours on the same PC as `own_prefix`; 0: none such.
-std::int32_t process_of(const rtps::ParticipantProxyData& peer, const rtps::GuidPrefix_t& own_prefix) {
-  // Fast DDS: two octets of its number, two of the PC.
-  const auto& own = own_prefix.value;
-  const auto& its = peer.m_guid.guidPrefix.value;
-  if (!std::equal(own, own + 4, its)) return 0;
-  const auto data = peer.m_userData.getValue();
-  if (data.size() != pid_mark.size() + sizeof(std::int32_t) ||
-      !std::equal(pid_mark.begin(), pid_mark.end(), data.begin()))
-    return 0;
-  std::int32_t pid = 0;
-  std::memcpy(&pid, data.data() + pid_mark.size(), sizeof pid);
-  return pid;
 }
 
 std::vector<PeerAddress> addresses_of(const rtps::ParticipantProxyData& peer) {
@@ -127,31 +90,33 @@ std::uint32_t entity_of(const rtps::GUID_t& guid) {
 
 /// A sample takes half of the segment at most; ports that belong to another domain are not this one's.
 RtpsLimits limits_of(const NodeOptions& options) {
-  const std::uint32_t first = 7400U + 250U * options.domain;
+  const std::uint32_t first = DomainPorts{options.domain}.multicast();
   return {options.segment_size / 2, first, first + 249U};
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const auto& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
 }
 
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
                                            Traffic traffic, const Profiles& profiles,
-                                           const std::shared_ptr<Reception>& reception) {
+                                           const std::shared_ptr<Reception>& reception,
+                                           const MemoryIdentity& identity, const MemorySizes& memory) {
   namespace transport = eprosima::fastdds::rtps;
   fdds::DomainParticipantQos qos;
   qos.name(name);
-  std::vector<rtps::octet> user_data{pid_mark.begin(), pid_mark.end()};
-  const std::int32_t pid = getpid();
-  user_data.resize(user_data.size() + sizeof pid);
-  std::memcpy(user_data.data() + pid_mark.size(), &pid, sizeof pid);
-  qos.user_data().data_vec(user_data);
+  qos.user_data().data_vec(to_user_data(identity));
   qos.transport().use_builtin_transports = false;
-  qos.wire_protocol().participant_id = own_number(options.domain);
+  qos.wire_protocol().participant_id = free_participant_number(options.domain);
   const bool realtime = traffic == Traffic::realtime;
-  if (options.shared_memory) {
-    auto shm = std::make_shared<Filtered<transport::SharedMemTransportDescriptor>>();
+  if (memory.any()) {
+    auto shm = std::make_shared<Filtered<ReachableMemory>>();
     shm->reception = reception;
-    // A segment holds several of the largest samples, or samples of that size are lost or slow.
-    shm->segment_size(realtime ? 512U << 10U : options.segment_size);
-    shm->max_message_size(realtime ? 65'500 : options.segment_size / 2);
-    shm->port_queue_capacity(1024);
+    shm->segment_size(memory.segment);
+    shm->max_message_size(memory.message);
+    shm->port_queue_capacity(MemorySizes::queue);
     qos.transport().user_transports.push_back(shm);
   }
   auto udp = std::make_shared<Filtered<transport::UDPv4TransportDescriptor>>();
@@ -191,8 +156,19 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
                          Discovery& discovery)
     : discovery_{discovery},
       name_{"invar/" + options.cell + "/" + options.process},
-      reception_{std::make_shared<Reception>(limits_of(options))} {
+      reception_{std::make_shared<Reception>(limits_of(options))},
+      identity_{own_memory_identity()} {
+  MemoryPlan memory;
+  if (options.shared_memory) memory = plan_memory(traffic, options.segment_size, options.processes);
+  if (!memory.sizes.any()) identity_.folder = 0;
+  if (!memory.shortage.empty()) discovery_.raise({"shared memory", memory.shortage, false});
   if (traffic == Traffic::realtime) name_ += "/realtime";
+  keep_middleware_log();
+  if (!options.addresses.empty() &&
+      std::none_of(options.addresses.begin(), options.addresses.end(), has_address))
+    throw InputError{
+        name_, "no running interface of this PC has " + joined(options.addresses),
+        "it has " + own_addresses_text() + "; look for the cable, or mend the address in the file"};
   // Between two components of a process that an executor did not join, samples go the same way as between
   // processes: a writer never runs a reader's listener.
   eprosima::fastrtps::LibrarySettingsAttributes settings;
@@ -201,11 +177,14 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
 
   const Priority priority{traffic == Traffic::realtime ? options.realtime_priority : 0};
   participant_ = fdds::DomainParticipantFactory::get_instance()->create_participant(
-      options.domain, participant_qos(options, name_, traffic, profiles, reception_), this,
-      fdds::StatusMask::none());
-  if (participant_ == nullptr)
-    throw InputError{"domain " + std::to_string(options.domain), "Fast DDS could not create a participant",
-                     "check that the host's address is one of this PC's, and that /dev/shm has room"};
+      options.domain, participant_qos(options, name_, traffic, profiles, reception_, identity_, memory.sizes),
+      this, fdds::StatusMask::none());
+  if (participant_ == nullptr) {
+    const std::string said = newest_middleware_error();
+    throw InputError{"domain " + std::to_string(options.domain),
+                     "Fast DDS could not create a participant" + (said.empty() ? "" : " (" + said + ")"),
+                     "look with `invar doctor` for the address, /dev/shm and the ports"};
+  }
   discovery_.add_participant(guid_text(participant_->guid().guidPrefix), name_);
   discovery_.add_source([reception = reception_]() -> std::optional<Alarm> {
     auto text = reception->report(monotonic_now());
@@ -298,25 +277,24 @@ bool Participant::has_dead_peer() const {
   return std::any_of(peers_.begin(), peers_.end(), [](const auto& peer) { return !is_alive(peer.second); });
 }
 
-void Participant::on_participant_discovery(fdds::DomainParticipant* own,
-                                           rtps::ParticipantDiscoveryInfo&& info) {
+void Participant::on_participant_discovery(fdds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) {
   const std::string id = guid_text(info.info.m_guid.guidPrefix);
   const bool is_gone = info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
                        info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
+  const auto identity = memory_identity_from(info.info.m_userData.getValue());
   {
     const std::lock_guard lock{peers_mutex_};
-    const std::int32_t pid = is_gone ? 0 : process_of(info.info, own->guid().guidPrefix);
-    if (pid != 0)
-      peers_[id] = pid;
+    if (!is_gone && identity && is_reachable(*identity, identity_))
+      peers_[id] = identity->process;
     else
       peers_.erase(id);
   }
   const GuidPrefix prefix = prefix_of(info.info.m_guid);
   is_gone ? reception_->guard().forget(prefix) : reception_->know_participant(prefix);
-  if (is_gone)
-    discovery_.remove_participant(id);
-  else
-    discovery_.add_participant(id, info.info.m_participantName.c_str(), addresses_of(info.info));
+  if (is_gone) return discovery_.remove_participant(id);
+  discovery_.add_participant(id, info.info.m_participantName.c_str(), addresses_of(info.info));
+  const std::string why = identity ? why_unreachable(identity_, *identity) : "";
+  if (!why.empty()) discovery_.raise_slow_path(identity->process, info.info.m_participantName.c_str(), why);
 }
 
 void Participant::on_publisher_discovery(fdds::DomainParticipant*, rtps::WriterDiscoveryInfo&& info) {

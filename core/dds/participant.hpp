@@ -20,6 +20,7 @@
 #include "core/dds/discovery.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/profile.hpp"
+#include "core/dds/reachable_memory.hpp"
 #include "core/dds/receive_filter.hpp"
 
 namespace invar::dds {
@@ -64,6 +65,7 @@ class Participant final : private fdds::DomainParticipantListener {
   Discovery& discovery_;
   std::string name_;
   std::shared_ptr<Reception> reception_;
+  MemoryIdentity identity_;
   fdds::DomainParticipant* participant_ = nullptr;
   std::mutex mutex_;
   mutable std::mutex peers_mutex_;

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <stdexcept>
 #include <thread>
 
@@ -20,6 +21,7 @@
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/own_host.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
 
@@ -175,8 +177,8 @@ class JobNews {
 };
 
 /// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
-bool keeps_time(const LaunchOptions& options, const config::Cell& cell) {
-  return options.host.empty() || cell.processes.front().host == options.host;
+bool keeps_time(const std::set<std::string>& hosts, const config::Cell& cell) {
+  return hosts.contains(cell.processes.front().host);
 }
 
 bool any_ended(std::vector<Child>& children) {
@@ -255,13 +257,15 @@ std::vector<std::string> names_of(const List& list, const Name& name) {
 }
 
 /// A run is silent while all is well: one line says what goes on and how to end it.
-void announce(const LaunchOptions& options, const config::Cell& cell, bool simulated) {
-  std::string names;
-  for (const auto& process : cell.processes)
-    if (options.host.empty() || process.host == options.host)
-      names += (names.empty() ? "" : ", ") + process.name;
-  spdlog::info("cell `{}` runs {} in {}; Ctrl-C stops it in order", cell.name, names,
-               simulated ? "simulated time" : "real time");
+void announce(const std::set<std::string>& hosts, const config::Cell& cell, bool simulated) {
+  std::string names, others;
+  for (const auto& process : cell.processes) {
+    std::string& list = hosts.contains(process.host) ? names : others;
+    list += (list.empty() ? "" : ", ") + process.name;
+  }
+  spdlog::info("cell `{}` runs {} in {}{}; Ctrl-C stops it in order", cell.name, names,
+               simulated ? "simulated time" : "real time",
+               others.empty() ? "" : " (" + others + " on other PCs)");
 }
 
 }  // namespace
@@ -274,24 +278,22 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   if (!options.job.empty() && !cell.jobs.contains(options.job))
     throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell",
                      mend_name(options.job, names_of(cell.jobs, [](const auto& job) { return job.first; }))};
-  if (!options.host.empty() && std::none_of(cell.hosts.begin(), cell.hosts.end(),
-                                            [&](const auto& host) { return host.name == options.host; }))
-    throw InputError{
-        "--host", "`" + options.host + "` is no host of " + cell.file.string(),
-        mend_name(options.host, names_of(cell.hosts, [](const auto& host) { return host.name; }))};
+  const std::set<std::string> hosts = own_hosts(cell, options.host);
   for (const auto& process : cell.processes)  // let go at once: the processes claim their names themselves
-    if (options.host.empty() || process.host == options.host) (void)ProcessClaim{cell, process.name};
+    if (hosts.contains(process.host)) (void)ProcessClaim{cell, process.name};
+  for (const std::string& host : hosts)
+    if (!wait_for_address(cell, host, stop)) return outcome;
   outcome.simulated = options.simulated.value_or(cell.simulated_time);
-  if (!options.quiet) announce(options, cell, outcome.simulated);
+  if (!options.quiet) announce(hosts, cell, outcome.simulated);
 
   const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
   JobNews news{options, cell, folder.path()};
   std::vector<Child> children;
   for (const auto& process : cell.processes)
-    if (options.host.empty() || process.host == options.host)
+    if (hosts.contains(process.host))
       children.push_back(spawn(options, process.name, outcome.simulated, folder.path()));
 
-  if (outcome.simulated && !keeps_time(options, cell)) {
+  if (outcome.simulated && !keeps_time(hosts, cell)) {
     while (!stop && any_runs(children)) sleep_a_little();
   } else if (outcome.simulated) {
     outcome.failure = keep_simulated_time(options, cell, children, stop, begin, news, outcome);

@@ -32,6 +32,7 @@
 #include "tools/cell/black_box_file.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
 
 namespace invar::tools {
@@ -53,6 +54,9 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of,
   options.process = process.name;
   options.domain = static_cast<std::uint32_t>(loaded.cell->domain);
   options.shared_memory = loaded.cell->shared_memory;
+  options.processes =
+      static_cast<std::size_t>(std::count_if(loaded.cell->processes.begin(), loaded.cell->processes.end(),
+                                             [&](const auto& other) { return other.host == process.host; }));
   for (const auto& host : loaded.cell->hosts)
     if (host.name == process.host) options.addresses = {host.address};
   if (process.realtime) {
@@ -251,6 +255,7 @@ class RunningProcess {
         spdlog::warn("{}: {}", file_.name, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
       leave_progress();
+      watch_address();
       for (const dds::Alarm& alarm : node_.take_alarms()) {
         spdlog::warn("{}: {}: {}", file_.name, alarm.topic, alarm.text);
         service_->publish(alarm.fault ? event::SEVERITY_FAULT : event::SEVERITY_WARNING, file_.name,
@@ -369,6 +374,13 @@ class RunningProcess {
     progress_.leave(job_.progress(), job_.text().c_str());
   }
 
+  void watch_address() {
+    const auto news = address_.look();
+    if (!news) return;
+    spdlog::warn("{}: {}", file_.name, news->text);
+    service_->publish(news->is_back ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, file_.name, news->text);
+  }
+
   void say_how_the_job_ended() {
     const std::scoped_lock lock{job_mutex_};
     if (runs_job_ && job_ended_ && job_.phase() != job::JOB_DONE)
@@ -435,6 +447,7 @@ class RunningProcess {
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
+  AddressWatch address_{node_.options().addresses.empty() ? "127.0.0.1" : node_.options().addresses.front()};
   std::deque<stage::AxisState> axes_;  // newest state of each, the loop's; addresses stay
   std::unique_ptr<dds::ProcessService> service_;
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
@@ -471,6 +484,7 @@ int run_process(const ProcessOptions& options, const ProcessOrders& orders) {
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
                      mend_name(options.process, loaded.process_names())};
   const ProcessClaim claim{*loaded.cell, options.process};
+  if (!wait_for_address(*loaded.cell, process->file->host, orders.stop)) return 0;
   if (process->file->realtime) keep_memory_small();
   return RunningProcess{options, loaded, *process}.run(orders);
 }

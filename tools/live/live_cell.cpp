@@ -5,6 +5,8 @@
 #include <iostream>
 #include <set>
 
+#include "core/dds/domain_ports.hpp"
+#include "core/dds/own_address.hpp"
 #include "tools/live/interrupt.hpp"
 
 namespace invar::tools {
@@ -116,8 +118,10 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
     cell_ = read_structure(call.file);
     options.domain = static_cast<std::uint32_t>(cell_->domain);
     if (options.addresses.empty()) {
+      // None where this PC is no host of the cell: it looks on all of its networks then.
       const auto add = [&](const std::string& address) {
-        if (std::find(options.addresses.begin(), options.addresses.end(), address) == options.addresses.end())
+        if (dds::has_address(address) &&
+            std::find(options.addresses.begin(), options.addresses.end(), address) == options.addresses.end())
           options.addresses.push_back(address);
       };
       for (const auto& host : cell_->hosts) add(host.address);
@@ -131,6 +135,7 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
     options.domain = static_cast<std::uint32_t>(call.domain);
   }
   where_ = "domain " + std::to_string(options.domain);
+  ports_ = dds::DomainPorts{options.domain}.text();
   node_ = std::make_unique<dds::Node>(options, profiles);
   if (cell_) {
     name_ = cell_->name;
@@ -252,8 +257,16 @@ void LiveCell::say_not_found(const std::string& command) const {
     std::cerr << command << ": the cell " << name_ << " runs, but no component of it answers to this\n";
     return;
   }
-  std::cerr << command << ": no cell answers in " << where_ << " within " << patience_.in_seconds()
-            << " s; is it running, and on an address of this PC? (--wait gives a busy one longer)\n";
+  std::string hosts;
+  if (cell_)
+    for (const auto& host : cell_->hosts)
+      hosts += (hosts.empty() ? ", whose hosts are " : ", ") + host.address;
+  std::cerr << command << ": no cell answers in " << where_ << hosts << " within " << patience_.in_seconds()
+            << " s; this PC has " << dds::own_addresses_text()
+            << ". Is it running, on one network with this PC, "
+            << "and open to UDP " << ports_
+            << " in the firewalls of both? (`invar doctor` looks; --wait gives a "
+            << "busy one longer)\n";
 }
 
 dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers, std::int64_t depth) {

@@ -89,6 +89,7 @@ class LiveCell {
   std::unique_ptr<dds::CellClient> client_;
   Duration patience_;
   std::string where_;
+  std::string ports_;  // of its domain, for a firewall
 };
 
 /// A profile that takes all that `writers` of one topic send: reads as reliably and as late as the weakest of them allows.

@@ -1,0 +1,33 @@
+// DomainPorts: the UDP ports of a DDS domain, and the number of a participant from which its ports follow.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace invar::dds {
+
+/// The formula of the RTPS specification (section 9.6.2.4) with its default constants. A domain has one port for multicast
+/// discovery, and each of its participants on a PC two: one for discovery, one for data.
+struct DomainPorts {
+  std::uint32_t domain = 0;
+
+  [[nodiscard]] std::uint32_t multicast() const { return 7400 + 250 * domain; }
+  [[nodiscard]] std::uint32_t discovery(std::int32_t number) const {
+    return multicast() + 10 + 2 * static_cast<std::uint32_t>(number);
+  }
+  [[nodiscard]] std::uint32_t data(std::int32_t number) const { return discovery(number) + 1; }
+  /// Participants of one PC that a domain has room for: 110, or as many as fit below port 65536 (63 in domain 232).
+  [[nodiscard]] std::int32_t participants() const;
+  [[nodiscard]] std::uint32_t last() const { return data(participants() - 1); }
+  /// For a firewall: "7400, 7410-7629".
+  [[nodiscard]] std::string text() const;
+};
+
+/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed and
+/// started again has the ports it had before: others then go on writing into the shared memory of the dead one, and are not
+/// heard. So it is one that left no trace and whose ports nobody on this network uses (a container may share the network and
+/// not the memory); where another process takes it in the same moment, the library shifts the ports. Throws InputError when
+/// all are taken. Set-up only.
+[[nodiscard]] std::int32_t free_participant_number(std::uint32_t domain);
+
+}  // namespace invar::dds
