@@ -21,6 +21,8 @@
 #include <sstream>
 #include <thread>
 
+#include "core/dds/memory_plan.hpp"
+#include "core/dds/node.hpp"
 #include "tools/live/text_table.hpp"
 
 namespace invar::tools {
@@ -101,11 +103,14 @@ Finding shared_memory_room() {
     return {Level::bad, "/dev/shm", "is not there: no shared memory between processes",
             "mount -t tmpfs tmpfs /dev/shm, or `shared_memory: false` in the cell file"};
   const double free = static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize);
-  // A process takes 18 MB: 16 for its general traffic, 2 for the loop's.
+  const double process =
+      static_cast<double>(dds::wanted_memory(dds::Traffic::general, dds::NodeOptions{}.segment_size).total() +
+                          dds::wanted_memory(dds::Traffic::realtime, 0).total());
   const std::string text = number_text(free / 1e6) + " MB free";
-  if (free > 200e6) return {Level::good, "/dev/shm", text, ""};
+  if (free > 10.0 * process) return {Level::good, "/dev/shm", text, ""};
   return {Level::bad, "/dev/shm",
-          text + ": room for " + std::to_string(static_cast<int>(free / 18e6)) + " processes",
+          text + ": room for " + std::to_string(static_cast<int>(free / process)) +
+              " processes, others take less or use UDP",
           "mount -o remount,size=1G /dev/shm; in a container --shm-size"};
 }
 

@@ -29,16 +29,6 @@ bool wait_until(Duration patience, Condition condition) {
   return true;
 }
 
-/// The structure of the cell file only: what components ask for is no matter here.
-std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file) {
-  const config::Yaml yaml = config::Yaml::load(file);
-  auto cell = std::make_unique<config::Cell>(config::read_cell(yaml));
-  for (const auto& process : cell->processes)
-    for (const auto& component : process.components) component.node.accept_all();
-  yaml.finish();
-  return cell;
-}
-
 /// "invar/<cell>/<process>" and "invar/<cell>/<process>/realtime".
 std::string cell_of_participant(const std::string& name) {
   constexpr std::string_view prefix = "invar/";
@@ -69,6 +59,15 @@ std::set<std::string> processes_in(const dds::Snapshot& snapshot, const std::str
 }
 
 }  // namespace
+
+std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file) {
+  const config::Yaml yaml = config::Yaml::load(file);
+  auto cell = std::make_unique<config::Cell>(config::read_cell(yaml));
+  for (const auto& process : cell->processes)
+    for (const auto& component : process.components) component.node.accept_all();
+  yaml.finish();
+  return cell;
+}
 
 CellCall::CellCall(CLI::App& app, std::vector<Word> words)
     : command{"invar " +

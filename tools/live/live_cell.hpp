@@ -49,6 +49,9 @@ class CellCall {
   std::vector<std::string> words_;  // one more than described: CELL comes first
 };
 
+/// The structure of a cell file only: what its components ask for is no matter here. Throws InputError.
+[[nodiscard]] std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file);
+
 class LiveCell {
  public:
   /// Takes part in the domain of the cell. Without a file, waits for the one cell that is there. Throws InputError for a
