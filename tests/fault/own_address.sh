@@ -55,6 +55,7 @@ ip -n "$a" link set cable down
 for _ in $(seq 100); do (($(grep -c 'any more' late.log) == 2)) && break; sleep 0.1; done
 (($(grep -c 'any more' late.log) == 2)) || fail "late.log does not say that the cable is out"
 ip -n "$a" link set cable up
+for _ in $(seq 100); do (($(grep -c 'is back' late.log) == 2)) && break; sleep 0.1; done
 on "$b" "$invar" status cell.yaml --wait 20 >cable.log 2>&1 || fail "the other PC does not see the cell after the cable was out"
 for log in *.log; do no_raw_lines "$log"; done
 echo "late, gone and back, cable out: passed"
