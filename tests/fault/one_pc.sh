@@ -26,7 +26,7 @@ both() {
   wait "$first" || fail "$case: a ended with a fault"
   for side in a b; do
     sed "s/^/$case, $side: /" "$folder/$side"
-    awk '/^came/ { c = $2; of = $4 + 0; slow = $6 + 0; cpu = $8 + 0; age = $12 } END { exit !(age < 1.2 && c > 200 && c >= 0.98 * of && slow > 5 && cpu < 0.3) }' \
+    awk '/^came/ { c = $2; of = $4 + 0; slow = $6 + 0; cpu = $8 + 0; age = $12 } END { exit !(age < 3 && c >= 300 && c >= 0.98 * of && slow >= 6 && cpu < 0.3) }' \
       "$folder/$side" || fail "$case: $side did not hear its peer, or a thread spins"
     grep -q "segments $segments" "$folder/$side" || fail "$case: $side has opened other memory than $segments"
     [[ -n $told ]] || ! grep -q '^told' "$folder/$side" || fail "$case: $side was told of a fault that is none"

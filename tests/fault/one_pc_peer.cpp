@@ -1,4 +1,4 @@
-// One of two processes of one PC: `one_pc_peer NAME PEER SECONDS [PRIORITY]`. Each writes a loop's state at 500 Hz and a slow
+// One of two processes of one PC: `one_pc_peer NAME PEER SECONDS [PRIORITY]`, longer on a busy machine. Each writes a loop's state at 500 Hz and a slow
 // state, and reads those of the other. At the end it prints how many of the peer's samples came, the share of a core that its
 // busiest thread took, how many segments of shared memory it has opened (two are its own), and what was told. `one_pc_peer --foreign`
 // is a program that is not of Invar: it sends announcements by shared memory to every port that it finds there.
@@ -14,6 +14,7 @@
 #include <iostream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
@@ -113,9 +114,13 @@ int take_part(int argc, char** argv) {
   const auto begin = std::chrono::steady_clock::now();
   std::map<std::string, double> before;
   double measured = 0.0;
+  std::optional<double> enough_at;
   for (std::uint64_t cycle = 1;; ++cycle) {
     const double now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (now > seconds) break;
+    // On a busy machine longer, so that there is something to count; the peer needs some more of ours.
+    const bool enough = came >= 300 && slow_came >= 6;
+    if (enough && !enough_at) enough_at = now;
+    if ((now > seconds && enough_at && now > *enough_at + 1.0) || now > 45.0) break;
     if (before.empty() && now > 0.4 * seconds) {
       before = seconds_of_threads();
       measured = now;
@@ -129,9 +134,10 @@ int take_part(int argc, char** argv) {
     std::this_thread::sleep_for(std::chrono::milliseconds{2});
   }
   const std::size_t opened = segments();
+  const double elapsed = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   double busiest = 0.0;
   for (const auto& [task, spent] : seconds_of_threads())
-    busiest = std::max(busiest, (spent - before[task]) / (seconds - measured));
+    busiest = std::max(busiest, (spent - before[task]) / (elapsed - measured));
   std::cout << "came " << came << " of " << (came == 0 ? 0 : last - first + 1) << ", slow " << slow_came
             << ", busiest " << busiest << ", segments " << opened << ", newest "
             << 1e-9 * static_cast<double>(monotonic_now().ns - newest_ns) << " s ago" << std::endl;
