@@ -77,7 +77,8 @@ void feed_noise(Recorder& recorder, std::size_t samples) {
   std::vector<std::byte> noise(100'000);
   for (std::uint64_t i = 1; i <= samples && recorder.failure() == nullptr; ++i) {
     for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
-    recorder.record({"a", "t", "state", ""}, "writer", i, Instant{static_cast<std::int64_t>(i)}, noise);
+    const Instant at{static_cast<std::int64_t>(i)};
+    recorder.record({"a", "t", "state", ""}, "writer", i, at, at, noise);
     recorder.step({Instant{static_cast<std::int64_t>(i) * 20'000'000}, 0.02, i});
     std::this_thread::sleep_for(std::chrono::milliseconds{1});
   }
