@@ -57,7 +57,8 @@ Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* reco
     const bool answered = state != nullptr && state->command_id() == command.id();
     if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
       throw std::runtime_error{axis_said + " tripped while moving" + loop_.figures()};
-    if (answered && state->command_refused()) throw std::runtime_error{axis_said + " refused a motion of the job"};
+    if (answered && state->command_refused())
+      throw std::runtime_error{axis_said + " refused a motion of the job"};
     if (answered && state->command_done()) {
       if (const auto fault = loop_.fault()) throw std::runtime_error{axis_said + ": " + *fault};
       co_return;

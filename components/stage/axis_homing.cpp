@@ -39,6 +39,7 @@ bool Stage::start_homing(const Tick& tick) noexcept {
   const auto order = homing_.start(
       Homing::settings(parameters_.homing, parameters_.homing_velocity, parameters_.travel.width()),
       sensed(tick));
+  if (order.kind == Homing::Order::Kind::failed) return false;  // the refusal gives the reason
   carry_out(order, tick);
   return mode_ == AXIS_MODE_HOMING;
 }
@@ -76,7 +77,6 @@ void Stage::carry_out(const Homing::Order& order, const Tick& tick) noexcept {
     }
     case Kind::failed:
       notices_.say(event::SEVERITY_FAULT, homing_.reason());
-      if (mode_ != AXIS_MODE_HOMING) break;  // it has not begun
       in_vain_ = true;
       brake(at, tick);
       break;

@@ -177,6 +177,12 @@ bool Stage::start_move(const AxisCommand& command, const Tick& tick) noexcept {
 
 /// Answers a command that is not carried out. The same reason is told once a second at most: whoever sends commands in a loop
 /// must not fill the log.
+const char* Stage::why_not(const AxisCommand& command) const noexcept {
+  if (without_correction_) return "the correction that the axis needs has stopped coming";
+  const bool could_home = command.kind() == AXIS_COMMAND_HOME && mode_ == AXIS_MODE_HOLDING;
+  return could_home ? homing_.reason() : why_refused(command, mode_, homed_, parameters_.travel);
+}
+
 void Stage::refuse(const AxisCommand& command, const char* why, const Tick& tick) noexcept {
   sample_.command_id(command.id());
   sample_.command_refused(true);
@@ -239,11 +245,7 @@ void Stage::obey(const AxisCommand& command, const Tick& tick) noexcept {
       blind_ = false;
       break;
   }
-  if (!accepted)
-    return refuse(command,
-                  without_correction_ ? "the correction that the axis needs has stopped coming"
-                                      : why_refused(command, mode_, homed_, parameters_.travel),
-                  tick);
+  if (!accepted) return refuse(command, why_not(command), tick);
   sample_.command_id(command.id());
   sample_.command_refused(false);
   sample_.command_done(done);

@@ -139,6 +139,7 @@ class Stage final : public Component {
   [[nodiscard]] std::string load(const std::filesystem::path& file, Staged::Model& model) const;
   void read_position(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void obey(const AxisCommand& command, const Tick& tick) noexcept;
+  [[nodiscard]] const char* why_not(const AxisCommand& command) const noexcept;
   void refuse(const AxisCommand& command, const char* why, const Tick& tick) noexcept;
   [[nodiscard]] bool start_sine(const AxisCommand& command, const Tick& tick) noexcept;
   [[nodiscard]] bool start_move(const AxisCommand& command, const Tick& tick) noexcept;

@@ -8,14 +8,18 @@ namespace invar::thermal {
 namespace {
 
 constexpr double nearly_full = 0.95;  // of full power: a loop at its limit, wherever the reading is
-constexpr Duration comparable = Duration::seconds(1.0);   // readings further apart say nothing of a leap
+constexpr Duration comparable = Duration::seconds(1.0);  // readings further apart say nothing of a leap
+constexpr Duration starting =
+    Duration::seconds(2.0);  // a controller that starts may report 0 before it has measured
 constexpr Duration second_look = Duration::seconds(2.0);  // a leap that goes away sooner was a bad reading
 
 }  // namespace
 
 bool HeatWatch::trusts(const Settings& settings, std::optional<double> reading, Instant now) noexcept {
   if (!reading) return true;
-  const bool leaps = trusted_at_ && std::abs(*reading - trusted_) > settings.leap &&
+  if (!begun_at_) begun_at_ = now;
+  const bool leaps = trusted_at_ && now - *begun_at_ > starting &&
+                     std::abs(*reading - trusted_) > settings.leap &&
                      (leapt_at_ || now - *trusted_at_ <= comparable);
   if (leaps && !leapt_at_) leapt_at_ = now;
   if (leaps) return false;

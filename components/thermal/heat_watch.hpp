@@ -42,8 +42,9 @@ class HeatWatch {
   double unanswered_ = 0.0;  // heat beyond holding that did not warm the reading [J]
   double silent_ = 0.0;      // heat since the reading last changed [J]
   double waited_ = 0.0;
-  double last_power_ = 0.0;  // that a device was reached with [W]
-  double unreached_ = 0.0;   // [s]
+  double last_power_ = 0.0;          // that a device was reached with [W]
+  double unreached_ = 0.0;           // [s]
+  std::optional<Instant> begun_at_;  // of the first reading
   std::optional<Instant> looked_at_, trusted_at_, leapt_at_;
   double trusted_ = 0.0;  // reading [degC]
 };

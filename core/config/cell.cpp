@@ -162,7 +162,8 @@ Cell read_cell(const Yaml& yaml) {
   cell.simulated_time = root.choice("time", {"real", "simulated"}, "real") == "simulated";
   cell.window = Duration::seconds(root.number("window", "s", Range{1e-3, 1.0}, 0.02));
   cell.shared_memory = root.flag("shared_memory", true);
-  cell.address_wait = Duration::seconds(root.number("address_wait", "s", Range{0.0, 1e9}, 60.0));  // 1e9: for ever
+  cell.address_wait =
+      Duration::seconds(root.number("address_wait", "s", Range{0.0, 1e9}, 60.0));  // 1e9: for ever
   const auto beside = [&](const Node& node) {
     std::filesystem::path path = node.as_text();
     if (path.is_relative()) path = cell.file.parent_path() / path;

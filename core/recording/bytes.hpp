@@ -18,7 +18,8 @@ using ByteView = std::span<const std::uint8_t>;
 /// Stores `value` at `to`, least significant byte first.
 template <std::unsigned_integral T>
 void store(std::uint8_t* to, T value) {
-  for (std::size_t i = 0; i < sizeof(T); ++i) to[i] = static_cast<std::uint8_t>((std::uint64_t{value} >> (8U * i)) & 0xFFU);
+  for (std::size_t i = 0; i < sizeof(T); ++i)
+    to[i] = static_cast<std::uint8_t>((std::uint64_t{value} >> (8U * i)) & 0xFFU);
 }
 
 template <std::unsigned_integral T>

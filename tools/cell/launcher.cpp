@@ -279,8 +279,8 @@ void announce(const std::set<std::string>& hosts, const config::Cell& cell, bool
     std::string& list = hosts.contains(process.host) ? names : others;
     list += (list.empty() ? "" : ", ") + process.name;
   }
-  spdlog::info("invar {}: cell `{}` runs {} in {}{}; Ctrl-C stops it in order", INVAR_VERSION, cell.name, names,
-               simulated ? "simulated time" : "real time",
+  spdlog::info("invar {}: cell `{}` runs {} in {}{}; Ctrl-C stops it in order", INVAR_VERSION, cell.name,
+               names, simulated ? "simulated time" : "real time",
                others.empty() ? "" : " (" + others + " on other PCs)");
 }
 

@@ -291,8 +291,7 @@ class RunningProcess {
     for (bool over = false; up && !over && !orders.stop.load() && !asked_to_stop_ && executor_.is_running() &&
                             (!job_ended_ || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      if (const std::string refused = memory_.look(); !refused.empty())
-        say(event::SEVERITY_WARNING, refused);
+      if (const std::string refused = memory_.look(); !refused.empty()) say(event::SEVERITY_WARNING, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
       leave_progress();
       watch_address();

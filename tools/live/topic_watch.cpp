@@ -29,7 +29,7 @@ void Flow::add(const dds::RawSample& sample, std::int64_t arrived_ns) {
   if (last_sequence_ != 0 && sample.sequence > last_sequence_ + 1)
     missing += sample.sequence - last_sequence_ - 1;
   last_sequence_ = sample.sequence;
-  if (last_ns_ != 0) {
+  if (samples > 1) {
     const double interval = static_cast<double>(sample.sent_ns - last_ns_) * 1e-9;
     shortest = intervals == 0 ? interval : std::min(shortest, interval);
     longest = intervals == 0 ? interval : std::max(longest, interval);

@@ -122,8 +122,9 @@ TEST(CommandGate, RefusesWhatIsTooOldAndSaysSo) {
   const auto alarms = discovery.take_alarms();
   ASSERT_EQ(alarms.size(), 1U);
   EXPECT_FALSE(alarms[0].fault);
-  EXPECT_THAT(alarms[0].text, AllOf(HasSubstr("a command of `plant` on `cell/test/c` was not obeyed"),
-                                    HasSubstr("sent 3"), HasSubstr("lifespan"), HasSubstr("clock of the sender")));
+  EXPECT_THAT(alarms[0].text,
+              AllOf(HasSubstr("a command of `plant` on `cell/test/c` was not obeyed"), HasSubstr("sent 3"),
+                    HasSubstr("lifespan"), HasSubstr("clock of the sender")));
 }
 
 TEST(CommandGate, TellsOfMoreRefusalsNowAndThen) {
