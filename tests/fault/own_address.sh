@@ -40,7 +40,7 @@ says '`pd` is no host of' name.log
 echo "never there, no host: passed"
 
 # It comes late; then it goes and comes back. The other PC sees the cell.
-on "$a" "$invar" run cell.yaml --host pc >/dev/null 2>late.log & run=$!; pids+=("$run")
+ip netns exec "$a" "$invar" run cell.yaml --host pc >/dev/null 2>late.log & run=$!; pids+=("$run")
 until_says 'waiting 20 s for it' late.log
 sleep 1
 ip -n "$a" address add 10.79.0.11/24 dev cable
