@@ -75,7 +75,11 @@ fdds::DataWriterQos writer_qos(const Profile& p) {
   set_common(qos, p);
   if (p.lease.ns != 0) qos.liveliness().announcement_period = wire_time(p.lease / 3);
   qos.ownership_strength().value = static_cast<std::uint32_t>(p.strength);
-  qos.reliability().max_blocking_time = wire_time(p.blocking);
+  // Fast DDS spins while its shared memory is full; a sample of the loop is soon overtaken, and dropped instead.
+  constexpr Duration loop_patience = Duration::microseconds(100);
+  const bool is_of_loop = p.traffic == Traffic::realtime && !p.reliable;
+  qos.reliability().max_blocking_time =
+      wire_time(is_of_loop ? std::min(p.blocking, loop_patience) : p.blocking);
   qos.reliable_writer_qos().times.heartbeatPeriod = {0, 20'000'000};
   qos.reliable_writer_qos().times.nackResponseDelay = {0, 1'000'000};
   qos.reliable_writer_qos().disable_heartbeat_piggyback = !p.asks_at_once;

@@ -4,6 +4,7 @@
 # mismatch.sh INVAR SOURCE_DIR jobs|live|clock|nothing|watch|refusals     live: simulated time at the pace of the wall clock, slower where
 # the host is busy, so that no cycle is lost; clock: by the wall clock, by hand
 set -euo pipefail
+export COLUMNS=250  # so that no line of a table is broken
 invar=$1 source=$2 part=$3
 folder=$(mktemp -d); cell_pid=
 trap 'kill $cell_pid ${record_pid:-} 2>/dev/null || true; wait; rm -rf "$folder"' EXIT

@@ -16,10 +16,11 @@ namespace invar::tools {
 
 namespace {
 
-constexpr std::size_t gap = 2;
+constexpr std::size_t usual_gap = 2, least_gap = 1;
 constexpr std::size_t usual_width = 80, least_width = 40;
-constexpr std::size_t readable = 10,
-                      least_column = 4;  // a text column is not made narrower while another can be
+constexpr std::size_t readable = 10;       // a text column is not made narrower while another can be
+constexpr std::size_t longest_whole = 16;  // words up to this length are not broken while a gap can give way
+constexpr std::size_t least_column = 4;
 
 std::size_t longest_word(const std::string& text) {
   std::istringstream words{text};
@@ -89,31 +90,42 @@ void TextTable::add(std::vector<std::string> cells) {
   rows_.push_back(std::move(cells));
 }
 
-/// Headings give way first, then the widest texts. Numbers stay whole, be the line too long.
-std::vector<std::size_t> TextTable::widths_within(std::size_t width) const {
-  std::vector<std::size_t> cells(headings_.size()), widths;
+/// Headings give way first, then the widest texts, then the gaps, at last words. Numbers stay whole, be the line too long.
+TextTable::Layout TextTable::layout_within(std::size_t width) const {
+  std::vector<std::size_t> cells(headings_.size()), words, widths;
   for (std::size_t i = 0; i < headings_.size(); ++i) {
-    for (const auto& row : rows_) cells[i] = std::max(cells[i], row[i].size());
+    words.push_back(longest_word(headings_[i]));
+    for (const auto& row : rows_) {
+      cells[i] = std::max(cells[i], row[i].size());
+      words[i] = std::max(words[i], std::min(longest_word(row[i]), longest_whole));
+    }
     widths.push_back(std::max(cells[i], headings_[i].size()));
   }
+  std::size_t gap = usual_gap;
   const auto too_wide = [&] {
     return std::accumulate(widths.begin(), widths.end(), gap * (widths.size() - 1)) > width;
   };
-  if (!too_wide()) return widths;
+  if (!too_wide()) return {widths, gap};
   for (std::size_t i = 0; i < widths.size(); ++i) widths[i] = std::max(cells[i], longest_word(headings_[i]));
-  for (const std::size_t least : {readable, least_column})
+  const auto narrow = [&](auto least) {
     while (too_wide()) {
       std::size_t widest = widths.size();
       for (std::size_t i = 0; i < widths.size(); ++i)
-        if (!right_[i] && widths[i] > least && (widest == widths.size() || widths[i] > widths[widest]))
+        if (!right_[i] && widths[i] > least(i) && (widest == widths.size() || widths[i] > widths[widest]))
           widest = i;
-      if (widest == widths.size()) break;
+      if (widest == widths.size()) return;
       --widths[widest];
     }
-  return widths;
+  };
+  narrow([&](std::size_t i) { return std::max(readable, words[i]); });
+  narrow([&](std::size_t i) { return words[i]; });
+  if (too_wide()) gap = least_gap;
+  narrow([](std::size_t) { return least_column; });
+  return {widths, gap};
 }
 
-void TextTable::print_row(const Row& row, const std::vector<std::size_t>& widths, std::ostream& out) const {
+void TextTable::print_row(const Row& row, const Layout& layout, std::ostream& out) const {
+  const auto& [widths, gap] = layout;
   std::vector<std::vector<std::string>> lines;
   std::size_t most = 1;
   for (std::size_t i = 0; i < row.size(); ++i) {
@@ -133,9 +145,9 @@ void TextTable::print_row(const Row& row, const std::vector<std::size_t>& widths
 }
 
 void TextTable::print(std::ostream& out, std::size_t width) const {
-  const auto widths = widths_within(width);
-  print_row(headings_, widths, out);
-  for (const Row& row : rows_) print_row(row, widths, out);
+  const Layout layout = layout_within(width);
+  print_row(headings_, layout, out);
+  for (const Row& row : rows_) print_row(row, layout, out);
 }
 
 std::string number_text(double value, int digits) {

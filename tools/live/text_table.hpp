@@ -22,8 +22,12 @@ class TextTable {
 
  private:
   using Row = std::vector<std::string>;
-  [[nodiscard]] std::vector<std::size_t> widths_within(std::size_t width) const;
-  void print_row(const Row& row, const std::vector<std::size_t>& widths, std::ostream& out) const;
+  struct Layout {
+    std::vector<std::size_t> widths;
+    std::size_t gap;
+  };
+  [[nodiscard]] Layout layout_within(std::size_t width) const;
+  void print_row(const Row& row, const Layout& layout, std::ostream& out) const;
 
   std::vector<std::string> headings_;
   std::vector<bool> right_;
