@@ -26,6 +26,7 @@
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
 #include "core/dds/qos.hpp"
+#include "core/dds/raw_type.hpp"
 #include "core/dds/reachable_memory.hpp"
 #include "core/dds/rtps_bytes.hpp"
 #include "core/dds/writer_keys.hpp"
@@ -245,11 +246,21 @@ fdds::DataWriter& Participant::create_writer(const std::string& name, fdds::Topi
   return *writer;
 }
 
+namespace {
+WriterKeys::Kind instances_of(const Profile& profile, const fdds::TopicDataType& type) {
+  if (profile.exclusive) return WriterKeys::Kind::by_writer;
+  const bool latest_counts = profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
+  const bool is_raw = dynamic_cast<const RawType*>(&type) != nullptr;  // who records wants each instance
+  return latest_counts && !is_raw ? WriterKeys::Kind::folded : WriterKeys::Kind::as_they_are;
+}
+}  // namespace
+
 fdds::DataReader& Participant::create_reader(const std::string& name, fdds::TopicDataType* type,
                                              const Profile& profile, fdds::DataReaderListener* listener) {
   const std::lock_guard lock{mutex_};
-  fdds::Topic* on = topic(name, type);
-  const WriterKeys::Making making{profile.exclusive};
+  const WriterKeys::Kind instances = instances_of(profile, *type);
+  fdds::Topic* on = topic(name, type);  // takes the type support over
+  const WriterKeys::Making making{instances};
   auto* reader = subscriber(profile.partitions)->create_datareader(on, reader_qos(profile), listener);
   INVAR_EXPECTS(reader != nullptr, name, profile.name);
   discovery_.add_endpoint(

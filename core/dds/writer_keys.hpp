@@ -1,5 +1,5 @@
-// WriterKeys: gives each writer instances of its own at readers whose ownership is exclusive, so that nothing is refused in
-// silence: CommandGate decides there who is obeyed.
+// WriterKeys: the instances of a reader. Each writer has its own where ownership is exclusive, so that nothing is refused in
+// silence: CommandGate decides there who is obeyed. Where the latest sample counts, foreign keys take no more than a few.
 #pragma once
 
 #include <fastdds/rtps/common/CacheChange.h>
@@ -22,24 +22,29 @@ namespace invar::dds {
 /// is how such a reader is known here.
 class WriterKeys {
  public:
-  /// While one lives, readers that are made on this thread are of exclusive ownership.
+  /// `by_writer`: each writer's instances are its own. `folded`: any number of keys makes `most_folded` instances: Fast DDS
+  /// keeps an instance as long as its writer lives, and refuses every key beyond the limit of the reader, also the right one.
+  enum class Kind { as_they_are, by_writer, folded };
+  static constexpr std::uint8_t most_folded = 32;
+
+  /// While one lives, readers that are made on this thread are of this kind.
   class Making {
    public:
-    explicit Making(bool exclusive) { active() = exclusive; }
-    ~Making() { active() = false; }
+    explicit Making(Kind kind) { active() = kind; }
+    ~Making() { active() = Kind::as_they_are; }
     Making(const Making&) = delete;
     Making& operator=(const Making&) = delete;
-    static bool& active() {
-      thread_local bool making = false;
+    static Kind& active() {
+      thread_local Kind making = Kind::as_they_are;
       return making;
     }
   };
 
   /// From createData, deleteData, deserialize and getKey of the type.
   void* created(void* object) {
-    if (!Making::active()) return object;
+    if (Making::active() == Kind::as_they_are) return object;
     const std::lock_guard lock{mutex_};
-    entries_.push_back({object, {}});
+    entries_.push_back({object, Making::active(), {}});
     any_ = true;
     return object;
   }
@@ -58,7 +63,8 @@ class WriterKeys {
     if (!any_) return;
     const std::lock_guard lock{mutex_};
     for (const Entry& entry : entries_)
-      if (entry.object == object) handle = mixed(handle, entry.writer);
+      if (entry.object == object)
+        handle = entry.kind == Kind::folded ? folded(handle) : mixed(handle, entry.writer);
   }
 
  private:
@@ -66,6 +72,7 @@ class WriterKeys {
   using Change = eprosima::fastrtps::rtps::CacheChange_t;
   struct Entry {
     const void* object;
+    Kind kind;
     Guid writer;
   };
 
@@ -92,6 +99,15 @@ class WriterKeys {
     eprosima::fastrtps::rtps::InstanceHandle_t out;
     for (std::size_t i = 0; i < 16; ++i)
       out.value[i] = static_cast<std::uint8_t>(halves[i / 8] >> (8U * (i % 8)));
+    return out;
+  }
+
+  static eprosima::fastrtps::rtps::InstanceHandle_t folded(
+      const eprosima::fastrtps::rtps::InstanceHandle_t& handle) {
+    eprosima::fastrtps::rtps::InstanceHandle_t out;
+    out.value[0] =
+        static_cast<std::uint8_t>(1U + mixed(handle, Guid{}).value[0] % most_folded);  // 0 is no instance
+    for (std::size_t i = 1; i < 16; ++i) out.value[i] = 1;
     return out;
   }
 
