@@ -44,8 +44,8 @@ at +0s 1 "active" lifecycle $cell watch_x configure # it is active still
 for offset in +3s +1h; do
   at $offset 0 "is active" job apply $cell stage_x --model deployment/machines/linear-axis-believed.yaml
   at $offset 0 "" job run $cell excite --detach
-  for _ in $(seq 100); do "$invar" job list $cell | grep -q running && break; sleep 0.1; done
-  "$invar" job list $cell | grep -q running || fail "$offset: the job does not run"
+  running=; for _ in $(seq 100); do "$invar" job list $cell | grep -q running && running=yes && break; sleep 0.1; done
+  [[ -n $running ]] || fail "$offset: the job does not run"
   at $offset 0 "cancelled" job cancel $cell
 done
 for offset in -3s -1h; do

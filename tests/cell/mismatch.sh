@@ -116,7 +116,7 @@ case $part in
     cp out/mismatch/motion_before.csv first.csv
     # The watch in the loop has seen it by itself, and says where.
     "$invar" status $cell >said || true
-    grep -E "warning +watch_x: axis and model part: .*axis\.force" said || { cat said; fail "the watch has said nothing"; }
+    grep -E "warning +watch_x:? +axis and model part: .*axis\.force" said || { cat said; fail "the watch has said nothing"; }
     sleep 3 # as on a host where the next command takes so long to start
     kill -INT $record_pid
     wait $record_pid || { cat recorded; fail "the recording failed"; }
