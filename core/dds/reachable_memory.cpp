@@ -1,4 +1,5 @@
 #include "core/dds/reachable_memory.hpp"
+#include "core/dds/one_sender.hpp"
 
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
@@ -102,6 +103,12 @@ class Transport final : public transport::ChainingTransport {
     if (!low_level_transport_->transform_remote_locator(remote, result)) return false;
     turn_host(result);
     return true;
+  }
+
+  bool OpenOutputChannel(eprosima::fastdds::rtps::SendResourceList& senders,
+                         const rtps::Locator_t& locator) override {
+    return open_one_sender(senders, kind(),
+                           [&] { return ChainingTransport::OpenOutputChannel(senders, locator); });
   }
 
   bool send(rtps::SenderResource* sender, const rtps::octet* bytes, std::uint32_t size,

@@ -1,4 +1,5 @@
 #include "core/dds/receive_filter.hpp"
+#include "core/dds/one_sender.hpp"
 
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastrtps/utils/IPLocator.h>
@@ -53,6 +54,12 @@ class Filter final : public transport::ChainingTransport {
       : ChainingTransport{chain}, below_{chain.low_level_descriptor}, reception_{std::move(reception)} {}
 
   transport::TransportDescriptorInterface* get_configuration() override { return below_.get(); }
+
+  bool OpenOutputChannel(eprosima::fastdds::rtps::SendResourceList& senders,
+                         const rtps::Locator_t& locator) override {
+    return open_one_sender(senders, kind(),
+                           [&] { return ChainingTransport::OpenOutputChannel(senders, locator); });
+  }
 
   bool send(rtps::SenderResource* below, const rtps::octet* data, std::uint32_t size,
             rtps::LocatorsIterator* begin, rtps::LocatorsIterator* end,
