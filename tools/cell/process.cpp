@@ -422,6 +422,7 @@ class RunningProcess {
   void watch_address() {
     const auto news = address_.look();
     if (!news) return;
+    if (news->is_back) spdlog::warn("{}: {}", file_.name, news->text);  // the log leaves notes out
     service_->publish(news->is_back ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, file_.name, news->text);
   }
 
