@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "components/calibration/deliver.hpp"
+
 namespace invar::calibration {
 
 Size size_of(const std::vector<double>& values) {
@@ -101,6 +103,15 @@ Task AxisRunner::align(double from) {
   while (reading_.take(before)) {  // of another beam
   }
 }
+
+Task AxisRunner::use_model(const std::filesystem::path& model) {
+  std::string path;
+  co_await deliver(*this, model_, model, path);
+  co_await command_model(compensation::MODEL_STAGE, path);
+  co_await command_model(compensation::MODEL_ACTIVATE, path);
+}
+
+Task AxisRunner::roll_back_model() { co_await command_model(compensation::MODEL_ROLLBACK, ""); }
 
 Task AxisRunner::command_model(compensation::ModelCommandKind kind, const std::string& path) {
   compensation::ModelCommand command;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,8 @@ class AxisRunner : public JobComponent {
   Task wait(double seconds);
   /// Zeroes the laser where the tool stands, which is called `from` [m].
   Task align(double from);
-  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
+  Task use_model(const std::filesystem::path& model);
+  Task roll_back_model();
 
   Input<stage::AxisState> state_{*this, "state"};
   Inbox<sensing::DisplacementReading> reading_{
@@ -48,6 +50,7 @@ class AxisRunner : public JobComponent {
 
  private:
   void make_safe() override;
+  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
   void send(stage::AxisCommand& command);
 
   const std::int64_t& axis_;

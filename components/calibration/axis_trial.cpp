@@ -136,8 +136,7 @@ Task AxisTrial::run(const RippleJob& job) {
     file << model::patched(yaml, model);
     if (!file.flush()) throw std::runtime_error{patched.string() + " cannot be written"};
   }
-  co_await command_model(compensation::MODEL_STAGE, patched.string());
-  co_await command_model(compensation::MODEL_ACTIVATE, patched.string());
+  co_await use_model(patched);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the ripple is fed forward; verifying");
   co_await wait(2.0);  // it fades in
@@ -148,7 +147,7 @@ Task AxisTrial::run(const RippleJob& job) {
   const Size was = size_of(following(before));
   const Size is = size_of(following(after));
   if (is.rms > was.rms) {
-    co_await command_model(compensation::MODEL_ROLLBACK, patched.string());
+    co_await roll_back_model();
     throw std::runtime_error{"the following error grew from " + micrometres(was.rms) + " to " +
                              micrometres(is.rms) + " RMS; rolled back"};
   }
@@ -233,8 +232,7 @@ Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
   }
   progress_ = 0.5;
   report(job::JOB_RUNNING, "giving the model to the stage");
-  co_await command_model(compensation::MODEL_STAGE, file.string());
-  co_await command_model(compensation::MODEL_ACTIVATE, file.string());
+  co_await use_model(file);
   co_await wait(2.0);  // it fades in
   recording::Table after = record_table();
   co_await move_at_all_speeds(job, after);
@@ -242,7 +240,7 @@ Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
   const Size was = size_of(before.in("following_error", "m"));
   const Size is = size_of(after.in("following_error", "m"));
   if (is.rms > was.rms) {
-    co_await command_model(compensation::MODEL_ROLLBACK, file.string());
+    co_await roll_back_model();
     throw std::runtime_error{"the following error grew from " + micrometres(was.rms) + " to " +
                              micrometres(is.rms) + " RMS; rolled back"};
   }

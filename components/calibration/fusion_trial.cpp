@@ -244,8 +244,7 @@ Task FusionTrial::run(const FusionJob& job) {
   text.write(file);
   co_await move(job.from, 0.0, nullptr);
   co_await wait(settle);
-  co_await command_model(compensation::MODEL_STAGE, file.string());
-  co_await command_model(compensation::MODEL_ACTIVATE, file.string());
+  co_await use_model(file);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the model is in use; verifying");
   co_await verify(job, "after", after);
@@ -254,7 +253,7 @@ Task FusionTrial::run(const FusionJob& job) {
   progress_ = 1.0;
   if (after.fused.rms >= before.fused.rms || !metrology::surely_less(after.parts, before.parts, 2.0)) {
     co_await move(job.from, 0.0, nullptr);
-    co_await command_model(compensation::MODEL_ROLLBACK, file.string());
+    co_await roll_back_model();
     report(job::JOB_DONE, fused + ": no more than chance gives; the fusion is as it was before");
     co_return;
   }

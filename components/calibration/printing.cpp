@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "components/calibration/deliver.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/recording/table.hpp"
 
@@ -137,8 +138,10 @@ Task Printing::use(const metrology::DropletTrajectory& trajectory, std::filesyst
   compensation::ModelText text{"dispenser", {source}};
   compensation::write_trajectory(text, trajectory);
   text.write(file);
-  co_await change_model(compensation::MODEL_STAGE, file.string());
-  co_await change_model(compensation::MODEL_ACTIVATE, file.string());
+  std::string path;
+  co_await deliver(owner_, aim_, file, path);
+  co_await change_model(compensation::MODEL_STAGE, path);
+  co_await change_model(compensation::MODEL_ACTIVATE, path);
 }
 
 /// One picture with everything on it that vision found; its answer is in the inbox afterwards.

@@ -2,6 +2,7 @@
 #include <stdexcept>
 
 #include "components/calibration/calibration.hpp"
+#include "components/calibration/deliver.hpp"
 
 namespace invar::calibration {
 
@@ -43,8 +44,10 @@ Task Calibration::clear_models(const std::string& layers) {
 
 /// Activates a model on trial and waits until its correction is eased in.
 Task Calibration::use_model(const std::filesystem::path& model) {
-  co_await command_model(compensation::MODEL_STAGE, model.string());
-  co_await command_model(compensation::MODEL_ACTIVATE, model.string());
+  std::string path;
+  co_await deliver(*this, model_, model, path);
+  co_await command_model(compensation::MODEL_STAGE, path);
+  co_await command_model(compensation::MODEL_ACTIVATE, path);
   co_await wait(1.0);
 }
 

@@ -15,6 +15,7 @@
 namespace invar {
 
 class CellFolders;
+class ModelCourier;
 class Port;
 class InputPort;
 
@@ -108,6 +109,8 @@ class Component {
   std::uint32_t id = 0;
   /// Where files lie that a command may name; null: everywhere, as in a test. Set before configure.
   std::shared_ptr<const CellFolders> folders;
+  /// Brings models to components on other PCs; null: every file is found where it was written. Set before configure.
+  ModelCourier* courier = nullptr;
   /// Time is simulated: whatever waits for the outside must do so inside `step` (a Modbus exchange), so that runs repeat.
   bool simulated_time = false;
 

@@ -29,6 +29,13 @@ void FaultList::add(Fault fault) {
     first_beyond_.emplace(kind, std::move(fault));
 }
 
+void FaultList::withdraw(const std::string& where, const std::string& what) {
+  const auto meant = [&](const Fault& fault) { return fault.where == where && fault.what == what; };
+  if (std::erase_if(kept_, meant) == 0) return;
+  seen_.erase({where, what});
+  --kinds_[kind_of(what)];
+}
+
 std::vector<Fault> FaultList::all() const {
   std::vector<Fault> faults = kept_;
   for (const auto& [kind, fault] : first_beyond_) {

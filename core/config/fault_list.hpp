@@ -16,6 +16,8 @@ namespace invar::config {
 class FaultList {
  public:
   void add(Fault fault);
+  /// One that another fault explains, if it was added.
+  void withdraw(const std::string& where, const std::string& what);
   /// How many were added, each place and fault once.
   [[nodiscard]] std::size_t count() const { return seen_.size(); }
   /// Those kept, in order; for each kind with more, one that says how many.

@@ -23,17 +23,11 @@ namespace {
 
 using detail::Document;
 using detail::joined;
+using detail::located;
 using detail::Place;
 
 int line_of(const YAML::Node& node, int otherwise) {
   return node.IsDefined() && !node.IsNull() && !node.Mark().is_null() ? node.Mark().line + 1 : otherwise;
-}
-
-std::string located(const Document& document, const Place& place) {
-  std::string where = document.file.string();
-  if (place.line > 0) where += ":" + std::to_string(place.line);
-  if (!place.path.empty()) where += ": " + place.path;
-  return where;
 }
 
 Yaml fail(const std::filesystem::path& file, const std::string& what, const std::string& mend) {
@@ -101,6 +95,8 @@ void Node::fault(std::string what, std::string mend) const {
   document_->faults.add({where(), std::move(what), std::move(mend)});
 }
 
+void Node::missing(std::string mend) const { fault(detail::missing, std::move(mend)); }
+
 bool Node::has(std::string_view name) const { return (*this)[name].exists(); }
 
 Node Node::operator[](std::string_view name) const {
@@ -131,8 +127,7 @@ Node Node::operator[](std::string_view name) const {
 Node Node::required(std::string_view name) const {
   if (is_list()) fault("a map is expected here", "write `" + std::string{name} + ": ...` below it");
   Node child = (*this)[name];
-  if (!child.exists() && !child.place_->empty && is_map())
-    child.fault("missing", "add `" + std::string{name} + ":`");
+  if (!child.exists() && !child.place_->empty && is_map()) child.missing("add `" + std::string{name} + ":`");
   return child;
 }
 
@@ -185,7 +180,7 @@ Quantity Node::as_quantity(std::string_view unit, Range range) const {
   const double harmless =
       range.contains(0.0) ? 0.0 : (std::isfinite(range.lower) ? range.lower : range.upper);
   if (!exists()) {
-    fault("missing", "write a number here");
+    missing("write a number here");
     return {harmless, std::nullopt};
   }
   Node number = *this;

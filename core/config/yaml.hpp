@@ -49,6 +49,8 @@ class Node {
   [[nodiscard]] bool is_scalar() const;
   /// Records a fault at this place, once.
   void fault(std::string what, std::string mend = "") const;
+  /// Records that this place is missing; a key beside it that is a misspelling of this one takes the fault's place.
+  void missing(std::string mend) const;
 
   [[nodiscard]] bool has(std::string_view name) const;
   /// The child, which may not exist; marks the key as known. A key without value is a fault.

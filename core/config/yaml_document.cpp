@@ -5,6 +5,13 @@
 
 namespace invar::config::detail {
 
+std::string located(const Document& document, const Place& place) {
+  std::string where = document.file.string();
+  if (place.line > 0) where += ":" + std::to_string(place.line);
+  if (!place.path.empty()) where += ": " + place.path;
+  return where;
+}
+
 std::string joined(const std::string& path, const std::string& key) {
   return path.empty() ? clipped(key) : path + "." + clipped(key);
 }
@@ -34,6 +41,7 @@ void collect_keys_at(const Document& document, const Place& place, FaultList& fa
     std::string mend = "remove it, or use one of: ";
     if (const std::string near = nearest(key, known); !near.empty()) {
       mend = "did you mean `" + near + "`?";
+      if (const auto meant = place.child(near)) faults.withdraw(located(document, *meant), missing);
     } else {
       for (const auto& name : known) mend += (name == known.front() ? "" : ", ") + name;
     }

@@ -57,6 +57,11 @@ struct Document {
   FaultList faults;
 };
 
+/// The fault of a place that is needed and not there.
+inline constexpr const char* missing = "missing";
+
+/// "file:line: path" of a place.
+std::string located(const Document& document, const Place& place);
 /// The path of a key below a path.
 std::string joined(const std::string& path, const std::string& key);
 

@@ -115,8 +115,8 @@ void read_parameters(const Node& root, Model& model) {
   for (const auto& row : parameter_rows(model.plant)) {
     if (!node.has(row.name)) {
       if (row.required)
-        node.fault(std::string{"`"} + row.name + "` is missing",
-                   std::string{"add `"} + row.name + ": {value: ..., unit: " + row.unit + ", sigma: ...}`");
+        node[row.name].missing(std::string{"add `"} + row.name + ": {value: ..., unit: " + row.unit +
+                               ", sigma: ...}`");
       continue;
     }
     std::string unit = row.unit;

@@ -206,7 +206,7 @@ class Looking(unittest.TestCase):
             self.assertEqual(status, 0, (name, out, err))
 
         text = ends["status"][1]
-        for word in ("motion", "heat", "calibration", "stage_x", "simulated_stage", "active", "not asked", "motion latency",
+        for word in ("motion", "heat", "calibration", "stage_x", "simulated_stage", "active", "granted", "motion latency",
                      "stage_x.feedback", "step"):
             self.assertIn(word, text)
         self.assertNotIn("\x1b", text, "no colours in a pipe")
@@ -601,8 +601,9 @@ class Running(unittest.TestCase):
             words = ["setpriv", "--bounding-set=-sys_nice", "--inh-caps=-sys_nice", *words]
         run = subprocess.run(words, cwd=file.parent, capture_output=True, text=True, timeout=200)
         self.assertEqual(run.returncode, 0, run.stderr)
-        self.assertRegex(run.stdout, r"not granted +motion: realtime.priority: SCHED_FIFO priority 20 not granted")
-        self.assertRegex(run.stdout, r"late input +stage_x.feedback: \d+ of \d+ steps read a sample older than 0.01 ms")
+        said = " ".join(run.stdout.split())  # a table keeps to its line
+        self.assertIn("not granted motion: realtime.priority: SCHED_FIFO priority 20 not granted", said)
+        self.assertRegex(said, r"late input stage_x.feedback: \d+ of \d+ steps read a sample older than 0.01 ms")
         self.assertNotRegex(run.stdout, r"^(report|recording)")
 
     def test_a_run_that_fails_names_only_what_is_there(self):
@@ -684,7 +685,7 @@ class OnThisHost(unittest.TestCase):
         for file, complains in ((good, False), (bad, True)):
             env = dict(os.environ, FASTRTPS_DEFAULT_PROFILES_FILE=str(file))
             _, out, err = invar("status", "--domain", 98, "--address", "127.0.0.1", "--wait", 0.1, env=env)
-            self.assertEqual("XML" in out + err, complains, out + err)
+            self.assertEqual("Error parsing" in out + err, complains, out + err)
         import xml.etree.ElementTree as tree
         names = [p.get("name") for p in tree.fromstring(invar("profiles", "--xml", "cyclone")[1].encode()).iter()
                  if p.tag.endswith("qos_profile")]

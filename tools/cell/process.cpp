@@ -33,6 +33,7 @@
 #include "tools/cell/component_faults.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/node_courier.hpp"
 #include "tools/cell/notice_log.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
@@ -87,6 +88,7 @@ class RunningProcess {
     models.emplace_back(received_models);
     const auto folders = std::make_shared<const CellFolders>(std::move(models), loaded.result_places);
     for (LoadedComponent& member : process.components) {
+      member.component->courier = &courier_;
       member.component->simulated_time = options.simulated;
       member.component->folders = folders;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
@@ -495,6 +497,7 @@ class RunningProcess {
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
+  NodeCourier courier_{node_, *loaded_.cell, file_.host};
   AddressWatch address_{node_.options().addresses.empty() ? "127.0.0.1" : node_.options().addresses.front()};
   std::vector<std::string> faults_at_end_;
   std::deque<stage::AxisState> axes_;  // newest state of each, the loop's; addresses stay

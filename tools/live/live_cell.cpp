@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/dds/domain_ports.hpp"
+#include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
 #include "tools/live/interrupt.hpp"
 
@@ -136,6 +137,10 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
   where_ = "domain " + std::to_string(options.domain);
   ports_ = dds::DomainPorts{options.domain}.text();
   node_ = std::make_unique<dds::Node>(options, profiles);
+  // A profiles file in the environment that Fast DDS does not understand shows here and nowhere else.
+  (void)dds::newest_middleware_error();  // waits until all are said
+  for (const auto& error : dds::take_middleware_errors())
+    std::cerr << call.command << ": Fast DDS reports: " << error << '\n';
   if (cell_) {
     name_ = cell_->name;
   } else if (need == Need::nobody || !call.cell.empty()) {

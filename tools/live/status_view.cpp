@@ -18,7 +18,7 @@ nlohmann::ordered_json json_of(const lifecycle::Percentiles& p) {
 std::string clock_text(const lifecycle::ProcessStatus& process) {
   if (process.pid() == 0) return "ended";
   if (process.simulated()) return "simulated";
-  if (!process.realtime_asked()) return "not asked";
+  if (!process.realtime_asked()) return "no";
   return process.realtime_granted() ? "granted" : "not granted";
 }
 

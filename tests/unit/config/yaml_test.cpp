@@ -53,6 +53,12 @@ TEST(Yaml, SuggestsTheKeyThatWasMeant) {
   EXPECT_EQ(only_fault(yaml), "a.yaml:2: intervall: unknown key; did you mean `interval`?");
 }
 
+TEST(Yaml, AMisspeltKeyIsOneFaultAndNotAMissingOneBesideIt) {
+  const auto yaml = Yaml::parse("loop:\n  rat: 500\n", "a.yaml");
+  (void)yaml.root()["loop"].number("rate", "Hz");
+  EXPECT_EQ(only_fault(yaml), "a.yaml:2: loop.rat: unknown key; did you mean `rate`?");
+}
+
 TEST(Yaml, RefusesAKeyThatStandsTwiceAtAnyDepth) {
   const auto yaml = Yaml::parse("loop:\n  rate: 500\n  rate: 100\n", "a.yaml");
   (void)yaml.root()["loop"].number("rate", "Hz");

@@ -1,0 +1,16 @@
+// deliver: a model of a job, brought to where the component that shall use it finds it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "components/calibration/task.hpp"
+#include "core/component/port.hpp"
+
+namespace invar::calibration {
+
+/// `found`: the path for a command on `output`. Throws std::runtime_error where the file could not be brought. In simulated
+/// time all within one step, so that runs repeat.
+Task deliver(const Component& owner, const Port& output, std::filesystem::path file, std::string& found);
+
+}  // namespace invar::calibration
