@@ -300,8 +300,9 @@ class Looking(unittest.TestCase):
         same(writers[1], writers[2], "writer")
         self.assertEqual(list(writers[0]), list(writers[1])[:4])
         self.assertEqual([w["guid"] for w in writers], [writers[0]["guid"]] * 3)
-        same(running[0], one[0], "parameter")
-        same(running[0], types[0], "parameter of a type")
+        shown, declared = (next(p for p in some if p["path"] == one[0]["path"]) for some in (running, types))
+        same(shown, one[0], "parameter")
+        same(shown, declared, "parameter of a type")
         self.assertEqual((one[0]["value"], one[0]["unit"], type(one[0]["lower"])), (one[0]["value"] + 0, "degC", float))
         self.assertEqual((sample["topic"], sample["units"]["position"]), (state, "m"))
         # What the table of the reference names is there.

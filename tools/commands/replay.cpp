@@ -131,7 +131,7 @@ int replay(Options& options) {
 
   LiveCell cell{options.call, LiveCell::Need::nobody};
   std::map<std::string, Channel> channels;
-  cell.settle(std::chrono::seconds{3});  // on a busy PC a writer may be late to say that it is there
+  cell.settle();
   if (const auto taken = written_already(cell, selection.topics); !taken.empty() && !options.beside) {
     for (const std::string& topic : taken)
       std::cerr << "invar replay: `" << topic

@@ -99,6 +99,11 @@ int top(Options& options) {
                    }};
   if (!options.no_topics) cell.settle();  // so that the first look finds all of them
   watch.look();
+  const auto asked = std::chrono::steady_clock::now();
+  while (!watch.hears_all() &&
+         std::chrono::steady_clock::now() - asked < std::chrono::nanoseconds{cell.patience().ns} &&
+         sleep_for(Duration::milliseconds(20))) {
+  }
   Looks looks;
   Silence silence;
   const bool screen = isatty(STDOUT_FILENO) != 0 && !options.once && !options.json;

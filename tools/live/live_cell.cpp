@@ -214,7 +214,8 @@ bool LiveCell::knows_all(const dds::Snapshot& snapshot) const {
                      });
 }
 
-void LiveCell::settle(std::chrono::seconds silence) {
+void LiveCell::settle() {
+  constexpr std::chrono::seconds silence{3};
   std::size_t known = 0;
   auto since = Clock::now();
   wait_until(patience_, [&] {

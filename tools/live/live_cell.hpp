@@ -73,8 +73,9 @@ class LiveCell {
   /// Returns the processes that did not.
   std::vector<std::string> wait_for_processes();
   /// Waits until all writers and readers of the cell's processes have been discovered; where others take part, whom nobody
-  /// can ask how many they have, until nothing new has been for so long.
-  void settle(std::chrono::seconds silence = std::chrono::seconds{1});
+  /// can ask how many they have, until nothing new has been for 3 s: a participant
+  /// that missed the first announcements hears the next after 1.5 s.
+  void settle();
   /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.
   std::vector<dds::Endpoint> wait_for_writers(const std::string& text);
   [[nodiscard]] std::string topic(const std::string& text) const;

@@ -93,6 +93,11 @@ void TopicWatch::look() {
   }
 }
 
+bool TopicWatch::hears_all() const {
+  return std::all_of(readers_.begin(), readers_.end(),
+                     [](const auto& reader) { return reader.second->matched() > 0; });
+}
+
 std::map<std::string, Flows> TopicWatch::flows() const {
   const std::lock_guard lock{mutex_};
   return flows_;

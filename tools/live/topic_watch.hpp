@@ -57,6 +57,8 @@ class TopicWatch {
 
   /// Begins to read the wanted topics that were discovered since the last call.
   void look();
+  /// Each topic that is read has found a writer; before that its rate is no rate.
+  [[nodiscard]] bool hears_all() const;
   [[nodiscard]] std::size_t topics() const { return readers_.size(); }
   /// By topic and writer.
   [[nodiscard]] std::map<std::string, Flows> flows() const;
