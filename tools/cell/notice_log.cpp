@@ -46,25 +46,54 @@ void NoticeLog::write_waiting() {
   }
   if (lost > told_lost_) spdlog::warn("{} notices came too fast to be written here", lost - told_lost_);
   told_lost_ = lost;
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_count_) return;
+  next_count_ = now + std::chrono::seconds{1};
+  write_repeated(repeats_after);
+}
+
+void NoticeLog::write_last() {
+  write_waiting();
+  write_repeated({});
 }
 
 void NoticeLog::write(const event::Notice& notice) {
   if (notice.level() == event::SEVERITY_NOTE) return;
   const auto now = std::chrono::steady_clock::now();
-  std::string line = std::string{notice.source().c_str()} + ": " + notice.text().c_str();
   {
     const std::scoped_lock lock{mutex_};
     if (said_.size() > remembered_most) said_.clear();
     const auto [said, is_new] =
-        said_.try_emplace({notice.source().c_str(), notice.text().c_str()}, Said{now, 0});
-    if (!is_new && now - said->second.at < repeats_after) {
+        said_.try_emplace({notice.source().c_str(), notice.text().c_str()}, Said{now});
+    if (!is_new) {
       ++said->second.more;
+      said->second.newest = notice;
       return;
     }
-    if (said->second.more > 0)
-      line += " (" + std::to_string(said->second.more) + " times more since the last line)";
-    said->second = {now, 0};
   }
+  write_line(notice, 0);
+}
+
+/// A text that was said again after its line is told with its count some time after that line, and forgotten otherwise.
+void NoticeLog::write_repeated(std::chrono::steady_clock::duration after) {
+  const auto now = std::chrono::steady_clock::now();
+  const std::scoped_lock lock{mutex_};
+  for (auto said = said_.begin(); said != said_.end();) {
+    if (now - said->second.at < after) {
+      ++said;
+    } else if (said->second.more == 0) {
+      said = said_.erase(said);
+    } else {
+      write_line(said->second.newest, said->second.more);
+      said->second = {now};
+      ++said;
+    }
+  }
+}
+
+void NoticeLog::write_line(const event::Notice& notice, std::uint64_t more) const {
+  std::string line = std::string{notice.source().c_str()} + ": " + notice.text().c_str();
+  if (more > 0) line += " (" + std::to_string(more) + " times more since the last line)";
   if (simulated_) line = "at " + shown(static_cast<double>(notice.at().time_ns()) * 1e-9, 6) + " s: " + line;
   spdlog::log(level_of(notice.level()), "{}", line);
 }

@@ -69,7 +69,8 @@ std::optional<AddressWatch::News> AddressWatch::look() {
   is_there_ = is_there;
   if (is_there) return News{true, address_ + " is back: this process hears other PCs again"};
   return News{false,
-              "no running interface of this PC has " + address_ + " any more (it has " +
+              "no running interface of this PC has " + address_ + " any more" +
+                  (++gone_ == 1 ? "" : ", " + std::to_string(gone_) + " times by now") + " (it has " +
                   dds::own_addresses_text() +
                   "): other PCs do not hear this process; look for the cable and the network's settings"};
 }

@@ -33,6 +33,7 @@ class AddressWatch {
  private:
   std::string address_;
   bool is_there_ = true;
+  int gone_ = 0;  // each time is news: the log must not take it for a repetition
   Instant looked_{INT64_MIN / 2};
 };
 

@@ -310,7 +310,7 @@ class RunningProcess {
     status_ = control_.status();
     if (!resting_) faults_at_end_ = faults();
     control_.stop();
-    log_.write_waiting();
+    log_.write_last();
     write_outcome();
     service_.reset();
   }
