@@ -145,7 +145,8 @@ class Warm(unittest.TestCase):
 
         taken.close()
         alive = self.wait_for("it to live", lambda: (lambda p: p if p["pid"] else None)(self.process("device")))
-        self.assertGreater(alive["restarts"], 7)
+        # As many as in the pause, where the port was free before its end.
+        self.assertGreaterEqual(alive["restarts"], ended["restarts"])
         self.assertEqual(alive["last_end"], "status 1")
         self.wait_for("a cell that is well", lambda: self.status()[1]["healthy"])
         self.assertEqual(self.end(run), 0, self.log())
