@@ -3,7 +3,7 @@
 # their processes give back what each took. Resident and locked memory after the first sixth (at least 30) and after all.
 # many_models.sh INVAR SOURCE_DIR [MODELS]
 set -euo pipefail
-invar=$1 source=$2 models=${3:-${INVAR_MODELS:-90}}
+invar=$1 source=$2 models=${3:-${INVAR_MODELS:-66}}
 source "$source/tests/cell/own_cell.sh"
 own_cell print-cell "$source" 15030
 cd "$folder"
