@@ -9,7 +9,6 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -27,10 +26,10 @@
 #include "core/executor/locked_memory.hpp"
 #include "core/executor/process_control.hpp"
 #include "core/recording/type_book.hpp"
-#include "idl/job.h"
 #include "idl/stage.h"
 #include "tools/cell/black_box_file.hpp"
 #include "tools/cell/component_faults.hpp"
+#include "tools/cell/job_follower.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/cell/node_courier.hpp"
@@ -106,7 +105,7 @@ class RunningProcess {
       faults_.watch(index, port);
       log_.follow(port);
     });
-    watch_job();
+    follow_job();
     service_ = std::make_unique<dds::ProcessService>(
         node_, control_,
         dds::ProcessService::Options{
@@ -202,35 +201,17 @@ class RunningProcess {
     return lines;
   }
 
-  /// Prepares the command that starts the job, for the inbox of the component that runs it once that is active, and follows
-  /// its status.
-  void watch_job() {
+  void follow_job() {
     const auto found = loaded_.cell->jobs.find(options_.job);
     if (found == loaded_.cell->jobs.end()) return;
     const auto index = executor_.find(found->second);
     if (!index) return;
-    Component& component = executor_.component(*index);
-    auto* inbox = dynamic_cast<Inbox<job::JobCommand>*>(component.find_port("job"));
-    auto* status = dynamic_cast<Output<job::JobStatus>*>(component.find_port("status"));
-    if (inbox == nullptr || status == nullptr)
-      throw InputError{loaded_.cell->file.string() + ": jobs." + options_.job,
-                       "`" + found->second + "` runs no jobs",
+    try {
+      job_.follow(executor_.component(*index), options_.job);
+    } catch (const std::invalid_argument& error) {
+      throw InputError{loaded_.cell->file.string() + ": jobs." + options_.job, error.what(),
                        "name a component with the ports `job` and `status`"};
-    runs_job_ = true;
-    status->add_sink([this](const job::JobStatus& sample, Instant) {
-      const std::scoped_lock lock{job_mutex_};
-      if (sample.phase() == job::JOB_RUNNING && job_.phase() != job::JOB_RUNNING)
-        job_began_ns_ = sample.at().time_ns();
-      job_ = sample;
-      job_ended_ = sample.phase() == job::JOB_DONE || sample.phase() == job::JOB_FAILED ||
-                   sample.phase() == job::JOB_CANCELLED;
-    });
-    job::JobCommand command;
-    command.cell(loaded_.cell->id);
-    command.id(1);
-    command.kind(job::JOB_RUN);
-    command.name(options_.job);
-    start_job_ = [lane = inbox->add_lane(), command] { lane(command, Instant{0}); };
+    }
   }
 
   Duration separation(std::size_t component, const Port& port) const {
@@ -246,7 +227,7 @@ class RunningProcess {
       spdlog::error("{}: cannot {}: {}", file_.name, to_text(transition), outcome.reason);
       return false;
     }
-    if (start_job_) start_job_();
+    job_.start();
     return true;
   }
 
@@ -291,7 +272,7 @@ class RunningProcess {
     const bool up = bring_up();
     service_->publish_status();  // who waits for the cell need not wait for the next regular one
     for (bool over = false; up && !over && !orders.stop.load() && !asked_to_stop_ && executor_.is_running() &&
-                            (!job_ended_ || resting_);) {
+                            (!job_.has_ended() || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (const std::string refused = memory_.look(); !refused.empty()) say(event::SEVERITY_WARNING, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
@@ -319,7 +300,7 @@ class RunningProcess {
   bool ended_well() {
     if (options_.launcher == 0)
       for (const std::string& line : faults_at_end_) spdlog::error("at the end: {}", line);
-    return job_succeeded() && (options_.launcher != 0 || faults_at_end_.empty());
+    return job_.is_well() && (options_.launcher != 0 || faults_at_end_.empty());
   }
 
   int run_simulated(const std::atomic<bool>& stop) {
@@ -353,7 +334,7 @@ class RunningProcess {
         [&] {
           leave_progress();
           log_.write_waiting();
-          return !options_.job.empty() && (!runs_job_ || job_ended_.load());
+          return !options_.job.empty() && (!job_.runs() || job_.has_ended());
         },
         stop);
     if (!outcome.failure.empty()) spdlog::error("{}: {}", file_.name, outcome.failure);
@@ -416,9 +397,9 @@ class RunningProcess {
   }
 
   void leave_progress() {
-    if (!runs_job_) return;
-    const std::scoped_lock lock{job_mutex_};
-    progress_.leave(job_.progress(), job_.text().c_str());
+    if (!job_.runs()) return;
+    const job::JobStatus status = job_.status();
+    progress_.leave(status.progress(), status.text().c_str());
   }
 
   void watch_address() {
@@ -429,14 +410,9 @@ class RunningProcess {
   }
 
   void say_how_the_job_ended() {
-    const std::scoped_lock lock{job_mutex_};
-    if (runs_job_ && job_ended_ && job_.phase() != job::JOB_DONE)
-      spdlog::error("job `{}` failed: {}", job_.name().c_str(), job_.text().c_str());
-  }
-
-  bool job_succeeded() {
-    const std::scoped_lock lock{job_mutex_};
-    return !runs_job_ || !job_ended_ || job_.phase() == job::JOB_DONE;
+    if (job_.is_well()) return;
+    const job::JobStatus status = job_.status();
+    spdlog::error("job `{}` failed: {}", status.name().c_str(), status.text().c_str());
   }
 
   static recorder::Source source(const std::string& topic, const std::string& type,
@@ -478,22 +454,16 @@ class RunningProcess {
     outcome["faults"] = faults_at_end_;
     if (recorder_ != nullptr && std::filesystem::exists(recorder_->file()))
       outcome["recording"] = std::filesystem::absolute(recorder_->file()).string();
-    if (runs_job_) {
-      const std::scoped_lock lock{job_mutex_};
-      outcome["job"] = {{"name", job_.name().c_str()},
-                        {"done", job_.phase() == job::JOB_DONE},
-                        {"text", job_.text().c_str()},
-                        {"result", job_.result_path().c_str()},
-                        {"seconds", static_cast<double>(job_.at().time_ns() - job_began_ns_) * 1e-9}};
-    }
+    if (job_.runs()) outcome["job"] = job_.outcome();
     write_whole(options_.outcome, outcome);
   }
 
   const ProcessOptions& options_;
   LoadedCell& loaded_;
   const config::CellProcess& file_;
-  ComponentFaults faults_;  // before the executor, whose components write into these two
+  ComponentFaults faults_;  // before the executor, whose components write into these three
   NoticeLog log_{options_.simulated};
+  JobFollower job_;
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;
@@ -514,12 +484,6 @@ class RunningProcess {
   std::vector<std::unique_ptr<dds::Connection>> topics_;
   std::set<std::string> recorded_;
   ProcessStatus status_;
-  bool runs_job_ = false;
-  std::function<void()> start_job_;
-  std::mutex job_mutex_;
-  job::JobStatus job_;
-  std::int64_t job_began_ns_ = 0;
-  std::atomic<bool> job_ended_{false};
   ProgressFile progress_{options_.outcome};
 };
 
