@@ -13,7 +13,8 @@ namespace invar::thermal {
 namespace {
 
 metrology::Thermistor equation_of(const Thermal::Thermistor& parameters) {
-  return {parameters.resistance, parameters.base_temperature, parameters.coefficient_percent};
+  return {parameters.resistance, parameters.base_temperature, parameters.coefficient_percent,
+          parameters.third_order};
 }
 
 event::Severity severity_of(modbus::HealthChange::Level level) {

@@ -46,10 +46,13 @@ class Thermal final : public Component {
     double resistance = 1000.0;
     double base_temperature = 25.0;
     double coefficient_percent = 4.4;
+    double third_order = 0.0;
     void describe(auto& p) {
       p(resistance, "resistance", "ohm", Range{1.0, 1e7}, "at the base temperature");
       p(base_temperature, "base_temperature", "degC", Range{-50.0, 150.0}, "where that resistance holds");
       p(coefficient_percent, "coefficient", "%/K", Range{1e-3, 20.0}, "loss of resistance per kelvin there");
+      p(third_order, "third_order", "1/K", Range{-1e-5, 1e-5},
+        "C of the Steinhart-Hart equation in ln(R / 1 ohm); 0: the B law");
     }
   };
   struct Response {

@@ -46,14 +46,36 @@ ThermistorFit fit_of(const Options& options, const std::vector<double>& temperat
   return fit;
 }
 
+std::string law_of(const ThermistorFit& fit) {
+  return fit.thermistor.third_order == 0.0
+             ? "B law"
+             : "Steinhart-Hart with C = " + number(fit.thermistor.third_order, 6) + " 1/K";
+}
+
+/// Each reading by the equation from all others: how far one between them may be off.
+std::string held_out_text(const ThermistorFit& fit) {
+  if (!std::isfinite(fit.held_out_b)) return "two readings leave nothing to check the equation with";
+  std::string text = "a reading left out is predicted to " + si(fit.held_out_b, "K") + " RMS by the B law";
+  if (std::isfinite(fit.held_out_steinhart_hart))
+    text += ", to " + si(fit.held_out_steinhart_hart, "K") + " by Steinhart-Hart";
+  return text;
+}
+
+/// Of a temperature by the equation [K].
+double sigma_of(const ThermistorFit& fit) {
+  const double held_out = fit.thermistor.third_order == 0.0 ? fit.held_out_b : fit.held_out_steinhart_hart;
+  return std::isfinite(held_out) ? held_out : fit.rms;
+}
+
 report::Page page_of(const Options& options, const std::vector<double>& temperature,
                      const std::vector<double>& resistance, const ThermistorFit& fit) {
   report::Page page{"Thermistor", options.readings.filename().string()};
   page.callout(number(fit.thermistor.resistance_at_base, 6) + " ohm at " +
                    number(options.base_temperature, 4) + " degC, " +
-                   number(fit.thermistor.coefficient_percent, 4) + " %/K; the readings are met to " +
-                   si(fit.rms, "K") + " RMS",
-               "good");
+                   number(fit.thermistor.coefficient_percent, 4) + " %/K, " + law_of(fit) +
+                   "; the readings are met to " + si(fit.rms, "K") + " RMS, the worst to " +
+                   si(fit.largest, "K") + "; " + held_out_text(fit) + ".",
+               "plain");
   report::Plot curve;
   curve.title = "Resistance";
   curve.x_label = "temperature [degC]";
@@ -93,26 +115,37 @@ void calibrate(const Options& options) {
   const ThermistorFit fit = fit_of(options, temperature, resistance);
   const Thermistor& found = fit.thermistor;
   compensation::ModelText text{"thermistor", {options.readings}};
-  text.comment("R = resistance exp((coefficient / 100) T_B^2 (1/T - 1/T_B)), T in kelvin")
+  text.comment(
+          "1/T = 1/T_B + (x - x_B) / B + C (x^3 - x_B^3 - 3 x_B^2 (x - x_B)), T in kelvin, x = ln(R / 1 "
+          "ohm), "
+          "B = (coefficient / 100) T_B^2, C = third_order")
       .number("resistance", found.resistance_at_base)
       .number("base_temperature", found.base_temperature)
       .number("coefficient", found.coefficient_percent)
-      .number("sigma", fit.rms);
+      .number("third_order", found.third_order)
+      .number("sigma", sigma_of(fit));
   const bool known = std::isfinite(fit.sigma_coefficient);
   nlohmann::json report{{"kind", "thermistor"},
                         {"readings", table.rows()},
                         {"resistance_ohm", found.resistance_at_base},
                         {"base_temperature_degC", found.base_temperature},
                         {"coefficient_percent_per_K", found.coefficient_percent},
+                        {"third_order_per_K", found.third_order},
                         {"rms_K", fit.rms},
+                        {"largest_K", fit.largest},
                         {"unidentified", nlohmann::json::array()}};
   if (known) report["sigma_coefficient_percent_per_K"] = fit.sigma_coefficient;
+  if (std::isfinite(fit.held_out_b)) report["held_out_b_law_K"] = fit.held_out_b;
+  if (std::isfinite(fit.held_out_steinhart_hart))
+    report["held_out_steinhart_hart_K"] = fit.held_out_steinhart_hart;
   write_calibration(options.out, text, report, page_of(options, temperature, resistance, fit));
-  std::cout << "thermistor from " << table.rows() << " readings, met to " << si(fit.rms, "K") << " RMS\n"
+  std::cout << "thermistor from " << table.rows() << " readings, " << law_of(fit) << ", met to "
+            << si(fit.rms, "K") << " RMS, the worst to " << si(fit.largest, "K") << '\n'
+            << held_out_text(fit) << '\n'
             << "in the cell file: thermistor: {resistance: " << number(found.resistance_at_base, 7)
             << ", base_temperature: " << number(found.base_temperature, 5)
-            << ", coefficient: " << number(found.coefficient_percent, 6) << "}\n";
-  if (!known) std::cout << "note: two readings leave nothing to check the equation with\n";
+            << ", coefficient: " << number(found.coefficient_percent, 6)
+            << (found.third_order == 0.0 ? "" : ", third_order: " + number(found.third_order, 7)) << "}\n";
   std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
@@ -135,7 +168,8 @@ recording::Table predict_thermistor(const config::Yaml& file, const recording::T
   file.root()["identified_from"].accept_all();
   const Thermistor found{file.root().number("resistance", "ohm", Range::positive()),
                          file.root().number("base_temperature", "degC", Range{-200.0, 500.0}),
-                         file.root().number("coefficient", "1", Range::positive())};
+                         file.root().number("coefficient", "1", Range::positive()),
+                         file.root().has("third_order") ? file.root().number("third_order", "1/K") : 0.0};
   const double rms = file.root().number("sigma", "K", Range::not_negative());
   file.finish();
   std::vector<double> temperature = inputs.in("resistance", "ohm");

@@ -37,6 +37,43 @@ TEST(Thermistor, IsCalibratedFromReadings) {
   EXPECT_LT(fit.rms, 1e-9);
 }
 
+/// 10 kOhm NTC of many data sheets: 1/T = A + B ln R + C ln(R)^3, 25 degC at 10 kOhm.
+double steinhart_hart(double resistance) {
+  const double x = std::log(resistance);
+  return 1.0 / (1.129148e-3 + 2.34125e-4 * x + 8.76741e-8 * x * x * x) - 273.15;
+}
+
+TEST(Thermistor, IsSteinhartHartWhereThatPredictsReadingsBetter) {
+  Eigen::VectorXd r(15), t(15);
+  for (Eigen::Index i = 0; i < 15; ++i) r(i) = 400.0 * std::pow(1.42, static_cast<double>(i));
+  for (Eigen::Index i = 0; i < 15; ++i) t(i) = steinhart_hart(r(i));
+  const ThermistorFit fit = fit_thermistor(t, r);
+  EXPECT_GT(fit.thermistor.third_order, 0.0);
+  EXPECT_NEAR(fit.thermistor.third_order, 8.76741e-8, 1e-12);
+  EXPECT_NEAR(fit.thermistor.resistance_at_base, 1e4, 1.0);
+  EXPECT_GT(fit.held_out_b, 0.3);
+  for (double resistance = 450.0; resistance < 5e4; resistance *= 1.3) {
+    EXPECT_NEAR(fit.thermistor.temperature(resistance), steinhart_hart(resistance), 1e-6);
+    EXPECT_NEAR(fit.thermistor.resistance(steinhart_hart(resistance)), resistance, 1e-6 * resistance);
+  }
+}
+
+TEST(Thermistor, StaysWithTheBLawWhereNothingSpeaksAgainstIt) {
+  const Thermistor truth{1013.0, 25.0, 4.1};
+  int b_laws = 0;
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    std::mt19937 random{seed};
+    std::normal_distribution<double> normal;
+    const Eigen::VectorXd t = Eigen::VectorXd::LinSpaced(12, 10.0, 80.0);
+    const Eigen::VectorXd r =
+        t.unaryExpr([&](double at) { return truth.resistance(at + 0.02 * normal(random)); });
+    const ThermistorFit fit = fit_thermistor(t, r);
+    b_laws += fit.thermistor.third_order == 0.0 ? 1 : 0;
+    EXPECT_LT(std::abs(fit.thermistor.temperature(truth.resistance(45.0)) - 45.0), 0.05) << seed;
+  }
+  EXPECT_GT(b_laws, 30);
+}
+
 /// A stage with smooth geometry, expansion with curvature, and what else a test asks for.
 struct Stage {
   std::array<double, 5> geometry{};
