@@ -187,6 +187,7 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
                      "Fast DDS could not create a participant" + (said.empty() ? "" : " (" + said + ")"),
                      "look with `invar doctor` for the address, /dev/shm and the ports"};
   }
+  reception_->open();
   discovery_.add_participant(guid_text(participant_->guid().guidPrefix), name_);
   discovery_.add_source([reception = reception_]() -> std::optional<Alarm> {
     auto text = reception->report(monotonic_now());

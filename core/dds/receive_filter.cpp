@@ -1,12 +1,14 @@
 #include "core/dds/receive_filter.hpp"
-#include "core/dds/one_sender.hpp"
 
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastrtps/utils/IPLocator.h>
 
+#include <chrono>
 #include <cstring>
 #include <span>
+#include <thread>
 
+#include "core/dds/one_sender.hpp"
 #include "core/dds/rtps_submessage.hpp"
 
 namespace invar::dds {
@@ -72,6 +74,7 @@ class Filter final : public transport::ChainingTransport {
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     // Nothing: memory that cannot be opened (shared_memory_calls.cpp), of another user or one that has ended. Lost, no flaw.
     if (size == 0 && local.kind == LOCATOR_KIND_SHM) return;
+    reception_->wait_until_open();
     const auto message = std::as_bytes(std::span{data, size});
     RtpsContent content;
     const Flaw flaw = examine(message, reception_->limits(), reception_->guard(), content);
@@ -125,6 +128,12 @@ void Reception::know_participant(const GuidPrefix& prefix) {
   for (const std::uint32_t writer :
        {participant_writer, participant_message_writer, publication_writer, subscription_writer})
     guard_.know(prefix, writer);
+}
+
+void Reception::wait_until_open() {
+  constexpr auto pause = std::chrono::microseconds{100};
+  for (int i = 0; i < 10'000 && !open_.load(std::memory_order_acquire); ++i)
+    std::this_thread::sleep_for(pause);
 }
 
 void Reception::drop(Flaw flaw, const rtps::Locator_t& sender) {

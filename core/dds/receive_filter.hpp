@@ -25,6 +25,12 @@ class Reception {
   /// The writers that discovery shows; those of discovery itself belong to each participant.
   void know_participant(const GuidPrefix& prefix);
 
+  /// The participant stands. Fast DDS 2.9.1 announces a participant before it takes in the first message, and throws away what
+  /// comes until then: the answer of a peer that is quick, which says the same again only after a second or more.
+  void open() { open_.store(true, std::memory_order_release); }
+  /// Receiving threads: until `open`, one second at most.
+  void wait_until_open();
+
   /// Receiving threads, without locks.
   void drop(Flaw flaw, const eprosima::fastrtps::rtps::Locator_t& sender);
   /// Messages dropped since the start, of one cause or of all.
@@ -36,6 +42,7 @@ class Reception {
  private:
   RtpsLimits limits_;
   SequenceGuard guard_;
+  std::atomic<bool> open_{false};
   std::array<std::atomic<std::uint64_t>, flaws> dropped_{};
   std::atomic<std::uint64_t> sender_{0};  // IPv4 address and port of the last one; 0: this PC's shared memory
   std::array<std::uint64_t, flaws> told_{};
