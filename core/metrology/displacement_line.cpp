@@ -81,6 +81,16 @@ void find_points(LineFit& work) {
       middle = static_cast<int>(i);
 }
 
+bool is_revisited(const LineFit& work) {
+  std::vector<int> last(work.first_row.size(), -1);
+  for (std::size_t i = 0; i < work.point_of.size(); ++i) {
+    int& before = last[static_cast<std::size_t>(work.point_of[i])];
+    if (before >= 0 && static_cast<std::size_t>(before) + 1 != i) return true;
+    before = static_cast<int>(i);
+  }
+  return false;
+}
+
 LineFit prepare(const DisplacementLine& line) {
   LineFit work;
   work.line = &line;
@@ -90,6 +100,7 @@ LineFit prepare(const DisplacementLine& line) {
   work.weights = Eigen::VectorXd::Ones(rows);
   work.regressors.resize(rows, nuisances);
   find_points(work);
+  work.revisited = is_revisited(work);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Reading& reading = line.readings[static_cast<std::size_t>(i)];
     const Eigen::Vector3d moved = reading.position + reading.tool - work.beam.start - work.beam.start_tool;
@@ -210,7 +221,7 @@ std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, 
   int pooled_lines = 0;
   for (LineFit& work : works) {
     fit_robustly(work, drift, floor * 0.1);
-    if (work.degrees < 15.0) continue;
+    if (work.degrees < 15.0 || !work.revisited) continue;
     ++pooled_lines;
     for (int k = 0; k < drift_terms; ++k) {
       const double c = work.nuisance[1 + k];

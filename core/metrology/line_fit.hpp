@@ -26,6 +26,7 @@ struct LineFit {
   Eigen::VectorXd y;           // reading minus nominal
   Eigen::MatrixXd regressors;  // rows x (reversal, drift, steps)
   std::vector<int> breaks;
+  bool revisited = false;  // some point is read again after others: only that tells drift from place
   bool expanding = false;  // expansion is a regressor, after the drift
   double temperature = std::numeric_limits<double>::quiet_NaN();
   Eigen::VectorXd weights;

@@ -155,6 +155,22 @@ TEST(Identification, TakesReadingsOnTheFly) {
   EXPECT_LT(left_over(machine, &found.model).rms, 0.3e-6);
 }
 
+// One pass cannot tell what drifts in time from what lies at the place, however many readings it has.
+TEST(Identification, OnePassKeepsItsErrorAndCallsNothingDrift) {
+  std::mt19937_64 random{25};
+  RecordProperty("seed", 25);
+  Laser laser;
+  laser.passes = 1;
+  laser.drift = 0.0;
+  for (const int readings : {60, 402, 701, 5000}) {
+    const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
+    const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), readings, random, laser));
+    for (const auto& line : found.lines) EXPECT_LT(std::abs(line.noise.drift), 1e-9) << readings;
+    // The noise of a reading averages out along the line; what the curves leave does not.
+    EXPECT_LT(left_over(machine, &found.model).rms, 0.3e-6 + 5e-6 / std::sqrt(readings)) << readings;
+  }
+}
+
 TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {
   std::mt19937_64 random{14};
   RecordProperty("seed", 14);
