@@ -46,6 +46,9 @@ void FusionObserver::reset() noexcept {
   velocity_memory_.fill({});
   information_.fill(0.0);
   steps_ = 0;
+  doubt_ = 0.0;
+  for (const VelocitySensorModel& sensor : model_.velocities)
+    doubt_ = std::max(doubt_, std::min(10.0 * sensor.gain_sigma, most_doubt));
   started_ = false;
 }
 
@@ -79,26 +82,35 @@ void FusionObserver::start(const FusionSample& sample) noexcept {
     mode.covariance.diagonal() = deviation.cwiseAbs2();
     mode.probability = 1.0 / models;
   }
-  counted_ = modes_;
+  unheld_ = modes_;
+  settled_at_ = x;
   started_ = true;
 }
 
-FusionObserver::State FusionObserver::mean() const noexcept {
+FusionObserver::State FusionObserver::mean(const Estimate& modes) const noexcept {
   State sum = State::Zero(states_);
-  for (const Mode& mode : modes_) sum += mode.probability * mode.mean;
+  for (const Mode& mode : modes) sum += mode.probability * mode.mean;
+  return sum;
+}
+
+/// Mean square distance of the position from `about` [m2].
+double FusionObserver::variance(const Estimate& modes, double about) noexcept {
+  double sum = 0.0;
+  for (const Mode& mode : modes)
+    sum += mode.probability * (mode.covariance(0, 0) + std::pow(mode.mean(0) - about, 2));
   return sum;
 }
 
 /// Interaction of the models: each starts the period from a mixture of all.
-void FusionObserver::mix() noexcept {
-  const auto before = modes_;
+void FusionObserver::mix(Estimate& modes) const noexcept {
+  const Estimate before = modes;
   std::array<double, models> total{};
   const auto& change = switching_;
   for (std::size_t j = 0; j < models; ++j)
     for (std::size_t i = 0; i < models; ++i)
       total[j] += (i == j ? 1.0 - change : change / (models - 1)) * before[i].probability;
   for (std::size_t j = 0; j < models; ++j) {
-    Mode& mode = modes_[j];
+    Mode& mode = modes[j];
     mode.mean.setZero();
     mode.covariance.setZero();
     std::array<double, models> share{};
@@ -115,14 +127,14 @@ void FusionObserver::mix() noexcept {
   }
 }
 
-void FusionObserver::predict(double dt) noexcept {
+void FusionObserver::predict(Estimate& modes, double dt) const noexcept {
   Eigen::Matrix3d transition;
   transition << 1.0, dt, 0.5 * dt * dt, 0.0, 1.0, dt, 0.0, 0.0, 1.0;
   Eigen::Matrix3d noise;
   noise << std::pow(dt, 5) / 20.0, std::pow(dt, 4) / 8.0, std::pow(dt, 3) / 6.0, std::pow(dt, 4) / 8.0,
       std::pow(dt, 3) / 3.0, dt * dt / 2.0, std::pow(dt, 3) / 6.0, dt * dt / 2.0, dt;
   for (std::size_t j = 0; j < models; ++j) {
-    Mode& mode = modes_[j];
+    Mode& mode = modes[j];
     const Eigen::Vector3d motion = transition * mode.mean.head<3>();
     mode.mean.head<3>() = motion;
     Eigen::Matrix3d own = transition * mode.covariance.topLeftCorner<3, 3>() * transition.transpose();
@@ -137,25 +149,27 @@ void FusionObserver::predict(double dt) noexcept {
   }
 }
 
-void FusionObserver::renormalise(const std::array<double, models>& likelihood) noexcept {
+void FusionObserver::renormalise(Estimate& modes, const std::array<double, models>& likelihood) noexcept {
   double total = 0.0;
   for (std::size_t j = 0; j < models; ++j) {
-    modes_[j].probability *= std::max(likelihood[j], 1e-30);
-    total += modes_[j].probability;
+    modes[j].probability *= std::max(likelihood[j], 1e-30);
+    total += modes[j].probability;
   }
   double floored = 0.0;
-  for (Mode& mode : modes_) {
+  for (Mode& mode : modes) {
     mode.probability = std::max(mode.probability / total, 1e-6);
     floored += mode.probability;
   }
-  for (Mode& mode : modes_) mode.probability /= floored;
+  for (Mode& mode : modes) mode.probability /= floored;
 }
 
 void FusionObserver::advance(double period) noexcept {
   if (period <= 0.0) return;
   switching_ = std::min(0.3, switching_rate * period);
-  mix();
-  predict(period);
+  for (Estimate* modes : {&modes_, &unheld_}) {
+    mix(*modes);
+    predict(*modes, period);
+  }
 }
 
 FusedPosition FusionObserver::step(const FusionSample& sample) noexcept {
@@ -170,15 +184,14 @@ FusedPosition FusionObserver::step(const FusionSample& sample) noexcept {
   ++steps_;
   for (std::size_t i = 0; i < velocities_; ++i) use_velocity(i, sample);
   for (std::size_t i = 0; i < positions_; ++i) use_position(i, sample);
+  settle();
 
   FusedPosition fused;
-  const State state = mean();
+  const double stuck = unheld_weight();
+  const State state = (1.0 - stuck) * mean(modes_) + stuck * mean(unheld_);
   fused.position = state(0);
   fused.velocity = state(1);
-  double variance = 0.0;
-  for (const Mode& mode : modes_)
-    variance += mode.probability * (mode.covariance(0, 0) + std::pow(mode.mean(0) - state(0), 2));
-  fused.sigma = std::sqrt(variance);
+  fused.sigma = std::sqrt((1.0 - stuck) * variance(modes_, state(0)) + stuck * variance(unheld_, state(0)));
   double total = 0.0;
   const auto share = [&](std::size_t sensor, bool faulty) {
     if (faulty) {

@@ -14,12 +14,15 @@ namespace invar::metrology {
 /// acceleration, and over what drifts in the sensors while they work: gain, offset and lag of each velocity sensor,
 /// offset and delay of each position sensor but the first, which is the reference. A quantised reading is the
 /// certainty that the position lies in its cell, so every edge is an absolute fix; the cell's likelihood is applied
-/// by its exact first two moments. An encoder that counts on edge by edge, without a leap that no motion explains, is believed
-/// against any velocity sensor: then it is the estimate that was lost, and the gains are sought anew. Noise of the velocity sensors is estimated from their second differences. A
-/// sensor that repeats itself, contradicts the others or is missing loses its weight and gets it back when it
-/// agrees again: within one period where a reading is missing or jumps, within four repetitions more than it ever
-/// showed where a continuous one dies, within the way of about two cells where an encoder sticks. An encoder that stood still
-/// while the others moved comes back only after it has counted again: the true position may pass the stuck one.
+/// by its exact first two moments. An encoder that counts on edge by edge, without a leap that no motion explains, is
+/// believed against any velocity sensor: then it is the estimate that was lost, and the gains are sought anew. Noise of
+/// the velocity sensors is estimated from their second differences. A sensor that repeats itself, contradicts the
+/// others or is missing loses its weight and gets it back when it agrees again: within one period where a reading is
+/// missing or jumps, within four repetitions more than it ever showed where a continuous one dies, within the way of
+/// about two cells where an encoder sticks.
+/// A second estimate runs without the readings that stand still. As these become improbable by that estimate, the fused
+/// position goes over to it, and sigma holds the distance of both. An encoder that stood still while the others moved
+/// comes back only after it has counted again: the true position may pass the stuck one.
 /// Source: metrology.md section 10 (interval observer and its Kalman version).
 class FusionObserver final : public FusionEstimator {
  public:
@@ -29,6 +32,8 @@ class FusionObserver final : public FusionEstimator {
 
  private:
   static constexpr int models = 3;
+  static constexpr double most_doubt =
+      0.5;  // a velocity sensor is believed that the axis moves, if not how far
   static constexpr int most_states = 3 + 3 * static_cast<int>(most_sensors);
   using State = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_states, 1>;
   using Covariance = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_states, most_states>;
@@ -37,6 +42,7 @@ class FusionObserver final : public FusionEstimator {
     Covariance covariance;
     double probability;
   };
+  using Estimate = std::array<Mode, models>;
   /// A reading's dependence on the state: the few entries that are not zero.
   struct Row {
     std::array<Eigen::Index, 6> at{};
@@ -49,14 +55,20 @@ class FusionObserver final : public FusionEstimator {
     [[nodiscard]] double dot(const State& state) const noexcept;
     [[nodiscard]] State times(const Covariance& covariance) const noexcept;  // covariance . row
   };
+  /// What a reading says about an estimate: how the distribution of the quantity that it measures changes, mode by mode.
+  struct Reading {
+    std::array<State, models> gains;      // covariance . row
+    std::array<double, models> before{};  // variance of the quantity by the estimate
+    std::array<double, models> shift{};   // of its mean
+    std::array<double, models> keep{};    // part of its variance that is left
+    std::array<double, models> likelihood{};
+    /// Of such a reading or an odder one; of a cell over the most that a cell of its size can hold.
+    double probability = 0.0;
+  };
   struct PositionMemory {
     double last = std::numeric_limits<double>::quiet_NaN();
     double conflict = 0.0;  // cumulated surprise while the reading stands still
-    double agreed = 0.0;    // estimate when it last met no conflict [m] ...
-    double agreed_variance = 0.0;
-    double agreed_travel = 0.0;  // ... and `travel` then
-    double agreed_travel_variance = 0.0;
-    double travel = 0.0;  // that the velocity sensors report since the reading last changed [m]
+    double travel = 0.0;    // that the velocity sensors report since the reading last changed [m]
     double travel_variance = 0.0;
     double leapt = 0.0;  // changes of the reading that no motion explains, since it was last believed [m]
     double from = 0.0;   // reading when it last was doubted, or leapt [m]
@@ -65,7 +77,8 @@ class FusionObserver final : public FusionEstimator {
     int odd = 0;   // surprising readings in a row
     int good = 0;  // unsurprising ones in a row
     bool faulty = false;
-    bool left = false;  // it stood still while others moved, and has not counted since
+    bool left = false;    // it stood still while others moved, and has not counted since
+    double unheld = 1.0;  // probability of its reading by the estimate that no standing reading holds
   };
   struct VelocityMemory {
     std::array<double, 2> last{};
@@ -82,30 +95,40 @@ class FusionObserver final : public FusionEstimator {
   };
 
   void start(const FusionSample& sample) noexcept;
-  void mix() noexcept;
-  void predict(double dt) noexcept;
+  void mix(Estimate& modes) const noexcept;
+  void predict(Estimate& modes, double dt) const noexcept;
   void learn_noise(const FusionSample& sample) noexcept;
   void use_velocity(std::size_t i, const FusionSample& sample) noexcept;
   void use_position(std::size_t i, const FusionSample& sample) noexcept;
+  [[nodiscard]] Reading velocity_reading(const Estimate& modes, std::size_t i,
+                                         const FusionSample& sample) const noexcept;
+  [[nodiscard]] Reading position_reading(const Estimate& modes, std::size_t i,
+                                         const FusionSample& sample) const noexcept;
+  static double take(Estimate& modes, const Reading& reading) noexcept;
   void add_travel(const FusionSample& sample) noexcept;
   [[nodiscard]] bool travelled_on(std::size_t position) const noexcept;
   [[nodiscard]] bool stood_still(std::size_t position, const FusionSample& sample) const noexcept;
-  [[nodiscard]] bool refuted_standing(std::size_t position) const noexcept;
+  [[nodiscard]] bool refuted_standing(std::size_t position, double reading) const noexcept;
+  [[nodiscard]] bool left_behind(std::size_t position, double reading) const noexcept;
   [[nodiscard]] bool refuted_jump(std::size_t position) const noexcept;
   [[nodiscard]] bool counts_on(std::size_t position, double reading) const noexcept;
+  [[nodiscard]] bool counts_again(std::size_t position, double reading) noexcept;
   void see_change(std::size_t position, double reading, double time) noexcept;
+  [[nodiscard]] bool witnessed() const noexcept;
   [[nodiscard]] bool only_position(std::size_t position) const noexcept;
-  [[nodiscard]] double doubt() const noexcept;
   void watch_for_dead(const FusionSample& sample) noexcept;
   [[nodiscard]] bool outlived(std::size_t still, std::size_t moving, double reading) const noexcept;
   void undo(std::size_t steps) noexcept;
   void advance(double period) noexcept;
-  void agree(std::size_t position) noexcept;
-  void go_on_without(std::size_t position, const FusionSample& sample) noexcept;
+  void leave(std::size_t position, double reading) noexcept;
+  void settle() noexcept;
+  [[nodiscard]] double unheld_weight() const noexcept;
+  void restart(std::size_t position, double reading) noexcept;
   void restart_at(std::size_t position, double reading) noexcept;
   [[nodiscard]] bool alone(std::size_t position) const noexcept;
-  void renormalise(const std::array<double, models>& likelihood) noexcept;
-  [[nodiscard]] State mean() const noexcept;
+  static void renormalise(Estimate& modes, const std::array<double, models>& likelihood) noexcept;
+  [[nodiscard]] State mean(const Estimate& modes) const noexcept;
+  [[nodiscard]] static double variance(const Estimate& modes, double about) noexcept;
   [[nodiscard]] bool silent(const FusionSample& sample, std::size_t sensor) const noexcept {
     return (sample.silent >> sensor & 1U) != 0U;
   }
@@ -124,11 +147,15 @@ class FusionObserver final : public FusionEstimator {
   std::size_t positions_, velocities_;
   Eigen::Index states_;
   State drift_;  // spectral density of each drifting property
-  std::array<Mode, models> modes_{};
-  std::array<Mode, models> counted_{};  // when a position sensor that is believed last changed its reading
+  Estimate modes_{};
+  /// The estimate by all but the readings that stand still, since those were last beyond doubt. A stuck sensor is tested
+  /// against this estimate, and the fusion goes on with it.
+  Estimate unheld_{};
+  double settled_at_ = 0.0;  // position when it last was set [m]
+  double doubt_ = 0.0;       // by how much, relative, the travel that the velocity sensors tell may be wrong
   static constexpr std::size_t history = 16;
   struct Past {
-    std::array<Mode, models> modes;  // as predicted for the sample, before its readings
+    Estimate modes;  // as predicted for the sample, before its readings
     FusionSample sample;
   };
   std::array<Past, history> past_{};  // a ring

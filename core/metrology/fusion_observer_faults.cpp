@@ -1,6 +1,7 @@
 // Who is to be believed: noise learned on line, sensors that died, stick or jump, and what to do about it.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "core/metrology/fusion_observer.hpp"
@@ -11,6 +12,9 @@ namespace {
 constexpr double noise_memory = 400.0;  // samples
 constexpr double lost_gain =
     0.1;  // how well gains are known, relative, when the estimate that used them was lost
+constexpr double beyond_doubt =
+    0.99;  // probability above which a standing reading takes nothing from the estimate
+constexpr double stuck_odds = 1e-4;  // of a sensor that stands still to be stuck, before others tell
 }  // namespace
 
 /// White noise of variance s^2 has second differences of variance 6 s^2; motion hardly shows in them.
@@ -67,20 +71,13 @@ void FusionObserver::add_travel(const FusionSample& sample) noexcept {
   }
 }
 
-/// By how much, relative, the travel that the velocity sensors tell may be wrong.
-double FusionObserver::doubt() const noexcept {
-  double most = 0.0;
-  for (const VelocitySensorModel& sensor : model_.velocities) most = std::max(most, 10.0 * sensor.gain_sigma);
-  return std::min(most, 0.5);
-}
-
 /// True where the velocity sensors tell, beyond their noise and what their gain may be, that a position which reads the same
 /// went on by more than its cell.
 bool FusionObserver::travelled_on(std::size_t position) const noexcept {
   const PositionMemory& memory = position_memory_[position];
   const double cell =
       std::max(0.75 * model_.positions[position].step, 10.0 * model_.positions[position].noise);
-  return std::abs(memory.travel) > (1.0 + 2.0 * doubt()) * cell + 5.0 * std::sqrt(memory.travel_variance) &&
+  return std::abs(memory.travel) > (1.0 + 2.0 * doubt_) * cell + 5.0 * std::sqrt(memory.travel_variance) &&
          memory.travel_variance > 0.0;
 }
 
@@ -94,10 +91,28 @@ bool FusionObserver::stood_still(std::size_t position, const FusionSample& sampl
   return false;
 }
 
-/// True where a witness says that a position which reads the same cannot stand still: a velocity sensor, or another position
-/// sensor. A filter that merely expected motion is no witness.
-bool FusionObserver::refuted_standing(std::size_t position) const noexcept {
-  return travelled_on(position) || !only_position(position);
+/// True where a velocity sensor lives that tells whether the axis moves.
+bool FusionObserver::witnessed() const noexcept {
+  for (std::size_t i = 0; i < velocities_; ++i)
+    if (!velocity_memory_[i].faulty) return true;
+  return false;
+}
+
+/// True where a witness says that a position which reads the same cannot stand still: another position sensor, or a velocity
+/// sensor, by more than its gain may be wrong. A filter that merely expected motion is no witness.
+bool FusionObserver::refuted_standing(std::size_t position, double reading) const noexcept {
+  if (!only_position(position)) return true;
+  if (!witnessed()) return false;
+  const PositionSensorModel& sensor = model_.positions[position];
+  const double at = mean(unheld_)(0);
+  const double beyond = std::abs(at - reading - sensor.offset) - 0.5 * sensor.step;
+  return beyond > doubt_ * (std::abs(at - settled_at_) + sensor.step);
+}
+
+/// True where the others went on by two cells from what is read.
+bool FusionObserver::left_behind(std::size_t position, double reading) const noexcept {
+  const PositionSensorModel& sensor = model_.positions[position];
+  return std::abs(mean(unheld_)(0) - reading - sensor.offset) > 2.5 * sensor.step;
 }
 
 /// A reading that differs from the one before, `time` earlier: what no motion explains is a leap. A sensor that comes back
@@ -111,7 +126,7 @@ void FusionObserver::see_change(std::size_t position, double reading, double tim
     fastest = std::max(fastest, 3.0 * sensor.largest);
   const double change = reading - memory.last;
   const double beyond = std::abs(change - memory.travel) - 5.0 * std::sqrt(memory.travel_variance) -
-                        doubt() * std::abs(memory.travel);
+                        doubt_ * std::abs(memory.travel);
   if (std::abs(change) <= cell + fastest * time || beyond <= cell) return;
   memory.leapt += change - memory.travel;
   memory.from = reading;
@@ -136,6 +151,17 @@ bool FusionObserver::counts_on(std::size_t position, double reading) const noexc
   const double cells =
       std::max(3.0 * model_.positions[position].step, 30.0 * model_.positions[position].noise);
   return std::abs(reading - position_memory_[position].from) > 0.9 * cells && !refuted_jump(position);
+}
+
+/// True where a sensor that left because it stood still counts within two cells of where the others meanwhile went: it did not
+/// stick, they told more than was travelled, and are to be doubted more.
+bool FusionObserver::counts_again(std::size_t position, double reading) noexcept {
+  const PositionSensorModel& sensor = model_.positions[position];
+  const double away = std::abs(reading + sensor.offset - mean(modes_)(0));
+  if (!position_memory_[position].left || away > std::max(2.0 * sensor.step, 20.0 * sensor.noise))
+    return false;
+  doubt_ = std::clamp(2.0 * doubt_, lost_gain, most_doubt);
+  return true;
 }
 
 /// True where sensor `still` has not changed while `moving` went on by more than both their cells.
@@ -176,7 +202,8 @@ void FusionObserver::watch_for_dead(const FusionSample& sample) noexcept {
 /// used again. Bounded by the history.
 void FusionObserver::undo(std::size_t steps) noexcept {
   if (steps == 0 || steps >= history || steps > steps_) return;
-  modes_ = past_[(steps_ - steps) % history].modes;
+  modes_ = unheld_ = past_[(steps_ - steps) % history].modes;
+  settled_at_ = mean(modes_)(0);
   for (std::size_t k = steps_ - steps; k < steps_; ++k) {
     Past& past = past_[k % history];
     if (k > steps_ - steps) advance(past.sample.period);
@@ -188,58 +215,52 @@ void FusionObserver::undo(std::size_t steps) noexcept {
   }
 }
 
-/// The estimate where a position sensor meets no conflict: from here it can go on without it.
-void FusionObserver::agree(std::size_t position) noexcept {
+/// A sensor that stood still while the axis moved held the estimate back, and taught it wrong gains: on with what the others tell.
+void FusionObserver::leave(std::size_t position, double reading) noexcept {
   PositionMemory& memory = position_memory_[position];
-  memory.agreed = 0.0;
-  memory.agreed_variance = 0.0;
-  for (const Mode& mode : modes_) {
-    memory.agreed += mode.probability * mode.mean(0);
-    memory.agreed_variance += mode.probability * mode.covariance(0, 0);
-  }
-  memory.agreed_travel = memory.travel;
-  memory.agreed_travel_variance = memory.travel_variance;
+  memory.faulty = memory.left = true;
+  memory.good = 0;
+  memory.unheld = 1.0;
+  memory.from = reading;
+  modes_ = unheld_;
 }
 
-/// A sensor that stood still while the axis moved held the estimate back, and taught it wrong gains: on from where they last
-/// agreed, by what the velocity sensors told since, with the gains as they were when positions were last counted.
-void FusionObserver::go_on_without(std::size_t position, const FusionSample& sample) noexcept {
-  const PositionMemory& memory = position_memory_[position];
-  double speed = 0.0, speed_variance = 0.0;
-  for (std::size_t i = 0; i < velocities_; ++i) {
-    if (silent(sample, positions_ + i) || velocity_memory_[i].faulty || !std::isfinite(sample.velocities[i]))
-      continue;
-    const double gain = std::max(std::abs(model_.velocities[i].sensitivity(0.0)), 1e-6);
-    speed = (sample.velocities[i] - model_.velocities[i].offset) / gain;
-    speed_variance = velocity_memory_[i].variance / (gain * gain);
-    break;
-  }
-  const double travel = memory.travel - memory.agreed_travel;
-  const double variance =
-      memory.agreed_variance + std::max(0.0, memory.travel_variance - memory.agreed_travel_variance);
-  constexpr double hardest = 2.0;  // m/s2, that the axis may accelerate by meanwhile
-  for (std::size_t j = 0; j < models; ++j) {
-    Mode& mode = modes_[j];
-    if (counted_[j].mean.size() == states_) {
-      mode.mean.tail(states_ - 3) = counted_[j].mean.tail(states_ - 3);
-      mode.covariance = counted_[j].covariance;
-    }
-    mode.mean.head<3>() << memory.agreed + travel, speed, 0.0;
-    mode.covariance.topRows<3>().setZero();
-    mode.covariance.leftCols<3>().setZero();
-    mode.covariance.diagonal().head<3>() << variance, speed_variance, hardest * hardest;
-    mode.probability = 1.0 / models;
-  }
+/// Where every reading that stands still is beyond doubt, none holds the estimate back.
+void FusionObserver::settle() noexcept {
+  for (std::size_t i = 0; i < positions_; ++i)
+    if (model_.positions[i].step > 0.0 && !position_memory_[i].faulty &&
+        position_memory_[i].unheld < beyond_doubt)
+      return;
+  unheld_ = modes_;
+  settled_at_ = mean(modes_)(0);
+}
+
+/// How far the estimate without standing readings is to be believed, where a witness speaks for it: the odds of a stuck sensor
+/// against its reading's probability.
+double FusionObserver::unheld_weight() const noexcept {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < positions_; ++i)
+    if (model_.positions[i].step > 0.0 && !position_memory_[i].faulty &&
+        refuted_standing(i, position_memory_[i].last))
+      least = std::min(least, position_memory_[i].unheld);
+  return stuck_odds / (stuck_odds + least);
 }
 
 /// The sensor is to be trusted, not the estimate: begin anew in the cell that is read, at unknown speed. What is known of the
 /// sensors stays, but gains with which the estimate was lost are not known.
 void FusionObserver::restart_at(std::size_t position, double reading) noexcept {
-  const PositionSensorModel& sensor = model_.positions[position];
   PositionMemory& memory = position_memory_[position];
   memory.faulty = memory.left = false;
-  memory.odd = 0;
+  memory.unheld = 1.0;
   memory.conflict = memory.leapt = 0.0;
+  restart(position, reading);
+  unheld_ = modes_;
+  settled_at_ = reading + model_.positions[position].offset;
+}
+
+void FusionObserver::restart(std::size_t position, double reading) noexcept {
+  const PositionSensorModel& sensor = model_.positions[position];
+  position_memory_[position].odd = 0;
   double fastest = 0.3;
   for (const VelocitySensorModel& velocity : model_.velocities) fastest = velocity.largest;
   const double cell = std::hypot(sensor.step / std::sqrt(12.0), sensor.noise);

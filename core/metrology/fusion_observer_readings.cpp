@@ -1,6 +1,7 @@
 // What one reading does to the estimate: a velocity as a Kalman update, a position by the cell that it stands for.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "core/metrology/fusion_observer.hpp"
@@ -11,6 +12,7 @@ namespace {
 
 constexpr double surprise = 1e-7;        // probability below which a reading is not believed
 constexpr double doubtful = 1e-3;        // probability below which a reading proves nothing for its sensor
+constexpr double odd_velocity = 4e-8;    // 5.5 deviations
 constexpr double stuck_conflict = 16.0;  // log odds against a reading that stands still
 constexpr int odd_limit = 5;
 constexpr int good_limit = 20;
@@ -82,24 +84,24 @@ double FusionObserver::velocity_lag(std::size_t i, const State& state) const noe
   return model_.velocities[i].lag + state(gain_of_velocity(i) + 2);
 }
 
-void FusionObserver::use_velocity(std::size_t i, const FusionSample& sample) noexcept {
-  if (silent(sample, positions_ + i)) return;
+/// Kalman updates of all modes. Returns the information gained [nats].
+double FusionObserver::take(Estimate& modes, const Reading& reading) noexcept {
+  double information = 0.0;
+  for (std::size_t j = 0; j < models; ++j)
+    information += modes[j].probability * apply(modes[j].mean, modes[j].covariance, reading.gains[j],
+                                                reading.before[j], reading.shift[j], reading.keep[j]);
+  renormalise(modes, reading.likelihood);
+  return information;
+}
+
+FusionObserver::Reading FusionObserver::velocity_reading(const Estimate& modes, std::size_t i,
+                                                         const FusionSample& sample) const noexcept {
   const VelocitySensorModel& sensor = model_.velocities[i];
-  VelocityMemory& memory = velocity_memory_[i];
-  const double reading = sample.velocities[i];
-  if (!std::isfinite(reading)) {
-    memory.faulty = true;  // it must prove itself again
-    memory.good = good_limit - 2;
-    return;
-  }
-  const double noise = memory.variance * sensor.correlation * sensor.correlation;
-  std::array<double, models> likelihood{};
-  std::array<State, models> gains;
-  std::array<double, models> innovation{};
-  std::array<double, models> variance{};
-  double least = 1e9;
+  const double noise = velocity_memory_[i].variance * sensor.correlation * sensor.correlation;
+  Reading reading;
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t j = 0; j < models; ++j) {
-    const Mode& mode = modes_[j];
+    const Mode& mode = modes[j];
     const Eigen::Index own = gain_of_velocity(i);
     const double lag = velocity_lag(i, mode.mean) + sample.ages[positions_ + i];
     const double v = mode.mean(1) - lag * mode.mean(2);
@@ -112,54 +114,49 @@ void FusionObserver::use_velocity(std::size_t i, const FusionSample& sample) noe
     row.add(own, response);
     row.add(own + 1, 1.0);
     row.add(own + 2, -mode.mean(2) * slope);
-    innovation[j] = reading - sensor.offset - mode.mean(own + 1) - gain * response;
-    gains[j] = row.times(mode.covariance);
-    variance[j] = row.dot(gains[j]) + noise;
-    const double z = innovation[j] / std::sqrt(variance[j]);
-    likelihood[j] = normal_density(std::min(std::abs(z), 8.0)) / std::sqrt(variance[j]);
-    least = std::min(least, std::abs(z));
+    const double innovation = sample.velocities[i] - sensor.offset - mode.mean(own + 1) - gain * response;
+    reading.gains[j] = row.times(mode.covariance);
+    reading.before[j] = row.dot(reading.gains[j]);
+    const double variance = reading.before[j] + noise;
+    // The scalar row . state: its variance shrinks to noise / (noise + its own) of what it was.
+    reading.shift[j] = innovation * reading.before[j] / variance;
+    reading.keep[j] = noise / variance;
+    const double z = std::abs(innovation) / std::sqrt(variance);
+    reading.likelihood[j] = normal_density(std::min(z, 8.0)) / std::sqrt(variance);
+    least = std::min(least, z);
   }
-  const bool odd = least > 5.5;
+  reading.probability = 2.0 * beyond(least);
+  return reading;
+}
+
+void FusionObserver::use_velocity(std::size_t i, const FusionSample& sample) noexcept {
+  if (silent(sample, positions_ + i)) return;
+  VelocityMemory& memory = velocity_memory_[i];
+  if (!std::isfinite(sample.velocities[i])) {
+    memory.faulty = true;  // it must prove itself again
+    memory.good = good_limit - 2;
+    return;
+  }
+  const Reading reading = velocity_reading(modes_, i, sample);
+  const Reading unheld = velocity_reading(unheld_, i, sample);
+  // Where only an estimate that a standing reading holds back is surprised, the velocity sensor is not to blame.
+  const bool odd = std::max(reading.probability, unheld.probability) < odd_velocity;
   memory.odd = odd ? memory.odd + 1 : 0;
   memory.good = odd || memory.dead ? 0 : memory.good + 1;
   if (memory.dead || memory.odd >= odd_limit) memory.faulty = true;
   if (memory.faulty && memory.good >= good_limit) memory.faulty = false;
-  if (memory.faulty || odd) return;
-  double information = 0.0;
-  for (std::size_t j = 0; j < models; ++j) {
-    Mode& mode = modes_[j];
-    const double state_variance = variance[j] - noise;
-    // The scalar row . state: its variance shrinks to noise / (noise + its own) of what it was.
-    information +=
-        mode.probability * apply(mode.mean, mode.covariance, gains[j], state_variance,
-                                 innovation[j] * state_variance / variance[j], noise / variance[j]);
-  }
-  information_[positions_ + i] += information;
-  renormalise(likelihood);
+  if (memory.faulty) return;
+  if (unheld.probability >= odd_velocity) take(unheld_, unheld);
+  if (reading.probability >= odd_velocity) information_[positions_ + i] += take(modes_, reading);
 }
 
-void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noexcept {
-  if (silent(sample, i)) return;
+FusionObserver::Reading FusionObserver::position_reading(const Estimate& modes, std::size_t i,
+                                                         const FusionSample& sample) const noexcept {
   const PositionSensorModel& sensor = model_.positions[i];
-  PositionMemory& memory = position_memory_[i];
-  const double reading = sample.positions[i];
-  if (!std::isfinite(reading)) {
-    memory.faulty = true;
-    memory.good = good_limit - 2;
-    return;
-  }
-  const bool moved = reading != memory.last && std::isfinite(memory.last);
-  if (moved) see_change(i, reading, sample.period);
-  if (moved) memory.left = false;
-  if (!moved && memory.faulty && sensor.step > 0.0 && stood_still(i, sample)) memory.left = true;
-  memory.last = reading;
-  std::array<State, models> gains;
-  std::array<Cut, models> cuts;
-  std::array<double, models> deviation{};
-  std::array<double, models> edge{};
-  double probability = 0.0;
+  const double read = sample.positions[i];
+  Reading reading;
   for (std::size_t j = 0; j < models; ++j) {
-    const Mode& mode = modes_[j];
+    const Mode& mode = modes[j];
     const double delay = position_delay(i, mode.mean) + sample.ages[i];
     const double then = mode.mean(1) - delay * mode.mean(2);  // velocity when it was read
     Row row;
@@ -173,81 +170,122 @@ void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noe
     const double sign = mode.mean(1) > 0.0 ? 1.0 : (mode.mean(1) < 0.0 ? -1.0 : 0.0);
     const double expected = mode.mean(0) - 0.5 * delay * (mode.mean(1) + then) - sensor.offset -
                             (i > 0 ? mode.mean(offset_of_position(i)) : 0.0) - sign * sensor.hysteresis;
-    gains[j] = row.times(mode.covariance);
-    edge[j] = std::max(row.dot(gains[j]), 1e-18);
+    reading.gains[j] = row.times(mode.covariance);
+    reading.before[j] = std::max(row.dot(reading.gains[j]), 1e-18);
     const double noise = std::max(sensor.noise, 1e-7);
-    deviation[j] = std::sqrt(edge[j] + noise * noise);
+    const double deviation = std::sqrt(reading.before[j] + noise * noise);
+    Cut found;
+    double most = 1.0;
     if (sensor.step > 0.0) {
-      cuts[j] = cut((reading - 0.5 * sensor.step - expected) / deviation[j],
-                    (reading + 0.5 * sensor.step - expected) / deviation[j]);
+      found = cut((read - 0.5 * sensor.step - expected) / deviation,
+                  (read + 0.5 * sensor.step - expected) / deviation);
+      most = std::max(most_probable(0.0, sensor.step / deviation), 1e-12);
     } else {
-      const double z = (reading - expected) / deviation[j];
-      cuts[j] = {std::exp(-0.5 * z * z), z, 0.0};  // state and noise together are known exactly
+      const double z = (read - expected) / deviation;
+      found = {std::exp(-0.5 * z * z), z, 0.0};  // state and noise together are known exactly
     }
-    const double width = sensor.step / deviation[j];
-    probability += mode.probability * cuts[j].probability /
-                   (sensor.step > 0.0 ? std::max(most_probable(0.0, width), 1e-12) : 1.0);
+    const double ratio =
+        reading.before[j] / (deviation * deviation);  // the state's share of the scalar's variance
+    reading.shift[j] = found.mean * deviation * ratio;
+    reading.keep[j] = 1.0 - (1.0 - found.variance) * ratio;
+    reading.likelihood[j] = sensor.step > 0.0 ? found.probability : found.probability / deviation;
+    reading.probability += mode.probability * found.probability / most;
   }
-  // A reading that stands still while the rest moves on is refuted little by little; an edge clears it.
-  const bool odd = probability < surprise;
-  if (moved && !odd) memory.conflict = 0.0;
+  return reading;
+}
+
+void FusionObserver::use_position(std::size_t i, const FusionSample& sample) noexcept {
+  if (silent(sample, i)) return;
+  const PositionSensorModel& sensor = model_.positions[i];
+  PositionMemory& memory = position_memory_[i];
+  const double read = sample.positions[i];
+  if (!std::isfinite(read)) {
+    memory.faulty = true;
+    memory.good = good_limit - 2;
+    return;
+  }
+  const bool moved = read != memory.last && std::isfinite(memory.last);
+  if (moved) see_change(i, read, sample.period);
   if (moved) memory.travel = memory.travel_variance = 0.0;
+  const bool again = moved && counts_again(i, read);
+  if (!moved && memory.faulty && sensor.step > 0.0 && stood_still(i, sample)) memory.left = true;
+  const double change = std::abs(read - memory.last);
+  memory.last = read;
+  Reading reading = position_reading(modes_, i, sample);
+  const Reading unheld = position_reading(unheld_, i, sample);
+  if (moved && !memory.faulty && reading.probability < surprise && change < 2.5 * sensor.step &&
+      only_position(i)) {
+    // It counts where the estimate did not expect it: held by the readings before, or lost.
+    if (unheld.probability < doubtful) {
+      restart_at(i, read);
+      return;
+    }
+    modes_ = unheld_;
+    reading = unheld;
+  }
+  const bool odd = reading.probability < surprise;
+  const bool stands = !moved && sensor.step > 0.0;
+  memory.unheld = stands ? unheld.probability : 1.0;
+  // A reading that stands still while the rest moves on is refuted little by little; an edge clears it.
+  if (moved && !odd) memory.conflict = 0.0;
+  if (moved && reading.probability >= doubtful) memory.left = false;
   memory.conflict = std::clamp(
-      memory.conflict - std::log(std::max(probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0), 0.0,
+      memory.conflict - std::log(std::max(reading.probability, 1e-30)) - (sensor.step > 0.0 ? 0.3 : 2.0), 0.0,
       2.0 * stuck_conflict);  // no more, so that a sensor can live it down
-  if (memory.conflict <= 0.0 || moved) agree(i);
   memory.odd = odd ? memory.odd + 1 : 0;
-  memory.good = odd || probability < doubtful ? 0 : memory.good + 1;
+  memory.good = odd || reading.probability < doubtful ? 0 : memory.good + 1;
   if (alone(i) && !(memory.faulty && !moved) && (memory.odd >= 2 || memory.conflict > stuck_conflict)) {
-    restart_at(i, reading);
+    restart_at(i, read);
     return;
   }
   if (memory.odd >= odd_limit)
     for (std::size_t k = 0; k < positions_; ++k)
-      if (k != i && !position_memory_[k].faulty && outlived(k, i, reading)) {
+      if (k != i && !position_memory_[k].faulty && outlived(k, i, read)) {
         position_memory_[k].faulty = true;  // it stood still while this one moved on
         position_memory_[k].good = 0;
-        restart_at(i, reading);
+        restart_at(i, read);
         return;
       }
-  // Nobody contradicts the sensor: it is the estimate that was lost.
-  const bool stuck = !moved && sensor.step > 0.0 && travelled_on(i);
-  if (!memory.faulty && memory.odd >= odd_limit && !stuck && !refuted_jump(i)) {
-    restart_at(i, reading);
+  const bool refuted = stands && unheld.probability < surprise && refuted_standing(i, read);
+  if (refuted && !memory.faulty &&
+      (memory.odd >= odd_limit || memory.conflict > stuck_conflict || left_behind(i, read))) {
+    leave(i, read);
     return;
   }
-  if (memory.faulty && moved && counts_on(i, reading)) {
-    if (probability < doubtful) {
-      restart_at(i, reading);
+  // Others doubt a reading that stands still: the estimate waits who is right, with gains that may be wrong.
+  if (stands && !memory.faulty && odd && witnessed()) {
+    if (memory.odd >= odd_limit && !refuted && !refuted_jump(i)) restart(i, read);
+    return;
+  }
+  // Nobody contradicts the sensor: it is the estimate that was lost.
+  if (!memory.faulty && memory.odd >= odd_limit && !refuted_jump(i)) {
+    restart_at(i, read);
+    return;
+  }
+  if (memory.faulty && moved && (again || counts_on(i, read))) {
+    if (reading.probability < doubtful) {
+      restart_at(i, read);
       return;
     }
-    memory.faulty = false;
+    memory.faulty = memory.left = false;
     memory.conflict = 0.0;
   }
   if (!memory.faulty &&
-      (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict && refuted_standing(i)))) {
+      (memory.odd >= odd_limit || (!moved && memory.conflict > stuck_conflict && !only_position(i)))) {
     memory.faulty = true;
-    memory.from = reading;
-    if (!moved && sensor.step > 0.0 && travelled_on(i)) go_on_without(i, sample);
+    memory.from = read;
   }
   if (memory.faulty && !memory.left && memory.good >= good_limit && memory.conflict <= 0.0)
     memory.faulty = false;
   if (memory.faulty || odd) return;
   memory.leapt = 0.0;
-  double information = 0.0;
-  std::array<double, models> likelihood{};
-  for (std::size_t j = 0; j < models; ++j) {
-    Mode& mode = modes_[j];
-    const double ratio =
-        edge[j] / (deviation[j] * deviation[j]);  // the state's share of the scalar's variance
-    const double keep = 1.0 - (1.0 - cuts[j].variance) * ratio;
-    information += mode.probability * apply(mode.mean, mode.covariance, gains[j], edge[j],
-                                            cuts[j].mean * deviation[j] * ratio, keep);
-    likelihood[j] = sensor.step > 0.0 ? cuts[j].probability : cuts[j].probability / deviation[j];
+  information_[i] += take(modes_, reading);
+  if (moved) {
+    unheld_ = modes_;
+    settled_at_ = mean(modes_)(0);
+  } else if (sensor.step <= 0.0 && unheld.probability >= surprise) {
+    take(unheld_, unheld);
   }
-  information_[i] += information;
-  renormalise(likelihood);
-  if (moved) counted_ = modes_;
 }
 
 }  // namespace invar::metrology
