@@ -251,9 +251,14 @@ fdds::DataWriter& Participant::create_writer(const std::string& name, fdds::Topi
 namespace {
 WriterKeys::Kind instances_of(const Profile& profile, const fdds::TopicDataType& type) {
   if (profile.exclusive) return WriterKeys::Kind::by_writer;
+  if (dynamic_cast<const RawType*>(&type) != nullptr)  // who records wants each instance
+    return WriterKeys::Kind::as_they_are;
   const bool latest_counts = profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
-  const bool is_raw = dynamic_cast<const RawType*>(&type) != nullptr;  // who records wants each instance
-  return latest_counts && !is_raw ? WriterKeys::Kind::folded : WriterKeys::Kind::as_they_are;
+  // A client's key is that of one call: each would take a kilobyte until `max_instances` are there.
+  const bool is_request = profile.reliable && profile.durability == Durability::volatile_ &&
+                          profile.traffic == Traffic::general && !profile.keep_all &&
+                          profile.depth >= WriterKeys::most_folded;
+  return latest_counts || is_request ? WriterKeys::Kind::folded : WriterKeys::Kind::as_they_are;
 }
 }  // namespace
 

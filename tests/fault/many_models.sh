@@ -59,7 +59,7 @@ for ((i = 1; i <= models; i++)); do
   "$invar" job apply "$cell" "$component" --model "$component.yaml" --wait 30 >said 2>&1 || { cat said; fail "model $i is not taken"; }
   if ((i == early)); then motion=$(memory motion) dispense=$(memory dispense); fi
 done
-most=$((1024 + 4 * (models - early)))  # kB: pages of the allocator, and a tenth of the 47 kB that a model once kept
+most=1024  # kB: pages of the allocator; where each model was kept, 600 took 28 MB
 for process in motion dispense; do
   read -r resident locked <<<"${!process}"
   read -r resident_now locked_now <<<"$(memory $process)"

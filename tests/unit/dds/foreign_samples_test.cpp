@@ -222,5 +222,38 @@ TEST(CommandGateClocks, ASenderBehindIsRefusedAndTheDifferenceIsNamed) {
   EXPECT_THAT(alarms[0].text, HasSubstr("3600 s behind"));
 }
 
+// A command of a person is a client of its own: a cell that runs for years hears millions.
+TEST(Requests, EachClientIsHeardAndLeavesNoMemoryBehind) {
+  Node server{local("server"), standard_profiles()}, clients{local("clients"), standard_profiles()};
+  std::atomic<std::uint64_t> came{0};
+  const auto reader = server.reader<transfer::ModelRequest>("cell/test/model_request", "request",
+                                                            [&](const auto&) { ++came; });
+  std::uint64_t client = 0;
+  const auto call = [&](int writers) {
+    for (int i = 0; i < writers; ++i) {
+      auto writer = clients.writer<transfer::ModelRequest>("cell/test/model_request", "request");
+      ASSERT_TRUE(eventually([&] { return writer.connection().matched() == 1; }));
+      const std::uint64_t before = came;
+      transfer::ModelRequest request;
+      ASSERT_TRUE(eventually([&] {  // a first one that is lost before the reader's side of the match
+        request.client(++client);
+        writer.write(request);
+        return came > before;
+      }));
+      const std::uint64_t first = came;
+      constexpr std::uint64_t calls = 80;
+      for (std::uint64_t k = 0; k < calls; ++k) {
+        request.client(++client);
+        writer.write(request);
+      }
+      ASSERT_TRUE(eventually([&] { return came >= first + calls; }));
+    }
+  };
+  call(3);
+  const std::size_t before = mallinfo2().uordblks;
+  call(8);
+  EXPECT_LT(static_cast<double>(mallinfo2().uordblks) - static_cast<double>(before), 2e5);
+}
+
 }  // namespace
 }  // namespace invar::dds
