@@ -105,6 +105,7 @@ void WeightedFusion::reset() noexcept {
   unread_.fill(0.0);
   way_.fill(0.0);
   since_.fill(0.0);
+  left_.fill(false);
   jitter_.fill(0.0);
   readings_.fill(0);
   doubted_.fill(0);
@@ -189,7 +190,10 @@ void WeightedFusion::read_position(std::size_t i, const FusionSample& sample, Fu
   }
   const double reading = sample.positions[i];
   repeats_[i] = reading == last_[i] ? repeats_[i] + 1 : 0;
-  if (repeats_[i] == 0) since_[i] = 0.0;
+  if (repeats_[i] == 0) {
+    since_[i] = 0.0;
+    left_[i] = false;
+  }
   bool sound = std::isfinite(reading);
   if (i < model_.known.size()) {
     const PositionSensorModel& known = model_.known[i];
@@ -278,13 +282,15 @@ FusedPosition WeightedFusion::step(const FusionSample& sample) noexcept {
   step_moved_ = speed_ * sample.period;  // where no velocity sensor says better
   for (std::size_t i = positions_; i < sensors_; ++i) read_velocity(i, sample, fused);
   for (std::size_t i = 0; i < positions_; ++i) read_position(i, sample, fused);
-  // A position that stands still while the velocity has moved on by far more than it steps: stuck.
-  if (sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U)
-    for (std::size_t i = 0; i < positions_; ++i) {
-      const bool stepped = i < model_.known.size() && model_.known[i].step > 0.0;
-      if (repeats_[i] > 0 && std::abs(since_[i]) > (stepped ? 3.0 * model_.known[i].step : 0.005))
-        fused.live &= ~(1U << i);
-    }
+  // A position that stands still while the velocity has moved on by far more than it steps: stuck, until it counts again. The
+  // true position may pass the stuck one meanwhile.
+  const bool witnessed = sensors_ > positions_ && (fused.live >> positions_ & 1U) != 0U;
+  for (std::size_t i = 0; i < positions_; ++i) {
+    const bool stepped = i < model_.known.size() && model_.known[i].step > 0.0;
+    left_[i] |=
+        witnessed && repeats_[i] > 0 && std::abs(since_[i]) > (stepped ? 3.0 * model_.known[i].step : 0.005);
+    if (left_[i]) fused.live &= ~(1U << i);
+  }
   weigh(sample, fused);
 
   double mean = 0.0;

@@ -109,6 +109,7 @@ class WeightedFusion final : public FusionEstimator {
   std::array<double, most_sensors> unread_{};  // time since it was read [s]
   Values way_{};                               // moved since a position was read [m]
   Values since_{};                             // moved since it changed [m]
+  std::array<bool, most_sensors> left_{};      // it stood still meanwhile, and has not changed since
   Values jitter_{};  // mean square of what two readings differ by, beside the motion [m2, m2/s2]
   std::array<int, most_sensors> readings_{};  // that are in it
   std::array<int, most_sensors> doubted_{};  // readings until a sensor that leapt is believed again; 0: it is

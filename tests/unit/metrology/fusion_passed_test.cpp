@@ -7,6 +7,8 @@
 #include <string>
 
 #include "core/metrology/fusion_observer.hpp"
+#include "core/metrology/weight_identification.hpp"
+#include "core/metrology/weighted_fusion.hpp"
 #include "tests/unit/metrology/fusion_rig.hpp"
 
 namespace invar::metrology {
@@ -147,6 +149,27 @@ TEST(FusionPassed, ASlowEncoderThatSticksAndJumpsBack) {
     EXPECT_EQ(fused.back().live & 1U, 1U) << "run " << k << ": it did not come back";
   }
   score.expect_honest(rig);
+}
+
+TEST(FusionPassed, WeightsTakeAnEncoderThatStuckBackOnlyWhenItCounts) {
+  Random random;
+  const Rig rig;
+  WeightModel weights = identify_weights(training(rig));
+  weights.known = model_of(rig).positions;
+  for (int k = 0; k < 10; ++k) {
+    const double period = random.between(2.0, 6.0);
+    FusionRun run = record(rig, sinusoid(period), 4.0 * period, random.between(0.03, 0.3),
+                           static_cast<unsigned>(random.engine()));
+    const auto row = [&](double periods) { return static_cast<Eigen::Index>(periods * period / dt); };
+    // Stuck where it turns, from the first period to the third, when the true position has passed it twice.
+    run.positions.col(0).segment(row(1.0), row(2.0)).setConstant(run.positions(row(1.0), 0));
+    WeightedFusion fusion{weights};
+    const auto fused = fuse(fusion, run);
+    const auto lives = [&](Eigen::Index i) { return (fused[static_cast<std::size_t>(i)].live & 1U) != 0U; };
+    EXPECT_TRUE(lives(row(0.9)));
+    for (Eigen::Index i = row(1.3); i < row(2.9); ++i) ASSERT_FALSE(lives(i)) << "run " << k << ", row " << i;
+    EXPECT_TRUE(lives(row(3.4))) << "run " << k;
+  }
 }
 
 }  // namespace
