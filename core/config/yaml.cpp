@@ -97,6 +97,8 @@ void Node::fault(std::string what, std::string mend) const {
 
 void Node::missing(std::string mend) const { fault(detail::missing, std::move(mend)); }
 
+std::size_t Node::fault_count() const { return document_->faults.count(); }
+
 bool Node::has(std::string_view name) const { return (*this)[name].exists(); }
 
 Node Node::operator[](std::string_view name) const {
@@ -286,7 +288,9 @@ bool Node::as_flag() const {
 }
 
 Range Node::as_range(std::string_view unit) const {
+  const std::size_t known = fault_count();
   const auto numbers = as_numbers(unit);
+  if (fault_count() > known) return {0.0, 1.0};
   if (numbers.size() != 2 || !(numbers[0] < numbers[1])) {
     fault("a range is expected here", "write [lower, upper] with lower < upper");
     return {0.0, 1.0};

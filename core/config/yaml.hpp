@@ -52,6 +52,9 @@ class Node {
   /// Records that this place is missing; a key beside it that is a misspelling of this one takes the fault's place.
   void missing(std::string mend) const;
 
+  /// Faults of the file so far, unknown keys not counted: what follows from one that was just found need not be told.
+  [[nodiscard]] std::size_t fault_count() const;
+
   [[nodiscard]] bool has(std::string_view name) const;
   /// The child, which may not exist; marks the key as known. A key without value is a fault.
   [[nodiscard]] Node operator[](std::string_view name) const;

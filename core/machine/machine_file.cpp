@@ -20,8 +20,9 @@ std::string letter(int axis) {
 
 metrology::Chain read_chain(const Node& node, int least_axes) {
   metrology::Chain chain;
+  const std::size_t known = node.fault_count();
   const auto names = node.as_texts();
-  if (!node.exists()) return chain;
+  if (!node.exists() || node.fault_count() > known) return chain;
   if (names.size() < static_cast<std::size_t>(least_axes) || names.size() > 3) {
     node.fault(std::string{"a chain has "} + (least_axes < 2 ? "one, " : "") +
                    "two or three axes, this one has " + std::to_string(names.size()),
@@ -107,7 +108,12 @@ metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& c
 metrology::Machine read_machine(const config::Node& root, int least_axes) {
   (void)root.integer("invar_machine", 1, 1);
   metrology::Machine machine;
+  const std::size_t known = root.fault_count();
   machine.chain = read_chain(root.required("chain"), least_axes);
+  if (root.fault_count() > known) {  // the rest is told by the chain
+    for (const char* key : {"travel", "tool", "resolution", "errors"}) root[key].accept_all();
+    return machine;
+  }
   const Node travel = root.required("travel");
   for (int axis = 0; axis < metrology::axis_count; ++axis) {
     if (!machine.chain.has(axis)) {

@@ -69,8 +69,7 @@ void read_columns(const Node& root, Model& model) {
   for (const auto& row : signal_rows(model.plant, model.controller.has_value())) {
     if (!columns.has(row.name)) {
       if (row.required)
-        columns.fault(std::string{"no column is named for `"} + row.name + "`",
-                      std::string{"add `"} + row.name + ": <column of the recording>`");
+        columns[row.name].missing(std::string{"add `"} + row.name + ": <column of the recording>`");
       continue;
     }
     model.signals.push_back({row.name, columns.text(row.name), row.unit, row.is_output});
