@@ -37,7 +37,7 @@ namespace invar::physics {
 namespace {
 
 constexpr std::string_view no_name =
-    "An effect that no term of the library describes, as a table over the variable on which it depends.";
+    "An effect that no term of the library describes, as a curve over the variable on which it depends.";
 
 constexpr TermInfo unnamed(Plant plant, std::string_view site) {
   return {.name = "unmodelled",

@@ -35,7 +35,8 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SHARED = pathlib.Path(os.environ.get("INVAR_SHARED", ROOT.parent / "shared"))
 TIMES_NOISE = 2.0    # design: a residual above twice the noise is mismatch
-BY_CHANCE = 1.05     # two RMS of a thousand rows each differ by so much without any reason
+BY_CHANCE = 1.1      # the RMS of fifty independent values is uncertain by a tenth
+NOTHING = 1e-5       # a share of the mismatch
 FEWEST = 8           # values of an output that are worth a comparison
 ABSURD = 1e30        # in the unit of the axis of a plot: no machine goes there
 KINDS = ("noise", "said", "heldout", "other", "nothing", "table", "diverged", "report")
@@ -159,6 +160,14 @@ def is_worse(one, than, noise):
     return one > BY_CHANCE * than and one * one - than * than > 0.25 * noise * noise
 
 
+def worse_output(rows, one, than):
+    """The first output of which a model errs more than another, where the other outputs do not make up for it."""
+    worse = [s for s, r in rows.items() if is_worse(r[one], r[than], r["noise_floor"])]
+    gain = sum(math.log(max(r[than], 1e-300) / max(r[one], 1e-300)) for r in rows.values() if max(r[one], r[than]) > 0.0)
+    grossly = any(rows[s][one] > 1.5 * rows[s][than] for s in worse)
+    return worse[0] if worse and (grossly or gain < 0.0) else None
+
+
 # ------------------------------------------------------------------ a case
 
 def faults_of_report(report, summary, page, patched):
@@ -170,19 +179,19 @@ def faults_of_report(report, summary, page, patched):
     said = re.search(r"(?:explains the recording to|what remains is) ([0-9.e+]+) times", summary)
     if summary.startswith(("No mismatch", "Only parameters")) and (said and float(said[1]) > TIMES_NOISE or top > TIMES_NOISE):
         yield "said", f"`{summary.split(':')[0]}` beside {float(said[1]) if said else top:.1f} times the noise"
-    for signal_name, row in fit["heldout"].items():
-        for one, than in (("after", "retuned"), ("retuned", "before")):
-            if is_worse(row[one], row[than], row["noise_floor"]):
-                yield "heldout", f"{signal_name}: {than} {row[than]:.3g}, {one} {row[one]:.3g} {row['unit']}"
+    for one, than in (("after", "retuned"), ("retuned", "before")):
+        if at := worse_output(fit["heldout"], one, than):
+            row = fit["heldout"][at]
+            yield "heldout", f"{at}: {than} {row[than]:.3g}, {one} {row[one]:.3g} {row['unit']}"
     for finding in report["findings"]:
         sizes = [abs(p["value"]) for p in finding["parameters"].values()] + [abs(v) for v in finding.get("curve", {}).get("values", [])]
         # A place that has neither a name nor a curve (`unmodelled` alone) is said by itself.
-        if finding["share"] < 1e-3 and (sizes or "stand_in" in finding) or sizes and max(sizes) < 1e-12:
+        if finding["share"] < NOTHING and (sizes or "stand_in" in finding) or sizes and max(sizes) < 1e-12:
             yield "nothing", f"{finding['term']} {finding.get('stand_in', '')} share {finding['share']:.2g}"
         if "stand_in" in finding and "as a table" in finding["description"]:
             yield "table", f"{finding['stand_in']} is described as a table"
     if re.search(r"no known term describes it; patched.yaml has", summary):
-        yield "table", "a fitted term is called an effect that no term describes"
+        yield "table", "a fitted term is called what no term describes"
     if number := drawn_absurdly(page):
         yield "diverged", f"an axis of a plot reads {number}"
 
@@ -190,14 +199,13 @@ def faults_of_report(report, summary, page, patched):
 def faults_of_other(job, program, out, report, summary, page, patched, limit):
     """What the recordings that no fit saw say, by running `invar simulate` (a start that is a guess: by the report)."""
     named = set(report.get("worse_on", []))
-    noise = {s: r["noise_floor"] for s, r in report["fit"]["heldout"].items()}
     for inputs, outputs in job.others:
         rows = report["fit"].get("other_recordings", {}).get(inputs.name)
         if rows is None:
             continue
-        worse = [f"{s}: {than} {r[than]:.3g}, {one} {r[one]:.3g} {r['unit']}" for s, r in rows.items()
-                 for one, than in (("after", "retuned"), ("retuned", "before")) if is_worse(r[one], r[than], noise.get(s, 0.0))]
-        is_told = inputs.name in named and inputs.name in patched.split("\ninvar_model")[0] and "worse on " in summary and "worse on " in page
+        worse = [f"{at}: {than} {rows[at][than]:.3g}, {one} {rows[at][one]:.3g} {rows[at]['unit']}"
+                 for one, than in (("after", "retuned"), ("retuned", "before")) if (at := worse_output(rows, one, than))]
+        is_told = inputs.name in named and inputs.name in patched.split("\ninvar_model")[0] and f"Worse on {inputs.name}" in summary and f"Worse on {inputs.name}" in page
         if worse and not is_told:
             yield "other", f"{inputs.name}: {worse[0]}"
         if job.fits_start or rows is None or report.get("data", {}).get("looked_at", "").find("windows") >= 0:
@@ -210,14 +218,12 @@ def faults_of_other(job, program, out, report, summary, page, patched, limit):
                 simulated, measured = columns(table), columns(outputs or inputs)
                 errors[what] = {n: error(v, measured[n]) for n, v in simulated.items() if n in measured}
         if {"before", "retuned", "after"} <= errors.keys() and not is_told:
-            for name, after in errors["after"].items():
-                before, retuned = errors["before"].get(name), errors["retuned"].get(name)
-                if None in (before, retuned, after) or name in ("t", "time"):
-                    continue
-                # The noise in the column's own unit is not known here: chance alone is allowed for, and more.
-                if after > 1.2 * retuned or retuned > 1.2 * before:
-                    yield "other", f"{inputs.name}, simulated: {name} {before:.3g}, retuned {retuned:.3g}, patched {after:.3g}"
-                    break
+            # The noise in the column's own unit is not known here: chance alone is allowed for.
+            rows = {n: {what: errors[what][n] for what in errors} | {"noise_floor": 0.0} for n in errors["after"]
+                    if n not in ("t", "time") and all(errors[what].get(n) is not None for what in errors)}
+            for one, than in (("after", "retuned"), ("retuned", "before")):
+                if at := worse_output(rows, one, than):
+                    yield "other", f"{inputs.name}, simulated: {at}: {than} {rows[at][than]:.3g}, {one} {rows[at][one]:.3g}"
 
 
 def judge(job, program, limit):

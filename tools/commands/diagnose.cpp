@@ -10,6 +10,7 @@
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <sstream>
 
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
@@ -79,6 +80,19 @@ void keep_memory() {
   (void)mallopt(M_ARENA_MAX, 1);  // what one thread leaves another may use
 }
 
+/// The summary; on a terminal the lines that warn are red.
+void print(const std::string& summary) {
+  const bool is_seen = isatty(STDOUT_FILENO) == 1;
+  std::istringstream lines{summary};
+  for (std::string line; std::getline(lines, line);) {
+    const bool is_red = is_seen && line.starts_with("Worse on ");
+    if (is_red) steer(std::cout, red);
+    std::cout << line;
+    if (is_red) steer(std::cout, plain);
+    std::cout << '\n';
+  }
+}
+
 int run(const Options& options) {
   keep_memory();
   if (!options.check_outputs.empty() && options.check_outputs.size() != options.checks.size())
@@ -121,6 +135,7 @@ int run(const Options& options) {
   const auto page = diagnose::page_text(data, diagnosis, options.model.string());
   patience.reset();
   diagnose::ReportFolder folder{options.out};
+  const auto of_one = diagnose::of_one_recording(diagnosis);
   for (const bool is_retuned : {true, false}) {
     auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
     changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
@@ -134,10 +149,19 @@ int run(const Options& options) {
         if (sigmas[k] > 0.0 && std::isfinite(sigmas[k]))  // 0: was not fitted
           changed.terms[model.terms.size() + i].sigmas[k] = sigmas[k];
     }
-    const std::string made_of =
+    std::string made_of =
         "# " + options.model.filename().string() +
         (is_retuned ? ", its own parameters refitted, no physics added\n"
                     : " after `invar diagnose`. " + diagnose::verdict_sentence(data, diagnosis) + "\n");
+    for (const auto& run : diagnosis.other_runs)
+      if (const auto worse = diagnose::worse_on(diagnosis, run); !worse.empty())
+        made_of += "# " + worse + "\n";
+    if (!is_retuned)
+      for (std::size_t k = of_one.size(); k-- > 0;) {
+        made_of += "# Without the curve over " + changed.terms[of_one[k]].curve.over +
+                   ", with which it is worse elsewhere.\n";
+        changed = physics::without_term(std::move(changed), of_one[k]);
+      }
     folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", made_of + model::patched(yaml, changed));
   }
   folder.put("report.html", page);
@@ -146,7 +170,8 @@ int run(const Options& options) {
   if (options.json)
     std::cout << json << '\n';
   else
-    std::cout << diagnose::summary(data, diagnosis) << "  " << (options.out / "report.html").string() << '\n';
+    print(diagnose::summary(data, diagnosis)),
+        std::cout << "  " << (options.out / "report.html").string() << '\n';
   return diagnosis.is_partial ? 130 : 0;
 }
 

@@ -68,7 +68,12 @@ struct OtherRun {
   bool fits_start = false;                    // each model starts where it comes nearest
   std::vector<std::vector<double>> measured;  // by output; NaN where nothing is to be compared
   physics::Outputs before, retuned, after;
-  std::vector<FitRow> fit;  // of the outputs that were measured
+  std::vector<FitRow> fit;   // of the outputs that were measured
+  std::string how_windowed;  // judged over windows, and why; empty: in one free run
+  std::vector<std::size_t>
+      left_out;           // found terms (places in the best model) that say nothing of this recording
+  bool is_worse = false;  // retuned or with what was found the model errs more than as given
+  bool is_worse_with_them = false;  // patched.yaml would be, with the terms that are left out here
 };
 
 enum class Verdict { no_mismatch, parameters_only, explained, partly_explained, ambiguous, unknown_physics };

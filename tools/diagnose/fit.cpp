@@ -68,7 +68,8 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
   for (std::size_t t = 0; t < model.terms.size(); ++t) {
     const auto& term = model.terms[t];
     const bool is_nominal = t < believed.terms.size();
-    for (std::size_t i = 0; i < term.curve.values.size(); ++i) {
+    const bool is_known = is_nominal && believed.terms[t].sigmas[0].value_or(1.0) == 0.0;
+    for (std::size_t i = 0; i < term.curve.values.size() && !is_known; ++i) {
       double size = term.curve.usual;
       for (double v : term.curve.values)
         if (!(term.curve.usual > 0.0)) size = std::max(size, std::abs(v));

@@ -5,6 +5,9 @@
 #include <cmath>
 
 #include "core/model/recording_file.hpp"
+#include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/handed_over.hpp"
+#include "tools/diagnose/windows.hpp"
 
 namespace invar::diagnose {
 
@@ -112,13 +115,61 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
   return run;
 }
 
-void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
-  const auto outputs_of = [&](const physics::Model& model) {
-    return run.fits_start ? from_best_start(model, run) : simulated(model, run.inputs);
-  };
-  run.before = outputs_of(data.model);
-  run.retuned = outputs_of(diagnosis.retuned.model);
-  run.after = outputs_of(diagnosis.best.model);
+namespace {
+
+/// The run as the diagnosis would look at it, with the model as it was given.
+Case case_of(const Case& data, const OtherRun& run) {
+  Case other;
+  other.model = data.model;
+  std::erase_if(other.model.parameters, is_start);
+  other.outputs = data.outputs;
+  other.given_noise = data.given_noise;
+  other.is_time_series = data.is_time_series;
+  other.windows.few = data.windows.few;
+  other.recordings.push_back({run.name, run.inputs, run.measured, physics::prepare(other.model, run.inputs)});
+  return other;
+}
+
+/// What a model makes of each window from states of its own.
+physics::Outputs from_own_starts(const Case& windows, const physics::Model& model) {
+  auto own = windows;
+  own.remembered = std::make_shared<Remembered>();
+  own.model = model;
+  std::erase_if(own.model.parameters, is_start);
+  for (const auto& parameter : windows.model.parameters)
+    if (is_start(parameter)) own.model.parameters.push_back(parameter);
+  own.recordings.front().simulation = physics::prepare(own.model, own.recordings.front().inputs);
+  estimate_starts(own);
+  return simulate(own, own.model).front();
+}
+
+/// From where to where a variable goes there; nothing where it is not known.
+std::optional<Range> range_of(const Case& other, const physics::Term& term) {
+  if (other.model.plant == physics::Plant::equations) {
+    const auto [low, high] = span_of(other, other.model, term.curve.over);
+    return Range{low, high};
+  }
+  std::optional<Range> range;
+  for (const double v : variable_values(other, 0, term.curve.over, term.on))
+    if (std::isfinite(v))
+      range = range ? Range{std::min(range->lower, v), std::max(range->upper, v)} : Range{v, v};
+  return range;
+}
+
+/// A course over time is that of one recording, and one over anything else says nothing past its knots.
+bool says_nothing_of(const Case& other, const physics::Term& term) {
+  const auto& curve = term.curve;
+  if (curve.knots.empty() || curve.period > 0.0) return false;
+  if (curve.over == "time" || curve.over == "t") return true;
+  const auto range = range_of(other, term);
+  // Between two knots it goes straight, and so it may half a step beyond the last.
+  const double beyond = curve.knots.size() > 1 ? 0.5 * (curve.knots[1] - curve.knots[0]) : 0.0;
+  return range && (range->lower < curve.knots.front() - beyond || range->upper > curve.knots.back() + beyond);
+}
+
+std::vector<FitRow> rows_of(const Case& data, const Diagnosis& diagnosis, const OtherRun& run,
+                            const physics::Outputs& after) {
+  std::vector<FitRow> rows;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto n = count(run.measured[o]);
     if (n < fewest) continue;
@@ -129,10 +180,54 @@ void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
       return std::sqrt(sum / static_cast<double>(n));
     };
     const auto& signal = *data.model.signal(data.outputs[o]);
-    run.fit.push_back({signal.name, signal.unit == "degC" ? "K" : signal.unit, rms(run.before),
-                       rms(run.retuned), rms(run.after),
-                       o < diagnosis.heldout.size() ? diagnosis.heldout[o].noise_floor : 0.0});
+    rows.push_back({signal.name, signal.unit == "degC" ? "K" : signal.unit, rms(run.before), rms(run.retuned),
+                    rms(after), o < diagnosis.heldout.size() ? diagnosis.heldout[o].noise_floor : 0.0});
   }
+  return rows;
+}
+
+bool errs_more(const std::vector<FitRow>& rows) {
+  return is_worse(rows, &FitRow::after, &FitRow::retuned) || is_worse(rows, &FitRow::after, &FitRow::before);
+}
+
+}  // namespace
+
+void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
+  auto other = case_of(data, run);
+  if (data.windows.count > 0) cut_into_windows(other);
+  auto best = diagnosis.best.model;
+  const std::size_t given = data.model.terms.size();
+  for (std::size_t t = best.terms.size(); t-- > given;)
+    if (says_nothing_of(other, best.terms[t])) {
+      run.left_out.insert(run.left_out.begin(), t);
+      best = physics::without_term(std::move(best), t);
+    }
+  const bool windowed = other.windows.count > 0;
+  if (windowed) {
+    run.how_windowed = how_windowed(other);
+    run.measured = other.recordings.front().measured;
+  }
+  const auto outputs_of = [&](const physics::Model& model) {
+    return windowed         ? from_own_starts(other, model)
+           : run.fits_start ? from_best_start(model, run)
+                            : simulated(model, run.inputs);
+  };
+  run.before = outputs_of(data.model);
+  run.retuned = outputs_of(diagnosis.retuned.model);
+  run.after = outputs_of(best);
+  run.fit = rows_of(data, diagnosis, run, run.after);
+  run.is_worse = errs_more(run.fit) || is_worse(run.fit, &FitRow::retuned, &FitRow::before);
+  run.is_worse_with_them =
+      !run.left_out.empty() && errs_more(rows_of(data, diagnosis, run, outputs_of(diagnosis.best.model)));
+}
+
+std::vector<std::size_t> of_one_recording(const Diagnosis& diagnosis) {
+  std::vector<std::size_t> terms;
+  for (const auto& run : diagnosis.other_runs)
+    if (run.is_worse_with_them) terms.insert(terms.end(), run.left_out.begin(), run.left_out.end());
+  std::sort(terms.begin(), terms.end());
+  terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
+  return terms;
 }
 
 }  // namespace invar::diagnose

@@ -16,7 +16,10 @@ struct OtherRunFiles {
 
 /// Reads it. Throws InputError for what is unusable.
 OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files);
-/// Runs the three models over it as `invar simulate` does, and compares.
+/// Runs the three models over it as `invar simulate` does, each over windows of its own states where the diagnosis did so, and
+/// compares. Found curves over time, or asked past their knots, are left out.
 void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run);
+/// Places in the best model of the curves that were left out of a comparison and would make patched.yaml worse there.
+std::vector<std::size_t> of_one_recording(const Diagnosis& diagnosis);
 
 }  // namespace invar::diagnose

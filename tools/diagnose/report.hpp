@@ -33,7 +33,7 @@ std::string readable(std::string_view name);
 /// Where a term acts, for somebody who does not know the library: "temperature sensor of pad".
 std::string place_of(const Case& data, const physics::Term& term);
 /// "amplitude 2.40 +- 0.01 N, pitch ..."
-std::string sizes_of(const Case& data, const Finding& finding);
+std::string sizes_of(const Case& data, const Diagnosis& diagnosis, const Finding& finding);
 /// How many rows there were, and what of them was left out or put right.
 std::string rows_read(const DataCount& count);
 /// Which part of a recording the fits did not run through, and why; empty where they saw all of it.
@@ -45,6 +45,15 @@ std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
 /// What the verdict alone would hide, in a line: parameters that went far from what was believed, much that remains, and
 /// what in the files does not go together; empty where there is none.
 std::string beside_the_verdict(const Case& data, const Diagnosis& diagnosis);
+
+/// One line for a recording on which a model that is handed over errs more than a simpler one; empty where none does.
+std::string worse_on(const Diagnosis& diagnosis, const OtherRun& run);
+/// Which curves were left out of the comparison with another recording, and why; empty where none was.
+std::string left_out_of(const Case& data, const Diagnosis& diagnosis, const OtherRun& run);
+/// An RMS in its unit; a run that diverged is said in words.
+std::string error_of(double value, const FitRow& row);
+/// What is said of a finding: its term's description, or what fits best in the place of a name.
+std::string description_of(const Diagnosis& diagnosis, const Finding& finding);
 
 /// A number of the user's that a fit took away from what he believed.
 struct MovedNumber {

@@ -108,7 +108,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
                   {"share", finding.share},
                   {"parameters", parameters},
                   {"alternatives", alternatives},
-                  {"description", term.info->description}};
+                  {"description", description_of(d, finding)}};
     if (finding.stand_in != nullptr) entry["stand_in"] = finding.stand_in->name;
     if (!term.on.empty()) entry["on"] = term.on;
     if (!term.with.empty()) entry["with"] = term.with;
@@ -167,12 +167,18 @@ std::string report_json(const Case& data, const Diagnosis& d) {
              {"unit", unit_of(data, term, f.index)}});
     }
   }
-  json other_runs = json::object();
-  for (const auto& run : d.other_runs) other_runs[run.name] = fit_json(run.fit);
+  json other_runs = json::object(), worse = json::array(), left_out = json::object();
+  for (const auto& run : d.other_runs) {
+    other_runs[run.name] = fit_json(run.fit);
+    if (run.is_worse) worse.push_back(run.name);
+    if (const auto text = left_out_of(data, d, run); !text.empty()) left_out[run.name] = text;
+  }
+  report["worse_on"] = worse;
   report["fit"] = {
       {"heldout", fit_json(d.heldout)},
       {"train", fit_json(d.train)},
       {"other_recordings", other_runs},
+      {"left_out_there", left_out},
       {"split",
        data.windows.count > 0 ? "each of the last three quarters of a window was kept from a fit in turn, "
                                 "never its beginning; " +

@@ -38,6 +38,25 @@ std::vector<double> difference(const Case& data, const std::vector<physics::Outp
   return out;
 }
 
+/// Did a run leave the machine for good? None of that is drawn.
+bool ran_away(const std::vector<double>& measured, const std::vector<double>& left) {
+  constexpr double far = 100.0;  // times as far as the machine itself went
+  double low = 1e300, high = -1e300, most = 0.0;
+  for (const double v : measured)
+    if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+  for (const double v : left)
+    most = std::isinf(v) ? v * v : std::max(most, std::isnan(v) ? 0.0 : std::abs(v));
+  return high > low && most > far * (high - low);
+}
+
+/// The same of an output over all recordings.
+bool ran_away(const Case& data, const std::vector<double>& left, std::size_t output) {
+  std::vector<double> measured;
+  for (const auto& recording : data.recordings)
+    measured.insert(measured.end(), recording.measured[output].begin(), recording.measured[output].end());
+  return ran_away(measured, left);
+}
+
 /// Of a sensor the place is the true position.
 std::string recorded_name(const Case& data, const std::string& variable) {
   return data.model.plant == physics::Plant::sensor && variable == "position" ? "true_position" : variable;
@@ -103,7 +122,8 @@ Series averaged(const std::string& label, const std::vector<double>& x, const st
 /// The four numbers of one output beside one another.
 void add_bars(report::Page& page, const FitRow& row, bool any_found) {
   const auto bar = [&](const char* label, double value, const char* colour) {
-    std::string text = report::si(value, row.unit);
+    std::string text = error_of(value, row);
+    if (text == "runs away") return report::Page::Bar{label, 0.0, text, colour};
     if (row.noise_floor > 0.0 && value != row.noise_floor)
       text += " (" + report::number(value / row.noise_floor) + " x noise)";
     return report::Page::Bar{label, value, text, colour};
@@ -121,16 +141,16 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
     missing.push_back({title_of(finding), where_of(data, d, i),
-                       report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, finding)});
+                       report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, d, finding)});
   }
   if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
   std::string fit;
   for (const auto& row : d.heldout) {
     if (is_bare(row)) continue;
-    fit += (fit.empty() ? "" : "; ") + row.signal + " " + report::si(row.before, row.unit) + " as it is, " +
-           report::si(row.retuned, row.unit) + " with its own parameters refitted" +
-           (d.findings.empty() ? "" : ", " + report::si(row.after, row.unit) + " with what was found") +
-           " (noise " + report::si(row.noise_floor, row.unit) + ")";
+    fit += (fit.empty() ? "" : "; ") + row.signal + " " + error_of(row.before, row) + " as it is, " +
+           error_of(row.retuned, row) + " with its own parameters refitted" +
+           (d.findings.empty() ? "" : ", " + error_of(row.after, row) + " with what was found") + " (noise " +
+           report::si(row.noise_floor, row.unit) + ")";
   }
   const std::string rest = report::number(d.unexplained, 3) + " times the noise";
   Names rows;
@@ -148,7 +168,11 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
 
 void add_other_run(report::Page& page, const Case& data, const Diagnosis& d, const OtherRun& run) {
   page.heading("Another recording, not used here: " + run.name);
-  page.paragraph("All three models run freely from the recording's first row to its last.");
+  if (const auto worse = worse_on(d, run); !worse.empty()) page.callout(worse, "bad");
+  page.paragraph(run.how_windowed.empty()
+                     ? "All three models run freely from the recording's first row to its last."
+                     : "All three models are " + run.how_windowed + ".");
+  if (const auto left_out = left_out_of(data, d, run); !left_out.empty()) page.paragraph(left_out + ".");
   for (const auto& row : run.fit) add_bars(page, row, !d.findings.empty());
   std::vector<Plot> plots;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
@@ -170,10 +194,16 @@ void add_other_run(report::Page& page, const Case& data, const Diagnosis& d, con
       for (std::size_t i = 0; i < values.size(); ++i) values[i] -= simulated[o][i];
       return values;
     };
-    both.series = {line("measured", run.measured[o], "#1c2733"), line("refitted", run.retuned[o], orange),
-                   line("with what was found", run.after[o], blue)};
-    apart.series = {line("refitted", rest(run.retuned), orange),
-                    line("with what was found", rest(run.after), blue)};
+    both.series = {line("measured", run.measured[o], "#1c2733")};
+    const auto add = [&](const char* label, const physics::Outputs& simulated, const char* colour) {
+      const auto left = rest(simulated);
+      if (ran_away(run.measured[o], left)) return;
+      both.series.push_back(line(label, simulated[o], colour));
+      apart.series.push_back(line(label, left, colour));
+    };
+    add("refitted", run.retuned, orange);
+    add("with what was found", run.after, blue);
+    if (apart.series.empty()) continue;
     for (auto* plot : {&both, &apart}) {
       report::in_handy_units(*plot);
       plots.push_back(std::move(*plot));
@@ -208,12 +238,17 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  const std::vector<physics::Outputs>& after) {
   const auto& finding = d.findings[which];
   const auto& info = *finding.term.info;
-  page.paragraph(title_of(finding) + " (" + where_of(data, d, which) + "; in the model file " +
-                 std::string{(finding.stand_in != nullptr ? finding.stand_in : &info)->name} + " at " +
-                 site_of(data, finding.term) + "): " + std::string{info.description} + " [" +
-                 std::string{info.source} + "] Of the mismatch, " + report::number(100.0 * finding.share, 3) +
-                 " % comes back when it alone is taken out.");
+  const auto& in_file = finding.stand_in != nullptr ? *finding.stand_in : info;
   const auto without = simulate(data, physics::without_term(d.best.model, data.model.terms.size() + which));
+  bool leaves = false;
+  for (std::size_t o = 0; o < data.outputs.size(); ++o)
+    leaves = leaves || ran_away(data, difference(data, without, o), o);
+  page.paragraph(title_of(finding) + " (" + where_of(data, d, which) + "; in the model file " +
+                 std::string{in_file.name} + " at " + site_of(data, finding.term) +
+                 "): " + description_of(d, finding) + " [" + std::string{in_file.source} + "] " +
+                 (leaves ? "Without it alone the model runs away from the machine."
+                         : "Of the mismatch, " + report::number(100.0 * finding.share, 3) +
+                               " % comes back when it alone is taken out."));
   // The output that it moves most, seen from its noise.
   std::size_t shown = 0;
   double most = -1.0;
@@ -241,9 +276,16 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
       return;  // direction and speed are both seen over velocity
     plot.x_label = label + in_brackets(unit_of_variable(data, variable));
     plot.y_label = "mean of measured - simulated" + in_brackets(unit);
-    plot.series = {averaged("without it", x, difference(data, without, shown), 80),
-                   averaged("with it", x, difference(data, after, shown), 80)};
-    plot.series[0].colour = orange, plot.series[1].colour = blue;
+    const auto draw = [&](const char* series, const std::vector<physics::Outputs>& simulated,
+                          const char* colour) {
+      const auto left = difference(data, simulated, shown);
+      if (ran_away(data, left, shown)) return;
+      plot.series.push_back(averaged(series, x, left, 80));
+      plot.series.back().colour = colour;
+    };
+    draw("without it", without, orange);
+    draw("with it", after, blue);
+    if (plot.series.empty()) return;
     report::in_handy_units(plot);
     if (plot.series[0].x.size() > 1) plots.push_back(std::move(plot));  // else it stood still
   };
@@ -340,6 +382,8 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   const bool clear =
       (d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only) && !d.is_partial;
   page.callout(verdict_sentence(data, d), fine ? "good" : (clear ? "plain" : "warn"));
+  for (const auto& run : d.other_runs)
+    if (const auto worse = worse_on(d, run); !worse.empty()) page.callout(worse, "bad");
   if (const auto beside = beside_the_verdict(data, d); !beside.empty()) page.callout(beside, "warn");
   in_short(page, data, d);
 
@@ -349,7 +393,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   page.paragraph(
       "RMS of measured - simulated on each third of the recording in turn, which its fit did not see. "
       "`Refitted` is the fair rival: the same model with its own parameters tuned, no physics added. `Noise` "
-      "is what the model file says, or the part of the residual that is not related from row to row.");
+      "is what the model file says, or what differences between neighbouring rows and rests say.");
   for (const auto& run : d.other_runs) add_other_run(page, data, d, run);
 
   const auto retuned = simulate(data, d.retuned.model), after = simulate(data, d.best.model);
@@ -363,9 +407,15 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
     plot.y_label = "measured - simulated" + in_brackets(unit_shown(data.model.signal(data.outputs[o])->unit));
     const auto style =
         data.is_time_series && time.size() > 1500 ? Series::Style::line : Series::Style::points;
-    plot.series.push_back({"refitted", style, time, difference(data, retuned, o), {}, {}, orange});
-    if (!d.findings.empty())
-      plot.series.push_back({"with what was found", style, time, difference(data, after, o), {}, {}, blue});
+    const auto draw = [&](const char* label, const std::vector<physics::Outputs>& simulated,
+                          const char* colour) {
+      auto left = difference(data, simulated, o);
+      if (!ran_away(data, left, o))
+        plot.series.push_back({label, style, time, std::move(left), {}, {}, colour});
+    };
+    draw("refitted", retuned, orange);
+    if (!d.findings.empty()) draw("with what was found", after, blue);
+    if (plot.series.empty()) continue;
     report::in_handy_units(plot);
     residuals.push_back(std::move(plot));
   }

@@ -34,8 +34,8 @@ void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& tit
   rows.push_back({title, "before", "retuned", "after", "noise"});
   for (const auto& row : fit) {
     if (row.before == 0.0 && row.after == 0.0) continue;  // no more than a start value was recorded
-    rows.push_back({row.signal, report::si(row.before, row.unit), report::si(row.retuned, row.unit),
-                    report::si(row.after, row.unit), report::si(row.noise_floor, row.unit)});
+    rows.push_back({row.signal, error_of(row.before, row), error_of(row.retuned, row),
+                    error_of(row.after, row), report::si(row.noise_floor, row.unit)});
   }
 }
 
@@ -44,12 +44,14 @@ void add_fit(std::vector<std::vector<std::string>>& rows, const std::string& tit
 std::string summary(const Case& data, const Diagnosis& d) {
   std::string out = verdict_sentence(data, d) + "\n";
   if (const auto beside = beside_the_verdict(data, d); !beside.empty()) out += beside + "\n";
+  for (const auto& run : d.other_runs)
+    if (const auto worse = worse_on(d, run); !worse.empty()) out += worse + "\n";
   std::vector<std::vector<std::string>> rows;
   if (!d.findings.empty()) rows.push_back({"missing", "where", "how sure", "size"});
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
     rows.push_back({title_of(finding), where_of(data, d, i),
-                    report::number(100.0 * finding.probability) + " %", sizes_of(data, finding)});
+                    report::number(100.0 * finding.probability) + " %", sizes_of(data, d, finding)});
   }
   out += aligned(rows);
   rows.clear();
@@ -61,6 +63,10 @@ std::string summary(const Case& data, const Diagnosis& d) {
     considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;
   if (const auto read = rows_read(data.count); read.find(';') != std::string::npos) out += "  " + read + "\n";
   if (const auto part = what_was_looked_at(data); !part.empty()) out += "  " + part + "\n";
+  for (const auto& run : d.other_runs) {
+    if (!run.how_windowed.empty()) out += "  in " + run.name + ": " + run.how_windowed + "\n";
+    if (const auto left_out = left_out_of(data, d, run); !left_out.empty()) out += "  " + left_out + "\n";
+  }
   if (!considered.empty()) out += "  not claimed: " + considered + "\n";
   return out + "  next: " + next_experiment(data, d) + "\n";
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/physics/equations_columns.hpp"
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/shorten.hpp"
@@ -189,11 +190,31 @@ std::string place_of(const Case& data, const physics::Term& term) {
   return text;
 }
 
-std::string sizes_of(const Case& data, const Finding& finding) {
+namespace {
+
+/// "2.4", "770": a ratio as one says it.
+std::string times(double ratio) {
+  return ratio >= 10.0 && ratio < 1e6 ? std::to_string(std::lround(ratio)) : report::number(ratio, 2);
+}
+
+/// What stands for a cause that has no name, and why it is not the name.
+std::string nearest_of(const Diagnosis& d, const Finding& finding) {
+  const double left = most_over_noise(d);
+  return readable(finding.stand_in->name) + " fits best, but " +
+         (left > times_noise ? "leaves " + times(left) + " times the noise" : "another cause is likelier");
+}
+
+}  // namespace
+
+std::string description_of(const Diagnosis& d, const Finding& finding) {
+  if (finding.stand_in == nullptr) return std::string{finding.term.info->description};
+  return "Of the known terms " + nearest_of(d, finding) + "; patched.yaml has it. " +
+         std::string{finding.stand_in->description};
+}
+
+std::string sizes_of(const Case& data, const Diagnosis& d, const Finding& finding) {
   const auto& info = *finding.term.info;
-  if (finding.stand_in != nullptr)
-    return "no known term describes it; patched.yaml has " + readable(finding.stand_in->name) +
-           " in its place";
+  if (finding.stand_in != nullptr) return nearest_of(d, finding) + "; patched.yaml has it";
   std::string text;
   for (std::size_t i = 0; i < info.parameter_count(); ++i)
     text += (i == 0 ? "" : ", ") + readable(info.parameters[i].name) + " " +
@@ -280,11 +301,6 @@ std::string what_was_looked_at(const Case& data) {
 }
 
 namespace {
-
-/// "2.4", "770": a ratio as one says it.
-std::string times(double ratio) {
-  return ratio >= 10.0 && ratio < 1e6 ? std::to_string(std::lround(ratio)) : report::number(ratio, 2);
-}
 
 std::string listed(const std::vector<MovedNumber>& moved) {
   std::string text;
@@ -397,7 +413,7 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
           if (const auto place = place_of(data, f.term); places.find(place) == std::string::npos)
             places += (places.empty() ? "" : " and the ") + place;
         return "Unknown physics: something is missing, most likely at the " + places +
-               ", that no known term describes.";
+               ". Of the known terms " + nearest_of(d, d.findings.front()) + ".";
       }
       return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
              " (" + site_of(data, d.findings.front().term) + ") that goes with " +

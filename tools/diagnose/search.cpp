@@ -10,6 +10,7 @@
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/detectable.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/handed_over.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/loop_noise.hpp"
 #include "tools/diagnose/misrecorded.hpp"
@@ -456,6 +457,7 @@ void Search::finish() {
   // What a run without noise left over may be what noise makes of the others.
   if (!curved) take([&] { return settle(), true; });
   if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_, options_.without), true; });
+  if (options_.refuses) take([&] { return leave_out_nothings(data_, d_), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
   if (!take(checked)) {  // in few steps, and not to be stopped

@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "core/physics/library.hpp"
+#include "tools/diagnose/handed_over.hpp"
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/other_cause.hpp"
@@ -154,7 +156,7 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     }
     rival = differs ? simulate(data, refitted(data, for_rival, k, d.retuned, 3).model) : retuned;
   });
-  double gain = 0.0;  // of what was not seen, in whitened residuals
+  double gain = 0.0, over_given = 0.0;  // of what was not seen, in whitened residuals
   for (const auto& [fold, retuned, after, rival] : runs) {
     for (const bool test : {true, false}) {
       const auto& on = test ? fold.test : fold.train;
@@ -164,11 +166,18 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
       for (std::size_t o = 0; o < sums.size(); ++o)
         sums[o].before += before[o], sums[o].retuned += without[o], sums[o].after += with[o];
     }
-    if (any)
-      gain +=
-          0.5 * d.weighing.temper *
-          (residual(data, fold.test, retuned).squaredNorm() - residual(data, fold.test, after).squaredNorm());
+    if (!any) continue;
+    const auto beyond_best = [&, &on = fold.test, &best = after](const std::vector<physics::Outputs>& other) {
+      return 0.5 * d.weighing.temper *
+             (residual(data, on, other).squaredNorm() - residual(data, on, best).squaredNorm());
+    };
+    gain += beyond_best(retuned);
+    over_given += beyond_best(nominal);
   }
+  std::vector<double> noise;
+  const auto simulated = simulate(recorded, d.best.model);
+  for (std::size_t o = 0; o < data.outputs.size(); ++o)
+    noise.push_back(instrument_noise(recorded, simulated, o));
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto& signal = *data.model.signal(data.outputs[o]);
     const auto row = [&](const Sums& sums) {
@@ -179,15 +188,35 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     d.heldout.push_back(row(tested[o]));
     d.train.push_back(row(trained[o]));
     d.heldout.back().noise_floor = d.train.back().noise_floor =
-        std::isfinite(data.given_noise[o]) ? data.given_noise[o]
-                                           : std::min(d.heldout.back().after, d.weighing.filters[o].sigma);
+        std::isfinite(data.given_noise[o]) ? data.given_noise[o] : std::min(d.heldout.back().after, noise[o]);
   }
-  if (d.best.model.terms.size() == given || !refuses) return;
+  if (!refuses) return;
+  // Numbers that lead away from what was not seen are not taken over.
+  if (is_worse(d.heldout, &FitRow::retuned, &FitRow::before)) {
+    d.retuned = fit(data, d.weighing, data.model, data.model, 0);
+    gain = over_given;
+    for (auto* rows : {&d.heldout, &d.train})
+      for (auto& row : *rows) row.retuned = row.before;
+    if (!any) {
+      d.best = d.retuned;
+      for (auto* rows : {&d.heldout, &d.train})
+        for (auto& row : *rows) row.after = row.before;
+    }
+  }
+  if (!any) return;
   // A claim must help on what it has not seen. Where a loop feeds noise back a run without noise may lie farther off.
   const bool is_loop = data.model.controller || !data.model.equations.controlled_input.empty();
   const bool is_nearer = std::any_of(d.heldout.begin(), d.heldout.end(),
                                      [](const FitRow& row) { return row.after < row.retuned; });
-  if (gain < 3.0 || !(is_loop || is_nearer)) {
+  const bool misleads = is_worse(d.heldout, &FitRow::after, &FitRow::retuned);
+  if (misleads && d.findings.size() > 1) {  // what was found last is the least of it
+    take_last_back(data, d, "with it the model is worse on held-out data");
+    d.heldout.clear();
+    d.train.clear();
+    hold_out(data, recorded, d, refuses);
+    return;
+  }
+  if (gain < 3.0 || misleads || !(is_loop || is_nearer)) {
     for (const auto& finding : d.findings)
       d.reject(std::string{finding.term.info->name}, "no gain on held-out data",
                d.best.evidence - d.retuned.evidence);
@@ -220,6 +249,15 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
     won += std::max(0.0, before[o] / after[o] - 1.0);
   }
   return left > 0.0 ? left / (left + won) : 0.0;
+}
+
+/// What an instrument adds is white or known: more than twice that is mismatch, whatever its colour.
+void keep_to_noise(const Case& data, Diagnosis& d) {
+  if (!(most_over_noise(d) > times_noise)) return;
+  if (d.verdict == Verdict::explained) d.verdict = Verdict::partly_explained;
+  if (d.verdict != Verdict::no_mismatch && d.verdict != Verdict::parameters_only) return;
+  d.verdict = Verdict::unknown_physics;
+  d.suspect = most_suspect(data, d);
 }
 
 }  // namespace
@@ -270,9 +308,9 @@ void conclude(const Case& data, Diagnosis& d) {
   }
   d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
-  double sum = 0.0;
-  for (const auto& row : d.heldout) sum += row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0;
-  d.unexplained = sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
+  d.unexplained = d.heldout.empty() ? 1.0 : 0.0;
+  for (const auto& row : d.heldout)
+    d.unexplained = std::max(d.unexplained, row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0);
   constexpr double far_above = 0.5;  // of the power of the noise that the user gave
   constexpr double times_the_noise = 3.0;
   leave_unsaid(d, rests,
@@ -318,6 +356,7 @@ void conclude(const Case& data, Diagnosis& d) {
     d.verdict = Verdict::unknown_physics;
     d.suspect = most_suspect(data, d);
   }
+  keep_to_noise(data, d);
   std::sort(d.rejected.begin(), d.rejected.end(),
             [](const auto& a, const auto& b) { return a.gain > b.gain; });
   std::erase_if(d.rejected, [&](const Rejection& r) {

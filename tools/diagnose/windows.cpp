@@ -210,22 +210,6 @@ Case in_windows(const Case& whole, std::size_t rows, const Rows& anew) {
   return data;
 }
 
-/// The states at the beginning of the windows that bring the model nearest, its numbers as they are believed.
-void estimate_starts(Case& data) {
-  auto fixed = data.model;
-  for (auto& parameter : fixed.parameters)
-    if (!is_start(parameter)) parameter.sigma = 0.0;
-  for (auto& term : fixed.terms) term.sigmas.fill(0.0);
-  for (int again = 0; again < 2; ++again) {
-    const auto plain = weigh(data, simulate(data, data.model), false);
-    data.model.parameters = [&] {
-      auto found = fit(data, plain, data.model, fixed, 8).model.parameters;
-      for (std::size_t p = 0; p < found.size(); ++p) found[p].sigma = data.model.parameters[p].sigma;
-      return found;
-    }();
-  }
-}
-
 /// By how much a disturbance of the states at the beginning of a window has grown at its end, the median of all windows.
 double growth_over_windows(const Case& data) {
   const auto at = simulate(data, data.model);
@@ -256,6 +240,21 @@ double growth_over_windows(const Case& data) {
 }
 
 }  // namespace
+
+void estimate_starts(Case& data) {
+  auto fixed = data.model;
+  for (auto& parameter : fixed.parameters)
+    if (!is_start(parameter)) parameter.sigma = 0.0;
+  for (auto& term : fixed.terms) term.sigmas.fill(0.0);
+  for (int again = 0; again < 2; ++again) {
+    const auto plain = weigh(data, simulate(data, data.model), false);
+    data.model.parameters = [&] {
+      auto found = fit(data, plain, data.model, fixed, 8).model.parameters;
+      for (std::size_t p = 0; p < found.size(); ++p) found[p].sigma = data.model.parameters[p].sigma;
+      return found;
+    }();
+  }
+}
 
 bool is_start(const physics::Parameter& parameter) {
   return parameter.name.find(".start") != std::string::npos;

@@ -25,6 +25,9 @@ std::optional<physics::Model> begun_in_windows(const Case& data);
 /// machine, but begin anew before anything slow shows.
 bool has_longer_windows(const Case& data);
 
+/// The states at the beginning of the windows that bring the model nearest, all its other numbers as they stand.
+void estimate_starts(Case& data);
+
 /// The model with its states as its outputs.
 physics::Model showing_states(const physics::Model& model);
 

@@ -30,7 +30,7 @@ class LettersOnly final : public std::streambuf {
 };
 
 constexpr std::string_view clear_line = "\r\x1b[K", clear_to_line_end = "\x1b[K", clear_below = "\x1b[J",
-                           go_home = "\x1b[H";
+                           go_home = "\x1b[H", red = "\x1b[31m", plain = "\x1b[0m";
 
 /// An order of the program's own to the terminal behind `stream`, past the filter.
 void steer(std::ostream& stream, std::string_view order);

@@ -1,0 +1,18 @@
+// What an instrument adds to an output: the measure of every residual, whatever its colour.
+#pragma once
+
+#include "tools/diagnose/diagnosis.hpp"
+
+namespace invar::diagnose {
+
+/// [SI] 1 sigma of an output: what `noise` of the model says; else what second differences of neighbouring rows say (of the
+/// readings or of what the model leaves of them, whichever is less), what the reading does while the machine rests, and the
+/// step in which it counts, whichever is most. What goes on from row to row is none of it.
+double instrument_noise(const Case& data, const std::vector<physics::Outputs>& simulated, std::size_t output);
+
+/// So many times the noise is mismatch.
+inline constexpr double times_noise = 2.0;
+/// The most that any output leaves in units of its noise: on held-out stretches, or on those that were fitted to.
+double most_over_noise(const Diagnosis& d);
+
+}  // namespace invar::diagnose
