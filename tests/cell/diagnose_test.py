@@ -32,7 +32,7 @@ terms: []
 """
 
 
-def tank(file, rows, seed, start=1.0, step=0.05, split=None):
+def tank(file, rows, seed, start=1.0, step=0.05, split=None, cubic=0.12):
     """x' = u - 0.3 x - 0.12 x^3, by small steps; the heat jumps every now and then."""
     draw = random.Random(seed)
     x, heat, table = start, 1.0, []
@@ -41,7 +41,7 @@ def tank(file, rows, seed, start=1.0, step=0.05, split=None):
             heat = draw.uniform(-1.5, 2.5)
         table.append([step * i, heat, x + draw.gauss(0.0, 0.01)])
         for _ in range(20):
-            x += step / 20 * (heat - 0.3 * x - 0.12 * x ** 3)
+            x += step / 20 * (heat - 0.3 * x - cubic * x ** 3)
     columns = ["t [s]", "heat [V/s]", "warmth [V]"]
     with open(file, "w", newline="") as out:
         write = csv.writer(out)
@@ -105,6 +105,29 @@ class Diagnose(unittest.TestCase):
             error.append(report["fit"]["other_recordings"]["other.csv"]["warmth"]["after"])
         self.assertGreater(error[0], 0.1)
         self.assertLess(error[1], 0.013)
+
+    def test_where_another_recording_says_otherwise_it_is_said_in_red_and_in_every_file(self):
+        tank(self.folder / "other.csv", 900, 4, start=0.4, cubic=0.0)
+        words = ["diagnose", "--model", "model.yaml", "--recording", "run.csv", "--check", "other.csv", "--out", "d"]
+        terminal, inside = pty.openpty()
+        done = subprocess.run([INVAR, *words], cwd=self.folder, stdout=inside, stderr=subprocess.DEVNULL, check=False)
+        os.close(inside)
+        text = b""
+        try:
+            while more := os.read(terminal, 65536):
+                text += more
+        except OSError:  # the other side is closed
+            pass
+        os.close(terminal)
+        self.assertEqual(done.returncode, 0)
+        worse = "Worse on other.csv, do not take it over: warmth "
+        self.assertIn("\x1b[31m" + worse, text.decode())
+        self.assertIn(f'<div class="callout bad">{worse}', (self.folder / "d/report.html").read_text())
+        self.assertEqual(json.loads((self.folder / "d/report.json").read_text())["worse_on"], ["other.csv"])
+        self.assertIn("# " + worse, (self.folder / "d/patched.yaml").read_text().split("invar_model")[0])
+        plain = call(self.folder, *words).stdout
+        self.assertIn("\n" + worse, plain)
+        self.assertNotIn("\x1b", plain)
 
     def test_no_file_that_is_read_is_written_over(self):
         before = (self.folder / "run.csv").read_bytes()

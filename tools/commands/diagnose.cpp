@@ -137,7 +137,7 @@ int run(const Options& options) {
   diagnose::ReportFolder folder{options.out};
   const auto of_one = diagnose::of_one_recording(diagnosis);
   for (const bool is_retuned : {true, false}) {
-    auto changed = is_retuned ? diagnosis.retuned.model : diagnosis.best.model;
+    auto changed = is_retuned ? diagnosis.retuned.model : diagnose::best_without(data, diagnosis, of_one);
     changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
     for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
@@ -145,9 +145,12 @@ int run(const Options& options) {
       if (const auto range = diagnose::covered(data, "temperature")) changed.baseline.temperature = range;
     for (std::size_t i = 0; !is_retuned && i < diagnosis.findings.size(); ++i) {
       const auto& sigmas = diagnosis.findings[i].sigmas;
+      const std::size_t place = model.terms.size() + i;
+      const auto at = std::lower_bound(of_one.begin(), of_one.end(), place);
+      if (at != of_one.end() && *at == place) continue;
+      auto& term = changed.terms[place - static_cast<std::size_t>(at - of_one.begin())];
       for (std::size_t k = 0; k < sigmas.size(); ++k)
-        if (sigmas[k] > 0.0 && std::isfinite(sigmas[k]))  // 0: was not fitted
-          changed.terms[model.terms.size() + i].sigmas[k] = sigmas[k];
+        if (sigmas[k] > 0.0 && std::isfinite(sigmas[k])) term.sigmas[k] = sigmas[k];  // 0: was not fitted
     }
     std::string made_of =
         "# " + options.model.filename().string() +
@@ -156,12 +159,9 @@ int run(const Options& options) {
     for (const auto& run : diagnosis.other_runs)
       if (const auto worse = diagnose::worse_on(diagnosis, run); !worse.empty())
         made_of += "# " + worse + "\n";
-    if (!is_retuned)
-      for (std::size_t k = of_one.size(); k-- > 0;) {
-        made_of += "# Without the curve over " + changed.terms[of_one[k]].curve.over +
-                   ", with which it is worse elsewhere.\n";
-        changed = physics::without_term(std::move(changed), of_one[k]);
-      }
+    for (std::size_t k = 0; !is_retuned && k < of_one.size(); ++k)
+      made_of += "# Without the curve over " + diagnosis.best.model.terms[of_one[k]].curve.over +
+                 ", with which it is worse elsewhere.\n";
     folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", made_of + model::patched(yaml, changed));
   }
   folder.put("report.html", page);
@@ -170,8 +170,7 @@ int run(const Options& options) {
   if (options.json)
     std::cout << json << '\n';
   else
-    print(diagnose::summary(data, diagnosis)),
-        std::cout << "  " << (options.out / "report.html").string() << '\n';
+    print(diagnose::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
   return diagnosis.is_partial ? 130 : 0;
 }
 
@@ -218,8 +217,9 @@ void add_diagnose(CLI::App& program) {
       ->capture_default_str();
   command->add_option(
       "--check", options->checks,
-      "another recording, which no fit sees: the model as it is, retuned and patched run freely over "
-      "it; may be repeated");
+      "another recording, which no fit sees: the model as it is, retuned and patched run over it (one that "
+      "integrates over windows); where patched is worse, summary, page, worse_on of report.json and the "
+      "head of patched.yaml say so; may be repeated");
   command->add_option("--check-outputs", options->check_outputs,
                       "the outputs of each --check, where they lie in a file of their own");
   command->add_flag("--check-fits-start", options->fits_check_start,

@@ -11,6 +11,7 @@
 #include "core/physics/approach.hpp"
 #include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/even_rows.hpp"
+#include "tools/diagnose/hiccups.hpp"
 #include "tools/diagnose/lone_inputs.hpp"
 #include "tools/diagnose/misrecorded.hpp"
 #include "tools/diagnose/shorten.hpp"
@@ -373,6 +374,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
     throw InputError{table.file.string() + ": column `" + model.signal("time")->column + "`",
                      "goes back at most of its rows", "name the column of the time, and sort the rows by it"};
   even_out(model, record, table.file.filename().string(), data.doubts);
+  leave_out_hiccups(model, record, table.file.filename().string(), data.doubts);
   leave_out_what_died(model, record, table.file.filename().string(), data.doubts);
   if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
   if (record.rows() < 8)

@@ -195,13 +195,9 @@ bool errs_more(const std::vector<FitRow>& rows) {
 void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
   auto other = case_of(data, run);
   if (data.windows.count > 0) cut_into_windows(other);
-  auto best = diagnosis.best.model;
-  const std::size_t given = data.model.terms.size();
-  for (std::size_t t = best.terms.size(); t-- > given;)
-    if (says_nothing_of(other, best.terms[t])) {
-      run.left_out.insert(run.left_out.begin(), t);
-      best = physics::without_term(std::move(best), t);
-    }
+  const auto& terms = diagnosis.best.model.terms;
+  for (std::size_t t = data.model.terms.size(); t < terms.size(); ++t)
+    if (says_nothing_of(other, terms[t])) run.left_out.push_back(t);
   const bool windowed = other.windows.count > 0;
   if (windowed) {
     run.how_windowed = how_windowed(other);
@@ -214,11 +210,20 @@ void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
   };
   run.before = outputs_of(data.model);
   run.retuned = outputs_of(diagnosis.retuned.model);
-  run.after = outputs_of(best);
+  run.after = outputs_of(best_without(data, diagnosis, run.left_out));
   run.fit = rows_of(data, diagnosis, run, run.after);
   run.is_worse = errs_more(run.fit) || is_worse(run.fit, &FitRow::retuned, &FitRow::before);
   run.is_worse_with_them =
       !run.left_out.empty() && errs_more(rows_of(data, diagnosis, run, outputs_of(diagnosis.best.model)));
+}
+
+physics::Model best_without(const Case& data, const Diagnosis& diagnosis,
+                            const std::vector<std::size_t>& terms) {
+  auto model = diagnosis.best.model;
+  if (terms.empty()) return model;
+  if (data.model.terms.size() + terms.size() == model.terms.size()) return diagnosis.retuned.model;
+  for (std::size_t k = terms.size(); k-- > 0;) model = physics::without_term(std::move(model), terms[k]);
+  return fit(data, diagnosis.weighing, model, data.model, 8).model;
 }
 
 std::vector<std::size_t> of_one_recording(const Diagnosis& diagnosis) {

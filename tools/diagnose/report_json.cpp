@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/region.hpp"
 #include "tools/diagnose/report.hpp"
@@ -25,6 +26,15 @@ json fit_json(const std::vector<FitRow>& rows) {
   return out;
 }
 
+/// How unlikely (log) white noise makes an RMS so many times its own: Chernoff's bound for chi squared.
+double above_noise(const Case& data, double times) {
+  if (!(times > times_noise)) return 0.0;
+  double rows = 0.0;
+  for (const auto& recording : data.recordings) rows += static_cast<double>(recording.inputs.rows());
+  const double power = times * times;
+  return 0.5 * rows * (power - 1.0 - std::log(power));
+}
+
 std::string text(double value) {
   std::ostringstream out;
   out.precision(3);
@@ -44,11 +54,13 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     over = std::max(over, row.noise_floor > 0.0 ? row.before / row.noise_floor : 1.0);
   // What moves within the user's own uncertainty is no mismatch, however far the residual of his best guess is above the noise.
   const bool is_believed = d.verdict == Verdict::no_mismatch && !d.is_partial;
+  const double left = most_over_noise(d);
   report["mismatch"] = {
-      {"significant", !is_believed && d.mismatch_gain > claim_margin},
+      {"significant", !is_believed && (d.mismatch_gain > claim_margin || left > times_noise)},
       {"residual_over_noise", over},
-      {"p_value", is_believed ? std::erfc(d.parameter_excursion / std::sqrt(2.0))
-                              : std::exp(-std::max(0.0, std::min(600.0, d.mismatch_gain)))}};
+      {"p_value",
+       is_believed ? std::erfc(d.parameter_excursion / std::sqrt(2.0))
+                   : std::exp(-std::clamp(std::max(d.mismatch_gain, above_noise(data, left)), 0.0, 600.0))}};
   report["location"] = json::array();
   report["findings"] = json::array();
   report["ambiguity"] = json::array();

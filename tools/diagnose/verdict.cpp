@@ -251,7 +251,7 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
   return left > 0.0 ? left / (left + won) : 0.0;
 }
 
-/// What an instrument adds is white or known: more than twice that is mismatch, whatever its colour.
+/// More than twice what the instruments add is mismatch, whatever its colour.
 void keep_to_noise(const Case& data, Diagnosis& d) {
   if (!(most_over_noise(d) > times_noise)) return;
   if (d.verdict == Verdict::explained) d.verdict = Verdict::partly_explained;
