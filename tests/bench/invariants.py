@@ -36,7 +36,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 SHARED = pathlib.Path(os.environ.get("INVAR_SHARED", ROOT.parent / "shared"))
 TIMES_NOISE = 2.0    # design: a residual above twice the noise is mismatch
 BY_CHANCE = 1.1      # the RMS of fifty independent values is uncertain by a tenth
-NOTHING = 1e-5       # a share of the mismatch
+NOTHING = 1e-3       # a share of what the retuned model leaves
 FEWEST = 8           # values of an output that are worth a comparison
 ABSURD = 1e30        # in the unit of the axis of a plot: no machine goes there
 KINDS = ("noise", "said", "heldout", "other", "nothing", "table", "diverged", "report")
@@ -162,6 +162,7 @@ def is_worse(one, than, noise):
 
 def worse_output(rows, one, than):
     """The first output of which a model errs more than another, where the other outputs do not make up for it."""
+    rows = {s: r for s, r in rows.items() if r["before"] > 0.0}  # else no more than a start value was recorded
     worse = [s for s, r in rows.items() if is_worse(r[one], r[than], r["noise_floor"])]
     gain = sum(math.log(max(r[than], 1e-300) / max(r[one], 1e-300)) for r in rows.values() if max(r[one], r[than]) > 0.0)
     grossly = any(rows[s][one] > 1.5 * rows[s][than] for s in worse)
@@ -186,8 +187,9 @@ def faults_of_report(report, summary, page, patched):
     for finding in report["findings"]:
         sizes = [abs(p["value"]) for p in finding["parameters"].values()] + [abs(v) for v in finding.get("curve", {}).get("values", [])]
         # A place that has neither a name nor a curve (`unmodelled` alone) is said by itself.
-        if finding["share"] < NOTHING and (sizes or "stand_in" in finding) or sizes and max(sizes) < 1e-12:
-            yield "nothing", f"{finding['term']} {finding.get('stand_in', '')} share {finding['share']:.2g}"
+        share = max(finding["share"], finding.get("share_of_rest", 0.0))
+        if share < NOTHING and (sizes or "stand_in" in finding) or sizes and max(sizes) < 1e-12:
+            yield "nothing", f"{finding['term']} {finding.get('stand_in', '')} share {share:.2g}"
         if "stand_in" in finding and "as a table" in finding["description"]:
             yield "table", f"{finding['stand_in']} is described as a table"
     if re.search(r"no known term describes it; patched.yaml has", summary):

@@ -8,6 +8,24 @@
 
 namespace invar::diagnose {
 
+namespace {
+
+/// A late instrument reads at first what was before the recording, and nobody knows that.
+void leave_out_unknown_past(const physics::Model& model, physics::Record& record) {
+  for (const auto& term : model.terms) {
+    const auto delay = term.info->index_of("delay");
+    const auto found = record.signals.find(term.on);
+    if (delay >= term.info->parameter_count() || found == record.signals.end()) continue;
+    constexpr std::size_t about = 2;  // rows: of the central difference
+    std::size_t until = 0;
+    while (until < record.rows() && record.time[until] < record.time.front() + term.values[delay]) ++until;
+    if (until == 0 || until + about + 8 > record.rows()) continue;
+    std::fill_n(found->second.begin(), until + about, std::numeric_limits<double>::quiet_NaN());
+  }
+}
+
+}  // namespace
+
 void leave_out_hiccups(const physics::Model& model, physics::Record& record, const std::string& file,
                        std::vector<std::string>& doubts) {
   constexpr double even = 0.2, too_fast = 0.7;  // of the usual step; a lost row makes none shorter
@@ -15,6 +33,7 @@ void leave_out_hiccups(const physics::Model& model, physics::Record& record, con
   constexpr std::size_t before = 3,
                         behind = 6;  // rows: of the central difference, and of an instrument that is late
   const auto found = record.signals.find("velocity_sensor");
+  if (model.plant == physics::Plant::sensor) leave_out_unknown_past(model, record);
   if (model.plant != physics::Plant::sensor || found == record.signals.end() || record.rows() < 20) return;
   std::vector<double> steps;
   for (std::size_t i = 1; i < record.rows(); ++i) steps.push_back(record.time[i] - record.time[i - 1]);

@@ -118,6 +118,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
                   {"site", site_of(data, term)},
                   {"probability", finding.probability},
                   {"share", finding.share},
+                  {"share_of_rest", finding.share_of_rest},
                   {"parameters", parameters},
                   {"alternatives", alternatives},
                   {"description", description_of(d, finding)}};

@@ -82,14 +82,14 @@ bool set_aside(const Case& data, Diagnosis& d) {
   return true;
 }
 
-void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far) {
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, double times_the_noise) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
     // Of the user's own equations a number may be far off: what he left out there is often a part of it.
     const bool is_astray =
         d.parameter_excursion > far_astray && finding.term.info->plant != physics::Plant::equations;
     constexpr double very_far = 10.0;  // times the noise: what is less likely than not is no name for it
-    const double least = is_far && d.unexplained > very_far             ? 0.5
+    const double least = is_far && times_the_noise > very_far           ? 0.5
                          : is_far || is_astray || rests[i] > plain_rest ? 0.3
                                                                         : 0.1;
     if (!finding.term.curve.knots.empty() || finding.probability >= least) continue;

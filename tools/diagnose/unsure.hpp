@@ -22,6 +22,6 @@ bool set_aside(const Case& data, Diagnosis& d);
 /// residuals far from the noise show that it is not the whole truth (`rests`, a share by finding; `is_far`,
 /// of the outputs), or where the names lead the numbers of a built-in plant far astray; in five, where these are ten times the
 /// noise.
-void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far);
+void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, double times_the_noise);
 
 }  // namespace invar::diagnose

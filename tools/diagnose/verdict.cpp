@@ -192,7 +192,14 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
   }
   if (!refuses) return;
   // Numbers that lead away from what was not seen are not taken over.
-  if (is_worse(d.heldout, &FitRow::retuned, &FitRow::before)) {
+  const auto errs_more = [&](OfModel one, OfModel than) {
+    constexpr double enough = 8.0;  // readings; a start value alone is compared with nothing
+    std::vector<FitRow> compared;
+    for (std::size_t o = 0; o < tested.size(); ++o)
+      if (tested[o].before.count >= enough) compared.push_back(d.heldout[o]);
+    return is_worse(compared, one, than);
+  };
+  if (errs_more(&FitRow::retuned, &FitRow::before)) {
     d.retuned = fit(data, d.weighing, data.model, data.model, 0);
     gain = over_given;
     for (auto* rows : {&d.heldout, &d.train})
@@ -208,7 +215,7 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
   const bool is_loop = data.model.controller || !data.model.equations.controlled_input.empty();
   const bool is_nearer = std::any_of(d.heldout.begin(), d.heldout.end(),
                                      [](const FitRow& row) { return row.after < row.retuned; });
-  const bool misleads = is_worse(d.heldout, &FitRow::after, &FitRow::retuned);
+  const bool misleads = errs_more(&FitRow::after, &FitRow::retuned);
   if (misleads && d.findings.size() > 1) {  // what was found last is the least of it
     take_last_back(data, d, "with it the model is worse on held-out data");
     d.heldout.clear();
@@ -249,6 +256,18 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
     won += std::max(0.0, before[o] / after[o] - 1.0);
   }
   return left > 0.0 ? left / (left + won) : 0.0;
+}
+
+/// What the best model leaves, over what of it is not related from row to row (over the noise that the user gave): the mean of
+/// the outputs. How sure a name is was learnt by this measure.
+double times_unrelated(const Case& data, const Diagnosis& d) {
+  double sum = 0.0;
+  for (std::size_t o = 0; o < d.heldout.size(); ++o) {
+    const double after = d.heldout[o].after, given = data.given_noise[o],
+                 noise = std::isfinite(given) ? given : std::min(after, d.weighing.filters[o].sigma);
+    sum += noise > 0.0 ? after / noise : 1.0;
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
 }
 
 /// More than twice what the instruments add is mismatch, whatever its colour.
@@ -311,11 +330,13 @@ void conclude(const Case& data, Diagnosis& d) {
   d.unexplained = d.heldout.empty() ? 1.0 : 0.0;
   for (const auto& row : d.heldout)
     d.unexplained = std::max(d.unexplained, row.noise_floor > 0.0 ? row.after / row.noise_floor : 1.0);
+  const double beyond_unrelated = times_unrelated(data, d);
   constexpr double far_above = 0.5;  // of the power of the noise that the user gave
   constexpr double times_the_noise = 3.0;
   leave_unsaid(d, rests,
                *std::max_element(excess.begin(), excess.end()) > far_above ||
-                   (data.model.plant == physics::Plant::equations && d.unexplained > times_the_noise));
+                   (data.model.plant == physics::Plant::equations && beyond_unrelated > times_the_noise),
+               beyond_unrelated);
   const bool nameless =
       !d.findings.empty() && std::all_of(d.findings.begin(), d.findings.end(),
                                          [](const Finding& f) { return f.stand_in != nullptr; });
@@ -341,21 +362,6 @@ void conclude(const Case& data, Diagnosis& d) {
                     ? Verdict::partly_explained
                     : Verdict::explained;
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);
-  // An equation, or a window of an axis, that says the right thing leaves noise. Many times that, and with what was
-  // recorded, is more physics, however much was found.
-  if ((data.model.plant == physics::Plant::equations || data.windows.count > 0) &&
-      most_followed > plainly_followed && d.verdict == Verdict::explained && d.unexplained > 10.0)
-    d.verdict = Verdict::partly_explained;
-  // A closed loop keeps what is left of a position small: three times the noise there is far more in a force.
-  if (data.model.plant == physics::Plant::axis && data.model.controller && d.verdict == Verdict::explained &&
-      d.unexplained > times_the_noise)
-    d.verdict = Verdict::partly_explained;
-  // Where every window of an axis begins anew, numbers that are off leave noise.
-  if (d.verdict == Verdict::parameters_only && data.model.plant == physics::Plant::axis &&
-      data.windows.count > 0 && d.unexplained > 3.0) {
-    d.verdict = Verdict::unknown_physics;
-    d.suspect = most_suspect(data, d);
-  }
   keep_to_noise(data, d);
   std::sort(d.rejected.begin(), d.rejected.end(),
             [](const auto& a, const auto& b) { return a.gain > b.gain; });

@@ -150,7 +150,7 @@ TEST(Astray, ANameThatIsUnlikelyIsNotSaidWhereTheNumbersWentFar) {
     finding.term.info = physics::find_term(plant, name);
     finding.probability = probability;
     d.parameter_excursion = excursion;
-    leave_unsaid(d, {rest}, is_far);
+    leave_unsaid(d, {rest}, is_far, 1.0);
     return d.findings[0].term.info->name != "unmodelled";
   };
   using physics::Plant;
