@@ -208,12 +208,20 @@ std::string si_unit(const Unit& unit) {
 }
 
 std::optional<Conversion> conversion(std::string_view from, std::string_view to) {
+  // Beside a temperature C and F are degrees; alone C is no unit here, and F a farad.
+  const auto degrees = [](std::string_view text, std::string_view other) -> std::string_view {
+    const auto beside = parse_unit(other);
+    if (!beside || beside->dimension != parse_unit("degC")->dimension) return text;
+    return text == "C" ? "degC" : text == "F" ? "degF" : text;
+  };
+  from = degrees(from, to), to = degrees(to, from);
   const auto source = parse_unit(from);
   const auto target = parse_unit(to);
   if (!source || !target || !source->same_quantity(*target)) return std::nullopt;
-  // Turns a minute are no pure numbers where the other side counts angles.
+  // Turns, a minute or a second, are no pure numbers where the other side counts angles.
   const auto turns = [](std::string_view text, const Unit& unit, const Unit& other) {
-    const bool counts_turns = text.find("rpm") != std::string_view::npos && unit.dimension[radian] == 0.0;
+    const auto holds = [&](const char* name) { return text.find(name) != std::string_view::npos; };
+    const bool counts_turns = (holds("rpm") || holds("Hz")) && unit.dimension[radian] == 0.0;
     return counts_turns ? std::pow(2.0 * pi, other.dimension[radian]) : 1.0;
   };
   const double from_size = source->factor * turns(from, *source, *target),

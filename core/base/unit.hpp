@@ -30,7 +30,8 @@ std::optional<Unit> parse_unit(std::string_view text);
 std::string si_unit(const Unit& unit);
 
 /// The factor and offset that carry a value in `from` to `to`; nothing when one is no unit or they measure
-/// different things. Angles and pure numbers (rad, 1) are compatible; rpm are turns beside rad/s.
+/// different things. Angles and pure numbers (rad, 1) are compatible; rpm and Hz are turns beside rad/s; C and F are degrees
+/// beside a temperature.
 struct Conversion {
   double factor = 1.0;
   double offset = 0.0;

@@ -11,129 +11,21 @@
 #include <utility>
 
 #include "core/base/contract.hpp"
-#include "core/base/input_file.hpp"
 #include "core/base/limits.hpp"
 #include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/unit.hpp"
 #include "core/recording/columns.hpp"
+#include "core/recording/table_form.hpp"
+#include "core/recording/text_lines.hpp"
+#include "core/recording/time_stamp.hpp"
 
 namespace invar::recording {
 
 namespace {
 
 constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-
-/// The lines of a text file, plain or gzip, unpacked block by block: an hour at 1 kHz is hundreds of megabytes of text.
-class Lines {
- public:
-  explicit Lines(const std::filesystem::path& file) : file_{file.string()} {
-    stream_.reset(gzdopen(open_input(file, "a CSV file"), "rb"));  // reads plain files too
-    if (!stream_) throw InputError{file_, "cannot be read", "check the path and its permissions"};
-    (void)gzbuffer(stream_.get(), 1U << 17U);
-    more();
-    if (text_.starts_with("\xEF\xBB\xBF")) at_ = 3;
-  }
-
-  /// The next line without its end, good until the next call; false where there are no more.
-  bool next(std::string_view& line) {
-    auto end = text_.find('\n', at_);
-    while (end == std::string::npos && !ended_) {
-      const std::size_t seen = text_.size() - at_;
-      if (seen > limits::csv_line)
-        throw InputError{file_ + ":" + std::to_string(lines_ + 1),
-                         "a line has more than " + std::to_string(limits::csv_line / limits::mib) + " MiB",
-                         "name a CSV file: a header, then one row a sample"};
-      more();
-      end = text_.find('\n', at_ + seen);
-    }
-    if (at_ >= text_.size()) return false;
-    ++lines_;
-    line = std::string_view{text_}.substr(at_, end == std::string::npos ? end : end - at_);
-    at_ = end == std::string::npos ? text_.size() : end + 1;
-    return true;
-  }
-  /// Throws where the rest of the file is damaged: that is what is wrong with it then, whatever a line seems to lack.
-  void check_rest() {
-    if (gzdirect(stream_.get()) != 0) return;  // not packed: nothing is damaged
-    while (!ended_) at_ = text_.size(), more();
-  }
-
- private:
-  void more() {
-    text_.erase(0, std::exchange(at_, 0));
-    const std::size_t kept = text_.size();
-    text_.resize(kept + block);
-    const int got = gzread(stream_.get(), text_.data() + kept, static_cast<unsigned>(block));
-    if (got < 0) throw InputError{file_, "is damaged (gzip cannot unpack it)", "copy the file again"};
-    text_.resize(kept + static_cast<std::size_t>(got));
-    unpacked_ += static_cast<std::uint64_t>(got);
-    check_size();
-    if (text_.find('\0', kept) != std::string::npos)
-      throw InputError{file_, "is not a text file", "name a CSV file"};
-    if (got > 0) return;
-    ended_ = true;
-    int status = 0;
-    gzerror(stream_.get(), &status);
-    if (status == Z_BUF_ERROR) throw InputError{file_, "is cut off (gzip ends early)", "copy the file again"};
-  }
-
-  /// What is packed must not grow without end; numbers shrink to a third or a tenth.
-  void check_size() const {
-    const auto packed = static_cast<std::uint64_t>(std::max<z_off_t>(gzoffset(stream_.get()), 0));
-    if (gzdirect(stream_.get()) != 0 ||
-        unpacked_ <= limits::csv_unpacked_free + limits::csv_unpacked_times * packed)
-      return;
-    throw InputError{file_,
-                     "unpacks to more than " + std::to_string(limits::csv_unpacked_times) + " times its size",
-                     "see that it is the right file; if it is, unpack it by `gunzip` and name that"};
-  }
-
-  static constexpr std::size_t block = 1U << 18U;
-  std::string file_;
-  std::unique_ptr<gzFile_s, int (*)(gzFile)> stream_{nullptr, gzclose};
-  std::string text_;  // from the line at `at_` to the end of the last block
-  std::size_t at_ = 0, lines_ = 0;
-  std::uint64_t unpacked_ = 0;
-  bool ended_ = false;
-};
-
-std::string_view trimmed(std::string_view text) {
-  const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
-  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-  return text;
-}
-
-/// The cells of one line; a comma inside double quotes does not separate.
-void split(std::string_view line, std::vector<std::string_view>& cells) {
-  cells.clear();
-  bool quoted = false;
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i <= line.size(); ++i) {
-    if (i < line.size() && line[i] == '"') quoted = !quoted;
-    if (i == line.size() || (line[i] == ',' && !quoted)) {
-      cells.push_back(trimmed(line.substr(begin, i - begin)));
-      begin = i + 1;
-    }
-  }
-}
-
-std::optional<double> number(std::string_view cell) {
-  if (cell.empty()) return missing;
-  if (cell.front() == '+') cell.remove_prefix(1);
-  double value = 0.0;
-  const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  if (error == std::errc::result_out_of_range) return std::nullopt;
-  if (error == std::errc{} && end == cell.data() + cell.size()) return value;
-  std::string lower{cell};
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](unsigned char c) { return std::tolower(c); });
-  for (const std::string_view none : {"nan", "na", "n/a", "#n/a", "null", "1.#qnan", "1.#ind", "-1.#ind"})
-    if (lower == none) return missing;
-  return std::nullopt;
-}
 
 /// A cell as a message shows it: a line of some hundred digits says no more than its beginning.
 std::string shortened(std::string_view cell) {
@@ -150,13 +42,27 @@ bool is_index(std::string_view cell, std::size_t open) {
          inside.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
+/// The round bracket at the end of a header's cell where a unit stands in it; npos where none does: `T (C)`, not `T (left)`.
+std::size_t unit_in_round_brackets(std::string_view cell) {
+  const auto open = cell.rfind('(');
+  if (open == std::string_view::npos || open == 0 || cell.back() != ')') return std::string_view::npos;
+  const auto inside = trimmed(cell.substr(open + 1, cell.size() - open - 2));
+  const bool is_number = inside.find_first_not_of("0123456789") == std::string_view::npos;
+  const bool is_temperature =
+      inside == "C" || inside == "F";  // what they measure, who asks for the column knows
+  return !is_number && (is_temperature || parse_unit(inside)) ? open : std::string_view::npos;
+}
+
 Column header(std::string_view cell, const std::string& where) {
   Column column;
+  column.header = std::string{cell};
   auto open = cell.rfind('[');
+  char closing = ']';
   if (open != std::string_view::npos && is_index(cell, open)) open = std::string_view::npos;
+  if (open == std::string_view::npos) open = unit_in_round_brackets(cell), closing = ')';
   column.name = std::string{trimmed(cell.substr(0, open))};
   if (open != std::string_view::npos) {
-    const auto close = cell.find(']', open);
+    const auto close = cell.find(closing, open);
     if (close == std::string_view::npos)
       throw InputError{where + ": column `" + std::string{cell} + "`", "the unit's bracket is not closed",
                        "write `" + column.name + " [unit]`"};
@@ -168,73 +74,247 @@ Column header(std::string_view cell, const std::string& where) {
   return column;
 }
 
+/// Times of one column as seconds since its first.
+class StampCells {
+ public:
+  /// Throws InputError for a stamp of another kind than the first, or one that may be two days.
+  double read(const TimeStamp& stamp, const std::string& where) {
+    constexpr std::int64_t day = 86'400'000'000'000, half = day / 2;
+    if (!first_) first_ = stamp, last_ = stamp.ns, date_ = stamp.ambiguous;
+    if (stamp.has_date != first_->has_date)
+      throw InputError{where, "has a date where others have none", "write all times in one form"};
+    if (stamp.ambiguous != date_)
+      throw InputError{where,
+                       "of `" + std::string{stamp.ambiguous.empty() ? date_ : stamp.ambiguous} +
+                           "` day and month may be either way round",
+                       "write dates as 2024-03-01"};
+    auto ns = stamp.ns;
+    while (!stamp.has_date && ns < last_ - half) ns += day;  // it is past midnight
+    last_ = ns;
+    return 1e-9 * static_cast<double>(ns - first_->ns);
+  }
+
+ private:
+  std::optional<TimeStamp> first_;
+  std::string date_;
+  std::int64_t last_ = 0;
+};
+
+/// What is taken of the columns of a file.
+struct Wanted {
+  std::vector<std::string> texts;
+  std::optional<std::vector<std::string>> only;
+
+  static bool names(const std::vector<std::string>& list, const Column& column) {
+    return std::any_of(list.begin(), list.end(),
+                       [&](const std::string& name) { return name == column.name || name == column.header; });
+  }
+  [[nodiscard]] bool takes(const Column& column) const { return !only || names(*only, column); }
+};
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& file, Wanted wanted)
+      : file_{file}, wanted_{std::move(wanted)}, lines_{file} {
+    table_.file = file;
+  }
+
+  Table run() {
+    auto first = first_lines();
+    std::vector<NumberedLine> sample = first;
+    std::erase_if(sample, [](const NumberedLine& line) { return is_comment(line.text); });
+    if (first.empty()) throw InputError{file_.string(), "is empty", "begin with a header `name [unit],...`"};
+    check_first(first.front());
+    form_ = form_of(sample, comment_, file_);
+    read_header(first.front());
+    cells_.assign(places_.size(), {NumberCells{form_.separator}, {}});
+    std::size_t begin = form_.header_is_row ? 1 : 0;
+    if (form_.header_is_row && first.size() > 1 && take_units(first[1])) begin = 2;
+    for (std::size_t i = begin; i < first.size(); ++i)
+      if (is_row(first[i].text)) read_row(first[i].text, first[i].number);
+    first.clear();
+    std::string_view line;
+    while (next_row(line)) read_row(line, number_);
+    for (Column& column : table_.columns) column.values.shrink_to_fit();
+    if (rows_ == 0) throw InputError{file_.string(), "has a header but no rows", "add the readings below it"};
+    table_.rows_read = rows_;
+    return std::move(table_);
+  }
+
+ private:
+  /// A comment is none where a name may begin as one does: then it has as many cells as a row.
+  bool is_row(std::string_view line) {
+    if (!is_comment(line)) return true;
+    if (is_text_.empty() || !is_text_.front()) return false;
+    form_.split(line, split_, count_);
+    return split_.size() == count_;
+  }
+
+  /// The next row.
+  bool next_row(std::string_view& line) {
+    while (lines_.next(line)) {
+      ++number_;
+      if (!trimmed(line).empty() && is_row(line)) return true;
+    }
+    return false;
+  }
+
+  /// The header, and as many lines behind it as tell the form; empty where there is none.
+  std::vector<NumberedLine> first_lines() {
+    constexpr std::size_t enough = 40, bytes = 1U << 20U;
+    std::vector<NumberedLine> first;
+    std::size_t size = 0;
+    std::string_view line;
+    while (first.size() < enough && size < bytes && lines_.next(line)) {
+      ++number_;
+      if (trimmed(line).empty()) continue;
+      NumberedLine one{number_, std::string{line}};
+      if (first.empty() && is_comment(line)) {
+        comment_ = std::move(one);
+        continue;
+      }
+      size += line.size();
+      first.push_back(std::move(one));
+    }
+    return first;
+  }
+
+  [[noreturn]] void refuse(const std::string& at, const std::string& what, const std::string& mend) {
+    const InputError fault{at, what, mend};  // its text is the line's, which the rest of the file overwrites
+    lines_.check_rest();
+    throw fault;
+  }
+  [[nodiscard]] std::string at(std::size_t number) const {
+    return file_.string() + ":" + std::to_string(number);
+  }
+
+  void check_first(const NumberedLine& line) {
+    if (trimmed(line.text).find('\r') != std::string_view::npos)
+      refuse(at(line.number), "the lines end in a carriage return alone",
+             "end them in a line feed, as by `tr '\\r' '\\n'`");
+  }
+
+  void read_header(const NumberedLine& first) {
+    const auto& line = form_.header ? *form_.header : first;
+    form_.split(line.text, split_);
+    if (split_.size() > limits::csv_columns)
+      refuse(at(line.number), "has " + std::to_string(split_.size()) + " columns",
+             "use at most " + std::to_string(limits::csv_columns));
+    if (split_.size() > 1 && split_.back().empty()) split_.pop_back();  // a separator at each line's end
+    count_ = split_.size();
+    table_.has_header = form_.header.has_value();
+    std::set<std::string> names;
+    for (std::size_t i = 0; i < count_; ++i) {
+      Column column;
+      if (!table_.has_header)
+        column.name = std::to_string(i + 1);
+      else if (!split_[i].empty() || !wanted_.only)
+        column = header(split_[i], at(line.number));
+      // Who asks for a number means the place, whatever a comment says.
+      if (!form_.header_is_row && wanted_.only &&
+          Wanted::names(*wanted_.only, {std::to_string(i + 1), "", {}, {}}))
+        column.name = std::to_string(i + 1);
+      const bool takes = wanted_.takes(column);
+      if (takes && !names.insert(column.name).second)
+        refuse(at(line.number), "column `" + column.name + "` stands twice", "keep one of them");
+      is_text_.push_back(Wanted::names(wanted_.texts, column));
+      if (takes)
+        places_.push_back(i), table_.columns.push_back(std::move(column));
+      else if (!column.name.empty())
+        table_.left_out.push_back(std::move(column.name));
+    }
+  }
+
+  /// A second line of units alone (`s;degC;W`) below a header without any; not where texts are read, which may look so.
+  bool take_units(const NumberedLine& line) {
+    form_.split(line.text, split_, count_);
+    const auto is_unit = [](std::string_view cell) {
+      return cell.empty() || (!NumberCells{}.read(cell) && (cell == "C" || cell == "F" || parse_unit(cell)));
+    };
+    const bool are_units =
+        wanted_.only && split_.size() == count_ && std::all_of(split_.begin(), split_.end(), is_unit) &&
+        std::any_of(split_.begin(), split_.end(), [](std::string_view cell) { return !cell.empty(); }) &&
+        std::all_of(table_.columns.begin(), table_.columns.end(),
+                    [](const Column& column) { return column.unit.empty(); });
+    for (std::size_t k = 0; are_units && k < places_.size(); ++k)
+      table_.columns[k].unit = std::string{split_[places_[k]]};
+    return are_units;
+  }
+
+  void read_row(std::string_view line, std::size_t number) {
+    form_.split(line, split_, count_);
+    ++rows_;
+    if (split_.size() != count_)
+      refuse(at(number),
+             "this row has " + std::to_string(split_.size()) + " cells, the " +
+                 (form_.header_is_row ? "header " : "first ") + std::to_string(count_),
+             split_.size() > count_ && form_.separator == ','
+                 ? "give every row one cell a column; where numbers have decimal commas, part cells by "
+                   "semicolons"
+                 : "give every row one cell a column (an empty one where a value is missing)");
+    for (std::size_t k = 0; k < places_.size(); ++k) {
+      Column& column = table_.columns[k];
+      const auto cell = split_[places_[k]];
+      if (is_text_[places_[k]])
+        read_text(column, cell, number);
+      else
+        column.values.push_back(read_number(k, cell, number));
+    }
+  }
+
+  void read_text(Column& column, std::string_view cell, std::size_t number) {
+    if (const auto flaw = flaw_of_label(cell))
+      refuse(at(number) + ": column `" + column.name + "`",
+             "`" + clipped(std::string{cell}) + "` " + flaw->what, flaw->mend);
+    column.texts.emplace_back(cell);
+    column.values.push_back(NumberCells{form_.separator}.read(cell).value_or(missing));
+  }
+
+  double read_number(std::size_t k, std::string_view cell, std::size_t number) {
+    Cells& cells = cells_[k];
+    Column& column = table_.columns[k];
+    if (const auto value = cells.numbers.read(cell); value && (!cells.stamps || std::isnan(*value)))
+      return *value;
+    const auto stamp = parse_time_stamp(cell);
+    const auto where = [&] { return at(number) + ": column `" + column.name + "`"; };
+    if (stamp && !cells.stamps && is_empty(column)) cells.stamps.emplace(), column.unit = "s";
+    if (stamp && cells.stamps) return cells.stamps->read(*stamp, where());
+    refuse(where(),
+           "`" + shortened(cell) + "` " + (cells.stamps ? "is not a time" : cells.numbers.flaw(cell)),
+           cells.stamps ? "write it as the times before it, such as 2024-03-01T09:00:02.4"
+                        : "write a number, or leave the cell empty");
+  }
+
+  static bool is_empty(const Column& column) {
+    return std::all_of(column.values.begin(), column.values.end(),
+                       [](double value) { return std::isnan(value); });
+  }
+
+  struct Cells {
+    NumberCells numbers;
+    std::optional<StampCells> stamps;
+  };
+  std::filesystem::path file_;
+  Wanted wanted_;
+  TextLines lines_;
+  Table table_;
+  TableForm form_;
+  std::optional<NumberedLine> comment_;
+  std::size_t number_ = 0, count_ = 0, rows_ = 0;  // of the line; cells of a row; rows read
+  std::vector<bool> is_text_;                      // by column of the file
+  std::vector<std::size_t> places_;                // in the file, by column of the table
+  std::vector<Cells> cells_;                       // by column of the table
+  std::vector<std::string_view> split_;
+};
+
 }  // namespace
 
 Table Table::read(const std::filesystem::path& file, const std::vector<std::string>& text_columns) {
-  Lines lines{file};
-  Table table;
-  table.file = file;
-  std::vector<std::string_view> cells;
-  std::vector<bool> is_text;
-  std::string_view line;
-  for (std::size_t line_number = 1; lines.next(line); ++line_number) {
-    if (trimmed(line).empty()) continue;
-    const auto where = [&] { return file.string() + ":" + std::to_string(line_number); };
-    const auto refuse = [&](const std::string& at, const std::string& what, const std::string& mend) {
-      const InputError fault{at, what,
-                             mend};  // its text is the line's, which the rest of the file overwrites
-      lines.check_rest();
-      throw fault;
-    };
-    split(line, cells);
-    if (table.columns.empty()) {
-      if (trimmed(line).find('\r') != std::string_view::npos)
-        refuse(where(), "the lines end in a carriage return alone",
-               "end them in a line feed, as by `tr '\\r' '\\n'`");
-      if (cells.size() == 1 && line.find_first_of(";\t") != std::string_view::npos)
-        refuse(where(), "the cells are parted by semicolons or tabs",
-               "part them by commas, and write decimal points");
-      if (cells.size() > limits::csv_columns)
-        refuse(where(), "has " + std::to_string(cells.size()) + " columns",
-               "use at most " + std::to_string(limits::csv_columns));
-      std::set<std::string> names;
-      for (const auto cell : cells) {
-        table.columns.push_back(header(cell, where()));
-        if (!names.insert(table.columns.back().name).second)
-          refuse(where(), "column `" + table.columns.back().name + "` stands twice", "keep one of them");
-        is_text.push_back(std::find(text_columns.begin(), text_columns.end(), table.columns.back().name) !=
-                          text_columns.end());
-      }
-      continue;
-    }
-    if (cells.size() != table.columns.size())
-      refuse(where(),
-             "this row has " + std::to_string(cells.size()) + " cells, the header " +
-                 std::to_string(table.columns.size()),
-             "give every row one cell a column (an empty one where a value is missing)");
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      Column& column = table.columns[i];
-      const auto value = number(cells[i]);
-      if (is_text[i]) {
-        if (const auto flaw = flaw_of_label(cells[i]))
-          refuse(where() + ": column `" + column.name + "`",
-                 "`" + clipped(std::string{cells[i]}) + "` " + flaw->what, flaw->mend);
-        column.texts.emplace_back(cells[i]);
-        column.values.push_back(value.value_or(missing));
-        continue;
-      }
-      if (!value)
-        refuse(where() + ": column `" + column.name + "`", "`" + shortened(cells[i]) + "` is not a number",
-               "write a number, or leave the cell empty");
-      column.values.push_back(*value);
-    }
-  }
-  for (Column& column : table.columns) column.values.shrink_to_fit();
-  if (table.columns.empty())
-    throw InputError{file.string(), "is empty", "begin with a header `name [unit],...`"};
-  if (table.rows() == 0)
-    throw InputError{file.string(), "has a header but no rows", "add the readings below it"};
-  return table;
+  return Reader{file, {text_columns, std::nullopt}}.run();
+}
+
+Table Table::read_columns(const std::filesystem::path& file, const std::vector<std::string>& wanted) {
+  return Reader{file, {{}, wanted}}.run();
 }
 
 void Table::write(const std::filesystem::path& target) const {
@@ -272,21 +352,30 @@ void Table::write(const std::filesystem::path& target) const {
   out.finish();
 }
 
-std::size_t Table::rows() const { return columns.empty() ? 0 : columns.front().values.size(); }
+std::size_t Table::rows() const { return columns.empty() ? rows_read : columns.front().values.size(); }
 bool Table::has(std::string_view name) const { return find(name) != nullptr; }
 
 const Column* Table::find(std::string_view name) const {
-  const auto found =
-      std::find_if(columns.begin(), columns.end(), [&](const Column& c) { return c.name == name; });
+  const auto by = [&](auto member) {
+    return std::find_if(columns.begin(), columns.end(), [&](const Column& c) { return c.*member == name; });
+  };
+  auto found = by(&Column::name);
+  if (found == columns.end()) found = by(&Column::header);
   return found == columns.end() ? nullptr : &*found;
+}
+
+std::string Table::names() const {
+  std::string list;
+  for (const Column& column : columns) list += (list.empty() ? "" : ", ") + column.name;
+  for (const auto& name : left_out) list += (list.empty() ? "" : ", ") + name;
+  return list;
 }
 
 std::vector<double> Table::in(std::string_view name, std::string_view unit) const {
   const Column* column = find(name);
   if (column == nullptr) {
-    std::string have;
-    for (const Column& c : columns) have += (have.empty() ? "" : ", ") + c.name;
-    throw InputError{file.string(), "column `" + std::string{name} + "` is missing (there are: " + have + ")",
+    throw InputError{file.string(),
+                     "column `" + std::string{name} + "` is missing (there are: " + names() + ")",
                      "add `" + std::string{name} + " [" + std::string{unit} + "]`"};
   }
   std::vector<double> values = column->values;

@@ -98,7 +98,6 @@ TEST_F(TableTest, NamesLineColumnAndMendOfEachFault) {
   EXPECT_THAT(fault_of(make("x [m]\n1\n" + std::string(400, '9') + "\n")),
               HasSubstr("`" + std::string(20, '9') + "...` is not a number"));
   EXPECT_THAT(fault_of(make("x,x\n1,2\n")), HasSubstr("stands twice"));
-  EXPECT_THAT(fault_of(make("x [m];y [m]\n1,5;2,5\n")), HasSubstr("parted by semicolons"));
   EXPECT_THAT(fault_of(make("x [m]\n")), HasSubstr("no rows"));
   EXPECT_THAT(fault_of(make("")), HasSubstr("is empty"));
   EXPECT_THAT(fault_of(make("x [m],y [m]\r1,2\r3,4\r")),
