@@ -8,6 +8,7 @@
 
 #include "core/base/unit.hpp"
 #include "core/model/own_expressions.hpp"
+#include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/static_plants.hpp"
@@ -66,10 +67,20 @@ std::vector<SignalRow> signal_rows(Plant plant, bool closed_loop) {
 
 void read_columns(const Node& root, Model& model) {
   const auto columns = root.required("columns");
+  if (columns.has("rate")) {
+    model.row_rate = columns.number("rate", "Hz", Range::positive());
+    if (columns.has("time"))
+      columns["rate"].fault("stands beside `time`",
+                            "leave one of them out: rows have a time or follow evenly");
+    else
+      model.signals.push_back({"time", "time", "s", false});
+  }
   for (const auto& row : signal_rows(model.plant, model.controller.has_value())) {
     if (!columns.has(row.name)) {
-      if (row.required)
-        columns[row.name].missing(std::string{"add `"} + row.name + ": <column of the recording>`");
+      const bool is_time = row.name == std::string{"time"};
+      if (row.required && !(is_time && model.row_rate))
+        columns[row.name].missing(std::string{"add `"} + row.name + ": <column of the recording>`" +
+                                  (is_time ? ", or `rate: <rows a second>`" : ""));
       continue;
     }
     model.signals.push_back({row.name, columns.text(row.name), row.unit, row.is_output});
@@ -109,8 +120,24 @@ std::vector<ParameterRow> parameter_rows(Plant plant) {
   }
 }
 
+/// What the file says under `unit` of a parameter; nothing where it says none that is known.
+std::optional<Unit> unit_said(const Node& node) {
+  if (!node.is_map() || !node.has("unit")) return std::nullopt;
+  return parse_unit(node.text("unit"));
+}
+
+/// An axis whose mass is a moment of inertia turns, and so does a sensor that resolves angles.
+bool turns(const Node& parameters, Plant plant) {
+  const char* tells = plant == Plant::axis ? "mass" : plant == Plant::sensor ? "resolution" : nullptr;
+  if (tells == nullptr || !parameters.has(tells)) return false;
+  const auto said = unit_said(parameters[tells]);
+  return said && said->dimension == parse_unit(plant == Plant::axis ? "kg m2" : "rad")->dimension;
+}
+
 void read_parameters(const Node& root, Model& model) {
   const auto node = root["parameters"];
+  const bool is_turning = turns(node, model.plant);
+  if (is_turning) physics::count_in_angles(model);
   for (const auto& row : parameter_rows(model.plant)) {
     if (!node.has(row.name)) {
       if (row.required)
@@ -120,12 +147,16 @@ void read_parameters(const Node& root, Model& model) {
     }
     std::string unit = row.unit;
     // A drive that is commanded in volts has its constant in N/V.
-    if (unit == "N/A" && node[row.name].is_map() && node[row.name].text("unit", "N/A") == "N/V") {
+    if (const auto said = unit_said(node[row.name]);
+        unit == "N/A" && said && said->same_quantity(*parse_unit(is_turning ? "N m/V" : "N/V"))) {
       unit = "N/V";
       for (auto& signal : model.signals)
         if (signal.name == "current" || signal.name == "feedforward") signal.unit = "V";
     }
-    add_parameter(model, row.name, unit, node[row.name], row.bounds);
+    auto bounds = row.bounds;
+    constexpr double smallest_rotor = 1e-12;  // [kg m2] a watch's wheel
+    if (is_turning && bounds.lower > 0.0) bounds.lower = smallest_rotor;
+    add_parameter(model, row.name, physics::counted_unit(model, unit), node[row.name], bounds);
   }
 }
 
@@ -151,6 +182,51 @@ void read_controller(const Node& root, Model& model) {
   model.controller = settings;
 }
 
+/// What a heater is commanded in, by what its gain is per: "W/%" -> "%", "W/V" -> "V", "W/duty" -> "duty", "W" -> "1"; "W"
+/// where the gain is a pure number or says no unit.
+std::string commanded_in(const Node& gain) {
+  if (!gain.is_map() || !gain.has("unit")) return "W";
+  auto text = gain.text("unit");
+  const auto is_power = [](const std::string& unit) {
+    const auto said = parse_unit(unit);
+    return said && said->same_quantity(*parse_unit("W"));
+  };
+  const auto slash = text.find('/');
+  if (slash == std::string::npos || !is_power(text.substr(0, slash))) return is_power(text) ? "1" : "W";
+  text.erase(0, slash + 1);
+  if (is_power(text)) return "W";
+  if (text.size() > 2 && text.front() == '(' && text.find(')') == text.size() - 1)
+    text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+config::Quantity free_quantity(const Node& node, Range bounds) {
+  if (!node.is_map()) return {node.as_number("", bounds), {}};
+  (void)node.text("unit", "");
+  config::Quantity quantity{node.required("value").as_number("", bounds), {}};
+  if (node.has("sigma")) quantity.sigma = node["sigma"].as_number("", Range::not_negative());
+  return quantity;
+}
+
+/// A heater's column counts in what its gain is per.
+void add_gain(Model& model, const std::string& name, const Node& node) {
+  const Range bounds{0.0, 1e6};
+  const auto gain = node.required("gain");
+  const auto per = commanded_in(gain);
+  const auto unit = per == "1" ? "W" : "W/" + per;
+  model.signals.push_back({name, node.text("column"), per, false});
+  if (parse_unit(unit)) {
+    add_parameter(model, name + ".gain", unit, gain, bounds);
+    return;
+  }
+  auto quantity = free_quantity(gain, bounds);  // per a unit of the user's own
+  const auto said = gain.text("unit");
+  const double factor = parse_unit(said.substr(0, said.find('/')))->factor;
+  quantity.value *= factor;
+  if (quantity.sigma) *quantity.sigma *= factor;
+  model.parameters.push_back({name + ".gain", unit, quantity.value, quantity.sigma, bounds});
+}
+
 void read_thermal(const Node& root, Model& model) {
   for (const auto& node : root.required("nodes").children()) {
     const auto name = node.key();
@@ -169,8 +245,7 @@ void read_thermal(const Node& root, Model& model) {
     const auto name = node.key();
     model.thermal.heaters.push_back({name, node.text("node")});
     known(node["node"], model.thermal.heaters.back().node);
-    model.signals.push_back({name, node.text("column"), "W", false});
-    add_parameter(model, name + ".gain", "W/W", node.required("gain"), {0.0, 1e6});
+    add_gain(model, name, node);
   }
   for (const auto& node : root["couplings"].children()) {
     const auto pair = node.required("between").as_texts();
@@ -189,14 +264,6 @@ void read_thermal(const Node& root, Model& model) {
     add_parameter(model, "ambient", "degC", ambient, {-100.0, 1000.0});
   else
     model.signals.push_back({"ambient", ambient.as_text(), "degC", false});
-}
-
-config::Quantity free_quantity(const Node& node, Range bounds) {
-  if (!node.is_map()) return {node.as_number("", bounds), {}};
-  (void)node.text("unit", "");
-  config::Quantity quantity{node.required("value").as_number("", bounds), {}};
-  if (node.has("sigma")) quantity.sigma = node["sigma"].as_number("", Range::not_negative());
-  return quantity;
 }
 
 /// A number of the user's own expressions, in whatever unit he says.
@@ -372,9 +439,11 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
       // "*": in whatever unit the place has on which the term acts; then only a number is checked. A time is one in any.
       const bool is_time = (key == "delay" || key == "time_constant") && node[key].is_map() &&
                            node[key].text("unit", "*") != "*";
-      const auto quantity = parameter.unit == "*" && !is_time
-                                ? free_quantity(node[key], parameter.bounds)
-                                : node[key].as_quantity(is_time ? "s" : parameter.unit, parameter.bounds);
+      const auto quantity =
+          parameter.unit == "*" && !is_time
+              ? free_quantity(node[key], parameter.bounds)
+              : node[key].as_quantity(is_time ? "s" : physics::unit_of_parameter(model, term, i),
+                                      physics::bounds_of_parameter(model, term, i));
       term.values[i] = quantity.value;
       term.sigmas[i] = quantity.sigma;
       term.given[i] = true;
@@ -439,7 +508,7 @@ YAML::Node term_yaml(const Term& term, const Model& model) {
     const auto& parameter = term.info->parameters[i];
     if (!term.given[i] && model.find(parameter.name) != nullptr) continue;  // shared with the nominal model
     node[std::string{parameter.name}] =
-        quantity_yaml(term.values[i], std::string{parameter.unit}, term.sigmas[i]);
+        quantity_yaml(term.values[i], physics::unit_of_parameter(model, term, i), term.sigmas[i]);
   }
   node.SetStyle(YAML::EmitterStyle::Flow);
   return node;

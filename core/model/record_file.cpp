@@ -9,6 +9,7 @@
 
 #include "core/base/unit.hpp"
 #include "core/model/own_expressions.hpp"
+#include "core/physics/counted_units.hpp"
 
 namespace invar::model {
 
@@ -99,6 +100,23 @@ std::optional<double> of_turns(const OwnState& state, const physics::Model& mode
   return std::nullopt;
 }
 
+/// The factor where a column counts turns (Hz, rpm) and its state angles, or the other way round; nothing elsewhere.
+std::optional<double> turns_to_angles(const std::string& column, const std::string& state) {
+  constexpr std::size_t radian = 5;
+  const auto is_angle = [](const std::string& text) {
+    const auto unit = parse_unit(text);
+    return unit && unit->dimension[radian] == 1.0;
+  };
+  const auto counts_turns = [&](const std::string& text) {
+    return parse_unit(text) && !is_angle(text) &&
+           (text.find("Hz") != std::string::npos || text.find("rpm") != std::string::npos);
+  };
+  if (!(counts_turns(column) && is_angle(state)) && !(is_angle(column) && counts_turns(state)))
+    return std::nullopt;
+  const auto to = conversion(column, state);
+  return to ? std::optional{to->factor} : std::nullopt;
+}
+
 /// Is a temperature of the model's states counted in this unit, `K` or `degC`?
 bool has_states_in(const physics::Model& model, const std::string& unit) {
   const auto wanted = parse_unit(unit);
@@ -132,6 +150,7 @@ ColumnUnit unit_of_expression(const recording::Column& column, const physics::Si
   check_own_unit(column, state, where);
   const auto unit = parse_unit(column.unit);
   if (const auto zero = to_the_states_zero(column, model)) return *zero;
+  if (const auto factor = turns_to_angles(column.unit, state.unit)) return {column.unit, *factor, 0.0};
   if (!unit || column.unit == "K" || speaks_in(model, column.unit) || speaks_in_parts(model, column.unit))
     return {column.unit, 1.0, 0.0};
   if (column.unit == "rpm")
@@ -139,12 +158,50 @@ ColumnUnit unit_of_expression(const recording::Column& column, const physics::Si
   return {column.unit, unit->factor, unit->offset};
 }
 
-ColumnUnit unit_of(const recording::Column& column, const physics::Signal& signal,
-                   const physics::Model& model, const std::string& where) {
+/// A header's `C` and `F` beside a temperature are degrees; elsewhere they stand for charge and capacity.
+recording::Column with_degrees(recording::Column column, const physics::Signal& signal,
+                               const physics::Model& model) {
+  if (column.unit != "C" && column.unit != "F") return column;
+  const auto is_temperature = [](const std::string& unit) {
+    const auto parsed = parse_unit(unit);
+    return parsed && parsed->dimension == parse_unit("degC")->dimension;
+  };
+  const auto state = state_of(signal, model);
+  const auto& compared = !signal.unit.empty() ? signal.unit : state.unit;
+  const bool is_known = !compared.empty() && compared != "1";
+  if (is_known ? is_temperature(compared) : has_states_in(model, "degC") || has_states_in(model, "K"))
+    column.unit = "deg" + column.unit;
+  return column;
+}
+
+bool commands_heater(const physics::Model& model, const physics::Signal& signal) {
+  const auto& heaters = model.thermal.heaters;
+  return std::any_of(heaters.begin(), heaters.end(),
+                     [&](const auto& heater) { return heater.name == signal.name; });
+}
+
+/// A heater's column that is no power, where its gain is a pure number (`W`) or per something of the user's own: in SI, or as
+/// it stands. A temperature commands no heater.
+std::optional<ColumnUnit> as_commanded(const std::string& column, const std::string& per) {
+  const auto unit = parse_unit(column);
+  if (!parse_unit(per)) {
+    const bool says_none = column == "1" || column == "-" || column == per;
+    return says_none ? std::optional{ColumnUnit{column, 1.0, 0.0}} : std::nullopt;
+  }
+  if (per != "W" || (unit && unit->dimension == parse_unit("K")->dimension)) return std::nullopt;
+  return unit ? ColumnUnit{column, unit->factor, unit->offset} : ColumnUnit{column, 1.0, 0.0};
+}
+
+ColumnUnit unit_of(recording::Column column, const physics::Signal& signal, const physics::Model& model,
+                   const std::string& where) {
+  column = with_degrees(std::move(column), signal, model);
   const auto& si = signal.unit;
   if (column.unit.empty()) return {si, 1.0, 0.0};
   if (si.empty()) return unit_of_expression(column, signal, model, where);
   const auto to = conversion(column.unit, si);
+  if (!to && commands_heater(model, signal)) {
+    if (const auto unit = as_commanded(column.unit, si)) return *unit;
+  }
   if (!to)
     throw InputError{where + ": column `" + column.name + "`",
                      "is in `" + column.unit + "`, which is no " + si, "give it in a unit like " + si};
@@ -170,6 +227,11 @@ physics::UnitsOfNames counted(const physics::Model& model, const RecordFile& fil
     const auto at = file.units.find(signal.name);
     if (at == file.units.end()) continue;
     const auto& text = signal.unit.empty() ? at->second.unit : signal.unit;
+    if (const auto state = state_of(signal, model);
+        signal.unit.empty() && turns_to_angles(text, state.unit)) {
+      units[signal.name] = {text + ", taken in " + state.unit, *parse_unit(state.unit)};
+      continue;
+    }
     auto unit = parse_unit(text);
     if (!unit || text.empty() || text == "1" || text == "-") continue;
     const bool converted = signal.unit.empty() && (at->second.factor != 1.0 || at->second.offset != 0.0);
@@ -183,24 +245,56 @@ physics::UnitsOfNames counted(const physics::Model& model, const RecordFile& fil
 
 }  // namespace
 
+namespace {
+
+/// A sensor whose model does not say which it measures, lengths or angles, and whose columns say angles.
+bool measures_angles(const recording::Table& table, const physics::Model& model) {
+  const auto* signal = model.signal("true_position");
+  if (model.plant != physics::Plant::sensor || signal == nullptr || model.find("resolution") != nullptr)
+    return false;
+  const auto* column = table.find(signal->column);
+  const auto unit = column != nullptr ? parse_unit(column->unit) : std::nullopt;
+  return unit && unit->dimension == parse_unit("rad")->dimension;
+}
+
+}  // namespace
+
 RecordFile to_record(const recording::Table& table, const physics::Model& model, bool outputs_needed) {
+  if (measures_angles(table, model) && !physics::is_rotary(model)) {
+    auto turning = model;
+    physics::count_in_angles(turning);
+    return to_record(table, turning, outputs_needed);
+  }
   RecordFile result;
   std::vector<Fault> faults;
-  std::string there;
-  for (const auto& column : table.columns) there += (there.empty() ? "" : ", ") + column.name;
   for (const auto& signal : model.signals) {
+    if (signal.name == "time" && model.row_rate) {
+      for (std::size_t row = 0; row < table.rows(); ++row)
+        result.record.time.push_back(static_cast<double>(row) / *model.row_rate);
+      continue;
+    }
     const auto* column = table.find(signal.column);
     if (column == nullptr) {
       if (signal.is_output ? outputs_needed : !is_controlled(model, signal))
         faults.push_back({table.file.string(),
                           "has no column `" + signal.column + "` for `" + signal.name + "`",
-                          "add it, or name the right one in the model (there are: " + there + ")"});
+                          (table.has_header ? "add it, or name the right one in the model (there are: "
+                                            : "the file has no header: name columns by number (there are: ") +
+                              table.names() + ")"});
       continue;
     }
-    const auto unit = unit_of(*column, signal, model, table.file.string());
+    const auto unit = unit_of({column->name, column->unit, {}, {}}, signal, model, table.file.string());
     std::vector<double> values = column->values;
     for (double& value : values) value = unit.factor * value + unit.offset;
     result.units[signal.name] = unit;
+    if (signal.unit == "W" && commands_heater(model, signal) && !unit.unit.empty() &&
+        !conversion(unit.unit, signal.unit))
+      result.doubts.push_back("column `" + signal.column + "` is in " + unit.unit + ", so the gain of `" +
+                              signal.name + "` is taken in W per " +
+                              (parse_unit(unit.unit) && si_unit(*parse_unit(unit.unit)).empty()
+                                   ? std::string{"1"}
+                               : parse_unit(unit.unit) ? si_unit(*parse_unit(unit.unit))
+                                                       : unit.unit));
     if (signal.name == "time")
       result.record.time = std::move(values);
     else
@@ -234,6 +328,10 @@ recording::Table to_table(const physics::Model& model, const RecordFile& inputs,
   recording::Table table;
   const auto add = [&](const physics::Signal& signal, std::vector<double> values) {
     ColumnUnit unit{signal.unit.empty() ? known_unit(state_of(signal, model)) : signal.unit, 1.0, 0.0};
+    if (const auto driven = inputs.units.find("true_position"); driven != inputs.units.end())
+      if (const auto given = parse_unit(driven->second.unit);
+          given && given->dimension == parse_unit("rad")->dimension)
+        unit.unit = physics::rotary_unit(unit.unit);
     if (const auto at = inputs.units.find(signal.name); at != inputs.units.end()) unit = at->second;
     for (double& value : values) value = (value - unit.offset) / unit.factor;
     table.add(signal.column, unit.unit, std::move(values));

@@ -137,6 +137,9 @@ class Reader {
       : file_{file.string()}, model_{model}, recording_{recording::Recording::open(file)} {}
 
   std::vector<recording::Table> run() {
+    if (model_.row_rate)
+      refuse("has stamps, and the model says a `rate` in place of them",
+             "name the stamp, such as `time: stage_x.state.at`");
     if (recording_.channels().empty()) refuse("holds no topic", "record with `invar record`");
     find_topics();
     read_samples();
@@ -452,12 +455,19 @@ void add_remainder(recording::Table& table, const physics::Model& model) {
 
 }  // namespace
 
+std::vector<std::string> columns_of(const physics::Model& model) {
+  std::vector<std::string> columns;
+  for (const auto& signal : model.signals)
+    if (signal.name != "time" || !model.row_rate) columns.push_back(signal.column);
+  return columns;
+}
+
 std::vector<recording::Table> read_recording(const std::filesystem::path& file, const physics::Model& model) {
   std::vector<recording::Table> tables;
   if (file.extension() == ".mcap")
     tables = Reader{file, model}.run();
   else
-    tables.push_back(recording::Table::read(file));
+    tables.push_back(recording::Table::read_columns(file, columns_of(model)));
   for (auto& table : tables) add_remainder(table, model);
   return tables;
 }

@@ -9,7 +9,11 @@
 
 namespace invar::model {
 
-/// A `.csv` or `.csv.gz` is one table. In an `.mcap` a column of the model is `component.port.field`, a field's path in the
+/// The columns of a recording that the model names.
+std::vector<std::string> columns_of(const physics::Model& model);
+
+/// A `.csv` or `.csv.gz`, or any other name than .mcap, is one table in whatever form `Table::read` knows; columns that the
+/// model does not name may hold anything. In an `.mcap` a column of the model is `component.port.field`, a field's path in the
 /// topic of that output (`stage_x.state.position`); `component.port[axis=1].field` where one topic carries several instances;
 /// `a.b.c + d` adds another field of the same message (setpoint plus correction). The column of `time` names the topic's
 /// stamp (`stage_x.state.at`): its cycles are the rows, one a period of the loop. What another topic said last by then

@@ -88,6 +88,7 @@ struct Equations {
 struct Model {
   Plant plant = Plant::axis;
   std::vector<Signal> signals;
+  std::optional<double> row_rate;  // [Hz] of the rows of a recording that has no column of time
   std::vector<Parameter> parameters;
   std::vector<Term> terms;
   std::map<std::string, double, std::less<>> noise;  // 1 sigma by signal, SI

@@ -8,6 +8,7 @@
 
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
+#include "core/model/recording_file.hpp"
 #include "core/physics/ripple_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
@@ -33,7 +34,8 @@ physics::RippleSamples read_runs(const Options& options, const physics::Model& m
     if (term.info->name == "force_ripple")
       throw InputError{options.model.string(), "has a force_ripple already",
                        "remove its terms: the ripple is identified as a whole"};
-  const auto record = model::to_record(recording::Table::read(options.recording), model, true).record;
+  const auto table = recording::Table::read_columns(options.recording, model::columns_of(model));
+  const auto record = model::to_record(table, model, true).record;
   for (const char* signal : {"reference", "position", "current"})
     if (record.find(signal) == nullptr)
       throw InputError{options.recording.string(), "has no signal `" + std::string{signal} + "`",

@@ -182,6 +182,9 @@ void add_diagnose(CLI::App& program) {
   command->footer(
       "Example: invar diagnose --example thermal > model.yaml\n"
       "         invar diagnose --model model.yaml --recording run1.csv.gz --out diagnosis\n"
+      "A CSV may be parted by commas, semicolons, tabs or blanks; `columns: {rate: 100, ...}` stands for a "
+      "time column, `time: 1` for\n"
+      "the first column of a file without header.\n"
       "In an .mcap a column of the model is component.port.field, that of the time component.port.at:\n"
       "  columns: {time: stage_x.state.at, reference: stage_x.state.setpoint_position + correction,\n"
       "            position: stage_x.state.position, current: stage_x.state.current, feedforward: "

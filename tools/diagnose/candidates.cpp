@@ -7,6 +7,7 @@
 #include <numbers>
 #include <set>
 
+#include "core/physics/counted_units.hpp"
 #include "core/physics/library.hpp"
 #include "tools/diagnose/jump.hpp"
 #include "tools/diagnose/kin.hpp"
@@ -370,7 +371,13 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
       }
       if (info->name == "periodic_error" && shapes.empty()) continue;
       const auto add = [&] {
+        const std::size_t first = starts.size();
         add_starts(starts, term, shapes);
+        // An angle may have a period that is too long for a length.
+        if (const auto pitch = info->index_of("pitch"); pitch != none && physics::is_rotary(data.model))
+          for (std::size_t k = 0; k < shapes.size(); ++k)
+            starts[first + k].term.values[pitch] =
+                physics::bounds_of_parameter(data.model, term, pitch).clamp(shapes[k]);
         if (info->name != "additive_disturbance") return;
         auto wave = term;  // and as a square wave
         const auto square = info->index_of("squareness"), phase = info->index_of("phase");

@@ -6,6 +6,7 @@
 #include <complex>
 #include <numbers>
 
+#include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/candidates.hpp"
 #include "tools/diagnose/sensitivities.hpp"
@@ -432,7 +433,8 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
   const auto& values = fit.model.terms[term].values;
   // A shape at the end of its range is another term in disguise.
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
-    const auto& p = info.parameters[i];
+    auto p = info.parameters[i];
+    p.bounds = physics::bounds_of_parameter(data.model, fit.model.terms[term], i);
     if (p.role == Role::amplitude && p.bounds.upper < 1e100 && std::abs(values[i]) > 0.99 * p.bounds.upper)
       return false;
     if (p.role != Role::shape || p.name == "center" || p.name == "limit" || p.name == "squareness") continue;

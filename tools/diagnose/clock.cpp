@@ -81,11 +81,13 @@ void check_ticks(const physics::Model& model, const std::vector<double>& time,
   for (std::size_t i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
   const double step = median(std::move(steps)), ticks = step * model.controller->rate;
   if (ticks > 0.1 && ticks < 200.0) return;
-  throw InputError{file.string() + ": column `" + model.signal("time")->column + "`",
+  throw InputError{file.string() + (model.row_rate ? "" : ": column `" + model.signal("time")->column + "`"),
                    "has rows " + report::si(step, "s") + " apart, the model's controller has a period of " +
                        report::si(1.0 / model.controller->rate, "s"),
-                   "write the unit of the time into its header, such as `" + model.signal("time")->column +
-                       " [ms]`, or the loop's rate into `controller`"};
+                   model.row_rate
+                       ? "mend `rate` under `columns`, or the loop's under `controller`"
+                       : "write the unit of the time into its header, such as `" +
+                             model.signal("time")->column + " [ms]`, or the loop's rate into `controller`"};
 }
 
 void check_clock(const Case& data) {
@@ -100,6 +102,10 @@ void check_clock(const Case& data) {
     for (const auto& clock : clocks) {
       if (!follows(data, recording, clock.factor, most)) continue;
       const auto& column = data.model.signal("time")->column;
+      if (data.model.row_rate)
+        throw InputError{recording.name,
+                         std::string{"the model would follow it were the time "} + clock.words,
+                         "mend `rate` under `columns`: it is in Hz, or `{value: 100, unit: ...}`"};
       const auto header = [&](const char* unit) { return "`" + column + " [" + unit + "]`"; };
       throw InputError{recording.name + ": column `" + column + "`",
                        std::string{"the model would follow the recording were the time "} + clock.words,

@@ -9,6 +9,7 @@
 #include "core/base/unit.hpp"
 #include "core/model/recording_file.hpp"
 #include "core/physics/approach.hpp"
+#include "core/physics/counted_units.hpp"
 #include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/even_rows.hpp"
 #include "tools/diagnose/hiccups.hpp"
@@ -344,6 +345,10 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   if (data.recordings.empty())  // they are of the same model and units each time
     for (const auto& doubt : content.doubts) data.doubts.push_back("units: " + doubt);
   data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
+  if (model.plant == physics::Plant::sensor && !physics::is_rotary(data.model)) {
+    const auto unit = parse_unit(content.units.at("true_position").unit);
+    if (unit && unit->dimension == parse_unit("rad")->dimension) physics::count_in_angles(data.model);
+  }
   table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
     const auto unit = content.units.find(signal.name);
@@ -401,7 +406,9 @@ void name_si_units(Case& data) {
   for (const auto& one : data.taken_in_si)
     for (auto& signal : data.model.signals)
       if (const auto unit = parse_unit(one.unit); unit && signal.name == one.signal)
-        signal.unit = one.unit == "rpm" && one.factor != unit->factor ? "rad/s" : si_unit(*unit);
+        signal.unit = one.factor == unit->factor  ? si_unit(*unit)
+                      : unit->dimension[5] == 0.0 ? "rad/s"
+                                                  : "Hz";
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/physics/counted_units.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/wander.hpp"
 
@@ -104,15 +105,16 @@ std::size_t fineness(const physics::TermInfo& info) {
   return std::min({info.index_of("pitch"), info.index_of("frequency"), physics::most_parameters});
 }
 
-Detectable described(const Smallest& smallest, double times) {
+Detectable described(const Case& data, const Smallest& smallest, double times) {
   const auto& term = smallest.screened->start.term;
   const auto& info = *term.info;
-  const auto& p = info.parameters[smallest.screened->start.directions[0].amplitude];
-  Detectable effect{std::string{info.name}, term.on, std::string{p.name}, std::string{p.unit},
-                    times * smallest.value, {}};
+  const auto amplitude = smallest.screened->start.directions[0].amplitude;
+  const auto unit = [&](std::size_t i) { return physics::unit_of_parameter(data.model, term, i); };
+  Detectable effect{
+      std::string{info.name}, term.on, std::string{info.parameters[amplitude].name}, unit(amplitude),
+      times * smallest.value, {}};
   if (const auto i = fineness(info); i < physics::most_parameters)
-    effect.at =
-        Quantity{std::string{info.parameters[i].name}, std::string{info.parameters[i].unit}, term.values[i]};
+    effect.at = Quantity{std::string{info.parameters[i].name}, unit(i), term.values[i]};
   return effect;
 }
 
@@ -139,7 +141,7 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
       smallest.push_back(range.most);
   }
   if (!data.is_time_series || d.best.columns.cols() != static_cast<Eigen::Index>(d.best.free.size())) {
-    for (const auto& one : smallest) d.detectable.push_back(described(one, 1.0));
+    for (const auto& one : smallest) d.detectable.push_back(described(data, one, 1.0));
     return;
   }
   const Series series{data, d};
@@ -152,7 +154,7 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
   });
   for (std::size_t i = 0; i < smallest.size(); ++i)
     if (times[i] < most)  // else it could be a wander at any size
-      d.detectable.push_back(described(smallest[i], times[i]));
+      d.detectable.push_back(described(data, smallest[i], times[i]));
 }
 
 }  // namespace invar::diagnose

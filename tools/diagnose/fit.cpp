@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/common_factor.hpp"
 #include "tools/diagnose/kin.hpp"
@@ -87,7 +88,7 @@ std::vector<Freedom> freedoms(const Model& model, const Model& believed) {
       if (!term.given[i] && model.find(info.name) != nullptr) continue;  // moves with the nominal one
       Freedom f;
       f.where = Freedom::Where::term, f.term = t, f.index = i;
-      f.bounds = info.bounds;
+      f.bounds = physics::bounds_of_parameter(model, term, i);
       const double usual = std::abs(info.starts[0]);
       f.scale = info.role == Role::phase
                     ? 0.3

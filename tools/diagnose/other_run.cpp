@@ -87,7 +87,7 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
   model::check_order(model, run.inputs, files.inputs);
   auto compared = table;
   if (has_own) {
-    const auto own = recording::Table::read(files.outputs);
+    const auto own = recording::Table::read_columns(files.outputs, model::columns_of(model));
     if (own.rows() != table.rows())
       throw InputError{
           files.outputs.string(),
@@ -96,7 +96,10 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
     compared.file = files.outputs;
     for (const auto& output : model.outputs()) {
       const auto& name = model.signal(output)->column;
-      std::erase_if(compared.columns, [&](const auto& column) { return column.name == name; });
+      if (const auto* ours = compared.find(name)) {
+        const auto place = ours - compared.columns.data();
+        compared.columns.erase(compared.columns.begin() + place);
+      }
       if (const auto* column = own.find(name)) compared.columns.push_back(*column);
     }
   }

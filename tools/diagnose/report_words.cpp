@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/odds.hpp"
@@ -71,7 +72,7 @@ std::vector<std::string> dependence(const Case& data, const Finding& finding) {
 }
 
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
-  const std::string unit{term.info->parameters[parameter].unit};
+  const auto unit = physics::unit_of_parameter(data.model, term, parameter);
   if (unit != "*") return unit;
   const auto name = term.info->parameters[parameter].name;
   if (name == "delay" || name == "time_constant" || (name == "period" && term.with == "t")) return "s";
@@ -92,11 +93,12 @@ std::string output_at(const Case& data, const std::string& place) {
 
 std::string unit_of_curve(const Case& data, const physics::Term& term) {
   using physics::Plant;
+  const auto counted = [&](const char* unit) { return physics::counted_unit(data.model, unit); };
   switch (data.model.plant) {
     case Plant::axis:
       if (term.info->site == "force")
-        return term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N";
-      return term.info->site == "measurement" ? "m" : "1";
+        return counted(term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N");
+      return term.info->site == "measurement" ? counted("m") : "1";
     case Plant::thermal:
       return term.info->site == "loss" ? "W/K" : term.info->site == "storage" ? "J/K" : "W";
     case Plant::error_map:
@@ -113,7 +115,7 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
 
 std::string unit_of_variable(const Case& data, const std::string& variable) {
   if (variable == "time") return "s";
-  if (variable == "velocity") return "m/s";
+  if (variable == "velocity") return physics::counted_unit(data.model, "m/s");
   if (data.model.plant == physics::Plant::thermal) {
     if (variable == "temperature" || variable == "ambient") return "degC";
     if (variable == "power") return "W";
@@ -325,8 +327,10 @@ std::vector<MovedNumber> moved_numbers(const Diagnosis& d, double least) {
     } else {
       const auto& info = *d.best.model.terms[f.term].info;
       const auto& p = info.parameters[f.index];
-      moved.push_back({readable(info.name) + (p.name == info.name ? "" : " " + std::string{p.name}),
-                       p.unit == "*" ? "" : std::string{p.unit}, to, f.center, sigmas});
+      moved.push_back(
+          {readable(info.name) + (p.name == info.name ? "" : " " + std::string{p.name}),
+           p.unit == "*" ? "" : physics::unit_of_parameter(d.best.model, d.best.model.terms[f.term], f.index),
+           to, f.center, sigmas});
     }
   }
   return moved;
@@ -341,6 +345,12 @@ std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
     text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
   for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + doubt;
+  constexpr std::size_t one_in = 20;  // a slip of an instrument is rarer
+  const std::size_t values = data.count.rows * data.outputs.size();
+  if (data.count.outliers > 0 && one_in * data.count.outliers >= values)
+    text +=
+        (text.empty() ? "" : "; ") + std::to_string(data.count.outliers) + " of " + std::to_string(values) +
+        " readings are left out as outliers, far more than slips of an instrument: look at what was recorded";
   return text.empty() ? text : "Mind: " + text + ".";
 }
 

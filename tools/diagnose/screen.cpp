@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/physics/counted_units.hpp"
 #include "tools/diagnose/excerpt.hpp"
 #include "tools/diagnose/sensitivities.hpp"
 
@@ -222,7 +223,9 @@ std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, 
       // More than all there is of something is none of it: the gain of what may be.
       if (s.start.term.curve.knots.empty() && s.start.directions.size() == 1 &&
           s.start.directions[0].amplitude < none) {
-        const double upper = info.parameters[s.start.directions[0].amplitude].bounds.upper,
+        const double upper = physics::bounds_of_parameter(base.model, s.start.term,
+                                                          s.start.directions[0].amplitude)
+                                 .upper,
                      full = s.strength(0);
         if (full > upper) {
           s.gain *= upper * (2.0 * full - upper) / (full * full);
@@ -394,7 +397,8 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
         continue;
       }
       if (direction.amplitude >= none) continue;
-      const auto& p = info.parameters[direction.amplitude];
+      auto p = info.parameters[direction.amplitude];
+      p.bounds = physics::bounds_of_parameter(model, term, direction.amplitude);
       const auto phase = info.index_of("phase");
       if (phase < none && d + 1 < s->start.directions.size() && s->start.directions[d + 1].quadrature) {
         const double cosine = share * s->strength(static_cast<Eigen::Index>(d + 1));
