@@ -16,8 +16,8 @@ constexpr double within_noise = 0.25;
 /// An output that is half as bad again is seen by everybody, whatever the others gain.
 constexpr double plainly_worse = 1.5;
 
-/// A share below this of what the retuned model leaves is none: the least effects that anybody lists are some times as large.
-constexpr double nothing = 1e-3;
+/// In power: what changes a residual by less than a thousandth of its size changes nothing that anybody could see.
+constexpr double nothing = 1e-6;
 
 bool is_zero(const physics::Term& term) {
   bool any = false;

