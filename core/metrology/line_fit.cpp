@@ -257,7 +257,8 @@ void tukey_weights(LineFit& work) {
 
 Eigen::VectorXd prior_variances(const LineFit& work, const std::array<double, drift_terms>& drift) {
   Eigen::VectorXd variance = Eigen::VectorXd::Constant(work.regressors.cols(), wide * wide);
-  for (int k = 0; k < drift_terms; ++k) variance[1 + k] = std::max(work.revisited ? drift[static_cast<std::size_t>(k)] : 0.0, 1e-22);
+  for (int k = 0; k < drift_terms; ++k)
+    variance[1 + k] = std::max(work.revisited ? drift[static_cast<std::size_t>(k)] : 0.0, 1e-22);
   if (work.expanding) variance[nuisances] = expansion_sd * expansion_sd;
   return variance;
 }

@@ -164,7 +164,8 @@ TEST(Identification, OnePassKeepsItsErrorAndCallsNothingDrift) {
   laser.drift = 0.0;
   for (const int readings : {60, 402, 701, 5000}) {
     const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
-    const auto found = identify(machine, measured(machine, recipe_lines(machine, 1), readings, random, laser));
+    const auto found =
+        identify(machine, measured(machine, recipe_lines(machine, 1), readings, random, laser));
     for (const auto& line : found.lines) EXPECT_LT(std::abs(line.noise.drift), 1e-9) << readings;
     // The noise of a reading averages out along the line; what the curves leave does not.
     EXPECT_LT(left_over(machine, &found.model).rms, 0.3e-6 + 5e-6 / std::sqrt(readings)) << readings;
