@@ -25,8 +25,8 @@ class Reception {
   /// The writers that discovery shows; those of discovery itself belong to each participant.
   void know_participant(const GuidPrefix& prefix);
 
-  /// The participant stands. Fast DDS 2.9.1 announces a participant before it takes in the first message, and throws away what
-  /// comes until then: the answer of a peer that is quick, which says the same again only after a second or more.
+  /// The participant is ready to receive. Fast DDS 2.9.1 announces a participant earlier, and throws away what arrives until
+  /// then. A quick peer's answer would be lost, and comes again only after up to 1.5 s.
   void open() { open_.store(true, std::memory_order_release); }
   /// Receiving threads: until `open`, one second at most.
   void wait_until_open();

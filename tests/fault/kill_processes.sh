@@ -10,24 +10,11 @@ cp -r "$source/deployment" "$folder/deployment"
 source "$source/tests/support/claims.sh"
 cell=$folder/deployment/xy-table.yaml
 # With a job of a minute, and a supervisor that gives a busy host the time to start a process again: what it takes down stays so.
-/usr/bin/python3 - "$cell" "$domain" "$port" <<'P'
+/usr/bin/python3 - "$cell" "$domain" "$port" "$source/tests/support/short_job.yaml" <<'P'
 import re, sys
 text = open(sys.argv[1]).read()
 text = re.sub(r"(?m)^domain: .*", f"domain: {sys.argv[2]}", text).replace("15020", sys.argv[3])
-short = """          - name: short
-            machine: machines/xy-table-nominal.yaml
-            interval: 0.02
-            verify_interval: 0.02
-            cycles: 1
-            readings: 1
-            out: out/short
-            lines:
-              - {name: X, from: [0, 0], to: [0.06, 0]}
-              - {name: Y, from: [0, 0], to: [0, 0.06]}
-              - {name: diagonal, from: [0, 0], to: [0.06, 0.06]}
-            verify:
-              - {name: other, from: [0.06, 0], to: [0, 0.06]}
-"""
+short = open(sys.argv[4]).read()
 text = text.replace("        jobs:\n", "        settle_timeout: 60\n        jobs:\n" + short, 1)
 text = text.replace("type: supervisor", "type: supervisor\n        timeout: 30")
 text = text.replace("jobs: {", "jobs: {short: calibration, ")

@@ -27,20 +27,7 @@ TRAVEL, MARGIN = (0.0, 0.2), 1e-3  # m
 FASTEST = 0.25  # m/s: the default velocity of an axis and the servo's overshoot
 HOTTEST = 45.0  # degC: of a slide that is held at 30
 
-SHORT = """          - name: short
-            machine: machines/xy-table-nominal.yaml
-            interval: 0.02
-            verify_interval: 0.02
-            cycles: 1
-            readings: 1
-            out: out/short
-            lines:
-              - {name: X, from: [0, 0], to: [0.06, 0]}
-              - {name: Y, from: [0, 0], to: [0, 0.06]}
-              - {name: diagonal, from: [0, 0], to: [0.06, 0.06]}
-            verify:
-              - {name: other, from: [0.06, 0], to: [0, 0.06]}
-"""
+SHORT = (SOURCE / "tests" / "support" / "short_job.yaml").read_text()
 
 
 def fail(text):

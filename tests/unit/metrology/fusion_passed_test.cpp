@@ -5,6 +5,7 @@
 #include <iostream>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "core/metrology/fusion_observer.hpp"
 #include "core/metrology/weight_identification.hpp"
@@ -48,6 +49,15 @@ struct Score {
       ++count;
     }
   }
+  /// Run `k` with its encoder stuck from row `from` to the end, where nobody must believe it.
+  void add_stuck(const Rig& rig, const FusionModel& model, FusionRun run, Eigen::Index from, int k) {
+    const double held = run.positions(from, 0);
+    run.positions.col(0).tail(run.time.size() - from).setConstant(held);
+    FusionObserver observer{model};
+    const auto fused = fuse(observer, run);
+    add(rig, run, fused, from, run.time.size());
+    EXPECT_EQ(fused.back().live & 1U, 0U) << "run " << k << ": the stuck encoder is believed at the end";
+  }
   /// The fusion knew the position when the sensor stuck, up to its cell; the velocity sensor alone sums its noise from the
   /// start of the run.
   void expect_honest(const Rig& rig) const {
@@ -83,12 +93,7 @@ TEST(FusionPassed, AnEncoderThatStuckAtRestIsPassedFromBothSides) {
                            leave + 8.0, std::exp(random.between(std::log(0.03), std::log(0.3))),
                            static_cast<unsigned>(random.engine()));
     const auto from = static_cast<Eigen::Index>(random.between(arrive, leave) / dt);
-    const double held = run.positions(from, 0);
-    run.positions.col(0).tail(run.time.size() - from).setConstant(held);
-    FusionObserver observer{model};
-    const auto fused = fuse(observer, run);
-    score.add(rig, run, fused, from, run.time.size());
-    EXPECT_EQ(fused.back().live & 1U, 0U) << "run " << k << ": the stuck encoder is believed at the end";
+    score.add_stuck(rig, model, std::move(run), from, k);
   }
   score.expect_honest(rig);
 }
@@ -106,12 +111,7 @@ TEST(FusionPassed, AnEncoderThatSticksAtTheMomentOfReversal) {
     // The cell in which it turns, entered before: stuck from then on is stuck at the reversal.
     const double turn = 0.5 * period * std::floor(random.between(1.0, 4.0));
     const auto from = static_cast<Eigen::Index>((turn + random.between(-0.01, 0.01)) / dt);
-    const double held = run.positions(from, 0);
-    run.positions.col(0).tail(run.time.size() - from).setConstant(held);
-    FusionObserver observer{model};
-    const auto fused = fuse(observer, run);
-    score.add(rig, run, fused, from, run.time.size());
-    EXPECT_EQ(fused.back().live & 1U, 0U) << "run " << k << ": the stuck encoder is believed at the end";
+    score.add_stuck(rig, model, std::move(run), from, k);
   }
   score.expect_honest(rig);
 }
