@@ -17,127 +17,243 @@ using physics::AxisControllerSettings;
 /// What a controller could make of a motion: each column one of its parts, were it alone.
 constexpr Eigen::Index parts = 5;
 
-/// Cycles in a row whose command is not limited, with what the law leaves of the current and what could be its parts.
+/// Rows from `begin` to before `end` are cycles without a gap, not at the limit.
 struct Stretch {
-  Eigen::VectorXd left, current;
-  Eigen::MatrixXd motion;
+  std::size_t recording = 0, begin = 0, end = 0;
 };
 
-Stretch stretch_of(const AxisControllerSettings& settings, const std::vector<double>& reference,
-                   const std::vector<double>& position, const std::vector<double>& current,
-                   const std::vector<double>& forward, const std::vector<double>& simulated,
-                   std::size_t begin, std::size_t end, std::size_t settles) {
-  AxisController controller{settings};
-  const auto n = static_cast<Eigen::Index>(end - begin - settles);
-  Stretch stretch{Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd(n, parts)};
-  // The law's own sum and filtered difference, each alone.
-  AxisControllerSettings integral, derivative;
-  integral.rate = derivative.rate = settings.rate;
-  integral.ki = derivative.kd = 1.0;
-  derivative.velocity_filter_hz = settings.velocity_filter_hz;
-  AxisController sum{integral}, of_error{derivative}, of_motion{derivative};
-  for (std::size_t i = begin; i < end; ++i) {
-    const double command = controller.step(reference[i], position[i]) + (forward.empty() ? 0.0 : forward[i]);
-    const double error = reference[i] - simulated[i], summed = sum.step(reference[i], simulated[i]),
-                 error_slope = of_error.step(reference[i], simulated[i]),
-                 motion_slope = of_motion.step(0.0, simulated[i]);
-    if (i < begin + settles) continue;
-    const auto row = static_cast<Eigen::Index>(i - begin - settles);
-    stretch.left(row) = current[i] - command;
-    stretch.current(row) = current[i];
-    stretch.motion.row(row) << error, summed, error_slope, motion_slope, reference[i];
-  }
-  // The sum began somewhere.
-  stretch.left.array() -= stretch.left.mean();
-  stretch.current.array() -= stretch.current.mean();
-  stretch.motion.rowwise() -= stretch.motion.colwise().mean().eval();
-  return stretch;
-}
-
-bool is_one_cycle(double step, double rate) { return step * rate > 0.6 && std::lround(step * rate) == 1; }
-
-}  // namespace
-
-std::optional<LawOff> off_the_law(const Case& data) {
-  const auto& model = data.model;
-  if (model.plant != physics::Plant::axis || !model.controller) return std::nullopt;
-  auto settings = *model.controller;
-  const double limit = settings.limit;
-  settings.limit = 0.0;
-  // The filter has forgotten a stretch's beginning.
-  const double tau = settings.velocity_filter_hz
-                         ? settings.rate / (2.0 * std::numbers::pi * *settings.velocity_filter_hz)
-                         : 1.0;
-  const auto settles = static_cast<std::size_t>(std::ceil(10.0 * tau)) + 2;
-  const auto simulated = simulate(data, model);
+/// Where the signals of a loop stand among the outputs; nothing where one is not recorded.
+struct Places {
+  std::size_t position = 0, current = 0;
+};
+std::optional<Places> places_of(const Case& data) {
+  if (data.model.plant != physics::Plant::axis || !data.model.controller) return std::nullopt;
   const auto place = [&](const char* output) {
     return static_cast<std::size_t>(std::find(data.outputs.begin(), data.outputs.end(), output) -
                                     data.outputs.begin());
   };
-  const std::size_t position_at = place("position"), current_at = place("current");
-  if (std::max(position_at, current_at) >= data.outputs.size()) return std::nullopt;
+  const Places at{place("position"), place("current")};
+  return std::max(at.position, at.current) < data.outputs.size() ? std::optional{at} : std::nullopt;
+}
+
+bool has_sum(const AxisControllerSettings& settings) {
+  return settings.kind == AxisControllerSettings::Kind::pid && settings.ki > 0.0;
+}
+
+/// Cycles after which the law's filter has forgotten how a stretch began.
+std::size_t settling_of(const AxisControllerSettings& settings) {
+  const double tau = settings.velocity_filter_hz
+                         ? settings.rate / (2.0 * std::numbers::pi * *settings.velocity_filter_hz)
+                         : 1.0;
+  return static_cast<std::size_t>(std::ceil(10.0 * tau)) + 2;
+}
+
+bool is_one_cycle(double step, double rate) { return step * rate > 0.6 && std::lround(step * rate) == 1; }
+
+/// Of all recordings, those longer than twice what the filter takes to settle.
+std::vector<Stretch> stretches_of(const Case& data, const Places& at) {
+  const auto& settings = *data.model.controller;
+  const std::size_t settles = settling_of(settings);
   std::vector<Stretch> all;
-  Eigen::Index rows = 0;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto& recording = data.recordings[r];
     const auto& time = recording.inputs.time;
     const auto& reference = recording.inputs.signals.at("reference");
-    const auto* fed = recording.inputs.find("feedforward");
-    const auto forward = fed != nullptr ? *fed : std::vector<double>{};
-    const auto &position = recording.measured[position_at], &current = recording.measured[current_at];
+    const auto* forward = recording.inputs.find("feedforward");
+    const auto &position = recording.measured[at.position], &current = recording.measured[at.current];
     const auto usable = [&](std::size_t i) {
       return std::isfinite(reference[i]) && std::isfinite(position[i]) && std::isfinite(current[i]) &&
-             (forward.empty() || std::isfinite(forward[i])) &&
-             (limit <= 0.0 || std::abs(current[i]) < 0.98 * limit);
+             (forward == nullptr || std::isfinite((*forward)[i])) &&
+             (settings.limit <= 0.0 || std::abs(current[i]) < 0.98 * settings.limit);
     };
     for (std::size_t i = 0; i < time.size();) {
       std::size_t end = i;
       while (end < time.size() && usable(end) &&
              (end == i || is_one_cycle(time[end] - time[end - 1], settings.rate)))
         ++end;
-      if (end > i + 2 * settles) {
-        all.push_back(stretch_of(settings, reference, position, current, forward, simulated[r][position_at],
-                                 i, end, settles));
-        rows += all.back().left.size();
-      }
+      if (end > i + 2 * settles) all.push_back({r, i, end});
       i = std::max(end, i + 1);
     }
   }
-  constexpr Eigen::Index blocks = 20, least = 50;
-  if (rows < blocks * least) return std::nullopt;
-  Eigen::VectorXd left(rows), current(rows);
-  Eigen::MatrixXd motion(rows, parts);
-  Eigen::Index at = 0;
-  for (const auto& s : all) {
-    const auto n = s.left.size();
-    left.segment(at, n) = s.left, current.segment(at, n) = s.current, motion.middleRows(at, n) = s.motion;
-    at += n;
+  return all;
+}
+
+/// What each part of the law makes of the motion that the model expects, from where the filter has settled.
+Eigen::MatrixXd motion_of(const Case& data, const Stretch& stretch, const std::vector<double>& simulated) {
+  const auto& settings = *data.model.controller;
+  const auto& reference = data.recordings[stretch.recording].inputs.signals.at("reference");
+  // The law's own sum and filtered difference, each alone.
+  AxisControllerSettings integral, derivative;
+  integral.rate = derivative.rate = settings.rate;
+  integral.ki = derivative.kd = 1.0;
+  derivative.velocity_filter_hz = settings.velocity_filter_hz;
+  AxisController sum{integral}, of_error{derivative}, of_motion{derivative};
+  const std::size_t settled = stretch.begin + settling_of(settings);
+  Eigen::MatrixXd motion(static_cast<Eigen::Index>(stretch.end - settled), parts);
+  for (std::size_t i = stretch.begin; i < stretch.end; ++i) {
+    const double error = reference[i] - simulated[i], summed = sum.step(reference[i], simulated[i]),
+                 error_slope = of_error.step(reference[i], simulated[i]),
+                 motion_slope = of_motion.step(0.0, simulated[i]);
+    if (i >= settled)
+      motion.row(static_cast<Eigen::Index>(i - settled)) << error, summed, error_slope, motion_slope,
+          reference[i];
   }
-  for (Eigen::Index k = 0; k < parts; ++k)
-    if (const double size = motion.col(k).norm(); size > 0.0) motion.col(k) /= size;
+  motion.rowwise() -= motion.colwise().mean().eval();
+  return motion;
+}
+
+/// The rows of a stretch from where the filter has settled, less their mean.
+Eigen::VectorXd changes(const std::vector<double>& values, std::size_t settled, std::size_t end) {
+  Eigen::VectorXd rows =
+      Eigen::Map<const Eigen::VectorXd>(values.data() + settled, static_cast<Eigen::Index>(end - settled));
+  rows.array() -= rows.mean();
+  return rows;
+}
+
+/// The squares of `left` that go with the columns: found on every second block of rows, counted on the others.
+double squares_with(const Eigen::MatrixXd& motion, const Eigen::VectorXd& left, Eigen::Index blocks) {
   double goes_with = 0.0;
+  const auto block = [&](Eigen::Index b) {
+    const Eigen::Index from = left.size() * b / blocks, to = left.size() * (b + 1) / blocks;
+    return std::pair<Eigen::MatrixXd, Eigen::VectorXd>{motion.middleRows(from, to - from),
+                                                       left.segment(from, to - from)};
+  };
   for (const Eigen::Index half : {0, 1}) {
     Eigen::MatrixXd square = Eigen::MatrixXd::Zero(parts, parts);
     Eigen::VectorXd product = Eigen::VectorXd::Zero(parts);
-    const auto of = [&](Eigen::Index block) {
-      return std::pair{rows * block / blocks, rows * (block + 1) / blocks};
-    };
     for (Eigen::Index b = half; b < blocks; b += 2) {
-      const auto [from, to] = of(b);
-      const auto part = motion.middleRows(from, to - from);
-      square += part.transpose() * part, product += part.transpose() * left.segment(from, to - from);
+      const auto [columns, values] = block(b);
+      square += columns.transpose() * columns, product += columns.transpose() * values;
     }
     square.diagonal().array() += 1e-9;
     const Eigen::VectorXd strength = square.ldlt().solve(product);
     for (Eigen::Index b = 1 - half; b < blocks; b += 2) {
-      const auto [from, to] = of(b);
-      const Eigen::VectorXd told = motion.middleRows(from, to - from) * strength;
-      goes_with += told.dot(2.0 * left.segment(from, to - from) - told);
+      const auto [columns, values] = block(b);
+      const Eigen::VectorXd told = columns * strength;
+      goes_with += told.dot(2.0 * values - told);
     }
   }
+  return goes_with;
+}
+
+}  // namespace
+
+std::vector<LawRows> rows_of_law(const Case& data) {
+  const auto at = places_of(data);
+  if (!at) return {};
+  auto settings = *data.model.controller;
+  settings.limit = 0.0;
+  std::vector<LawRows> all(data.recordings.size());
+  for (std::size_t r = 0; r < all.size(); ++r)
+    all[r].asked.assign(data.recordings[r].inputs.rows(), std::nan("")), all[r].beyond = all[r].asked;
+  for (const auto& stretch : stretches_of(data, *at)) {
+    const auto& recording = data.recordings[stretch.recording];
+    const auto& reference = recording.inputs.signals.at("reference");
+    const auto* forward = recording.inputs.find("feedforward");
+    auto& [asked, beyond] = all[stretch.recording];
+    AxisController controller{settings};
+    const std::size_t settled = stretch.begin + settling_of(settings);
+    double sum = 0.0;
+    for (std::size_t i = stretch.begin; i < stretch.end; ++i) {
+      const double command = controller.step(reference[i], recording.measured[at->position][i]) +
+                             (forward != nullptr ? (*forward)[i] : 0.0);
+      if (i < settled) continue;
+      asked[i] = command, beyond[i] = recording.measured[at->current][i] - command;
+      sum += beyond[i];
+    }
+    const double began = has_sum(settings) ? sum / static_cast<double>(stretch.end - settled) : 0.0;
+    for (std::size_t i = settled; i < stretch.end; ++i) asked[i] += began, beyond[i] -= began;
+  }
+  return all;
+}
+
+std::optional<LawOff> off_the_law(const Case& data) {
+  const auto at = places_of(data);
+  if (!at) return std::nullopt;
+  const auto stretches = stretches_of(data, *at);
+  const auto law = rows_of_law(data);
+  const std::size_t settles = settling_of(*data.model.controller);
+  Eigen::Index rows = 0;
+  for (const auto& stretch : stretches)
+    rows += static_cast<Eigen::Index>(stretch.end - stretch.begin - settles);
+  constexpr Eigen::Index blocks = 20, least = 50;
+  if (rows < blocks * least) return std::nullopt;
+  const auto simulated = simulate(data, data.model);
+  Eigen::VectorXd left(rows), current(rows);
+  Eigen::MatrixXd motion(rows, parts);
+  Eigen::Index row = 0;
+  for (const auto& stretch : stretches) {
+    const auto& recording = data.recordings[stretch.recording];
+    const std::size_t settled = stretch.begin + settles;
+    const auto n = static_cast<Eigen::Index>(stretch.end - settled);
+    left.segment(row, n) = changes(law[stretch.recording].beyond, settled, stretch.end);
+    current.segment(row, n) = changes(recording.measured[at->current], settled, stretch.end);
+    motion.middleRows(row, n) = motion_of(data, stretch, simulated[stretch.recording][at->position]);
+    row += n;
+  }
+  for (Eigen::Index k = 0; k < parts; ++k)
+    if (const double size = motion.col(k).norm(); size > 0.0) motion.col(k) /= size;
+  const double goes_with = squares_with(motion, left, blocks);
   if (!std::isfinite(goes_with)) return std::nullopt;  // a model that does not run
   const auto n = static_cast<double>(rows);
   return LawOff{std::sqrt(std::max(0.0, goes_with) / n), std::sqrt(current.squaredNorm() / n)};
+}
+
+namespace {
+
+/// What the law leaves as a loop without gaps would feel it. A sum holds whatever it began with, so that a stretch of a law
+/// with one goes on from where the last ended, and the first from zero.
+std::vector<double> joined(const std::vector<double>& beyond, bool is_summed) {
+  constexpr std::size_t first = 50;  // rows whose noise does not set a level
+  std::vector<double> all(beyond.size(), 0.0);
+  double now = 0.0, shift = 0.0;
+  for (std::size_t i = 0; i < beyond.size(); ++i) {
+    if (std::isfinite(beyond[i])) {
+      if (is_summed && (i == 0 || !std::isfinite(beyond[i - 1]))) {
+        const auto from = beyond.begin() + static_cast<std::ptrdiff_t>(i);
+        shift = now - median({from, from + static_cast<std::ptrdiff_t>(std::min(first, beyond.size() - i))});
+      }
+      now = beyond[i] + shift;
+    }
+    all[i] = now;
+  }
+  return all;
+}
+
+}  // namespace
+
+Case told_what_law_leaves(const Case& data, const std::vector<LawRows>& rows) {
+  Case told = data;
+  told.remembered = std::make_shared<Remembered>();
+  for (std::size_t r = 0; r < told.recordings.size(); ++r) {
+    auto& recording = told.recordings[r];
+    auto& forward = recording.inputs.signals["feedforward"];
+    forward.resize(recording.inputs.rows(), 0.0);
+    const auto beyond = joined(rows[r].beyond, has_sum(*data.model.controller));
+    for (std::size_t i = 0; i < forward.size(); ++i) forward[i] += beyond[i];
+    recording.simulation = physics::prepare(told.model, recording.inputs);
+  }
+  return told;
+}
+
+double share_of_law(const Case& data, const physics::Model& retuned) {
+  const auto at = places_of(data);
+  if (!at) return 0.0;
+  const auto told = told_what_law_leaves(data, rows_of_law(data));
+  const auto left_by = [&](const Case& loop, const physics::Model& model) {
+    double squares = 0.0;
+    const auto simulated = simulate(loop, model);
+    for (std::size_t r = 0; r < data.recordings.size(); ++r)
+      for (std::size_t i = 0; i < simulated[r][at->position].size(); ++i)
+        if (const double e = data.recordings[r].measured[at->position][i] - simulated[r][at->position][i];
+            std::isfinite(e))
+          squares += e * e;
+    return squares;
+  };
+  // Numbers that were retuned to another law may fit this one worse than those the user believes.
+  const double untold = left_by(data, retuned),
+               left = std::min(left_by(told, data.model), left_by(told, retuned));
+  return untold > 0.0 ? std::clamp(1.0 - left / untold, 0.0, 1.0) : 0.0;
 }
 
 }  // namespace invar::diagnose

@@ -136,7 +136,7 @@ std::string look_at_numbers(const Case& data, const Diagnosis& d) {
 
 std::string experiment_of(const Case& data, const Diagnosis& d) {
   if (d.is_partial) return "Let the diagnosis run to its end.";
-  if (d.off_law && d.off_law->is_another_law())
+  if (d.off_law && d.off_law->is_chief())
     return "Compare the controller block of the model's file with the drive: gains and their units, the "
            "filter, the rate, "
            "what is differentiated; invar diagnose --example axis says the law that is meant.";
@@ -189,7 +189,7 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
 }  // namespace
 
 std::string next_experiment(const Case& data, const Diagnosis& d) {
-  if (d.is_partial || (d.off_law && d.off_law->is_another_law())) return experiment_of(data, d);
+  if (d.is_partial || (d.off_law && d.off_law->is_chief())) return experiment_of(data, d);
   return look_at_numbers(data, d) + experiment_of(data, d);
 }
 

@@ -154,10 +154,19 @@ std::string report_json(const Case& data, const Diagnosis& d) {
          {"where", json::object()},
          {"share", d.still_follows},
          {"why",
-          d.off_law && d.off_law->is_another_law()
+          d.off_law && d.off_law->is_chief()
               ? "the recorded current is not what the controller makes of the recorded reference and position"
               : "what is left over follows what was recorded, most of all by way of the " +
                     d.suspect->place}});
+  if (d.off_law && d.off_law->is_beside())
+    report["location"].push_back(
+        {{"site", "axis.controller"},
+         {"depends_on", {"reference", "position"}},
+         {"where", json::object()},
+         {"share", d.off_law->share},
+         {"why",
+          "beside the others, the recorded current is not quite what the controller makes of the recorded "
+          "reference and position"}});
   report["parameter_corrections"] = json::array();
   for (std::size_t k = 0; k < d.best.free.size(); ++k) {
     const auto& f = d.best.free[k];

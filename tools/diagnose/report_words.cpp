@@ -344,6 +344,11 @@ std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
   if (d.unexplained >= much)
     text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
+  if (d.off_law && d.off_law->is_beside())
+    text += (text.empty() ? "" : "; ") + std::string{"the recorded current is "} +
+            report::si(d.off_law->off, "A") +
+            " RMS off what the controller makes of the recorded reference and position (" +
+            report::number(100.0 * d.off_law->share, 2) + " % of the mismatch): look at the controller block";
   for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + doubt;
   constexpr std::size_t one_in = 20;  // a slip of an instrument is rarer
   const std::size_t values = data.count.rows * data.outputs.size();
@@ -404,7 +409,7 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
     }
     case Verdict::unknown_physics:
-      if (d.off_law && d.off_law->is_another_law())
+      if (d.off_law && d.off_law->is_chief())
         return "Unknown physics: the recorded current is not what the model's controller makes of the "
                "recorded "
                "reference and position. What goes with the motion differs by " +

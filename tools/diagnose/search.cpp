@@ -131,8 +131,11 @@ class Search {
   /// Begins anew with what `start` claims, goes on from round `next` and keeps what is `better` than before.
   template <class Start, class Better>
   void begin_anew(const Diagnosis& begun, int next, Start start, Better better);
-  /// What is said where the machine's controller is another than the model's: nothing of what lies behind it.
+  /// Is most of what there is to explain that the machine's controller is another than the model's?
+  bool is_another_controller();
+  /// What is said then: nothing of what lies behind it.
   void stop_at_the_law();
+  void say_controller();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew. The share of rows that it leaves to
   /// chance.
   double quieten();
@@ -535,6 +538,12 @@ void Search::try_believed(const Diagnosis& begun) {
       });
 }
 
+bool Search::is_another_controller() {
+  d_.off_law = off_the_law(data_);
+  if (d_.off_law && d_.off_law->is_another_law()) d_.off_law->share = share_of_law(data_, d_.retuned.model);
+  return d_.off_law && d_.off_law->is_chief();
+}
+
 void Search::stop_at_the_law() {
   check(options_.refuses);
   d_.best =
@@ -542,9 +551,14 @@ void Search::stop_at_the_law() {
   for (auto* rows : {&d_.heldout, &d_.train})
     for (auto& row : *rows) row.after = row.before;
   conclude(data_, d_);
+  say_controller();
+  progress_(1.0, "done");
+}
+
+void Search::say_controller() {
+  d_.off_law->share = 1.0;  // nothing else explains any of it
   d_.verdict = Verdict::unknown_physics;
   d_.suspect = Suspect{"axis.controller", "controller", {"reference", "position"}};
-  progress_(1.0, "done");
 }
 
 Diagnosis Search::run() {
@@ -558,10 +572,7 @@ Diagnosis Search::run() {
     d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
     data_.stopped = options_.stopped;
   }
-  if (options_.refuses && take([&] {
-        d_.off_law = off_the_law(data_);
-        return d_.off_law && d_.off_law->is_another_law();
-      })) {
+  if (options_.refuses && take([&] { return is_another_controller(); })) {
     stop_at_the_law();
     return d_;
   }
@@ -585,6 +596,7 @@ Diagnosis Search::run() {
   }
   data_.count.left_to_chance = noise_->left_to_chance();
   (void)noise_->put_back();
+  if (d_.findings.empty() && d_.off_law && d_.off_law->is_another_law()) say_controller();
   d_.verdict = unless_stopped(d_);
   progress_(1.0, "done");
   return d_;
