@@ -106,6 +106,35 @@ class Diagnose(unittest.TestCase):
         self.assertGreater(error[0], 0.1)
         self.assertLess(error[1], 0.013)
 
+    def test_a_budget_that_ends_leaves_a_report_that_says_so(self):
+        tank(self.folder / "long.csv", 6000, 5)
+        began = time.monotonic()
+        done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "long.csv", "--out", "d", "--budget", "0.2")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertLess(time.monotonic() - began, 20.0)
+        report = json.loads((self.folder / "d/report.json").read_text())
+        self.assertTrue(report["partial"])
+        self.assertIn("further terms of the library", report["not_tried"])
+        self.assertNotIn(report["verdict"], ("no_mismatch", "parameters_only", "explained"))
+        self.assertTrue(report["fit"]["heldout"])
+        page = (self.folder / "d/report.html").read_text()
+        for words in ("The budget of 0.2 s ended before all was tried", "not tried: ", "further terms of the library"):
+            self.assertIn(words, done.stdout)
+            self.assertIn(words, page)
+        self.assertIn("a longer --budget", done.stdout)
+        self.assertTrue((self.folder / "d/patched.yaml").exists())
+
+    def test_a_whole_search_leaves_nothing_untried_and_a_budget_of_nothing_is_refused(self):
+        done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--out", "d", "--budget", "600")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads((self.folder / "d/report.json").read_text())["not_tried"], [])
+        self.assertNotIn("not tried", done.stdout)
+        for none in ("0", "-1", "nan"):
+            done = call(self.folder, "diagnose", "--model", "model.yaml", "--recording", "run.csv", "--budget", none)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn("--budget", done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1)
+
     def test_where_another_recording_says_otherwise_it_is_said_in_red_and_in_every_file(self):
         tank(self.folder / "other.csv", 900, 4, start=0.4, cubic=0.0)
         words = ["diagnose", "--model", "model.yaml", "--recording", "run.csv", "--check", "other.csv", "--out", "d"]

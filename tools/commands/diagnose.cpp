@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iomanip>
 #include <iostream>
@@ -37,7 +38,11 @@ struct Options {
   bool fits_check_start = false;
   bool json = false;
   unsigned seed = 1;
+  double budget = 60.0;  // s
 };
+
+/// What of the budget the search itself may take: what is known must still be held out, compared and drawn.
+constexpr double for_search = 0.75;
 
 /// `[######--------------]  31 %  fitting the short list`, on a terminal alone; gone when it goes, also by a fault.
 class ProgressLine {
@@ -94,7 +99,11 @@ void print(const std::string& summary) {
 }
 
 int run(const Options& options) {
+  using Clock = std::chrono::steady_clock;
+  const auto began = Clock::now();
   keep_memory();
+  if (!(options.budget > 0.0) || !std::isfinite(options.budget))
+    throw InputError{"--budget", "is no time above 0 s", "give seconds, for example --budget 60"};
   if (!options.check_outputs.empty() && options.check_outputs.size() != options.checks.size())
     throw InputError{"--check-outputs",
                      "are " + std::to_string(options.check_outputs.size()) + ", but --check are " +
@@ -119,13 +128,17 @@ int run(const Options& options) {
                 options.fits_check_start}));
   // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
   diagnose::Options how;
-  how.stopped = interrupted;
+  how.stopped = [&] {
+    const std::chrono::duration<double> took = Clock::now() - began;
+    return interrupted() || took.count() > for_search * options.budget;
+  };
   (void)interrupted();
   diagnose::ReportFolder{options.out};
   auto patience =
       std::make_unique<Patience>("invar: stopped before there was anything to say; no report was written");
   auto diagnosis = diagnose::search(data, progress, how);
   line.clear();
+  if (diagnosis.is_partial && !interrupted()) diagnosis.budget = options.budget;
   diagnose::check_runs(data, diagnosis.best.model, 0.0, options.model);
   for (auto& run : checks) {
     diagnose::compare(data, diagnosis, run);
@@ -171,7 +184,7 @@ int run(const Options& options) {
     std::cout << json << '\n';
   else
     print(diagnose::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
-  return diagnosis.is_partial ? 130 : 0;
+  return diagnosis.is_partial && diagnosis.budget == 0.0 ? 130 : 0;
 }
 
 }  // namespace
@@ -228,6 +241,12 @@ void add_diagnose(CLI::App& program) {
   command->add_flag("--check-fits-start", options->fits_check_start,
                     "the first row of --check is a guess: each model starts where it comes nearest");
   command->add_flag("--json", options->json, "print report.json instead of the summary");
+  command
+      ->add_option(
+          "--budget", options->budget,
+          "seconds that the diagnosis may take: where they end before all was tried, the report holds "
+          "what was known by then and says what was not tried")
+      ->capture_default_str();
   command->add_option("--seed", options->seed, "accepted for scripts; the search draws no random numbers")
       ->capture_default_str();
   command->callback([options] {

@@ -91,12 +91,14 @@ struct Diagnosis {
   std::vector<OtherRun> other_runs;
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
-  std::optional<Suspect> suspect;  // of unknown physics that has no curve either
-  double still_follows = 0.0;      // share of the mismatch that is left and follows what was recorded
-  std::optional<LawOff> off_law;   // of an axis in closed loop
-  bool is_unnamed = false;         // the finding is a curve alone
-  bool is_partial = false;         // stopped before all was tried
-  bool has_rest = false;           // the last finding is a curve beside named ones
+  std::optional<Suspect> suspect;      // of unknown physics that has no curve either
+  double still_follows = 0.0;          // share of the mismatch that is left and follows what was recorded
+  std::optional<LawOff> off_law;       // of an axis in closed loop
+  bool is_unnamed = false;             // the finding is a curve alone
+  bool is_partial = false;             // stopped before all was tried
+  std::vector<std::string> not_tried;  // of what is partial: the steps of the search that were cut off
+  double budget = 0.0;                 // [s] that ended it; 0: it was not the time
+  bool has_rest = false;               // the last finding is a curve beside named ones
 
   /// Remembers the best showing of a term that is not claimed.
   void reject(const std::string& term, const std::string& why, double gain);

@@ -135,7 +135,8 @@ std::string look_at_numbers(const Case& data, const Diagnosis& d) {
 }
 
 std::string experiment_of(const Case& data, const Diagnosis& d) {
-  if (d.is_partial) return "Let the diagnosis run to its end.";
+  if (d.is_partial)
+    return d.budget > 0.0 ? "Run it again with a longer --budget." : "Let the diagnosis run to its end.";
   if (d.off_law && d.off_law->is_chief())
     return "Compare the controller block of the model's file with the drive: gains and their units, the "
            "filter, the rate, "

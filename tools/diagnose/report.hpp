@@ -42,6 +42,10 @@ std::string what_was_looked_at(const Case& data);
 std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
+/// "Stopped", or which budget ended.
+std::string why_ended(const Diagnosis& diagnosis);
+/// "not tried: this; that" of a search that ended before its end; empty of a whole one.
+std::string not_tried(const Diagnosis& diagnosis);
 /// What the verdict alone would hide, in a line: parameters that went far from what was believed, much that remains, and
 /// what in the files does not go together; empty where there is none.
 std::string beside_the_verdict(const Case& data, const Diagnosis& diagnosis);

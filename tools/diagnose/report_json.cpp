@@ -49,6 +49,7 @@ std::string report_json(const Case& data, const Diagnosis& d) {
   report["invar_report"] = 1;
   report["verdict"] = name_of(d.verdict);
   if (d.is_partial) report["partial"] = true;
+  report["not_tried"] = d.not_tried;
   double over = 0.0;
   for (const auto& row : d.train)
     over = std::max(over, row.noise_floor > 0.0 ? row.before / row.noise_floor : 1.0);
@@ -132,8 +133,9 @@ std::string report_json(const Case& data, const Diagnosis& d) {
     report["findings"].push_back(entry);
   }
   if (d.is_partial && d.findings.empty() && d.verdict == Verdict::ambiguous)
-    report["ambiguity"].push_back({{"between", {"nothing is missing", "physics that was not tried"}},
-                                   {"experiment", "none: let the diagnosis run to its end"}});
+    report["ambiguity"].push_back(
+        {{"between", {"nothing is missing", "physics that was not tried"}},
+         {"experiment", "none: let the diagnosis run to its end, with a longer --budget"}});
   // What has neither a name nor a curve is said with its place alone. That something is missing at all is as good as sure.
   if (d.suspect && d.findings.empty() && d.verdict == Verdict::unknown_physics) {
     constexpr double of_its_place = 0.9;

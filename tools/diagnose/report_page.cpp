@@ -156,8 +156,8 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   Names rows;
   if (d.is_partial)
     rows.push_back({"what is missing", missing.empty()
-                                           ? "not known: it was stopped before all was tried"
-                                           : "so far the above: it was stopped before all was tried"});
+                                           ? "not known: the search ended before all was tried"
+                                           : "so far the above: the search ended before all was tried"});
   else if (missing.empty() && d.verdict != Verdict::unknown_physics)
     rows.push_back({"what is missing", "nothing that this recording shows"});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
@@ -353,6 +353,7 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
 
 void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
   page.heading("What was considered and why it is not claimed");
+  if (!d.not_tried.empty()) page.paragraph(why_ended(d) + " before all was tried. " + not_tried(d) + ".");
   Names considered;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
@@ -363,7 +364,7 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
            report::number(a.log_odds)});
   for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, report::number(r.gain)});
   if (considered.empty()) {
-    page.paragraph(d.is_partial ? "It was stopped before anything else was weighed."
+    page.paragraph(d.is_partial ? "The search ended before anything else was weighed."
                                 : "No other term of the library came near: none had a gain worth a fit.");
     return;
   }

@@ -67,6 +67,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
     if (!run.how_windowed.empty()) out += "  in " + run.name + ": " + run.how_windowed + "\n";
     if (const auto left_out = left_out_of(data, d, run); !left_out.empty()) out += "  " + left_out + "\n";
   }
+  if (!d.not_tried.empty()) out += "  " + not_tried(d) + "\n";
   if (!considered.empty()) out += "  not claimed: " + considered + "\n";
   return out + "  next: " + next_experiment(data, d) + "\n";
 }

@@ -373,15 +373,31 @@ std::string elsewhere(const Case& data, const Diagnosis& d) {
 
 }  // namespace
 
+std::string why_ended(const Diagnosis& d) {
+  return d.budget > 0.0 ? "The budget of " + report::number(d.budget) + " s ended" : "Stopped";
+}
+
+std::string not_tried(const Diagnosis& d) {
+  std::string text;
+  for (const auto& one : d.not_tried) text += (text.empty() ? "not tried: " : "; ") + one;
+  return text;
+}
+
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   if (d.is_partial) {
+    const std::string ended = why_ended(d) + " before all was tried";
     if (d.findings.empty())
-      return "Not finished, nothing can be said. Stopped before all was tried; nothing was found until then, "
-             "which does not say that nothing is missing.";
+      return "Not finished, nothing can be said. " + ended +
+             "; nothing was found until then, which does not say that nothing is missing.";
     auto whole = d;
     whole.is_partial = false;
-    return "Not finished. Stopped before all was tried, and rivals may not have been weighed; so far: " +
-           verdict_sentence(data, whole);
+    const bool has_rival = std::any_of(d.findings.begin(), d.findings.end(), [](const Finding& f) {
+      return std::any_of(f.alternatives.begin(), f.alternatives.end(),
+                         [](const Alternative& a) { return a.explains_as_well(); });
+    });
+    if (whole.verdict == Verdict::ambiguous && !has_rival) whole.verdict = Verdict::explained;
+    return "Not finished. " + ended +
+           ", and rivals may not have been weighed; so far: " + verdict_sentence(data, whole);
   }
   std::string names;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {

@@ -34,6 +34,7 @@ namespace invar::diagnose {
 namespace {
 
 using physics::Model;
+using physics::Plant;
 using physics::Role;
 using physics::Term;
 
@@ -68,9 +69,26 @@ bool goes_another_way(const Case& data, const Fit& fit) {
   return false;
 }
 
-/// Whoever reads the verdict alone must not take half a search for a whole one that found nothing.
-Verdict unless_stopped(const Diagnosis& d) {
-  return d.is_partial && d.findings.empty() ? Verdict::ambiguous : d.verdict;
+/// Steps of the search, as the report names those that were not tried.
+constexpr const char* own_numbers = "the model's own numbers refitted to their end";
+constexpr const char* in_step_columns = "columns that come early";
+constexpr const char* quiet_inputs = "inputs without their noise";
+constexpr const char* all_needed = "whether all that was found is needed";
+constexpr const char* rivals_weighed = "other names in place of what was found";
+
+void add_once(std::vector<std::string>& all, const std::string& one) {
+  if (std::find(all.begin(), all.end(), one) == all.end()) all.push_back(one);
+}
+
+/// Adds what was not tried. Whoever reads the verdict alone must not take half a search for a whole one that found nothing, nor
+/// a name for sure that was never held against its rivals.
+void say_not_tried(Diagnosis& d, const std::vector<std::string>& not_tried) {
+  for (const auto& one : not_tried) add_once(d.not_tried, one);
+  d.is_partial = d.is_partial || !d.not_tried.empty();
+  const bool is_unweighed =
+      std::find(d.not_tried.begin(), d.not_tried.end(), rivals_weighed) != d.not_tried.end();
+  if (d.is_partial && (d.findings.empty() || (is_unweighed && d.verdict == Verdict::explained)))
+    d.verdict = Verdict::ambiguous;
 }
 
 class Search {
@@ -147,8 +165,8 @@ class Search {
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
   /// or the step says so.
   template <class Step>
-  bool take(Step step) {
-    if (stopped()) return false;
+  bool take(const std::string& what, Step step) {
+    if (was_stopped(what)) return false;
     const auto kept = std::tuple{d_, rivals_};
     const auto readings = noise_->now();
     try {
@@ -157,10 +175,18 @@ class Search {
       std::tie(d_, rivals_) = kept;
       noise_->put(readings);
       beside_.reset();
+      leave(what);
       return false;
     }
   }
   [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
+  void leave(const std::string& what) { add_once(not_tried_, what); }
+  /// Is it over? Then `what` is not tried.
+  [[nodiscard]] bool was_stopped(const std::string& what) {
+    const bool is_over = stopped();
+    if (is_over) leave(what);
+    return is_over;
+  }
   [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
   [[nodiscard]] bool is_equations() const { return data_.model.plant == physics::Plant::equations; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
@@ -176,6 +202,7 @@ class Search {
   std::optional<LoopNoise> noise_;
   bool led_out_ = false;
   std::optional<Beside> beside_;  // of the best model, once it was looked for
+  std::vector<std::string> not_tried_;
 };
 
 void Search::begin() {
@@ -428,15 +455,18 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
 
 void Search::name(int first_round) {
   for (int round = first_round; round < 3; ++round)
-    if (!take([&] { return add_named(round); }) || !take([&] {
+    if (!take("further terms of the library", [&] { return add_named(round); }) ||
+        !take("further terms of the library", [&] {
           if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size
           return true;
         }))
       break;
-  take([&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
-  if (options_.refuses) take([&] { return prune(data_, d_, rivals_, options_.without), true; });
+  if (rivals_.empty()) return;
+  take("other laws of the same kind",
+       [&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
+  if (options_.refuses) take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
   progress_(0.7, "comparing with near twins");
-  if (!take([&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
+  if (!take(rivals_weighed, [&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
     data_.stopped = {};
     weigh_alternatives(data_, d_, rivals_, options_.refuses);  // the terms as they stand
   }
@@ -445,9 +475,11 @@ void Search::name(int first_round) {
 void Search::finish() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
   progress_(0.75, "trying other causes in place of names");
-  if (options_.refuses) take([&] { return doubt(data_, d_, beside_), true; });
+  const bool any = d_.best.model.terms.size() > given();
+  if (any && options_.refuses)
+    take("other causes in place of names", [&] { return doubt(data_, d_, beside_), true; });
   progress_(0.78, "looking for physics without a name");
-  take([&] {
+  take("physics without a name", [&] {
     // Only of equations the spans go with the model; all else was looked at already.
     if (!beside_ || data_.model.plant == physics::Plant::equations)
       beside_ = courses_beside(data_, d_.best, &d_.best);
@@ -458,12 +490,14 @@ void Search::finish() {
   });
   const bool curved = d_.is_unnamed || d_.has_rest;
   // What a run without noise left over may be what noise makes of the others.
-  if (!curved) take([&] { return settle(), true; });
-  if (!curved && options_.refuses) take([&] { return prune(data_, d_, rivals_, options_.without), true; });
-  if (options_.refuses) take([&] { return leave_out_nothings(data_, d_), true; });
+  if (!curved && any) take("the noise of what was found", [&] { return settle(), true; });
+  if (!curved && any && options_.refuses)
+    take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
+  if (d_.best.model.terms.size() > given() && options_.refuses)
+    take(all_needed, [&] { return leave_out_nothings(data_, d_), true; });
   progress_(0.88, "checking on held-out stretches");
   const auto checked = [&] { return check(options_.refuses), true; };
-  if (!take(checked)) {  // in few steps, and not to be stopped
+  if (!take("refits to their end on held-out stretches", checked)) {  // in few steps, and not to be stopped
     d_.is_partial = true;
     data_.stopped = {};
     (void)checked();
@@ -489,7 +523,7 @@ void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better be
   rivals_.clear();
   beside_.reset();
   data_.stopped = options_.stopped;
-  if (take([&] { return start(before); })) {
+  if (take("the search begun anew", [&] { return start(before); })) {
     name(next);
     finish();
   }
@@ -514,7 +548,7 @@ void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better be
 void Search::try_pairs(const Diagnosis& begun) {
   const bool has_rest = d_.verdict == Verdict::unknown_physics || d_.verdict == Verdict::partly_explained ||
                         (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
-  if (!has_rest || !options_.refuses || stopped()) return;
+  if (!has_rest || !options_.refuses || was_stopped("two terms at once")) return;
   begin_anew(
       begun, 2, [&](const Diagnosis& single) { return add_pair(&single.best); },
       [&](const Diagnosis& single) {
@@ -523,7 +557,9 @@ void Search::try_pairs(const Diagnosis& begun) {
 }
 
 void Search::try_believed(const Diagnosis& begun) {
-  if (!(d_.parameter_excursion > far_astray) || !options_.refuses || stopped()) return;
+  if (!(d_.parameter_excursion > far_astray) || !options_.refuses ||
+      was_stopped("a name sought from the numbers that the user believes"))
+    return;
   begin_anew(
       begun, 1,
       [&](const Diagnosis&) {
@@ -571,14 +607,15 @@ Diagnosis Search::run() {
     d_.weighing = weigh(data_, simulate(data_, data_.model), false);
     d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
     data_.stopped = options_.stopped;
+    leave(own_numbers);
   }
-  if (options_.refuses && take([&] { return is_another_controller(); })) {
+  if (options_.refuses && take("the controller's law", [&] { return is_another_controller(); })) {
     stop_at_the_law();
     return d_;
   }
   const Diagnosis begun = d_;
-  const bool paired = is_equations() && take([&] { return add_pair(); });
-  name(!paired ? 0 : take([&] { return put_one_in_place(begun); }) ? 1 : 2);
+  const bool paired = is_equations() && take("two terms at once", [&] { return add_pair(); });
+  name(!paired ? 0 : take("one term in place of two", [&] { return put_one_in_place(begun); }) ? 1 : 2);
   finish();
   if (!is_equations()) try_pairs(begun);
   try_believed(begun);
@@ -597,7 +634,7 @@ Diagnosis Search::run() {
   data_.count.left_to_chance = noise_->left_to_chance();
   (void)noise_->put_back();
   if (d_.findings.empty() && d_.off_law && d_.off_law->is_another_law()) say_controller();
-  d_.verdict = unless_stopped(d_);
+  say_not_tried(d_, not_tried_);
   progress_(1.0, "done");
   return d_;
 }
@@ -624,15 +661,37 @@ bool is_nearer(const Case& data, const Diagnosis& d, const Case& other_data, con
 
 Diagnosis search(Case& data, const std::function<void(double, const std::string&)>& progress,
                  const Options& options) {
-  settle_hold(data);
+  std::vector<std::string> not_tried;
+  // A step beside the search proper: one that is interrupted counts for nothing. Beside half a search none is taken.
+  Diagnosis d;
+  const auto unless_over = [&](const char* what, auto step) -> decltype(step()) {
+    if (d.is_partial) return {};
+    data.stopped = options.stopped;
+    try {
+      if (!data.stopped || !data.stopped()) {
+        auto found = step();
+        data.stopped = {};
+        return found;
+      }
+    } catch (const Stopped&) {
+    }
+    data.stopped = {};
+    add_once(not_tried, what);
+    return {};
+  };
+  if (data.model.plant == Plant::axis)
+    unless_over("how the reference goes on between rows", [&] { return settle_hold(data), true; });
   Case as_read = data;
-  auto d = Search{data, progress, options}.run();
+  as_read.stopped = {};
+  d = Search{data, progress, options}.run();
   if (!options.refuses) return d;
-  if (auto in_step = with_columns_in_step(as_read, data, d)) {
+  if (auto in_step = unless_over(in_step_columns, [&] { return with_columns_in_step(as_read, data, d); })) {
     Case before_search = *in_step;
     before_search.remembered = std::make_shared<Remembered>();
     auto after = Search{*in_step, progress, options}.run();
-    if (!comes_late_again(*in_step, after)) {
+    if (after.is_partial) {
+      add_once(not_tried, in_step_columns);
+    } else if (!comes_late_again(*in_step, after)) {
       as_read = std::move(before_search);
       data = std::move(*in_step);
       d = std::move(after);
@@ -643,10 +702,7 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
     longer.windows.few = true;
     longer.remembered = std::make_shared<Remembered>();
     auto in_long = Search{longer, progress, options}.run();
-    if (in_long.is_partial) {  // stopped before all was tried
-      d.is_partial = true;
-      d.verdict = unless_stopped(d);
-    }
+    if (in_long.is_partial) add_once(not_tried, "longer windows");
     // The same with fewer names is what more evidence makes of it.
     if (!in_long.is_partial && (named_by(in_long) > named_by(d) ||
                                 (named_by(in_long) == 2 && in_long.findings.size() < d.findings.size()))) {
@@ -655,13 +711,14 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
       d = std::move(in_long);
     }
   }
-  if (auto quiet = with_quiet_inputs(as_read, data, d)) {
+  if (auto quiet = unless_over(quiet_inputs, [&] { return with_quiet_inputs(as_read, data, d); })) {
     auto in_quiet = Search{*quiet, progress, options}.run();
     if (in_quiet.is_partial || !is_nearer(data, d, *quiet, in_quiet)) {
       data = std::move(*quiet);
       d = std::move(in_quiet);
     }
   }
+  say_not_tried(d, not_tried);
   return d;
 }
 
