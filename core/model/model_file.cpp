@@ -381,6 +381,21 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   return is_known("over", term.curve.over) && (term.with.empty() || is_known("with", term.with));
 }
 
+/// Of equations and of a coupling between nodes `with` is a place.
+void check_multiplier(const Node& node, const Model& model, const Term& term) {
+  const bool is_curve = !term.curve.knots.empty();
+  if (term.with.empty() || term.info == nullptr || model.plant == Plant::equations) return;
+  const auto& nodes = model.thermal.nodes;
+  if (std::find(nodes.begin(), nodes.end(), term.with) != nodes.end()) return;
+  const auto known = is_curve ? physics::multipliers_of(*term.info) : std::vector<std::string_view>{};
+  if (std::find(known.begin(), known.end(), term.with) != known.end()) return;
+  std::string list;
+  for (const auto name : known) list += (list.empty() ? "`" : ", `") + std::string{name} + "`";
+  node["with"].fault("`" + term.with + "` multiplies no " + std::string{is_curve ? "curve" : "term"} +
+                         " of site `" + std::string{term.info->site} + "`",
+                     list.empty() ? "leave `with` out" : "write one of " + list + ", or leave it out");
+}
+
 std::optional<Term> read_term(const Node& node, const Model& model) {
   const auto name = node.text("term");
   Term term;
@@ -402,13 +417,7 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
   }
   term.on = node.text("on", node.text("node", ""));
   term.with = node.text("with", "");
-  if (model.plant == Plant::axis && !term.with.empty() &&
-      (name != "unmodelled" || term.info->site != "force" ||
-       (term.with != "direction" && term.with != "velocity" && term.with != "acceleration")))
-    node["with"].fault(
-        "only an unmodelled force goes with something, `direction`, `velocity` or `acceleration`",
-        "`direction`: its curve is dry friction; `velocity`: damping; `acceleration`: mass; leave it "
-        "out: a force");
+  check_multiplier(node, model, term);
   if (node.has("between")) {
     const auto pair = node["between"].as_texts();
     if (pair.size() == 2) term.on = pair[0], term.with = pair[1];
@@ -489,11 +498,8 @@ YAML::Node place_of(YAML::Node root, const Model& model, const std::string& name
 YAML::Node term_yaml(const Term& term, const Model& model) {
   YAML::Node node;
   node["term"] = std::string{term.info->name};
-  if (model.plant != Plant::axis && model.plant != Plant::error_map) {
-    if (!term.on.empty()) node["on"] = term.on;
-    if (!term.with.empty()) node["with"] = term.with;
-  }
-  if (model.plant == Plant::axis && !term.with.empty()) node["with"] = term.with;
+  if (model.plant != Plant::axis && model.plant != Plant::error_map && !term.on.empty()) node["on"] = term.on;
+  if (!term.with.empty()) node["with"] = term.with;
   if (!term.curve.knots.empty()) {
     node["site"] = std::string{term.info->site};
     node["over"] = term.curve.over;

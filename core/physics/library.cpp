@@ -65,6 +65,8 @@ constexpr std::array unmodelled_infos{
 
 constexpr TermInfo thermal_unmodelled_storage_info = unnamed(Plant::thermal, "storage");
 constexpr ThermalTermKind thermal_unmodelled_storage{.info = &thermal_unmodelled_storage_info};
+constexpr TermInfo thermal_unmodelled_exchange_info = unnamed(Plant::thermal, "exchange");
+constexpr ThermalTermKind thermal_unmodelled_exchange{.info = &thermal_unmodelled_exchange_info};
 constexpr TermInfo axis_unmodelled_reading_info = unnamed(Plant::axis, "measurement");
 constexpr AxisTermKind axis_unmodelled_reading{.info = &axis_unmodelled_reading_info};
 constexpr AxisTermKind axis_unmodelled_force{.info = &unmodelled_infos[0]};
@@ -119,7 +121,8 @@ const TermInfo* find_term(Plant plant, std::string_view name) {
 }
 
 const TermInfo* unmodelled(Plant plant, std::string_view site) {
-  for (const auto* info : {&axis_unmodelled_reading_info, &thermal_unmodelled_storage_info})
+  for (const auto* info :
+       {&axis_unmodelled_reading_info, &thermal_unmodelled_storage_info, &thermal_unmodelled_exchange_info})
     if (plant == info->plant && site == info->site) return info;
   const TermInfo* any = nullptr;
   for (const auto& info : unmodelled_infos) {
@@ -128,6 +131,16 @@ const TermInfo* unmodelled(Plant plant, std::string_view site) {
     if (any == nullptr) any = &info;
   }
   return any;
+}
+
+std::vector<std::string_view> multipliers_of(const TermInfo& unmodelled) {
+  if (unmodelled.plant == Plant::axis && unmodelled.site == "force")
+    return {"direction", "velocity", "acceleration"};
+  if (unmodelled.plant == Plant::thermal && unmodelled.site == "source") return {"power"};
+  if (unmodelled.plant == Plant::error_map) return {"direction", "position", "temperature"};
+  if (unmodelled.plant == Plant::droplet) return {"height"};
+  if (unmodelled.plant == Plant::sensor) return {"true_position", "velocity"};
+  return {};
 }
 
 const AxisTermKind* axis_kind(const TermInfo& info) {
@@ -142,6 +155,7 @@ const AxisTermKind* axis_kind(const TermInfo& info) {
 const ThermalTermKind* thermal_kind(const TermInfo& info) {
   if (&info == thermal_unmodelled_loss.info) return &thermal_unmodelled_loss;
   if (&info == thermal_unmodelled_storage.info) return &thermal_unmodelled_storage;
+  if (&info == thermal_unmodelled_exchange.info) return &thermal_unmodelled_exchange;
   if (&info == thermal_unmodelled_source.info) return &thermal_unmodelled_source;
   for (const auto* kind : thermal_terms)
     if (kind->info == &info) return kind;

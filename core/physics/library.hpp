@@ -18,6 +18,8 @@ std::vector<const TermInfo*> terms_of(Plant plant);
 const TermInfo* find_term(Plant plant, std::string_view name);
 /// The term that stands for physics without a name, at a site: its shape is a Curve.
 const TermInfo* unmodelled(Plant plant, std::string_view site);
+/// The signals that a curve at this site may be multiplied by.
+std::vector<std::string_view> multipliers_of(const TermInfo& unmodelled);
 /// The plant by the name that model.yaml writes; false where there is none.
 bool plant_by_name(std::string_view name, Plant& plant);
 

@@ -75,7 +75,8 @@ ThermalPlant make_thermal(const Model& model) {
     couplings.push_back({place(a), place(b), model.value(a + "-" + b + ".conductance")});
   std::vector<ThermalTerm> terms;
   for (const auto& term : model.terms)
-    terms.push_back({thermal_kind(*term.info), term.values, place(term.on), place(term.with), term.curve});
+    terms.push_back({thermal_kind(*term.info), term.values, place(term.on), place(term.with), term.curve,
+                     !term.curve.knots.empty() && term.with == "power"});
   return {std::move(nodes), std::move(heaters), std::move(couplings), std::move(terms)};
 }
 

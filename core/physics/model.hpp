@@ -35,8 +35,8 @@ struct Term {
   std::array<bool, most_parameters> given{};    // written in the file; the others stand at their defaults
   std::array<double, most_parameters> usual{};  // as of a Parameter
   std::string on;                               // thermal: the node; equations: the state, input or output
-  /// Thermal coupling: the other node; equations: what it couples to; `unmodelled` force of an axis: "direction" where its
-  /// curve is dry friction, "velocity" where it is damping, "acceleration" where it is mass.
+  /// Thermal coupling: the other node; equations: the symbol that it couples to; a curve: the signal that multiplies it
+  /// (`multipliers_of`). The curve of a force is dry friction with "direction", damping with "velocity", mass with "acceleration".
   std::string with;
   Curve curve;  // `unmodelled` alone
 };

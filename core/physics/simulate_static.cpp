@@ -83,13 +83,19 @@ class ErrorMap final : public Simulation {
               {time_[i], position_[i], direction_[i], late[i], pressure_[i], offset_[i], first_, last_},
               term.values.data());
       if (const auto* over = variables_.find(term.curve.over); !term.curve.knots.empty() && over != nullptr)
-        for (std::size_t i = 0; i < n; ++i)
-          error[i] += term.curve((*over)[i]) *
-                      (term.info->site == "measurement" || term.info->site == "thermal" ? position_[i] : 1.0);
+        for (std::size_t i = 0; i < n; ++i) error[i] += term.curve((*over)[i]) * factor(term, i, late[i]);
     }
   }
 
  private:
+  /// What a curve is multiplied by: the signal that it names, else the position where a length is measured or warms.
+  [[nodiscard]] double factor(const Term& term, std::size_t row, double warmth) const {
+    if (term.with == "temperature") return warmth;
+    if (term.with == "direction") return direction_[row];
+    if (term.with == "position") return position_[row];
+    return term.info->site == "measurement" || term.info->site == "thermal" ? position_[row] : 1.0;
+  }
+
   Variables variables_;
   std::vector<double> time_, position_, direction_, pressure_, offset_;
   bool has_temperature_;
@@ -133,7 +139,9 @@ class Droplets final : public Simulation {
       double y = target_y_[i] + py + beside.y + scale * d.shift_y;
       for (const auto& term : model.terms) {
         const auto* over = term.curve.knots.empty() ? nullptr : variables_.find(term.curve.over);
-        if (over != nullptr) (term.on == "landed_y" ? y : x) += term.curve((*over)[i]);
+        if (over != nullptr)
+          (term.on == "landed_y" ? y : x) +=
+              term.curve((*over)[i]) * (term.with == "height" ? d.height : 1.0);
       }
       for (std::size_t o = 0; o < outputs_.size(); ++o)
         outputs[o][i] = outputs_[o] == "landed_x" ? x : (outputs_[o] == "landed_y" ? y : std::nan(""));
@@ -206,7 +214,9 @@ class Sensors final : public Simulation {
                                  : term.curve.over == "acceleration" ? acceleration_[i]
                                                                      : position[i];
             out[i] += term.curve(over != nullptr ? (*over)[i] : derived) *
-                      (term.with == "velocity" ? velocity[i] : 1.0);
+                      (term.with == "velocity"        ? velocity[i]
+                       : term.with == "true_position" ? position[i]
+                                                      : 1.0);
           }
         }
         if (encoder && resolution > 0.0) out[i] = resolution * std::round(out[i] / resolution);

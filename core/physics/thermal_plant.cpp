@@ -105,10 +105,14 @@ ThermalPlant::State ThermalPlant::slope(const State& state, double time,
       if (term.kind->couples) heat[term.other] -= flow;
     }
     if (!term.curve.knots.empty()) {
-      const double value = term.curve(variable(term.curve, at, received[term.node]));
-      if (term.kind->info->site == "storage")
+      double value = term.curve(variable(term.curve, at, received[term.node]));
+      if (term.by_power) value *= received[term.node];
+      if (term.kind->info->site == "storage") {
         stored[term.node] += value;
-      else
+      } else if (term.kind->info->site == "exchange") {
+        heat[term.node] += value * (at.other_temperature - at.temperature);
+        heat[term.other] -= value * (at.other_temperature - at.temperature);
+      } else
         heat[term.node] += term.kind->info->site == "loss" ? -value * (at.temperature - ambient) : value;
     }
   }

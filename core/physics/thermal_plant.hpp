@@ -31,7 +31,8 @@ struct ThermalTerm {
   std::array<double, most_parameters> parameters{};
   std::size_t node = 0;
   std::size_t other = 0;
-  Curve curve{};  // only of an `unmodelled` term
+  Curve curve{};          // only of an `unmodelled` term
+  bool by_power = false;  // the curve is of what its node's heaters give [W/W]
 };
 
 /// What drives the nodes during one step.
@@ -43,8 +44,8 @@ struct ThermalInputs {
 };
 
 /// The truth side of heater, slide and base: `world` steps one, `simulate` one for each recording. A term
-/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, at `storage` a capacity [J/K], elsewhere a heat
-/// [W]. Classical Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
+/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, at `exchange` a conductance [W/K] to the other node,
+/// at `storage` a capacity [J/K], elsewhere a heat [W] or, by power, a share of what the node's heaters give. Classical Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
 /// Repeatable bit for bit.
 class ThermalPlant {
  public:

@@ -433,16 +433,74 @@ std::pair<double, double> span_of(const Case& data, const std::string& name, con
   return {all[all.size() / 500], all[all.size() - 1 - all.size() / 500]};
 }
 
+/// A curve to be tried: its site, its variable, its knots and the signal that multiplies it.
+struct Choice {
+  const char* site;
+  const char* over;
+  std::size_t knots;
+  const char* with = "";
+};
+
+/// What a curve at this place goes with: the other nodes for heat that is exchanged, else what the choice says.
+std::vector<std::string> partners_of(const Case& data, const Choice& choice, const std::string& place) {
+  if (std::string_view{choice.site} != "exchange") return {choice.with};
+  auto others = data.model.thermal.nodes;
+  std::erase(others, place);
+  return others;
+}
+
+/// By how much a value of the curve is moved for its slope; 0: the plant's usual.
+double step_of_curve(const Case& data, const Fit& fitted, const Term& term) {
+  const auto site = term.info->site;
+  if (term.curve.usual > 0.0) return term.curve.usual;
+  if (data.model.plant == Plant::thermal) {
+    if (site == "storage") return 1e-3 * fitted.model.value(term.on + ".capacity", 1.0);
+    const double loss = std::abs(fitted.model.value(term.on + ".loss"));
+    if (site == "exchange") return loss > 0.0 ? 0.01 * loss : 1e-3;
+    return term.with == "power" ? 0.01 : 0.0;
+  }
+  if (data.model.plant != Plant::axis) return 0.0;
+  if (!term.with.empty())
+    return 0.1 * missing_force(data, fitted) / (term.with == "direction" ? 1.0 : usual(data, term.with));
+  return site == "force" ? std::min(0.05, small_force(data, fitted.model)) : 0.0;
+}
+
+/// Nothing where its variable does not vary, or what multiplies it was not recorded.
+std::optional<Start> curve_start(const Case& data, const Fit& fitted, const Choice& choice,
+                                 const std::string& place, const std::string& partner) {
+  const bool is_thermal = data.model.plant == Plant::thermal;
+  const auto [low, high] = span_of(data, choice.over, is_thermal ? place : "");
+  if (!(high - low > 1e-9 * (std::abs(high) + std::abs(low)))) return std::nullopt;
+  if (data.model.plant == Plant::error_map && !partner.empty() && partner != "direction" &&
+      !covered(data, partner))
+    return std::nullopt;
+  // Where an instrument changes with its velocity it does so beside rest.
+  const bool beside_rest = data.model.plant == Plant::sensor && std::string_view{choice.over} == "velocity" &&
+                           low < 0.0 && high > 0.0;
+  Start start;
+  start.term.info = physics::unmodelled(data.model.plant, choice.site);
+  start.term.on = place;
+  start.term.with = partner;
+  start.term.curve.over = choice.over;
+  for (std::size_t k = 0; k < choice.knots; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
+    const double away = 2.0 * share - 1.0;
+    start.term.curve.knots.push_back(beside_rest ? (away < 0.0 ? low : high) * away * away
+                                                 : low + share * (high - low));
+    start.term.curve.values.push_back(0.0);
+    start.directions.push_back({none, k, false});
+  }
+  // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
+  if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
+    start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
+  start.step = step_of_curve(data, fitted, start.term);
+  return start;
+}
+
 }  // namespace
 
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   if (data.model.plant == Plant::equations) return equation_curves(data, fitted.model);
-  struct Choice {
-    const char* site;
-    const char* over;
-    std::size_t knots;
-    const char* with = "";
-  };
   std::vector<Choice> choices;
   switch (data.model.plant) {
     case Plant::axis:
@@ -465,29 +523,43 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:
-      choices = {{"loss", "temperature", 6},     {"loss", "ambient", 5},
+      choices = {{"loss", "temperature", 6},
+                 {"loss", "ambient", 5},
                  {"storage", "temperature", 12},  // what melts takes heat at one temperature
-                 {"loss", "time", 12},           {"source", "time", 12},
-                 {"loss", "speed", 5},           {"source", "power", 6},
-                 {"source", "motor_current", 5}};
+                 {"loss", "time", 12},
+                 {"source", "time", 12},
+                 {"loss", "speed", 5},
+                 {"source", "power", 6},
+                 {"source", "motor_current", 5},
+                 {"source", "time", 8, "power"},
+                 {"source", "temperature", 5, "power"},  // a resistance that changes as it warms
+                 {"exchange", "temperature", 7}};        // to each other node
       break;
     case Plant::error_map:
-      choices = {{"kinematic", "position", 12},  {"kinematic", "time", 14},
-                 {"thermal", "temperature", 6},  {"kinematic", "temperature", 6},
-                 {"measurement", "pressure", 5}, {"kinematic", "pressure", 5},
-                 {"kinematic", "offset", 5},     {"thermal", "time", 10}};
+      choices = {{"kinematic", "position", 12},
+                 {"kinematic", "time", 14},
+                 {"thermal", "temperature", 6},
+                 {"kinematic", "temperature", 6},
+                 {"measurement", "pressure", 5},
+                 {"kinematic", "pressure", 5},
+                 {"kinematic", "offset", 5},
+                 {"thermal", "time", 10},
+                 {"kinematic", "position", 12, "direction"},   // a reversal that varies along the way
+                 {"thermal", "position", 12, "temperature"}};  // what warms bends
       break;
     case Plant::droplet:
-      choices = {{"flight", "time", 6},      {"flight", "height", 6},   {"camera", "image_x", 6},
-                 {"camera", "image_y", 6},   {"valve", "pressure", 6},  {"valve", "velocity_x", 6},
-                 {"valve", "velocity_y", 6}, {"flight", "target_x", 6}, {"flight", "target_y", 6},
-                 {"valve", "on_time", 5}};
+      choices = {{"flight", "time", 6},      {"flight", "height", 6},        {"camera", "image_x", 6},
+                 {"camera", "image_y", 6},   {"valve", "pressure", 6},       {"valve", "velocity_x", 6},
+                 {"valve", "velocity_y", 6}, {"flight", "target_x", 6},      {"flight", "target_y", 6},
+                 {"valve", "on_time", 5},    {"flight", "time", 6, "height"}};
       break;
     case Plant::sensor:
       choices = {{"measurement", "velocity", 12},
                  {"measurement", "acceleration", 6},
                  {"measurement", "time", 10},
-                 {"measurement", "true_position", 14}};
+                 {"measurement", "true_position", 14},
+                 {"measurement", "time", 10, "true_position"},  // a scale that grows
+                 {"measurement", "time", 8, "velocity"}};
       break;
     default:
       break;
@@ -501,38 +573,10 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
     std::vector<std::string> on{""};
     if (data.model.plant == Plant::thermal) on = data.model.thermal.nodes;
     if (data.model.plant == Plant::droplet || data.model.plant == Plant::sensor) on = data.outputs;
-    const bool beside_rest = data.model.plant == Plant::sensor && std::string_view{choice.over} == "velocity";
-    for (const auto& place : on) {
-      const auto [low, high] = span_of(data, choice.over, data.model.plant == Plant::thermal ? place : "");
-      if (!(high - low > 1e-9 * (std::abs(high) + std::abs(low)))) continue;
-      Start start;
-      start.term.info = physics::unmodelled(data.model.plant, choice.site);
-      start.term.on = place;
-      start.term.with = choice.with;
-      start.term.curve.over = choice.over;
-      for (std::size_t k = 0; k < choice.knots; ++k) {
-        const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
-        // Where an instrument changes with its velocity it does so beside rest.
-        const double away = 2.0 * share - 1.0;
-        start.term.curve.knots.push_back(beside_rest && low < 0.0 && high > 0.0
-                                             ? (away < 0.0 ? low : high) * away * away
-                                             : low + share * (high - low));
-        start.term.curve.values.push_back(0.0);
-        start.directions.push_back({none, k, false});
-      }
-      // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
-      if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
-        start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
-      if (start.term.curve.usual > 0.0) start.step = start.term.curve.usual;
-      if (data.model.plant == Plant::axis && start.term.info->site == "force")
-        start.step = std::min(0.05, small_force(data, fitted.model));
-      if (start.term.info->site == "storage")
-        start.step = 1e-3 * fitted.model.value(place + ".capacity", 1.0);
-      if (!start.term.with.empty())
-        start.step = 0.1 * missing_force(data, fitted) /
-                     (start.term.with == "direction" ? 1.0 : usual(data, start.term.with));
-      starts.push_back(std::move(start));
-    }
+    for (const auto& place : on)
+      for (const auto& partner : partners_of(data, choice, place))
+        if (auto start = curve_start(data, fitted, choice, place, partner))
+          starts.push_back(std::move(*start));
   }
   auto jumps = jump_starts(data, fitted);
   std::move(jumps.begin(), jumps.end(), std::back_inserter(starts));

@@ -79,6 +79,20 @@ double instrument_noise(const Case& data, const std::vector<physics::Outputs>& s
   return std::max({apart, rounding, spread_at_rest(data, output)});
 }
 
+double squares_in_noise(const Case& data, const Fit& fit, const Fit& best) {
+  const auto near = simulate(data, best.model), simulated = simulate(data, fit.model);
+  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  double sum = 0.0;
+  for (std::size_t o = 0; o < left.size(); ++o)
+    if (const double noise = instrument_noise(data, near, o); noise > 0.0)
+      sum += std::pow(left[o].rms() / noise, 2);
+  return sum;
+}
+
+bool leaves_less(const Case& data, const Fit& one, const Fit& other) {
+  return squares_in_noise(data, one, other) < squares_in_noise(data, other, other);
+}
+
 double most_over_noise(const Diagnosis& d) {
   double most = 0.0;
   for (const auto* rows : {&d.heldout, &d.train})

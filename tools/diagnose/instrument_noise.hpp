@@ -15,4 +15,11 @@ inline constexpr double times_noise = 2.0;
 /// The most that any output leaves in units of its noise: on held-out stretches, or on those that were fitted to.
 double most_over_noise(const Diagnosis& d);
 
+/// What a model leaves in units of the instruments' noise, squared: the mean of the rows, summed over the outputs. The noise is
+/// that beside `best`, the nearer of the models that are compared.
+double squares_in_noise(const Case& data, const Fit& fit, const Fit& best);
+/// Does `one` leave less than the other, counted so? An output that errs by far more than its noise decides; what filters or a
+/// count of independent rows make of a residual does not.
+bool leaves_less(const Case& data, const Fit& one, const Fit& other);
+
 }  // namespace invar::diagnose

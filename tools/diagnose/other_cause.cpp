@@ -7,6 +7,7 @@
 #include "tools/diagnose/burst.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/form.hpp"
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/screen.hpp"
 
@@ -129,6 +130,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
                           variable_of(s.start.term) == variable_of(named.model.terms[term])) ||
                          (s.start.term.with == "direction" && is_friction(named.model.terms[term]));
     if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
+    if (!leaves_less(data, one.fit, named)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }
   return found;

@@ -5,6 +5,7 @@
 
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
+#include "core/physics/library.hpp"
 #include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/report.hpp"
@@ -26,6 +27,18 @@ std::string site_of(const Case& data, const physics::Term& term) {
   return plant + "." + std::string{term.info->site};
 }
 
+namespace {
+
+/// Is a curve multiplied by a signal? The other node of an exchange of heat is a place.
+bool is_multiplied(const physics::Term& term) {
+  if (term.curve.knots.empty() || term.with.empty()) return false;
+  if (term.info->plant == physics::Plant::equations) return true;
+  const auto known = physics::multipliers_of(*term.info);
+  return std::find(known.begin(), known.end(), term.with) != known.end();
+}
+
+}  // namespace
+
 std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
   std::vector<std::string> names;
   for (const auto name : term.info->depends_on)
@@ -34,8 +47,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
-    const bool is_place = data.model.plant == physics::Plant::thermal;  // a node beside another
-    if (!is_place && !term.with.empty()) names.push_back(term.with);
+    if (is_multiplied(term)) names.push_back(term.with);
     if (term.with == "direction") names.emplace_back("velocity");  // whose sign it is
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
@@ -100,10 +112,15 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
         return counted(term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N");
       return term.info->site == "measurement" ? counted("m") : "1";
     case Plant::thermal:
-      return term.info->site == "loss" ? "W/K" : term.info->site == "storage" ? "J/K" : "W";
+      if (term.with == "power") return "1";
+      return term.info->site == "loss" || term.info->site == "exchange" ? "W/K"
+             : term.info->site == "storage"                             ? "J/K"
+                                                                        : "W";
     case Plant::error_map:
+      if (term.with == "temperature") return "m/K";
+      return term.with == "position" || (term.with.empty() && term.info->site != "kinematic") ? "1" : "m";
     case Plant::droplet:
-      return "m";
+      return term.with.empty() ? "m" : "1";
     default: {
       if (data.model.plant == Plant::equations)  // a state's rate counts in the user's own unit
         return term.info->site == "output" ? unit_of_variable(data, output_at(data, term.on)) : "";
@@ -188,7 +205,7 @@ std::string place_of(const Case& data, const physics::Term& term) {
     return term.with == "direction"      ? "dry friction of the carriage"
            : term.with == "acceleration" ? "mass of the carriage"
                                          : "damping of the carriage";
-  if (!term.with.empty()) text += " and " + term.with;
+  if (!term.with.empty() && !is_multiplied(term)) text += " and " + term.with;
   return text;
 }
 
@@ -224,8 +241,8 @@ std::string sizes_of(const Case& data, const Diagnosis& d, const Finding& findin
   if (!finding.term.curve.knots.empty()) {
     double top = 0.0;
     for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
-    const bool is_product =
-        finding.term.info->plant == physics::Plant::equations && !finding.term.with.empty();
+    const bool is_product = finding.term.info->plant != physics::Plant::axis && !finding.term.with.empty() &&
+                            finding.term.info->site != "exchange";
     text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over +
             (is_product ? " in proportion to " + finding.term.with : "") + ", up to " +
             report::si(top, unit_of_curve(data, finding.term));
@@ -449,9 +466,7 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
              " (" + site_of(data, d.findings.front().term) + ") that goes with " +
              d.findings.front().term.curve.over +
-             (data.model.plant == physics::Plant::equations && !d.findings.front().term.with.empty()
-                  ? " and " + d.findings.front().term.with
-                  : "") +
+             (is_multiplied(d.findings.front().term) ? " and " + d.findings.front().term.with : "") +
              ", and no known term describes it.";
   }
   return "";

@@ -5,6 +5,7 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/other_cause.hpp"
 #include "tools/diagnose/screen.hpp"
@@ -135,7 +136,8 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     if (instead.gain > margin) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
       if (instead.fit.evidence > named_there.evidence + margin &&
-          instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) {
+          instead.fit.evidence - named_there.evidence > 0.25 * instead.gain &&
+          leaves_less(data, instead.fit, d.best)) {
         for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
           d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
                    1.0);
