@@ -9,6 +9,7 @@
 #include "core/base/unit.hpp"
 #include "core/model/own_expressions.hpp"
 #include "core/physics/counted_units.hpp"
+#include "core/physics/curve_memory.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/static_plants.hpp"
@@ -381,6 +382,26 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
   return is_known("over", term.curve.over) && (term.with.empty() || is_known("with", term.with));
 }
 
+/// Of a curve whose knots are thresholds or time constants.
+void read_memory(const Node& node, const Model& model, Term& term) {
+  const auto kind = node.text("memory");
+  using Memory = physics::Curve::Memory;
+  term.curve.memory = kind == "stop"         ? Memory::stop
+                      : kind == "relaxation" ? Memory::relaxation
+                                             : Memory::none;
+  if (term.curve.memory == Memory::none)
+    node["memory"].fault("`" + kind + "` is no memory of a curve", "write `stop` or `relaxation`");
+  const bool is_place = model.plant == Plant::axis
+                            ? term.info->site == "force" && term.curve.over == "position"
+                            : model.plant == Plant::equations && term.info->site == "state";
+  if (!is_place)
+    node["memory"].fault("a curve with memory is a force over `position`, or a rate over a state",
+                         "leave `memory` out");
+  if (!(term.curve.knots.front() > 0.0) || term.curve.knots.size() > physics::CurveMemory::most)
+    node["knots"].fault("the knots of a curve with memory are thresholds or time constants",
+                        "write at most " + std::to_string(physics::CurveMemory::most) + ", each above 0");
+}
+
 /// Of equations and of a coupling between nodes `with` is a place.
 void check_multiplier(const Node& node, const Model& model, const Term& term) {
   const bool is_curve = !term.curve.knots.empty();
@@ -407,7 +428,9 @@ std::optional<Term> read_term(const Node& node, const Model& model) {
     if (term.curve.knots.empty() || term.curve.knots.size() != term.curve.values.size() ||
         !std::is_sorted(term.curve.knots.begin(), term.curve.knots.end()))
       node["knots"].fault("knots must ascend and be as many as values", "write one value a knot");
-    else if (node.has("period")) {
+    else if (node.has("memory")) {
+      read_memory(node, model, term);
+    } else if (node.has("period")) {
       term.curve.period = node["period"].as_number("", {1e-300, 1e300});
       if (!(term.curve.knots.back() - term.curve.knots.front() < term.curve.period))
         node["period"].fault("the knots reach over more than one period", "keep them within it");
@@ -508,6 +531,8 @@ YAML::Node term_yaml(const Term& term, const Model& model) {
     node["knots"].SetStyle(YAML::EmitterStyle::Flow);
     node["values"].SetStyle(YAML::EmitterStyle::Flow);
     if (term.curve.period > 0.0) node["period"] = term.curve.period;
+    if (term.curve.memory != physics::Curve::Memory::none)
+      node["memory"] = term.curve.memory == physics::Curve::Memory::stop ? "stop" : "relaxation";
     return node;
   }
   for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {

@@ -38,7 +38,10 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
     if (term.kind->command != nullptr) commands_.push_back(&term);
     if (term.kind->friction != nullptr) frictions_.push_back({term.kind->friction, p.data()});
     if (term.kind->reading != nullptr) readings_.push_back({term.kind->reading, p.data()});
-    if (!term.curve.knots.empty()) {
+    if (term.curve.memory != Curve::Memory::none) {
+      remembering_.emplace_back(&term, CurveMemory{});
+      fastest = std::max(fastest, std::sqrt(CurveMemory::stiffness(term.curve) / parameters.mass));
+    } else if (!term.curve.knots.empty()) {
       auto& curves = term.kind->info->site == "actuator"      ? motor_curves_
                      : term.kind->info->site == "measurement" ? reading_curves_
                      : term.acts == CurveActs::as_friction    ? friction_curves_
@@ -89,8 +92,8 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
   per_carriage_mass_ = 1.0 / (parameters.mass * (1.0 - mode_.share));
   if (mode_.share > 0.0) per_swinging_mass_ = 1.0 / (parameters.mass * mode_.share);
   has_motor_terms_ = !motors_.empty() || !motor_curves_.empty();
-  has_force_terms_ =
-      !forces_.empty() || !force_curves_.empty() || !damping_curves_.empty() || !bristles_.empty();
+  has_force_terms_ = !forces_.empty() || !force_curves_.empty() || !damping_curves_.empty() ||
+                     !bristles_.empty() || !remembering_.empty();
   // A history of 256 steps must cover the delays.
   const double oldest = static_cast<double>(Past::size - 8) * longest_step;
   delay_ = std::min(delay_, oldest);
@@ -109,6 +112,8 @@ void AxisPlant::rest_at(double position, double time) noexcept {
   bristle_from_ = position;
   velocity_ = swing_ = swing_speed_ = current_ = current_mean_ = 0.0;
   bristle_.fill(0.0);
+  for (auto& [term, memory] : remembering_) memory.start(term->curve, position);
+  remembered_at_ = time;
   commands_past_.clear();
   positions_past_.clear();
   positions_past_.push(time, position, 0.0);
@@ -118,6 +123,8 @@ void AxisPlant::go_on_from(double position, double velocity) noexcept {
   played_ += position - position_;
   bristle_from_ = position_ = position;
   velocity_ = velocity;
+  for (auto& [term, memory] : remembering_) memory.go_on_from(position);
+  remembered_at_ = time_;
   if (!(age_ > 0.0)) return;
   positions_past_.clear();
   const double shown = play_ != nullptr ? played_ : position_;
@@ -156,6 +163,8 @@ double AxisPlant::with_terms(double force, const AxisPoint& at) const noexcept {
     force -= PreslidingFriction::force(
         PreslidingFriction::deflection(bristle_[i], at.position - bristle_from_, p), at.velocity, p);
   }
+  for (const auto& [term, memory] : remembering_)
+    force += memory.value(term->curve, at.position, at.time - remembered_at_);
   return force;
 }
 
@@ -243,6 +252,8 @@ void AxisPlant::follow(double position) noexcept {
     bristle_[i] = PreslidingFriction::deflection(bristle_[i], position_ - bristle_from_,
                                                  bristles_[i]->parameters.data());
   bristle_from_ = position_;
+  for (auto& [term, memory] : remembering_) memory.advance(term->curve, position_, time_ - remembered_at_);
+  remembered_at_ = time_;
 }
 
 void AxisPlant::move(double h) noexcept {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/physics/axis_hooks.hpp"
-#include "core/physics/curve.hpp"
+#include "core/physics/curve_memory.hpp"
 
 namespace invar::physics {
 
@@ -146,6 +146,9 @@ class AxisPlant {
   double played_ = 0.0;
   double bristle_from_ = 0.0;
   std::array<double, 4> bristle_{};
+  /// Force curves with memory, over the position.
+  std::vector<std::pair<const AxisTerm*, CurveMemory>> remembering_;
+  double remembered_at_ = 0.0;  // [s]
   Past commands_past_, positions_past_;
 };
 

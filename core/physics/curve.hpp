@@ -12,10 +12,13 @@ namespace invar::physics {
 /// Linear between its knots (ascending, at least one) and constant outside them; with a `period` it comes again, and its knots
 /// lie within one. Evaluation is real-time.
 struct Curve {
+  /// A curve with memory has its numbers by threshold or by time constant in place of values (`CurveMemory`).
+  enum class Memory { none, stop, relaxation };
   std::string over;  // the signal that it goes over: "position", "velocity", "time", ...
   std::vector<double> knots;
   std::vector<double> values;
   double period = 0.0;  // 0: none
+  Memory memory = Memory::none;
   double usual =
       0.0;  // how large a value is expected to be, where the curve itself does not tell; 0: it does
 

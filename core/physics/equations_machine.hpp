@@ -10,6 +10,7 @@
 #include <memory>
 #include <numbers>
 
+#include "core/physics/curve_memory.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/expression.hpp"
 #include "core/physics/model.hpp"
@@ -134,6 +135,7 @@ class EquationsMachine {
     step_ = h;
     turned_ = 0.0;
     for (auto& late : delays_) late.before = late.past.size();
+    for (auto& course : curves_) course.before = course.memory, course.at_before = course.at;
     for (int part = 0; part < parts; ++part, t += h) {
       for (auto& late : delays_) late.past.emplace_back(t, s[late.use.on]);
       if (frictions_.empty())
@@ -149,6 +151,7 @@ class EquationsMachine {
           if (term.with < states_ && term.with != term.on) s[term.with][l] += term.p[l][1] * surplus;
         }
       }
+      for (auto& course : curves_) course.remember(s, t + h);
     }
     step_ = 0.0;
     for (auto& rub : frictions_) rub.direction.fill(0.0), rub.stuck.fill(false);
@@ -160,6 +163,7 @@ class EquationsMachine {
   /// Forgets the last advance, to take it again in other steps.
   void take_back() {
     for (auto& late : delays_) late.past.resize(late.before);
+    for (auto& course : curves_) course.memory = course.before, course.at = course.at_before;
   }
 
   /// Of all outputs of what was shown.
@@ -201,7 +205,17 @@ class EquationsMachine {
   /// Steps are longer than an explicit rule bears.
   void set_stiff(bool stiff) { stiff_ = stiff; }
 
-  void balance_hidden(State& s) const {
+  /// The states go on from other values; what is bent stays bent.
+  void go_on_from(const State& s, double t) {
+    for (auto& course : curves_)
+      for (std::size_t l = 0; l < lanes && course.remembers(); ++l)
+        course.memory[l].go_on_from(s[course.over][l]), course.at = t;
+  }
+  /// Of what the model does not say it starts with: stores in balance, nothing bent.
+  void balance_hidden(State& s, double t) {
+    for (auto& course : curves_)
+      for (std::size_t l = 0; l < lanes && course.remembers(); ++l)
+        course.memory[l].start(*course.curve[l], s[course.over][l]), course.at = t;
     for (std::size_t h = 0; h < hidden_.size(); ++h) s[states_ + h] = s[hidden_[h].on];
     for (std::size_t k = 0; k < lags_.size(); ++k) s[first_lag() + k] = s[lags_[k].on];
   }
@@ -217,10 +231,18 @@ class EquationsMachine {
     bool by_others_alone = false;
   };
   struct Course {
-    std::size_t on, over;
-    std::array<const Curve*, lanes> curve;
+    std::size_t on = 0, over = 0;
+    std::array<const Curve*, lanes> curve{};
     std::optional<std::size_t>
         with;  // what the curve is of is in proportion to this; nothing: a rate by itself
+    std::array<CurveMemory, lanes> memory{}, before{};
+    double at = 0.0, at_before = 0.0;  // [s] when it was advanced
+
+    [[nodiscard]] bool remembers() const { return curve[0]->memory != Curve::Memory::none; }
+    void remember(const State& s, double t) {
+      for (std::size_t l = 0; l < lanes && remembers(); ++l) memory[l].advance(*curve[l], s[over][l], t - at);
+      at = t;
+    }
   };
   struct Courses {
     std::array<InputCourse, lanes> of{};
@@ -273,9 +295,13 @@ class EquationsMachine {
         std::copy_n(slot(compiled_.rates[i]), lanes, d[i].begin());
     for (const auto& term : rate_terms_)
       for (std::size_t l = 0; l < lanes; ++l) d[term.on][l] += term.kind->rate(slot(term.with)[l], term.p[l]);
-    for (const auto& [on, over, curve, with] : curves_)
-      for (std::size_t l = 0; l < lanes; ++l)
-        d[on][l] += (*curve[l])(slot(over)[l]) * (with ? slot(*with)[l] : 1.0);
+    for (const auto& course : curves_)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double x = slot(course.over)[l];
+        d[course.on][l] += course.remembers()
+                               ? course.memory[l].value(*course.curve[l], s[course.over][l], t - course.at)
+                               : (*course.curve[l])(x) * (course.with ? slot(*course.with)[l] : 1.0);
+      }
     for (std::size_t h = 0; h < hidden_.size(); ++h) {
       const auto& term = hidden_[h];
       for (std::size_t l = 0; l < lanes; ++l) {
@@ -465,7 +491,9 @@ class EquationsMachine {
                                       compiled_.variables() - 1);
     if (on >= states_) return;  // at an input or output: the simulation bends those
     if (!term.curve.knots.empty()) {
-      Course course{on, std::min(compiled_.place(term.curve.over), compiled_.variables() - 1), {}, {}};
+      Course course;
+      course.on = on;
+      course.over = std::min(compiled_.place(term.curve.over), compiled_.variables() - 1);
       if (!term.with.empty()) course.with = with;
       for (std::size_t l = 0; l < lanes; ++l) course.curve[l] = &models[l]->terms[t].curve;
       curves_.push_back(course);

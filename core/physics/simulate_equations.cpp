@@ -217,7 +217,7 @@ class OwnEquations final : public Simulation {
       outputs[l]->assign(count, std::vector<double>(time_.size(), 0.0));
       for (std::size_t o = 0; o < count; ++o) out[o][l] = (*outputs[l])[o].data();
     }
-    machine.balance_hidden(s);
+    machine.balance_hidden(s, time.empty() ? 0.0 : time.front());
     const bool back = looks_back(*models[0]);
     Between<lanes> between;
     between.of.resize(back ? count : 0);
@@ -238,7 +238,10 @@ class OwnEquations final : public Simulation {
         for (std::size_t i = 0; i < machine.states(); ++i)
           for (std::size_t l = 0; l < lanes; ++l)
             s[i][l] = models[l]->parameters[restart->parameters[i]].value;
-        if (row == 0) machine.balance_hidden(s);
+        if (row == 0)
+          machine.balance_hidden(s, time[at]);
+        else
+          machine.go_on_from(s, time[at]);
         ++restart;
       }
       const std::size_t commanded_input = closed ? machine.controlled() - machine.states() : inputs_.size();

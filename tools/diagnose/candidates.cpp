@@ -433,12 +433,15 @@ std::pair<double, double> span_of(const Case& data, const std::string& name, con
   return {all[all.size() / 500], all[all.size() - 1 - all.size() / 500]};
 }
 
+using Memory = physics::Curve::Memory;
+
 /// A curve to be tried: its site, its variable, its knots and the signal that multiplies it.
 struct Choice {
   const char* site;
   const char* over;
   std::size_t knots;
   const char* with = "";
+  Memory memory = Memory::none;
 };
 
 /// What a curve at this place goes with: the other nodes for heat that is exchanged, else what the choice says.
@@ -482,7 +485,9 @@ std::optional<Start> curve_start(const Case& data, const Fit& fitted, const Choi
   start.term.on = place;
   start.term.with = partner;
   start.term.curve.over = choice.over;
-  for (std::size_t k = 0; k < choice.knots; ++k) {
+  start.term.curve.memory = choice.memory;
+  if (choice.memory != Memory::none) lay_memory(start, choice.knots, high - low, longest(data));
+  for (std::size_t k = 0; k < choice.knots && choice.memory == Memory::none; ++k) {
     const double share = static_cast<double>(k) / static_cast<double>(choice.knots - 1);
     const double away = 2.0 * share - 1.0;
     start.term.curve.knots.push_back(beside_rest ? (away < 0.0 ? low : high) * away * away
@@ -494,10 +499,23 @@ std::optional<Start> curve_start(const Case& data, const Fit& fitted, const Choi
   if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
     start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
   start.step = step_of_curve(data, fitted, start.term);
+  if (choice.memory == Memory::relaxation) start.step /= high - low;
   return start;
 }
 
 }  // namespace
+
+void lay_memory(Start& start, std::size_t count, double span, double duration) {
+  // From a thousandth of the way to all of it; from a five-hundredth of the time to half of it.
+  const bool is_stop = start.term.curve.memory == Memory::stop;
+  const double low = is_stop ? 1e-3 * span : 2e-3 * duration, high = is_stop ? 0.7 * span : 0.5 * duration;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(count - 1);
+    start.term.curve.knots.push_back(low * std::pow(high / low, share));
+    start.term.curve.values.push_back(0.0);
+    start.directions.push_back({none, k, false});
+  }
+}
 
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   if (data.model.plant == Plant::equations) return equation_curves(data, fitted.model);
@@ -519,7 +537,9 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
-                 {"actuator", "temperature", 5}};
+                 {"actuator", "temperature", 5},
+                 {"force", "position", 7, "", Memory::stop},
+                 {"force", "position", 6, "", Memory::relaxation}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:

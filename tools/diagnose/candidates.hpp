@@ -33,6 +33,8 @@ std::vector<Start> equation_starts(const Case& data, const physics::Model& fitte
 /// Curves of each rate over each state, input and the time; `products`: of what it has in proportion to another of them, as a
 /// number of the user's that changes, or two states that act together.
 std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products = false);
+/// The knots of a curve with memory: thresholds as shares of `span`, or time constants as shares of `duration`.
+void lay_memory(Start& start, std::size_t count, double span, double duration);
 /// From where to where a state, input, output or the time goes in a model of equations.
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// How far apart the middle four fifths of its rows lie.

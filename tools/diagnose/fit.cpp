@@ -166,7 +166,7 @@ bool same_term(const Model& a, const Model& b, std::size_t term) {
   if (term >= a.terms.size() || term >= b.terms.size()) return false;
   const auto &one = a.terms[term], &other = b.terms[term];
   return one.info == other.info && one.on == other.on && one.with == other.with &&
-         one.curve.knots == other.curve.knots;
+         one.curve.knots == other.curve.knots && one.curve.memory == other.curve.memory;
 }
 
 /// The sensitivities of `free`, as far as possible those of `near`.

@@ -162,7 +162,7 @@ std::optional<Range> range_of(const Case& other, const physics::Term& term) {
 /// A course over time is that of one recording, and one over anything else says nothing past its knots.
 bool says_nothing_of(const Case& other, const physics::Term& term) {
   const auto& curve = term.curve;
-  if (curve.knots.empty() || curve.period > 0.0) return false;
+  if (curve.knots.empty() || curve.period > 0.0 || curve.memory != physics::Curve::Memory::none) return false;
   if (curve.over == "time" || curve.over == "t") return true;
   const auto range = range_of(other, term);
   // Between two knots it goes straight, and so it may half a step beyond the last.

@@ -75,7 +75,8 @@ Region region_of_curve(const Case& data, const physics::Curve& curve) {
   Region region{
       curve.over, unit_of_variable(data, curve.over), {curve.knots.front(), curve.knots.front()}, false};
   bool any = false;
-  if (curve.period > 0.0) return region;  // everywhere
+  if (curve.period > 0.0) return region;                            // everywhere
+  if (curve.memory != physics::Curve::Memory::none) return region;  // its knots are no places
   for (std::size_t k = 0; k < curve.knots.size(); ++k)
     if (std::abs(curve.values[k]) > third * top) {
       region.within = {any ? region.within.lower : curve.knots[k], curve.knots[k]};

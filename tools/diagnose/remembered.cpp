@@ -19,7 +19,7 @@ bool same(const std::vector<physics::Term>& a, const std::vector<physics::Term>&
     return one.info == other.info && one.values == other.values && one.on == other.on &&
            one.with == other.with && one.curve.values == other.curve.values &&
            one.curve.knots == other.curve.knots && one.curve.over == other.curve.over &&
-           one.curve.period == other.curve.period;
+           one.curve.period == other.curve.period && one.curve.memory == other.curve.memory;
   });
 }
 

@@ -130,6 +130,8 @@ std::string report_json(const Case& data, const Diagnosis& d) {
       entry["curve"] = {
           {"over", term.curve.over}, {"knots", term.curve.knots}, {"values", term.curve.values}};
     if (term.curve.period > 0.0) entry["curve"]["period"] = term.curve.period;
+    if (term.curve.memory != physics::Curve::Memory::none)
+      entry["curve"]["memory"] = term.curve.memory == physics::Curve::Memory::stop ? "stop" : "relaxation";
     report["findings"].push_back(entry);
   }
   if (d.is_partial && d.findings.empty() && d.verdict == Verdict::ambiguous)

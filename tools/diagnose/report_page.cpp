@@ -311,7 +311,12 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
   if (!finding.term.curve.knots.empty()) {
     Plot plot;
     plot.title = "the effect without a name";
-    plot.x_label = finding.term.curve.over + in_brackets(unit_of_variable(data, finding.term.curve.over));
+    const auto& curve = finding.term.curve;
+    using Memory = physics::Curve::Memory;
+    plot.x_label = curve.memory == Memory::relaxation
+                       ? "time constant [s]"
+                       : (curve.memory == Memory::stop ? "threshold of " : "") + curve.over +
+                             in_brackets(unit_of_variable(data, curve.over));
     plot.y_label = "fitted curve" + in_brackets(unit_of_curve(data, finding.term));
     plot.series.push_back(
         {"", Series::Style::line, finding.term.curve.knots, finding.term.curve.values, {}, {}, blue});

@@ -47,6 +47,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
     if (term.curve.over.rfind("velocity_", 0) == 0) names.emplace_back("velocity");
+    if (term.curve.memory != physics::Curve::Memory::none) names.emplace_back("history");
     if (is_multiplied(term)) names.push_back(term.with);
     if (term.with == "direction") names.emplace_back("velocity");  // whose sign it is
   }

@@ -255,7 +255,8 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
   for (auto& s : ranked) {
     const auto is_kin = [&](const Start& start) {
       const auto &a = start.term, &b = s.start.term;
-      return a.info == b.info && a.on == b.on && a.with == b.with && a.curve.over == b.curve.over;
+      return a.info == b.info && a.on == b.on && a.with == b.with && a.curve.over == b.curve.over &&
+             a.curve.memory == b.curve.memory;
     };
     const bool is_good = !s.impossible && std::count_if(best.begin(), best.end(), is_kin) < 2 &&
                          (directions_of(best) < enough || best.size() < 2 * keep);

@@ -22,7 +22,7 @@ void sharpen(const Case& data, Curved& found) {
   auto& curved = found.fit;
   auto& weighing = found.weighing;
   const auto& curve = curved.model.terms.back().curve;
-  if (curve.period > 0.0) return;  // it has its width
+  if (curve.period > 0.0 || curve.memory != physics::Curve::Memory::none) return;  // it has its width
   const double level = median(curve.values);
   double top = 0.0;
   for (double v : curve.values) top = std::max(top, std::abs(v - level));
