@@ -411,10 +411,10 @@ void check_multiplier(const Node& node, const Model& model, const Term& term) {
   const auto known = is_curve ? physics::multipliers_of(*term.info) : std::vector<std::string_view>{};
   if (std::find(known.begin(), known.end(), term.with) != known.end()) return;
   std::string list;
-  for (const auto name : known) list += (list.empty() ? "`" : ", `") + std::string{name} + "`";
-  node["with"].fault("`" + term.with + "` multiplies no " + std::string{is_curve ? "curve" : "term"} +
-                         " of site `" + std::string{term.info->site} + "`",
-                     list.empty() ? "leave `with` out" : "write one of " + list + ", or leave it out");
+  for (std::size_t i = 0; i < known.size(); ++i)
+    list += (i == 0 ? "`" : i + 1 < known.size() ? ", `" : " or `") + std::string{known[i]} + "`";
+  node["with"].fault("nothing of site `" + std::string{term.info->site} + "` goes with `" + term.with + "`",
+                     list.empty() ? "leave `with` out" : "a curve there goes with " + list + ", or alone");
 }
 
 std::optional<Term> read_term(const Node& node, const Model& model) {

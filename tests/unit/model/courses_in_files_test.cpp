@@ -48,9 +48,36 @@ TEST(CoursesInFiles, OnlyAForceGoesWithTheMotion) {
       HasSubstr("`direction`, `velocity` or `acceleration`"));
   EXPECT_THAT(fault("{term: unmodelled, site: actuator, with: velocity, over: position, knots: [0, 1], "
                     "values: [1, 2]}"),
-              HasSubstr("only an unmodelled force"));
+              HasSubstr("nothing of site `actuator` goes with `velocity`"));
   EXPECT_THAT(fault("{term: constant_force, with: velocity, force: {value: 1, unit: N}}"),
-              HasSubstr("only an unmodelled force"));
+              HasSubstr("nothing of site `force` goes with `velocity`"));
+}
+
+TEST(CoursesInFiles, WhatACurveRemembersComesBack) {
+  for (const auto memory : {physics::Curve::Memory::stop, physics::Curve::Memory::relaxation}) {
+    const auto empty = axis("[]");
+    auto model = read_all(empty);
+    auto& term = model.terms.emplace_back();
+    term.info = physics::unmodelled(physics::Plant::axis, "force");
+    term.curve = {"position", {0.01, 0.1}, {1.0, 2.0}};
+    term.curve.memory = memory;
+    const auto again = read_all(config::Yaml::parse(patched(empty, model), "patched.yaml"));
+    ASSERT_EQ(again.terms.size(), 1U);
+    EXPECT_EQ(again.terms[0].curve.memory, memory);
+    EXPECT_EQ(again.terms[0].curve.knots, term.curve.knots);
+  }
+}
+
+TEST(CoursesInFiles, WhatCannotRememberIsRefused) {
+  using ::testing::HasSubstr;
+  const auto fault = [](const std::string& rest) {
+    return testing::fault_of([&] {
+      (void)read_all(axis("[{term: unmodelled, site: force, over: " + rest + ", values: [1, 2]}]"));
+    });
+  };
+  EXPECT_THAT(fault("position, memory: long, knots: [0.1, 1]"), HasSubstr("`stop` or `relaxation`"));
+  EXPECT_THAT(fault("velocity, memory: stop, knots: [0.1, 1]"), HasSubstr("a force over `position`"));
+  EXPECT_THAT(fault("position, memory: stop, knots: [0, 1]"), HasSubstr("each above 0"));
 }
 
 config::Yaml tank(const std::string& term) {
