@@ -513,6 +513,7 @@ void Search::finish() {
   }
   smallest_effects(data_, last_screen_, d_);
   conclude(data_, d_);
+  if (options_.refuses && leave_out_unseen(d_)) conclude(data_, d_);
 }
 
 template <class Start, class Better>

@@ -114,6 +114,11 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
       const double left = least_ratio(data, rough, under_plain);
       if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
     }
+    // What remembers is a filter of many numbers: it takes a little of nearly any dynamics that are not quite the machine's.
+    constexpr double plainly_less = 0.9;
+    if (term.curve.memory != physics::Curve::Memory::none &&
+        least_ratio(data, rough, under_plain) > plainly_less)
+      continue;
     // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
     if (gain > claim_margin && (best.gain < claim_margin || lead(data, curved, best.fit) > 0.0))
       best = {std::move(curved), own, gain};
@@ -150,7 +155,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   }
   // A rest counts where an engineer would see it.
   if (!d.is_unnamed && beside.gain > margin &&
-      least_ratio(data, beside.fit, d.best) < (named ? 0.9 : 0.985)) {
+      least_ratio(data, beside.fit, d.best) < (named ? seen_beside : seen_alone)) {
     d.best = std::move(beside.fit);
     d.weighing = std::move(beside.weighing);
     (named ? d.has_rest : d.is_unnamed) = true;
@@ -169,7 +174,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   // What moves a drop moves it in two directions, and an instrument may stand beside another.
   for (std::size_t more = 1; more < data.outputs.size() && !d.best.model.terms.back().on.empty(); ++more) {
     auto next = best_curve(data, d.best, courses_beside(data, d.best, &d.best));
-    if (next.gain < margin || least_ratio(data, next.fit, d.best) > (named ? 0.9 : 0.985)) break;
+    if (next.gain < margin || least_ratio(data, next.fit, d.best) > (named ? seen_beside : seen_alone)) break;
     const auto& terms = next.fit.model.terms;
     if (std::any_of(
             terms.begin() + static_cast<std::ptrdiff_t>(given), terms.end() - 1,

@@ -5,6 +5,9 @@
 
 namespace invar::diagnose {
 
+/// An effect without a name must leave less than this share of the residual's RMS, alone or beside names: an engineer sees it.
+inline constexpr double seen_alone = 0.985, seen_beside = 0.9;
+
 struct Curved {
   Fit fit;
   Weighing weighing;

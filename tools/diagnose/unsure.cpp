@@ -1,5 +1,6 @@
 #include "tools/diagnose/unsure.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string_view>
@@ -81,6 +82,23 @@ bool set_aside(const Case& data, Diagnosis& d) {
     d.findings.push_back(finding);
   }
   d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  return true;
+}
+
+bool leave_out_unseen(Diagnosis& d) {
+  if (d.findings.empty() || !std::all_of(d.findings.begin(), d.findings.end(),
+                                         [](const Finding& f) { return f.stand_in != nullptr; }))
+    return false;
+  if (std::any_of(d.heldout.begin(), d.heldout.end(),
+                  [](const FitRow& row) { return row.after < seen_alone * row.retuned; }))
+    return false;
+  for (const auto& finding : d.findings)
+    d.reject(std::string{finding.stand_in->name}, "another cause is likelier, and it hardly shows",
+             finding.gain);
+  d.findings.clear();
+  d.best = d.retuned;
+  for (auto* rows : {&d.heldout, &d.train})
+    for (auto& row : *rows) row.after = row.retuned;
   return true;
 }
 

@@ -24,4 +24,8 @@ bool set_aside(const Case& data, Diagnosis& d);
 /// noise.
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, double times_the_noise);
 
+/// Findings whose names were all left unsaid are held to what a curve without a name must do: an engineer sees the residual
+/// shrink, on rows that no fit saw. Those that do not are taken back; true where they were.
+bool leave_out_unseen(Diagnosis& d);
+
 }  // namespace invar::diagnose
