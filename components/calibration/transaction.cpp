@@ -30,7 +30,10 @@ Task Calibration::command_model(compensation::ModelCommandKind kind, const std::
                                  std::string{status->text().c_str()}};
       co_return;
     }
-    if (now() > give_up) throw std::runtime_error{"the compensation does not answer"};
+    if (now() > give_up)
+      throw std::runtime_error{
+          "the compensation does not answer: it is not active, or it obeys a commander that ended within 2 "
+          "s"};
   }
 }
 
