@@ -10,6 +10,7 @@
 
 #include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
+#include "tests/support/mismatch/crowd.hpp"
 #include "tests/support/mismatch/marks.hpp"
 #include "tools/diagnose/claim.hpp"
 
@@ -46,10 +47,11 @@ std::set<std::string, std::less<>> all_but(std::size_t keep, const Machine& mach
 }
 
 Row run(const std::string& plant, const std::string& effect, double size, unsigned seed,
-        const Trouble& trouble, bool leave_out, std::optional<std::size_t> keep) {
+        const Trouble& trouble, bool leave_out, std::optional<std::size_t> keep, bool crowded) {
   diagnose::Options options;
   Row row;
-  row.machine = make(plant, effect, size, seed, trouble);
+  row.machine =
+      crowded ? make_crowded(plant, effect, size, seed, trouble) : make(plant, effect, size, seed, trouble);
   if (keep) options.without = all_but(*keep, row.machine, seed);
   if (leave_out)
     for (auto& missing : row.machine.missing) {
@@ -160,6 +162,8 @@ int main(int argc, char** argv) {
   unsigned machine = 0;
   program.add_option("--machine", machine, "the one of this seed alone");
   program.add_option("--pairs", pairs, "machines of each plant with two effects");
+  bool crowded = false;
+  program.add_flag("--crowd", crowded, "three to six small effects that no list tells beside each");
   std::optional<std::size_t> keep;
   program.add_option("--keep", keep,
                      "names that stay in the library: the right ones and others drawn at random");
@@ -187,11 +191,13 @@ int main(int argc, char** argv) {
     const double drawn = draw.log_between(least, 2.0);
     trouble.rows = rows;
     if (!folder.empty()) {
-      write(make(plant, effect, size > 0.0 ? size : drawn, number, trouble),
+      const double wanted = size > 0.0 ? size : drawn;
+      write(crowded ? make_crowded(plant, effect, wanted, number, trouble)
+                    : make(plant, effect, wanted, number, trouble),
             folder / (plant + "-" + effect + "-" + std::to_string(number)));
       return;
     }
-    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out, keep);
+    const auto row = run(plant, effect, size > 0.0 ? size : drawn, number, trouble, leave_out, keep, crowded);
     std::string beside;
     for (const double won : row.beside)
       beside += (beside.empty() ? " (" : ", ") + std::to_string(std::lround(std::min(won, 1e9)));
@@ -213,6 +219,10 @@ int main(int argc, char** argv) {
     for (const auto& finding : row.claims) {
       // A twin that nothing tells from the right name is marked as right; but it is as probable as it is said to be.
       const std::string name{finding.term.info->name};
+      const auto& unlisted = row.machine.unlisted;
+      if (credit(row.machine, name) == 0.0 &&
+          std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
+        continue;
       const double right = ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
       claims.add(finding, row.still_follows, std::min(right, credit(row.machine, name)),
                  plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),

@@ -537,9 +537,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
                  {"force", "temperature", 6, "direction"},  // what greases it
                  {"force", "temperature", 6, "velocity"},
                  {"actuator", "current", 9},
-                 {"actuator", "temperature", 5},
-                 {"force", "position", 7, "", Memory::stop},
-                 {"force", "position", 6, "", Memory::relaxation}};
+                 {"actuator", "temperature", 5}};
       if (data.model.controller) choices.push_back({"measurement", "position", 28});
       break;
     case Plant::thermal:
@@ -602,6 +600,16 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   std::move(jumps.begin(), jumps.end(), std::back_inserter(starts));
   auto waves = wave_starts(data, fitted);
   std::move(waves.begin(), waves.end(), std::back_inserter(starts));
+  return starts;
+}
+
+std::vector<Start> memory_starts(const Case& data, const Fit& fitted) {
+  if (data.model.plant == Plant::equations) return equation_memories(data, fitted.model);
+  std::vector<Start> starts;
+  if (data.model.plant != Plant::axis) return starts;
+  for (const Choice& choice : {Choice{"force", "position", 7, "", Memory::stop},
+                               Choice{"force", "position", 6, "", Memory::relaxation}})
+    if (auto start = curve_start(data, fitted, choice, "", "")) starts.push_back(std::move(*start));
   return starts;
 }
 

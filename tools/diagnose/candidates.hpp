@@ -27,6 +27,8 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
                                 const std::set<std::string, std::less<>>& without);
 /// Curves over each variable, for what no name describes.
 std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted);
+/// Curves with memory, for hysteresis and what creeps.
+std::vector<Start> memory_starts(const Case& data, const Fit& fitted);
 
 /// Those of a model in the user's own equations.
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted);
@@ -35,6 +37,7 @@ std::vector<Start> equation_starts(const Case& data, const physics::Model& fitte
 std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products = false);
 /// The knots of a curve with memory: thresholds as shares of `span`, or time constants as shares of `duration`.
 void lay_memory(Start& start, std::size_t count, double span, double duration);
+std::vector<Start> equation_memories(const Case& data, const physics::Model& fitted);
 /// From where to where a state, input, output or the time goes in a model of equations.
 std::pair<double, double> span_of(const Case& data, const physics::Model& model, const std::string& name);
 /// How far apart the middle four fifths of its rows lie.

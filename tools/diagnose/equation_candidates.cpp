@@ -326,21 +326,6 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
       }
   }
   if (products) return starts;
-  // What a rate remembers of a state: hysteresis, and what creeps.
-  for (const auto& state : states)
-    for (const auto& other : states)
-      for (const auto memory : {physics::Curve::Memory::stop, physics::Curve::Memory::relaxation}) {
-        const auto &own = spans.of(state.name), &span = spans.of(other.name);
-        if (is_kinematic(equations, state) || !(span.width() > 1e-9 * span.size())) continue;
-        auto& start = starts.emplace_back();
-        start.term.info = physics::unmodelled(Plant::equations, "state");
-        start.term.on = state.name;
-        start.term.curve.over = other.name;
-        start.term.curve.memory = memory;
-        const bool is_stop = memory == physics::Curve::Memory::stop;
-        lay_memory(start, is_stop ? 7 : 6, span.width(), spans.duration);
-        start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration) / (is_stop ? 1.0 : span.width());
-      }
   // What an instrument reads wrong: more and more, or by what it reads.
   for (const auto& output : data.outputs) {
     const auto place = physics::place_of_output(equations, output);
@@ -355,6 +340,28 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
       lay_knots(start, span, knots);
     }
   }
+  return starts;
+}
+
+std::vector<Start> equation_memories(const Case& data, const physics::Model& fitted) {
+  const Spans spans{data, fitted};
+  const auto& equations = data.model.equations;
+  const auto states = states_of_machine(equations);
+  std::vector<Start> starts;
+  for (const auto& state : states)
+    for (const auto& other : states)
+      for (const auto memory : {physics::Curve::Memory::stop, physics::Curve::Memory::relaxation}) {
+        const auto &own = spans.of(state.name), &span = spans.of(other.name);
+        if (is_kinematic(equations, state) || !(span.width() > 1e-9 * span.size())) continue;
+        auto& start = starts.emplace_back();
+        start.term.info = physics::unmodelled(Plant::equations, "state");
+        start.term.on = state.name;
+        start.term.curve.over = other.name;
+        start.term.curve.memory = memory;
+        const bool is_stop = memory == physics::Curve::Memory::stop;
+        lay_memory(start, is_stop ? 7 : 6, span.width(), spans.duration);
+        start.step = 1e-3 * std::max(own.rate, own.size() / spans.duration) / (is_stop ? 1.0 : span.width());
+      }
   return starts;
 }
 

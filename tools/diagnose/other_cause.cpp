@@ -86,14 +86,14 @@ Beside beside(const Case& data, const Fit& best,
   Beside one;
   one.plain = weigh(data, simulate(data, best.model), false);
   one.fit = fit(data, one.plain, best.model, data.model, 4, &best);
-  one.courses = screen(data, one.plain, one.fit, starts(one.fit), 3);
+  one.courses = screen(data, one.plain, one.fit, starts(one.fit), tried_curves);
   return one;
 }
 
 }  // namespace
 
 Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
-  return beside(data, best, [&](const Fit& under_plain) {
+  auto one = beside(data, best, [&](const Fit& under_plain) {
     const auto& like = spanned != nullptr ? *spanned : under_plain;
     auto starts = unmodelled_starts(data, like);
     // What the wrong form of a name leaves comes in bursts too, wherever the machine moves.
@@ -101,6 +101,9 @@ Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
       for (auto& burst : burst_starts(data, like)) starts.push_back(std::move(burst));
     return starts;
   });
+  const auto& like = spanned != nullptr ? *spanned : one.fit;
+  one.memories = screen(data, one.plain, one.fit, memory_starts(data, like), tried_curves);
+  return one;
 }
 
 Beside products_beside(const Case& data, const Fit& best) {
@@ -108,7 +111,7 @@ Beside products_beside(const Case& data, const Fit& best) {
 }
 
 std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, std::size_t term) {
-  const auto& [plain, named, courses] = beside;
+  const auto& [plain, named, courses, memories] = beside;
   if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
     return std::nullopt;
   const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, 6);
@@ -129,7 +132,8 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
                          (data.model.plant == physics::Plant::equations &&
                           variable_of(s.start.term) == variable_of(named.model.terms[term])) ||
                          (s.start.term.with == "direction" && is_friction(named.model.terms[term]));
-    if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? 0.3 : 0.02)) continue;
+    if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? of_form : 0.02))
+      continue;
     if (!leaves_less(data, one.fit, named)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);
   }

@@ -8,6 +8,10 @@
 
 namespace invar::diagnose {
 
+/// Of what a free course takes, the share that a name over the same variable may leave: its own form, which is idealised, and
+/// small effects that go with that variable too.
+inline constexpr double of_form = 0.3;
+
 /// measured - simulated by output and recording; NaN where nothing was measured.
 using Left = std::vector<std::vector<std::vector<double>>>;
 
@@ -31,11 +35,13 @@ inline bool is_white(double evidence, double counted) { return counted > 0.7 * e
 /// So many times the margin a further claim must gain that hardly moves the size of the residual.
 double margins_of_a_further(const Case& data, double evidence, double counted);
 
-/// A model with every row counted alike, and what free courses would gain beside it, best first; three carry their columns.
+/// So many curves are tried, and carry their columns.
+inline constexpr std::size_t tried_curves = 3;
+/// A model with every row counted alike, and what free courses and courses with memory would gain beside it, best first.
 struct Beside {
   Weighing plain;
   Fit fit;
-  std::vector<Screened> courses;
+  std::vector<Screened> courses, memories;
 };
 /// The courses go from where to where the variables go with `spanned`; the fit itself where it is not given.
 Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned = nullptr);

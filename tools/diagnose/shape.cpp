@@ -79,7 +79,7 @@ double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd
 }
 
 OtherShape other_shape(const Case& data, const Beside& beside, std::size_t term) {
-  const auto& [plain, named, courses] = beside;
+  const auto& [plain, named, courses, memories] = beside;
   const double rows = independent_rows(data, named.model), squares = named.residual.squaredNorm();
   if (!(squares > 0.0) || !(rows > 1.0)) return {};
   OtherShape found;

@@ -83,53 +83,75 @@ bool shows(const Case& data, const Fit& with, const Fit& without) {
 
 }  // namespace
 
+namespace {
+
+/// A screened curve fitted beside the base; nothing where it does not pay.
+std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighing& plain,
+                                const Fit& under_plain, const Screened& s) {
+  const double margin = claim_margin_of(plain);
+  const Fit near = with_columns(data, under_plain, s);
+  if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) return std::nullopt;
+  auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, 2, &near));
+  const Weighing own = weigh(data, simulate(data, rough.model));
+  auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+  // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
+  if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
+  const auto without = fit(data, own, base.model, data.model, 4, &base);
+  const double evidence = curved.evidence - without.evidence;
+  double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
+  const auto& term = s.start.term;
+  // Noise that wanders has a course over time too, but none in proportion to what the machine does.
+  const bool may_wander = term.with.empty() && (term.curve.over == "time" || term.curve.over == "t");
+  if (const double counted = lead(data, rough, under_plain);
+      gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
+    if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
+  }
+  // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
+  // takes any is what such noise does.
+  if (may_wander) {
+    if (is_within_noise(data, under_plain)) return std::nullopt;
+    const double left = least_ratio(data, rough, under_plain);
+    if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin))
+      return std::nullopt;
+  }
+  return Curved{std::move(curved), own, gain};
+}
+
+}  // namespace
+
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   Curved best;
-  const auto& [plain, under_plain, screened] = looked;
-  const double margin = claim_margin_of(plain);
-  int tried = 0;
-  for (const auto& s : screened) {
-    if (tried++ >= 3 || s.merit < claim_margin) break;
-    const Fit near = with_columns(data, under_plain, s);
-    if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) continue;
-    auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, 2, &near));
-    const Weighing own = weigh(data, simulate(data, rough.model));
-    auto curved = fit(data, own, rough.model, data.model, 3, &rough);
-    // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
-    if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
-    const auto without = fit(data, own, base.model, data.model, 4, &base);
-    const double evidence = curved.evidence - without.evidence;
-    double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
-    const auto& term = s.start.term;
-    // Noise that wanders has a course over time too, but none in proportion to what the machine does.
-    const bool may_wander = term.with.empty() && (term.curve.over == "time" || term.curve.over == "t");
-    if (const double counted = lead(data, rough, under_plain);
-        gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
-      if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
-    }
-    // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
-    // takes any is what such noise does.
-    if (may_wander) {
-      if (is_within_noise(data, under_plain)) continue;
-      const double left = least_ratio(data, rough, under_plain);
-      if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin)) continue;
-    }
-    // What remembers is a filter of many numbers: it takes a little of nearly any dynamics that are not quite the machine's.
-    constexpr double plainly_less = 0.9;
-    if (term.curve.memory != physics::Curve::Memory::none &&
-        least_ratio(data, rough, under_plain) > plainly_less)
-      continue;
+  for (const auto& s : looked.courses) {
+    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    auto one = curved_by(data, base, looked.plain, looked.fit, s);
     // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
-    if (gain > claim_margin && (best.gain < claim_margin || lead(data, curved, best.fit) > 0.0))
-      best = {std::move(curved), own, gain};
+    if (one && one->gain > claim_margin && (best.gain < claim_margin || lead(data, one->fit, best.fit) > 0.0))
+      best = std::move(*one);
+  }
+  // What remembers is a filter of many numbers: it takes a little of nearly any dynamics that are not quite the machine's,
+  // and drifts as an instrument does. It must leave far less than without it, and than a curve that remembers nothing.
+  constexpr double far_less = 0.8, plainly_less = 0.9;
+  for (const auto& s : looked.memories) {
+    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    auto one = curved_by(data, base, looked.plain, looked.fit, s);
+    if (!one || !(one->gain > claim_margin) || least_ratio(data, one->fit, looked.fit) > plainly_less)
+      continue;
+    if (best.gain < claim_margin || least_ratio(data, one->fit, best.fit) < far_less) best = std::move(*one);
   }
   if (best.gain > claim_margin) sharpen(data, best);
   return best;
 }
 
+bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve) {
+  const double all = squares_in_noise(data, d.retuned, d.best),
+               by_names = all - squares_in_noise(data, d.best, d.best),
+               by_curve = all - squares_in_noise(data, curve, d.best);
+  return by_names < (1.0 - of_form) * by_curve;
+}
+
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
-  if (beside_best.courses.empty()) return;
+  if (beside_best.courses.empty() && beside_best.memories.empty()) return;
   const bool named = d.best.model.terms.size() > given;
   const double margin = 2.0 * claim_margin_of(d.weighing);
   auto beside = best_curve(data, d.best, beside_best);
@@ -142,7 +164,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
       if (instead.fit.evidence > named_there.evidence + margin &&
           instead.fit.evidence - named_there.evidence > 0.25 * instead.gain &&
-          leaves_less(data, instead.fit, d.best)) {
+          takes_far_more(data, d, instead.fit)) {
         for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
           d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
                    1.0);

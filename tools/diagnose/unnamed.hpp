@@ -21,4 +21,8 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked);
 /// place. `beside_best` is that of the best model.
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best);
 
+/// Does a curve take far more than the names do of what the retuned model leaves, in units of the noise? A name that takes most
+/// of it is right, and the rest is its form or the small effects beside it.
+bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve);
+
 }  // namespace invar::diagnose

@@ -6,7 +6,6 @@
 #include <string_view>
 
 #include "core/physics/library.hpp"
-#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/odds.hpp"
 #include "tools/diagnose/shape.hpp"
 #include "tools/diagnose/unnamed.hpp"
@@ -69,8 +68,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
     found = std::move(next);
     ++curves;
   }
-  if (curves == 0 || lead(data, found.fit, d.best) < 0.0 || !leaves_less(data, found.fit, d.best))
-    return false;
+  if (curves == 0 || lead(data, found.fit, d.best) < 0.0 || !takes_far_more(data, d, found.fit)) return false;
   d.best = std::move(found.fit);
   d.weighing = std::move(found.weighing);
   (kept.empty() ? d.is_unnamed : d.has_rest) = true;

@@ -199,7 +199,8 @@ Machine make(const std::string& plant, const std::string& effect, double size, u
   for (std::string part; std::getline(parts, part, '+');)
     if (part != "none") wish.effects.push_back(part);
   wish.size = size;
-  wish.colour = trouble.colour, wish.rows = trouble.rows, wish.muted = trouble.muted;
+  wish.colour = trouble.colour, wish.rows = trouble.rows, wish.muted = trouble.muted,
+  wish.crowd = trouble.crowd;
   Machine machine = plant == "axis"        ? make_axis(wish, draw)
                     : plant == "thermal"   ? make_thermal(wish, draw)
                     : plant == "error_map" ? make_error_map(wish, draw)

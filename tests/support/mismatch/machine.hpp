@@ -67,17 +67,20 @@ struct Machine {
   recording::Table test_inputs, test_outputs;        // another motion, outputs without noise
   std::vector<TrueTerm> missing;
   bool parameter_is_off = false;
+  std::vector<std::string> unlisted;            // of a crowd beside: neither right nor false
+  std::map<std::string, double> left_by_crowd;  // mean square on the test run that the crowd makes, by column
   std::map<std::string, double> verdicts;  // accepted where the effect is large enough to be seen, by credit
 };
 
 /// How a recording suffers on its way.
 struct Trouble {
   Colour colour = Colour::white;
-  std::size_t rows = 0;    // of a recording of an axis or of heat; 0: drawn
-  bool quantised = false;  // written in steps about as large as the noise
-  bool faults = false;     // gaps, empty cells, outliers, repeated and swapped rows
-  bool renamed = false;    // columns called c1, c2, ...
-  std::string muted;       // an effect of which the machine has nothing; all else is as with it
+  std::size_t rows = 0;                 // of a recording of an axis or of heat; 0: drawn
+  bool quantised = false;               // written in steps about as large as the noise
+  bool faults = false;                  // gaps, empty cells, outliers, repeated and swapped rows
+  bool renamed = false;                 // columns called c1, c2, ...
+  std::map<std::string, double> crowd;  // further effects by their size, that no list tells
+  std::string muted;                    // an effect of which the machine has nothing; all else is as with it
 };
 
 /// The effects that the machines of a plant can have: "none", "parameter", each term, "unknown:..." for what no term

@@ -92,6 +92,8 @@ double fit_on_test(const Machine& machine, const physics::Model& believed, const
     double noise = 0.0, was = 0.0, is = 0.0;
     for (double v : machine.noise.at(signal.column))
       noise += v * v / static_cast<double>(machine.noise.at(signal.column).size());
+    if (const auto at = machine.left_by_crowd.find(signal.column); at != machine.left_by_crowd.end())
+      noise += at->second;
     for (std::size_t i = 0; i < truth.size(); ++i) {
       was += std::pow(truth[i] - before[o][i], 2) / static_cast<double>(truth.size());
       is += std::pow(truth[i] - after[o][i], 2) / static_cast<double>(truth.size());
@@ -124,7 +126,9 @@ Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::D
       const auto site = diagnose::site_of(data, finding.term);
       if (const auto at = missing.names.find(std::string{finding.term.info->name}); at != missing.names.end())
         named = std::max(named, at->second);
-      if (std::find(missing.sites.begin(), missing.sites.end(), site) == missing.sites.end()) continue;
+      if (!missing.sites.empty() &&
+          std::find(missing.sites.begin(), missing.sites.end(), site) == missing.sites.end())
+        continue;
       const auto over = diagnose::dependence(data, finding.term);
       const bool meets =
           missing.depends_on.empty() || std::any_of(over.begin(), over.end(), [&](const auto& name) {
@@ -139,6 +143,7 @@ Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::D
   }
   for (const auto& finding : d.findings) {
     const std::string name{finding.term.info->name};
+    if (std::find(machine.unlisted.begin(), machine.unlisted.end(), name) != machine.unlisted.end()) continue;
     if (name == "unmodelled" ? machine.missing.empty() : credit(machine, name) == 0.0) ++marks.false_claims;
   }
   marks.fit = fit_on_test(machine, data.model, d.best.model);

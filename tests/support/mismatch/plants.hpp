@@ -13,7 +13,8 @@ struct Wish {
   double size = 1.0;
   Colour colour = Colour::white;
   std::size_t rows = 0;  // 0: drawn
-  std::string muted;     // of this effect nothing, all else as with it
+  std::map<std::string, double> crowd;
+  std::string muted;  // of this effect nothing, all else as with it
 
   [[nodiscard]] bool has(const std::string& name) const {
     return std::find(effects.begin(), effects.end(), name) != effects.end();
@@ -24,7 +25,11 @@ struct Wish {
            : colour == Colour::resonance ? draw.between(0.2, 2.0)
                                          : 0.0;
   }
-  [[nodiscard]] double of(const std::string& name) const { return has(name) && name != muted ? size : 0.0; }
+  [[nodiscard]] double of(const std::string& name) const {
+    if (has(name)) return name != muted ? size : 0.0;
+    const auto at = crowd.find(name);
+    return at == crowd.end() ? 0.0 : at->second;
+  }
 };
 
 Machine make_axis(const Wish& wish, Draw& draw);
