@@ -150,6 +150,10 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
                  readable(name_beside(data, a.term, finding.term)) + ": " +
                  separating_experiment(data, finding.term, a.term) + ".";
   if (!apart.empty()) return apart;
+  if (!d.findings.empty() && d.findings.back().term.curve.memory != physics::Curve::Memory::none)
+    return "Record the same way at two speeds, with long rests between: hysteresis knows neither, and what "
+           "creeps "
+           "goes on in the rests.";
   const auto over = [&]() -> std::string {
     if (!d.findings.empty() && !d.findings.back().term.curve.over.empty())
       return d.findings.back().term.curve.over;

@@ -77,6 +77,10 @@ std::string name_beside(const Case& data, const physics::Term& term, const physi
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter);
 /// The units, SI, of what an effect without a name adds at its place, and of what it goes with; empty where not known.
 std::string unit_of_curve(const Case& data, const physics::Term& term);
+/// Is a curve multiplied by a signal? The other node of an exchange of heat is a place.
+bool is_multiplied(const physics::Term& term);
+/// "a curve over position, up to 3 N", "hysteresis over position, elements that slip at 10 um to 2 mm".
+std::string size_of_curve(const Case& data, const physics::Term& term);
 std::string unit_of_variable(const Case& data, const std::string& variable);
 
 }  // namespace invar::diagnose

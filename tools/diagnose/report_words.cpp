@@ -27,18 +27,6 @@ std::string site_of(const Case& data, const physics::Term& term) {
   return plant + "." + std::string{term.info->site};
 }
 
-namespace {
-
-/// Is a curve multiplied by a signal? The other node of an exchange of heat is a place.
-bool is_multiplied(const physics::Term& term) {
-  if (term.curve.knots.empty() || term.with.empty()) return false;
-  if (term.info->plant == physics::Plant::equations) return true;
-  const auto known = physics::multipliers_of(*term.info);
-  return std::find(known.begin(), known.end(), term.with) != known.end();
-}
-
-}  // namespace
-
 std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
   std::vector<std::string> names;
   for (const auto name : term.info->depends_on)
@@ -91,44 +79,6 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   if (name == "delay" || name == "time_constant" || (name == "period" && term.with == "t")) return "s";
   const auto* signal = data.model.signal(term.on);
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
-}
-
-namespace {
-
-/// The output that a place names: `level`, `output.level`.
-std::string output_at(const Case& data, const std::string& place) {
-  for (const auto& output : data.model.equations.outputs)
-    if (physics::place_of_output(data.model.equations, output.name) == place) return output.name;
-  return place;
-}
-
-}  // namespace
-
-std::string unit_of_curve(const Case& data, const physics::Term& term) {
-  using physics::Plant;
-  const auto counted = [&](const char* unit) { return physics::counted_unit(data.model, unit); };
-  switch (data.model.plant) {
-    case Plant::axis:
-      if (term.info->site == "force")
-        return counted(term.with == "velocity" ? "N s/m" : term.with == "acceleration" ? "kg" : "N");
-      return term.info->site == "measurement" ? counted("m") : "1";
-    case Plant::thermal:
-      if (term.with == "power") return "1";
-      return term.info->site == "loss" || term.info->site == "exchange" ? "W/K"
-             : term.info->site == "storage"                             ? "J/K"
-                                                                        : "W";
-    case Plant::error_map:
-      if (term.with == "temperature") return "m/K";
-      return term.with == "position" || (term.with.empty() && term.info->site != "kinematic") ? "1" : "m";
-    case Plant::droplet:
-      return term.with.empty() ? "m" : "1";
-    default: {
-      if (data.model.plant == Plant::equations)  // a state's rate counts in the user's own unit
-        return term.info->site == "output" ? unit_of_variable(data, output_at(data, term.on)) : "";
-      const auto* signal = data.model.signal(term.on);
-      return signal != nullptr ? signal->unit : "";
-    }
-  }
 }
 
 std::string unit_of_variable(const Case& data, const std::string& variable) {
@@ -239,18 +189,8 @@ std::string sizes_of(const Case& data, const Diagnosis& d, const Finding& findin
   for (std::size_t i = 0; i < info.parameter_count(); ++i)
     text += (i == 0 ? "" : ", ") + readable(info.parameters[i].name) + " " +
             report::with_sigma(finding.term.values[i], finding.sigmas[i], unit_of(data, finding.term, i));
-  if (!finding.term.curve.knots.empty()) {
-    double top = 0.0;
-    for (const double v : finding.term.curve.values) top = std::max(top, std::abs(v));
-    const bool is_product = finding.term.info->plant != physics::Plant::axis && !finding.term.with.empty() &&
-                            finding.term.info->site != "exchange";
-    text += (text.empty() ? "" : ", ") + std::string{"a curve over "} + finding.term.curve.over +
-            (is_product ? " in proportion to " + finding.term.with : "") + ", up to " +
-            report::si(top, unit_of_curve(data, finding.term));
-    if (const double period = finding.term.curve.period; period > 0.0)
-      text +=
-          ", that comes again every " + report::si(period, unit_of_variable(data, finding.term.curve.over));
-  }
+  if (!finding.term.curve.knots.empty())
+    text += (text.empty() ? "" : ", ") + size_of_curve(data, finding.term);
   return text;
 }
 
@@ -466,6 +406,7 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       }
       return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
              " (" + site_of(data, d.findings.front().term) + ") that goes with " +
+             (d.findings.front().term.curve.memory != physics::Curve::Memory::none ? "the history of " : "") +
              d.findings.front().term.curve.over +
              (is_multiplied(d.findings.front().term) ? " and " + d.findings.front().term.with : "") +
              ", and no known term describes it.";
