@@ -7,6 +7,7 @@
 
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/excerpt.hpp"
+#include "tools/diagnose/foretold.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/left_over.hpp"
 #include "tools/diagnose/other_cause.hpp"
@@ -75,6 +76,9 @@ struct Followed {
   double rank = -1e300;
 };
 
+/// So many margins of evidence a name has that plainly foretells: enough for a further claim.
+constexpr double foretold_margins = 3.5;
+
 /// A wave was looked for at many frequencies.
 bool is_sought(const physics::Term& term) { return term.info->index_of("phase") < physics::most_parameters; }
 
@@ -103,6 +107,10 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
       options.refuses && gain < 2.0 * margin && least > 2.0 * margin &&
       (is_white(evidence, counted) || goes_with_recording(data, with, without)))
     gain = least;
+  // Filters of a residual that still holds effects take a name for noise; who foretells what no fit saw is none.
+  if (options.refuses && gain < margin && !noise.is_fed_back() && counted > 0.0 &&
+      foretold(data, with, without).is_plain())
+    gain = std::max(gain, foretold_margins * margin);
   // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
   // not, where the noise is loud at other frequencies, if it pays when counted in independent rows; nor in a loop, where
   // 200 machines that lacked nothing came nowhere near the margin.
