@@ -21,7 +21,7 @@ Case motor(double drag, unsigned seed) {
   double u = 0.0, w = 0.0, wander = 0.0;
   for (int i = 0; i < 1600; ++i) {
     if (i % 40 == 0) u = level(random);
-    wander = 0.99 * wander + 0.14 * normal(random);
+    wander = 0.99 * wander + 0.05 * normal(random);
     time.push_back(0.01 * i), volt.push_back(u), speed.push_back(w + wander + 0.02 * normal(random));
     for (int part = 0; part < 50; ++part) w += 2e-4 * (12.0 * u - 3.0 * w - drag * w * std::abs(w));
   }
