@@ -111,7 +111,8 @@ Machine make_crowded(const std::string& plant, const std::string& chief, double 
     double squares = 0.0;
     const auto& full = machine.test_outputs.columns[c].values;
     for (std::size_t i = 0; i < full.size(); ++i)
-      squares += std::pow(full[i] - test[c].values[i], 2) / static_cast<double>(full.size());
+      if (const double apart = full[i] - test[c].values[i]; std::isfinite(apart))
+        squares += apart * apart / static_cast<double>(full.size());
     machine.left_by_crowd[machine.test_outputs.columns[c].name] = squares;
   }
   if (machine.missing.empty()) {
