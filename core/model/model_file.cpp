@@ -305,7 +305,7 @@ void read_equations(const Node& root, Model& model) {
     model.equations.inputs.push_back(input);
     model.signals.push_back({input.signal, column, unit, false});
   }
-  for (const auto& node : root.required("states").children()) {
+  for (const auto& node : root["states"].children()) {
     model.equations.states.push_back({node.key(), node.text("derivative")});
     add_own(model, node.key() + ".initial", node.required("initial"));
   }
@@ -347,23 +347,40 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
       kind != nullptr && (kind->rate != nullptr || kind->memory == physics::EquationsMemory::dry_friction ||
                           !term.curve.knots.empty());
   const bool misreads = !term.curve.knots.empty() && term.info->site == "output";
-  if (is_rate && !(misreads ? on_output : on_state)) {
+  const bool is_reading = on_output && term.curve.knots.empty();
+  if (is_rate && !is_reading && !(misreads ? on_output : on_state)) {
     if (misreads)
       node.fault("a course of site `output` acts on `" + term.on + "`, which is none",
                  "name an output under `on`");
     else
-      node.fault("`" + name + "` changes a rate, and `" + term.on + "` is no state",
-                 "name a state under `on`");
+      node.fault(
+          "`" + name + "` changes a rate or a reading, and `" + term.on + "` is no state and no output",
+          "name one of them under `on`");
     node.accept_all();
     return false;
   }
-  if (misreads && (!term.with.empty() || (term.curve.over != "t" && term.curve.over != term.on))) {
-    node.fault("what an output reads wrong goes over `t` or over `" + term.on + "` alone",
-               "write one of them under `over`, and no `with`");
+  if (misreads && !term.with.empty()) {
+    node.fault("what an output reads wrong goes over one variable alone", "leave `with` out");
     node.accept_all();
     return false;
   }
-  if (misreads) return true;
+  std::vector<std::string> symbols{"t"};
+  for (const auto& state : model.equations.states) symbols.push_back(state.name);
+  for (const auto& input : model.equations.inputs) symbols.push_back(input.symbol);
+  const auto is_known = [&](const char* key, const std::string& symbol) {
+    if (std::find(symbols.begin(), symbols.end(), symbol) != symbols.end()) return true;
+    node[key].fault("`" + symbol + "` is no state, no input and not t", "name one of them");
+    node.accept_all();
+    return false;
+  };
+  if (misreads) return term.curve.over == term.on || is_known("over", term.curve.over);
+  if (is_rate && is_reading) {
+    if (name == "constant" || !term.with.empty()) return name == "constant" || is_known("with", term.with);
+    node.fault("`" + name + "` at an output goes with another variable, and none is named",
+               "name a state, an input or t under `with`");
+    node.accept_all();
+    return false;
+  }
   if (physics::is_felt_otherwise(term) && !term.with.empty() && (term.with != "others" || !on_state)) {
     node["with"].fault("`" + name + "` is felt by all rates, or of a state by the `others` alone",
                        "write `others`, or leave it out");
@@ -371,14 +388,6 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
     return false;
   }
   if (term.curve.over.empty()) return true;
-  std::vector<std::string> symbols{"t"};
-  for (const auto& state : model.equations.states) symbols.push_back(state.name);
-  for (const auto& input : model.equations.inputs) symbols.push_back(input.symbol);
-  const auto is_known = [&](const char* key, const std::string& symbol) {
-    if (std::find(symbols.begin(), symbols.end(), symbol) != symbols.end()) return true;
-    node[key].fault("`" + symbol + "` is no state, no input and not t", "name one of them");
-    return false;
-  };
   return is_known("over", term.curve.over) && (term.with.empty() || is_known("with", term.with));
 }
 

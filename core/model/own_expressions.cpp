@@ -173,8 +173,8 @@ void check_own_expressions(const Node& root, const physics::Model& model) {
   bool are_readable = names.are_good();
   for (const auto& node : formulas)
     are_readable = is_one_value(node) && names.are_good() && check_formula(node, model) && are_readable;
-  if (model.equations.states.empty())
-    root["states"].fault("names no state", "add one, with derivative and initial");
+  if (model.equations.states.empty() && model.equations.inputs.empty())
+    root.fault("names no state and no input", "add `inputs` that the outputs go with, or `states`");
   if (model.equations.outputs.empty())
     root["outputs"].fault("names no output", "add one, with column and expression");
   if (are_readable)

@@ -4,6 +4,8 @@
 #include <array>
 #include <utility>
 
+#include "core/physics/equations_columns.hpp"
+
 namespace invar::physics {
 
 namespace {
@@ -61,6 +63,13 @@ Range bounds_of_parameter(const Model& model, const Term& term, std::size_t para
     bounds.upper *= of_a_metre;
     if (bounds.lower < 0.0) bounds.lower *= of_a_metre;
   }
+  // A rate against the motion has one sign; an instrument may count either way.
+  if (model.plant == Plant::equations && term.info->parameters[parameter].role == Role::amplitude &&
+      is_added(term) &&
+      std::any_of(model.equations.outputs.begin(), model.equations.outputs.end(), [&](const auto& output) {
+        return place_of_output(model.equations, output.name) == term.on;
+      }))
+    return {};
   return bounds;
 }
 

@@ -77,7 +77,7 @@ double Bending::operator()(double now, double step, double value, double arch) {
 std::vector<Bending> bendings(const Model& model, const std::string& on, bool held, bool has_changes) {
   std::vector<Bending> all;
   for (const auto& term : model.terms)
-    if (term.on == on) all.emplace_back(term, held, has_changes);
+    if (term.on == on && !is_added(term)) all.emplace_back(term, held, has_changes);
   return all;
 }
 
@@ -103,6 +103,12 @@ bool is_felt_otherwise(const Term& term) {
 }
 
 bool is_felt_by_others_alone(const Term& term) { return term.with == "others" && is_felt_otherwise(term); }
+
+bool is_added(const Term& term) {
+  const auto* kind = equations_kind(*term.info);
+  if (!term.curve.knots.empty()) return term.curve.over != "t" && term.curve.over != term.on;
+  return kind != nullptr && (kind->rate != nullptr || kind->memory == EquationsMemory::dry_friction);
+}
 
 const std::string& goes_over(const Term& term) {
   return term.with.empty() || is_felt_by_others_alone(term) ? term.on : term.with;

@@ -21,6 +21,9 @@ bool is_felt_otherwise(const Term& term);
 /// A delay, lag or dead zone of a state that names `others` under `with`: what it gives off arrives so at the rates of the
 /// other states, its own feels it as it is. A store whose outflow takes its time to the next is one.
 bool is_felt_by_others_alone(const Term& term);
+/// Is it added to what it acts on: to a state's rate, or at an output to its value by what goes with another variable? Nothing
+/// of a signal's own past or size bends it.
+bool is_added(const Term& term);
 /// The variable that a term without a curve goes over: what it names under `with`, or what it acts on.
 const std::string& goes_over(const Term& term);
 

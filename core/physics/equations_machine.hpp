@@ -167,8 +167,21 @@ class EquationsMachine {
   }
 
   /// Of all outputs of what was shown.
-  void work_out_outputs() { compiled_.formulas->template run<lanes>(Expressions::outputs, slots_.data()); }
-  [[nodiscard]] const double* output(std::size_t i) { return slot(compiled_.outputs[i]); }
+  void work_out_outputs() {
+    compiled_.formulas->template run<lanes>(Expressions::outputs, slots_.data());
+    for (std::size_t i = 0; i < shown_.size(); ++i)
+      std::copy_n(slot(compiled_.outputs[i]), lanes, shown_[i].begin());
+    for (const auto& [output, over, use, curve] : added_)
+      for (std::size_t l = 0; l < lanes; ++l) {
+        const double s = slot(over)[l];
+        shown_[output][l] += curve[l] != nullptr         ? (*curve[l])(s)
+                             : use.kind->rate != nullptr ? use.kind->rate(s, use.p[l])
+                                                         : use.p[l][0] * sign_of(s);
+      }
+  }
+  [[nodiscard]] const double* output(std::size_t i) {
+    return shown_.empty() ? slot(compiled_.outputs[i]) : shown_[i].data();
+  }
   const double* law() {
     compiled_.formulas->template run<lanes>(Expressions::law, slots_.data());
     return slot(compiled_.law);
@@ -183,6 +196,7 @@ class EquationsMachine {
   /// Of all states, or of the user's own alone, here. A jump (the sign of a speed that is zero) has no rate of change: it
   /// would only make steps short.
   Rates fastest(const State& s, double t, bool own) {
+    if (all_states() == 0) return {};
     auto fine = jacobian(s, t, 1e-6);
     const auto coarse = jacobian(s, t, 1e-4);
     const auto n = static_cast<Eigen::Index>(own ? states_ : all_states());
@@ -191,6 +205,9 @@ class EquationsMachine {
       for (Eigen::Index k = 0; k < fine[l].size(); ++k)
         if (std::abs(fine[l](k)) > 30.0 * std::abs(coarse[l](k))) fine[l](k) = coarse[l](k);
       if (!fine[l].allFinite()) continue;
+      // Lanes of nearly the same numbers are as fast as the first: what turns is most of what a look costs.
+      constexpr double alike = 1e-3;
+      if (l > 0 && (fine[l] - fine[0]).norm() <= alike * fine[0].norm()) continue;
       for (const auto& rate : fine[l].topLeftCorner(n, n).eigenvalues()) {
         most.radius = std::max(most.radius, std::abs(rate));
         most.swing = std::max(most.swing,
@@ -243,6 +260,12 @@ class EquationsMachine {
       for (std::size_t l = 0; l < lanes && remembers(); ++l) memory[l].advance(*curve[l], s[over][l], t - at);
       at = t;
     }
+  };
+  /// To the value of an output.
+  struct Added {
+    std::size_t output, over;
+    Use use;
+    std::array<const Curve*, lanes> curve;  // null: a term without one
   };
   struct Courses {
     std::array<InputCourse, lanes> of{};
@@ -489,7 +512,10 @@ class EquationsMachine {
     const std::size_t on = compiled_.place(term.on),
                       with = std::min(term.with.empty() ? on : compiled_.place(term.with),
                                       compiled_.variables() - 1);
-    if (on >= states_) return;  // at an input or output: the simulation bends those
+    if (on >= states_) {  // at an input or output: the simulation bends those
+      if (is_added(term)) add_to_output(models, t, with);
+      return;
+    }
     if (!term.curve.knots.empty()) {
       Course course;
       course.on = on;
@@ -537,12 +563,35 @@ class EquationsMachine {
     }
   }
 
+  /// `with`: the slot of the variable that a term without a curve goes over.
+  void add_to_output(const Models& models, std::size_t t, std::size_t with) {
+    const Term& term = models[0]->terms[t];
+    const auto& equations = models[0]->equations;
+    for (std::size_t o = 0; o < equations.outputs.size(); ++o) {
+      if (place_of_output(equations, equations.outputs[o].name) != term.on) continue;
+      const bool is_curve = !term.curve.knots.empty();
+      Added added{o,
+                  is_curve ? compiled_.place(term.curve.over) : with,
+                  {equations_kind(*term.info), o, with, {}, false},
+                  {}};
+      for (std::size_t l = 0; l < lanes; ++l) {
+        added.use.p[l] = models[l]->terms[t].values.data();
+        added.curve[l] = is_curve ? &models[l]->terms[t].curve : nullptr;
+      }
+      added.over = std::min(added.over, compiled_.variables() - 1);
+      added_.push_back(added);
+      shown_.resize(equations.outputs.size());
+    }
+  }
+
   const CompiledEquations& compiled_;
   std::size_t states_, controlled_;
   std::vector<double> slots_;  // slot by slot, the lanes of one beside one another
   std::vector<Friction> frictions_;
   std::vector<Delay> delays_;
   std::vector<Course> curves_;
+  std::vector<Added> added_;
+  std::vector<Lane> shown_;  // values of the outputs with what is added; empty: nothing is
   std::vector<Courses> courses_;
   std::vector<std::size_t> spared_;  // states of which something is felt by the others alone
   std::vector<Use> rate_terms_, uppers_, lowers_, overflows_, hidden_, lags_, dead_zones_, sticking_;

@@ -52,8 +52,10 @@ class OwnEquations final : public Simulation {
  private:
   /// Reversals under dry friction come at a time of their own in each model.
   static bool has_reversals(const Model& model) {
-    return std::any_of(model.terms.begin(), model.terms.end(), [](const Term& t) {
-      return equations_kind(*t.info)->memory == EquationsMemory::dry_friction && !sticks(t);
+    const auto& states = model.equations.states;
+    return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& t) {
+      return equations_kind(*t.info)->memory == EquationsMemory::dry_friction && !sticks(t) &&
+             std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == t.on; });
     });
   }
   /// Do they differ in numbers alone?
@@ -266,8 +268,8 @@ class OwnEquations final : public Simulation {
           rates.radius = std::max(now.radius, 0.5 * rates.radius);
           rates.swing = std::max(now.swing, 0.5 * rates.swing);
         };
-        renew(own, true);
         if (machine.has_added_states()) {
+          renew(own, true);
           const double usual = (time_.back() - time_.front()) / static_cast<double>(time_.size());
           machine.set_shortest(usual / parts_for(usual * own.swing) / 2.5);
         }

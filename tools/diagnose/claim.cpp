@@ -69,7 +69,7 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   // Friction that never turned nor held is a constant.
   if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
   if (term.info->name == "dry_friction")
-    return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, term.on);
+    return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, over);
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
   // A limit that one or two rows touch is an outlier.
   auto free = model;

@@ -56,9 +56,37 @@ void put_in_order(physics::Record& record, DataCount& count) {
   reorder(record.time);  // last: the order is by it
 }
 
-/// A model without inputs loses nothing by rows that lie closer than its motion.
-void thin(physics::Record& record, std::size_t most) {
-  const std::size_t every = (record.rows() + most - 1) / most;
+/// How many rows on a reading has usually moved by no more than a small part of the way that it goes: forty rows of a swing.
+std::size_t rows_alike(const std::vector<double>& values) {
+  constexpr double small = 0.05;
+  std::vector<double> known, steps;
+  for (const double v : values)
+    if (std::isfinite(v)) known.push_back(v);
+  if (known.size() < 8) return values.size();  // a start value
+  const auto [low, high] = std::minmax_element(known.begin(), known.end());
+  const double bears = small * (*high - *low);
+  std::size_t alike = 1;
+  for (std::size_t every = 2; every < known.size() / 8; ++every) {
+    steps.clear();
+    for (std::size_t i = every; i < known.size(); i += every)
+      steps.push_back(std::abs(known[i] - known[i - every]));
+    if (!(median(steps) <= bears)) break;
+    alike = every;
+  }
+  return alike;
+}
+
+/// A model without inputs loses nothing by rows that lie closer than its motion: no more rows than these in one file, and where
+/// the motion allows it no more in all files together.
+void thin(physics::Record& record, const std::vector<std::string>& outputs, std::size_t files) {
+  constexpr std::size_t most = 6000;
+  const auto parted = [&](std::size_t rows) { return (rows + most - 1) / most; };
+  std::size_t alike = record.rows();
+  for (const auto& output : outputs)
+    if (const auto* values = record.find(output); values != nullptr && files > 1)
+      alike = std::min(alike, rows_alike(*values));
+  const std::size_t every =
+      std::max(parted(record.rows()), files > 1 ? std::min(alike, parted(files * record.rows())) : 1);
   if (every < 2) return;
   const auto thinned = [every](std::vector<double>& values) {
     std::size_t kept = 0;
@@ -381,7 +409,8 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
   even_out(model, record, table.file.filename().string(), data.doubts);
   leave_out_hiccups(model, record, table.file.filename().string(), data.doubts);
   leave_out_what_died(model, record, table.file.filename().string(), data.doubts);
-  if (model.plant == physics::Plant::equations && model.equations.inputs.empty()) thin(record, 6000);
+  if (model.plant == physics::Plant::equations && model.equations.inputs.empty())
+    thin(record, data.outputs, files);
   if (record.rows() < 8)
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
   check_ticks(model, record.time, table.file);

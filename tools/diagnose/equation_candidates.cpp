@@ -154,6 +154,7 @@ class Candidates {
       add_late(place, step);
       add("hidden_state", place, "", 0.1, store_times());
       const auto& span = spans_.of(place);
+      if (is_static(equations_)) add_readings(place, 1e-3 * span.width());
       add_limits(place, span);
       constexpr double plainly = 0.05;  // noise alone takes a reading to the other side
       if (std::min(-span.low, span.high) > plainly * span.width()) add_dead_zone(place, span);
@@ -203,6 +204,21 @@ class Candidates {
     if (own.low < 0.0 && own.high > 0.0) add("dry_friction", state, "", rate);  // else it is a constant
     if (!is_speed(equations_, state) && own.turns()) add("dry_friction", state, state, rate);
     add("periodic", state, "t", rate, residual_periods(data_, model_, 6));
+  }
+
+  /// Whatever may be added to an output of equations in which nothing moves: over the inputs and time.
+  void add_readings(const std::string& place, double size) {
+    for (const auto& input : equations_.inputs) {
+      const auto& span = spans_.of(input.symbol);
+      const double s = span.size();
+      add("coupling", place, input.symbol, size / s);
+      add("quadratic", place, input.symbol, size / (s * s));
+      add("cubic", place, input.symbol, size / (s * s * s));
+      add("periodic", place, input.symbol, size, periods_of(span));
+      if (span.low < 0.0 && span.high > 0.0) add("dry_friction", place, input.symbol, size);
+    }
+    add("constant", place, "", size);
+    add("periodic", place, "t", size, residual_periods(data_, model_, 6));
   }
 
   /// From half a period to some sixteen over the way that the variable goes.
@@ -329,7 +345,11 @@ std::vector<Start> equation_curves(const Case& data, const physics::Model& fitte
   // What an instrument reads wrong: more and more, or by what it reads.
   for (const auto& output : data.outputs) {
     const auto place = physics::place_of_output(equations, output);
-    for (const auto& symbol : {std::string{"t"}, place}) {
+    std::vector<std::string> variables{"t", place};
+    for (const auto& input :
+         equations.inputs)  // where nothing moves, what is left goes with what was recorded
+      if (is_static(equations)) variables.push_back(input.symbol);
+    for (const auto& symbol : variables) {
       const auto& span = spans.of(symbol);
       if (!(span.width() > 1e-9 * span.size())) continue;
       auto& start = starts.emplace_back();

@@ -23,7 +23,8 @@ std::vector<double> part(const std::vector<double>& values, std::size_t begin, s
 
 std::optional<Excerpt> excerpt(const Case& whole, const Weighing& weighing, const Fit& base,
                                std::size_t runs) {
-  if (whole.model.plant != physics::Plant::equations) return std::nullopt;
+  if (whole.model.plant != physics::Plant::equations || whole.model.equations.states.empty())
+    return std::nullopt;
   double rows = 0.0;
   for (const auto& recording : whole.recordings) {
     rows += static_cast<double>(recording.inputs.rows());

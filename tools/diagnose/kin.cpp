@@ -73,6 +73,9 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
   }
   // A steady rate against a motion that goes one way is the friction of that way.
   if (found.info->plant == physics::Plant::equations && name == "constant") {
+    const auto& states = model.equations.states;
+    if (std::none_of(states.begin(), states.end(), [&](const auto& state) { return state.name == found.on; }))
+      return others;
     const auto [low, high] = span_of(data, model, found.on);
     const double back = std::min(high, -low), forth = std::max(high, -low);
     const double level = high > -low ? -found.values[0] : found.values[0];

@@ -94,12 +94,22 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
     settled = std::move(nearer);
     if (arrived) break;
   }
-  const Weighing own = weigh(data, simulate(data, settled.model));
+  Weighing own = weigh(data, simulate(data, settled.model));
   auto with = fit(data, own, settled.model, data.model, 6, &settled);
   // Weights that follow the colour of what is still missing may lead away.
   if (least_ratio(data, settled, with) < 0.9) with = fit(data, own, settled.model, data.model, 0, &settled);
   auto without = fit(data, own, base.model, data.model, 4, &base);
-  const double evidence = advantage(data, own, with, without);
+  double evidence = advantage(data, own, with, without);
+  // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
+  // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
+  constexpr double half_of_squares = 0.7;
+  if (options.refuses && !noise.is_fed_back() && data.is_time_series &&
+      least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
+    own = plain;
+    with = fit(data, own, settled.model, data.model, 6, &settled);
+    without = fit(data, own, base.model, data.model, 4, &base);
+    evidence = advantage(data, own, with, without);
+  }
   double gain = std::min(evidence, noise.is_fed_back() ? noise.beyond(with.model, without.model, own)
                                                        : advantage_over_wander(data, own, with, without));
   const double counted = lead(data, with, without);

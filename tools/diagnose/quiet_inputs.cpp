@@ -19,6 +19,25 @@ std::vector<double> running_median(const std::vector<double>& values, std::size_
   return quiet;
 }
 
+/// Is what the medians take off the inputs noise, which comes anew in each row? A median that is long beside the motion takes
+/// the motion itself.
+bool takes_noise_alone(const Case& data, const Case& quiet) {
+  constexpr double mostly = 0.5;  // of the values that noise from row to row would be worth
+  for (const auto& signal : data.model.signals) {
+    std::vector<std::vector<double>> taken;
+    bool any = false;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto* was = data.recordings[r].inputs.find(signal.name);
+      const auto* now = quiet.recordings[r].inputs.find(signal.name);
+      if (signal.is_output || was == nullptr || now == nullptr) continue;
+      auto& one = taken.emplace_back(*was);
+      for (std::size_t i = 0; i < one.size(); ++i) one[i] -= (*now)[i], any = any || one[i] > 0.0;
+    }
+    if (any && independent_share(taken) < mostly) return false;
+  }
+  return true;
+}
+
 Case quietened(const Case& data, std::size_t reach) {
   auto quiet = data;
   quiet.quiet_rows = 2 * reach + 1;
@@ -66,6 +85,7 @@ std::optional<Case> with_quiet_inputs(const Case& as_read, const Case& judged, c
   double cost = d.retuned.cost - margin;
   for (const std::size_t tried : {1U, 2U, 4U, 8U, 16U}) {
     auto other = quietened(judged, tried);
+    if (!takes_noise_alone(judged, other)) break;
     const double now = fit(other, d.weighing, d.retuned.model, model, 0).cost;
     if (!(now < cost)) continue;
     cost = now, reach = tried;

@@ -216,7 +216,9 @@ std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, 
       }
       if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
         const auto& d = s.start.directions.front();
-        const double lower = d.amplitude < none ? info.parameters[d.amplitude].bounds.lower : 0.0;
+        const double lower = d.amplitude < none
+                                 ? physics::bounds_of_parameter(base.model, s.start.term, d.amplitude).lower
+                                 : 0.0;
         s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
       }
       const double numbers = static_cast<double>(s.start.directions.size() + shapes);
@@ -288,11 +290,12 @@ std::string why_impossible(const Start& start) {
 namespace {
 
 /// A strength that its bounds forbid, or a limit that would hardly be there.
-bool is_impossible(const Start& start, const Eigen::VectorXd& strength, Eigen::Index at) {
+bool is_impossible(const physics::Model& model, const Start& start, const Eigen::VectorXd& strength,
+                   Eigen::Index at) {
   if (start.directions.size() != 1) return false;  // a sine has any phase
   const auto& d = start.directions.front();
   if (d.amplitude >= none) return strength(at) < 0.2;
-  return strength(at) < 0.0 && start.term.info->parameters[d.amplitude].bounds.lower >= 0.0;
+  return strength(at) < 0.0 && physics::bounds_of_parameter(model, start.term, d.amplitude).lower >= 0.0;
 }
 
 double price(const Start& start, double observations) {
@@ -355,8 +358,8 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
       }
       const Eigen::VectorXd g = slope(places);
       const Eigen::VectorXd strength = -m.ldlt().solve(g);
-      if (!strength.allFinite() || is_impossible(chosen[i], strength, 0) ||
-          is_impossible(chosen[k], strength, second))
+      if (!strength.allFinite() || is_impossible(base.model, chosen[i], strength, 0) ||
+          is_impossible(base.model, chosen[k], strength, second))
         continue;
       ScreenedPair pair;
       pair.merit = -0.5 * strength.dot(g) - price(chosen[i], observations) - price(chosen[k], observations);

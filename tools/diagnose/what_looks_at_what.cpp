@@ -30,6 +30,11 @@ bool is_speed(const Equations& equations, const std::string& state) {
                      [&](const auto& other) { return other.derivative == state; });
 }
 
+bool is_static(const Equations& equations) {
+  return std::all_of(equations.states.begin(), equations.states.end(),
+                     [](const auto& state) { return state.derivative == "0"; });
+}
+
 bool is_used(const Equations& equations, const std::string& symbol) {
   return symbol == equations.controlled_input || mentions(equations.control_law, symbol) ||
          std::any_of(equations.states.begin(), equations.states.end(),

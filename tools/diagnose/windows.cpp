@@ -42,50 +42,6 @@ double reach(const std::vector<double>& values, double begin, double end) {
   return most;
 }
 
-/// How much farther a small steady push on any state has carried an output by the end of a recording than by its middle. A
-/// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves, or it forgets the push once that
-/// is over: then it goes farther for another reason, as a vessel does whose flow has ebbed.
-double goes_on(const Model& model, const Recording& recording) {
-  physics::Outputs at;
-  recording.simulation->run(model, at);
-  double most = 0.0;
-  for (const auto& state : model.equations.states) {
-    const auto* start = model.find(state.name + ".initial");
-    double size = std::max(std::abs(start->value), start->sigma.value_or(0.0));
-    for (const auto& output : at) size = std::max(size, std::min(1e6, reach(output, 0.0, 1.0)));
-    const double duration = recording.inputs.time.back() - recording.inputs.time.front();
-    const auto changes = [&](double share) {  // of the recording that the push lasts
-      auto pushed = model;
-      for (auto& one : pushed.equations.states)
-        if (one.name == state.name) {
-          std::ostringstream by;
-          by.precision(17);
-          by << "(" << one.derivative << ") + if(t < " << recording.inputs.time.front() + share * duration
-             << ", " << 1e-6 * std::max(size, 1e-9) / duration << ", 0)";
-          one.derivative = by.str();
-        }
-      physics::Outputs moved;
-      physics::prepare(pushed, recording.inputs)->run(pushed, moved);
-      for (std::size_t o = 0; o < at.size(); ++o)
-        for (std::size_t i = 0; i < at[o].size(); ++i) moved[o][i] -= at[o][i];
-      return moved;
-    };
-    const auto steady = changes(2.0);
-    physics::Outputs brief;  // where it is asked for
-    for (std::size_t o = 0; o < at.size(); ++o) {
-      const double early = reach(steady[o], 0.25, 0.5), late = reach(steady[o], 0.75, 1.0);
-      if (!(late > 1e-9 * size) || late / std::max(early, 1e-12 * size) <= most) continue;
-      if (late > still_going * early) {
-        if (brief.empty()) brief = changes(0.25);
-        constexpr double forgotten = 0.02;
-        if (reach(brief[o], 0.75, 1.0) < forgotten * reach(brief[o], 0.0, 0.5)) continue;
-      }
-      most = late / std::max(early, 1e-12 * size);
-    }
-  }
-  return most;
-}
-
 /// Slope and value of what was measured about a row, from the rows around it.
 std::pair<double, double> measured_at(const Recording& recording, std::size_t output, std::size_t row) {
   const auto& time = recording.inputs.time;
@@ -132,6 +88,66 @@ double guess_of(const Case& data, const Recording& recording, const physics::Out
   return std::isfinite(value) && std::abs(value) < 1e6
              ? value
              : data.model.value(equations.states[state].name + ".initial");
+}
+
+/// The model from where the recording begins: a pendulum that hangs at rest forgets what one that goes over the top does not.
+Model begun_as_recorded(const Case& data, const Model& near, const Recording& recording) {
+  Model model = near;
+  if (!starts_elsewhere(data, recording)) return model;
+  const auto& states = model.equations.states;
+  physics::Outputs free(states.size());
+  const auto shown = showing_states(model);
+  physics::prepare(shown, recording.inputs)->run(shown, free);
+  for (std::size_t i = 0; i < states.size(); ++i)
+    for (auto& parameter : model.parameters)
+      if (parameter.name == states[i].name + ".initial" && parameter.sigma.value_or(1.0) > 0.0)
+        parameter.value = guess_of(data, recording, free, i, 0);
+  return model;
+}
+
+/// How much farther a small steady push on any state has carried an output by the end of a recording than by its middle. A
+/// model that forgets is as far as it goes; one that integrates goes on. 0: nothing moves, or it forgets the push once that
+/// is over: then it goes farther for another reason, as a vessel does whose flow has ebbed.
+double goes_on(const Case& data, const Model& near, const Recording& recording) {
+  const auto model = begun_as_recorded(data, near, recording);
+  physics::Outputs at;
+  recording.simulation->run(model, at);
+  double most = 0.0;
+  for (const auto& state : model.equations.states) {
+    const auto* start = model.find(state.name + ".initial");
+    double size = std::max(std::abs(start->value), start->sigma.value_or(0.0));
+    for (const auto& output : at) size = std::max(size, std::min(1e6, reach(output, 0.0, 1.0)));
+    const double duration = recording.inputs.time.back() - recording.inputs.time.front();
+    const auto changes = [&](double share) {  // of the recording that the push lasts
+      auto pushed = model;
+      for (auto& one : pushed.equations.states)
+        if (one.name == state.name) {
+          std::ostringstream by;
+          by.precision(17);
+          by << "(" << one.derivative << ") + if(t < " << recording.inputs.time.front() + share * duration
+             << ", " << 1e-6 * std::max(size, 1e-9) / duration << ", 0)";
+          one.derivative = by.str();
+        }
+      physics::Outputs moved;
+      physics::prepare(pushed, recording.inputs)->run(pushed, moved);
+      for (std::size_t o = 0; o < at.size(); ++o)
+        for (std::size_t i = 0; i < at[o].size(); ++i) moved[o][i] -= at[o][i];
+      return moved;
+    };
+    const auto steady = changes(2.0);
+    physics::Outputs brief;  // where it is asked for
+    for (std::size_t o = 0; o < at.size(); ++o) {
+      const double early = reach(steady[o], 0.25, 0.5), late = reach(steady[o], 0.75, 1.0);
+      if (!(late > 1e-9 * size) || late / std::max(early, 1e-12 * size) <= most) continue;
+      if (late > still_going * early) {
+        if (brief.empty()) brief = changes(0.25);
+        constexpr double forgotten = 0.02;
+        if (reach(brief[o], 0.75, 1.0) < forgotten * reach(brief[o], 0.0, 0.5)) continue;
+      }
+      most = late / std::max(early, 1e-12 * size);
+    }
+  }
+  return most;
 }
 
 /// Does a spring that the model has already bring an axis back within a small part of the recording?
@@ -269,17 +285,18 @@ void cut_into_windows(Case& data) { cut_into_windows(data, data.model); }
 void cut_into_windows(Case& data, const Model& near) {
   const auto states = physics::states_of(data.model).size();
   const bool is_axis = data.model.plant == physics::Plant::axis;
-  if (data.model.plant != physics::Plant::equations && !(is_axis && states > 0)) return;
+  if (states == 0 || (data.model.plant != physics::Plant::equations && !is_axis)) return;
   const auto anew =
       is_axis ? axis_begun_anew(data) : begun_anew(data, most_starts / std::max<std::size_t>(1, states));
-  std::size_t rows = 0;
+  std::size_t rows = 0, all_rows = 0;
   bool goes = false;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto& recording = data.recordings[r];
     data.windows.anew += is_axis ? 0 : anew[r].size();
-    rows = is_axis ? rows + recording.inputs.rows() : std::max(rows, recording.inputs.rows());
+    all_rows += recording.inputs.rows();
+    rows = is_axis ? all_rows : std::max(rows, recording.inputs.rows());
     if (recording.inputs.rows() >= 4 * fewest_rows && data.model.equations.controlled_input.empty())
-      goes = goes || (is_axis ? !is_held(data) : goes_on(near, recording) > still_going);
+      goes = goes || (is_axis ? !is_held(data) : goes_on(data, near, recording) > still_going);
   }
   if (!goes) {
     if (std::all_of(anew.begin(), anew.end(), [](const auto& rows_anew) { return rows_anew.empty(); }))
@@ -288,7 +305,7 @@ void cut_into_windows(Case& data, const Model& near) {
     estimate_starts(data);
     return;
   }
-  const std::size_t shortest = std::max(fewest_rows, rows * states / most_starts);
+  const std::size_t shortest = std::max(fewest_rows, all_rows * states / (2 * most_starts));
   std::size_t window = data.windows.few ? std::max(shortest, rows / long_windows) : shortest;
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
@@ -312,8 +329,8 @@ void cut_into_windows(Case& data, const Model& near) {
 
 std::optional<Model> begun_in_windows(const Case& data) {
   const auto states = states_of(data.model).size();
-  if (data.model.plant != physics::Plant::equations || data.windows.count > 0 || data.windows.anew > 0 ||
-      !data.model.equations.controlled_input.empty())
+  if (data.model.plant != physics::Plant::equations || states == 0 || data.windows.count > 0 ||
+      data.windows.anew > 0 || !data.model.equations.controlled_input.empty())
     return std::nullopt;
   std::size_t rows = 0;
   for (const auto& recording : data.recordings) rows = std::max(rows, recording.inputs.rows());

@@ -76,6 +76,50 @@ TEST(Windows, TheAirsDragIsNamedWhereTheFreeRunDrifts) {
   EXPECT_LT(d.heldout[0].after, 0.2 * d.heldout[0].retuned);
 }
 
+/// A pendulum let go from these angles, of which the first is near the top, damped by the air.
+std::vector<recording::Table> swings(const std::vector<double>& from, std::size_t rows) {
+  std::mt19937 random{11};
+  std::normal_distribution<double> normal;
+  std::vector<recording::Table> all;
+  for (const double angle : from) {
+    std::vector<double> time, read;
+    double x = angle, v = 0.0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      time.push_back(0.001 * static_cast<double>(i));
+      read.push_back(x + 1e-4 * normal(random));
+      for (int part = 0; part < 4; ++part) {  // Heun's rule
+        const double h = 0.00025, a = -9.81 * std::sin(x) - 0.1 * v, w = v + h * a;
+        const double b = -9.81 * std::sin(x + h * v) - 0.1 * w;
+        x += h * (v + 0.5 * h * a);
+        v += 0.5 * h * (a + b);
+      }
+    }
+    auto& table = all.emplace_back();
+    table.add("t", "s", time);
+    table.add("y", "rad", read);
+  }
+  return all;
+}
+
+const char* const let_go =
+    "invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+    "states:\n  x: {derivative: v, initial: {value: 0, unit: rad, sigma: 3}}\n"
+    "  v: {derivative: '-g*sin(x)', initial: {value: 0, unit: rad/s, sigma: 3}}\n"
+    "outputs: {angle: {column: y, expression: x}}\n"
+    "parameters: {g: {value: 9.6, unit: 1/s2, sigma: 0.2}}\n";
+
+TEST(Windows, APendulumIsJudgedFromWhereItWasLetGoAndNotFromWhereItHangs) {
+  auto data = make_case(model_of(let_go), swings({3.1, -2.9, 3.0}, 4000));
+  EXPECT_LE(rows_of(data), 6000);  // of 12000: what swings once a second is known from fewer
+  const auto d = search(data, [](double, const std::string&) {});
+  EXPECT_GT(data.windows.count, data.recordings.size());
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "linear");
+  EXPECT_EQ(d.findings[0].term.on, "v");
+  EXPECT_NEAR(d.findings[0].term.values[0], -0.1, 0.005);
+  EXPECT_NEAR(d.best.model.value("g"), 9.81, 0.01);
+}
+
 /// A cell that loses 0.7 % of its charge an hour by itself: less than a window of some rows shows.
 TEST(Windows, ASlowLeakOfWhatAddsUpIsNamed) {
   std::mt19937 random{4};
