@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "tools/diagnose/diagnosis.hpp"
 #include "tools/diagnose/statistics.hpp"
 #include "tools/report/page.hpp"
 
@@ -90,7 +91,79 @@ void check_ticks(const physics::Model& model, const std::vector<double>& time,
                              model.signal("time")->column + " [ms]`, or the loop's rate into `controller`"};
 }
 
+namespace {
+
+[[noreturn]] void refuse(const Case& data, const Recording& recording, const Clock& clock) {
+  const auto& column = data.model.signal("time")->column;
+  if (data.model.row_rate)
+    throw InputError{recording.name, std::string{"the model would follow it were the time "} + clock.words,
+                     "mend `rate` under `columns`: it is in Hz, or `{value: 100, unit: ...}`"};
+  const auto header = [&](const char* unit) { return "`" + column + " [" + unit + "]`"; };
+  throw InputError{recording.name + ": column `" + column + "`",
+                   std::string{"the model would follow the recording were the time "} + clock.words,
+                   "write the true unit into the header, such as " + header(clock.true_unit) + " for " +
+                       header(clock.read_as) + ", or mend the units of the model's numbers"};
+}
+
+/// What the user's own equations leave of a recording once their numbers have given way, and how far these went.
+struct Retuned {
+  double left = 0.0;       // RMS over spread, of the output that is followed worst
+  double excursion = 0.0;  // [sigmas of what was believed]
+};
+
+/// Were the time multiplied: of the first rows, which are enough to know a clock by.
+Retuned retuned(const Case& data, const Recording& recording, double factor) {
+  constexpr std::size_t enough = 3000;
+  Case some = data;
+  some.remembered = std::make_shared<Remembered>();
+  some.recordings = {recording};
+  auto& [name, inputs, measured, simulation] = some.recordings.front();
+  const std::size_t rows = std::min(enough, inputs.rows());
+  inputs.time.resize(rows);
+  for (double& t : inputs.time) t *= factor;
+  for (auto& [signal, values] : inputs.signals) values.resize(rows);
+  for (auto& column : measured) column.resize(rows);
+  simulation = physics::prepare(some.model, inputs);
+  auto found = fit(some, weigh(some, simulate(some, some.model), false), some.model, some.model, 8);
+  found = fit(some, weigh(some, simulate(some, found.model), false), found.model, some.model, 8);
+  const auto simulated = simulate(some, found.model);
+  Retuned all{0.0, excursion_of(found)};
+  for (std::size_t o = 0; o < measured.size(); ++o) {
+    double sum = 0.0, squares = 0.0, n = 0.0;
+    for (const double y : measured[o])
+      if (std::isfinite(y)) sum += y, squares += y * y, n += 1.0;
+    if (n < 8.0) continue;
+    all.left = std::max(all.left, std::sqrt(squares_off(measured[o], simulated[0][o]) /
+                                            std::max(1e-300, squares - sum * sum / n)));
+  }
+  return all;
+}
+
+/// Numbers that are a little off, or of which the user is less sure, may hide a wrong clock: they are let give way. Refused is a time
+/// that the model follows with the numbers near what is believed, where as read it does not, or only with others.
+void check_retuned_clock(const Case& data) {
+  constexpr double follows_it = 0.2, near = 3.0, times_worse = 5.0;
+  const auto& parameters = data.model.parameters;
+  if (data.model.plant != physics::Plant::equations || data.model.equations.states.empty() ||
+      !data.model.equations.controlled_input.empty() ||
+      !std::all_of(parameters.begin(), parameters.end(), [](const auto& p) { return p.sigma.has_value(); }))
+    return;
+  const auto& recording = data.recordings.front();
+  const auto as_read = retuned(data, recording, 1.0);
+  if (as_read.left < follows_it && as_read.excursion <= far_astray) return;
+  for (const auto& clock : clocks) {
+    if (clock.factor != 1e3 && clock.factor != 1e-3) continue;  // less is within what a number may be off
+    const auto other = retuned(data, recording, clock.factor);
+    const bool is_nearer = as_read.left > times_worse * other.left && other.excursion <= far_astray,
+               is_likelier = as_read.excursion > far_astray && other.excursion <= near;
+    if (other.left < follows_it && (is_nearer || is_likelier)) refuse(data, recording, clock);
+  }
+}
+
+}  // namespace
+
 void check_clock(const Case& data) {
+  if (data.is_time_series) check_retuned_clock(data);
   if (!data.is_time_series || data.model.controller || data.model.plant == physics::Plant::error_map ||
       !is_believed(data.model))
     return;
@@ -101,16 +174,7 @@ void check_clock(const Case& data) {
     if (most.empty()) continue;
     for (const auto& clock : clocks) {
       if (!follows(data, recording, clock.factor, most)) continue;
-      const auto& column = data.model.signal("time")->column;
-      if (data.model.row_rate)
-        throw InputError{recording.name,
-                         std::string{"the model would follow it were the time "} + clock.words,
-                         "mend `rate` under `columns`: it is in Hz, or `{value: 100, unit: ...}`"};
-      const auto header = [&](const char* unit) { return "`" + column + " [" + unit + "]`"; };
-      throw InputError{recording.name + ": column `" + column + "`",
-                       std::string{"the model would follow the recording were the time "} + clock.words,
-                       "write the true unit into the header, such as " + header(clock.true_unit) + " for " +
-                           header(clock.read_as) + ", or mend the units of the model's numbers"};
+      refuse(data, recording, clock);
     }
   }
 }

@@ -8,6 +8,7 @@
 
 #include "tests/support/fault_of.hpp"
 #include "tests/support/mismatch/marks.hpp"
+#include "tests/support/model_of.hpp"
 
 namespace invar::test::mismatch {
 namespace {
@@ -44,6 +45,41 @@ TEST(Clock, HeatWhoseTimeIsInAnotherUnitIsRefused) {
     EXPECT_THAT(said_of(machine, 1e-3), HasSubstr("were the time 1000 times longer"));
     EXPECT_THAT(said_of(machine, 1.0 / 60.0), HasSubstr("were the time 60 times longer"));
     EXPECT_THAT(said_of(machine, 1.0 / 3600.0), HasSubstr("were the time 3600 times longer"));
+  }
+}
+
+TEST(Clock, OwnEquationsAreRefusedToWhateverTheyLeaveOut) {
+  for (const char* effect : {"none", "coupling", "delay"}) {
+    const auto machine = make("equations", effect, 1.0, 421);
+    SCOPED_TRACE(machine.yaml);
+    EXPECT_THAT(said_of(machine, 1e3), HasSubstr("were the time 1000 times shorter"));
+    EXPECT_THAT(said_of(machine, 1e-3), HasSubstr("were the time 1000 times longer"));
+  }
+}
+
+/// A tank of which the user knows each number to its own size alone, and whose time constant is four times as long.
+TEST(Clock, OwnEquationsWithUnsureNumbersAreRetunedFirst) {
+  const auto model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states: {x: {derivative: 'k*u - x/T', initial: {value: 0, sigma: 0}}}\n"
+      "outputs: {y: {column: y, expression: x}}\n"
+      "parameters: {k: {value: 1, sigma: 1}, T: {value: 2, sigma: 3}}\n");
+  for (const double factor : {1.0, 1e3, 1e-3}) {
+    recording::Table table;
+    std::vector<double> time, drive, level;
+    double x = 0.0, u = 0.0;
+    for (int i = 0; i < 800; ++i) {
+      if (i % 40 == 0) u = std::sin(1.7 * i);
+      time.push_back(factor * 0.1 * i), drive.push_back(u), level.push_back(x);
+      x = 12.0 * u + (x - 12.0 * u) * std::exp(-0.1 / 8.0);
+    }
+    table.add("t", "s", time);
+    table.add("u", "", drive);
+    table.add("y", "", level);
+    const auto said = testing::fault_of([&] { diagnose::check_clock(diagnose::make_case(model, {table})); });
+    EXPECT_THAT(said, HasSubstr(factor == 1.0  ? "accepted"
+                                : factor > 1.0 ? "1000 times shorter"
+                                               : "1000 times longer"));
   }
 }
 
