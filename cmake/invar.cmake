@@ -51,7 +51,7 @@ endfunction()
 function(invar_test name)
   cmake_parse_arguments(ARG "PATHS" "TIMEOUT" "SOURCES;LIBRARIES;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 120)
+    set(ARG_TIMEOUT 200)  # ten times what a test may take on an idle machine
   endif()
   add_executable(test_${name} ${ARG_SOURCES})
   target_compile_options(test_${name} PRIVATE ${INVAR_WARNINGS})

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <random>
 
 #include "tests/support/model_of.hpp"
@@ -63,7 +64,13 @@ TEST_P(NoiseOnQuietInputs, IsNoPhysics) {
   EXPECT_TRUE(d.findings.empty()) << d.findings.front().term.info->name << " over " << quiet_rows;
 }
 
-INSTANTIATE_TEST_SUITE_P(Motor, NoiseOnQuietInputs, ::testing::Values(1U, 2U, 3U, 5U, 6U, 7U));
+/// A sample; INVAR_CAMPAIGN=1 runs them all.
+std::vector<unsigned> seeds() {
+  if (std::getenv("INVAR_CAMPAIGN") != nullptr) return {1, 2, 3, 5, 6, 7};
+  return {2, 5};
+}
+
+INSTANTIATE_TEST_SUITE_P(Motor, NoiseOnQuietInputs, ::testing::ValuesIn(seeds()));
 
 TEST(QuietInputs, PhysicsIsStillNamedBesideThatNoise) {
   std::size_t quiet_rows = 0;

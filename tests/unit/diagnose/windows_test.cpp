@@ -109,8 +109,8 @@ const char* const let_go =
     "parameters: {g: {value: 9.6, unit: 1/s2, sigma: 0.2}}\n";
 
 TEST(Windows, APendulumIsJudgedFromWhereItWasLetGoAndNotFromWhereItHangs) {
-  auto data = make_case(model_of(let_go), swings({3.1, -2.9, 3.0}, 4000));
-  EXPECT_LE(rows_of(data), 6000);  // of 12000: what swings once a second is known from fewer
+  auto data = make_case(model_of(let_go), swings({3.1, -2.9}, 3500));
+  EXPECT_LE(rows_of(data), 6000);  // of 7000: what swings once a second is known from fewer
   const auto d = search(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, data.recordings.size());
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
