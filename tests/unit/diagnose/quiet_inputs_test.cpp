@@ -67,7 +67,7 @@ TEST_P(NoiseOnQuietInputs, IsNoPhysics) {
 /// A sample; INVAR_CAMPAIGN=1 runs them all.
 std::vector<unsigned> seeds() {
   if (std::getenv("INVAR_CAMPAIGN") != nullptr) return {1, 2, 3, 5, 6, 7};
-  return {2, 5};
+  return {1, 5};
 }
 
 INSTANTIATE_TEST_SUITE_P(Motor, NoiseOnQuietInputs, ::testing::ValuesIn(seeds()));
