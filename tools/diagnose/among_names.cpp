@@ -51,6 +51,9 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals,
     if (!possible) continue;
     const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing),
                  counted = lead(data, d.best, without);
+    // Nor is it dropped because filters that grew on what the others leave see little of it.
+    if (!data.model.controller && counted > 0.0 && least_ratio(data, d.best, without) < half_of_squares)
+      continue;
     // What makes the readings themselves lie farther off pleases the filters only.
     if (gain > margin && counted > 0.0 &&
         (least_ratio(data, d.best, without) < 0.95 ||

@@ -102,7 +102,6 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   double evidence = advantage(data, own, with, without);
   // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
   // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
-  constexpr double half_of_squares = 0.7;
   if (options.refuses && !noise.is_fed_back() && data.is_time_series &&
       least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
     own = plain;

@@ -22,6 +22,8 @@ struct Lead {
 };
 Lead lead_of(const Case& data, const Left& one, const Left& other);
 
+/// Of an RMS: what takes half of the squares is no noise, whatever its colour, outside a loop that feeds noise back.
+inline constexpr double half_of_squares = 0.7;
 /// log likelihood of `one` over `other` counted in independent rows of the residual that `one` leaves, less the price
 /// of the numbers that it has more: says which is right whatever the colour of the noise.
 double lead(const Case& data, const Fit& one, const Fit& other);
