@@ -179,6 +179,8 @@ void read_controller(const Node& root, Model& model) {
   if (node.has("velocity_filter_hz"))
     settings.velocity_filter_hz = node.number("velocity_filter_hz", "1", Range::positive());
   settings.limit = node.number("limit", "1", Range::not_negative(), 0.0);
+  if (node.has("current"))
+    model.records_applied = node.choice("current", {"command", "applied"}) == "applied";
   if (node.has("hold")) model.reference_goes_on = node.choice("hold", {"step", "smooth"}) == "smooth";
   model.controller = settings;
 }
@@ -619,6 +621,7 @@ std::string patched(const config::Yaml& original, const physics::Model& changed)
   for (const auto& term : changed.terms) root["terms"].push_back(term_yaml(term, changed));
   if (changed.reference_goes_on && !before.reference_goes_on)
     root["controller"]["hold"] = *changed.reference_goes_on ? "smooth" : "step";
+  if (changed.records_applied && !before.records_applied) root["controller"]["current"] = "applied";
   if (const auto& covered = changed.baseline.temperature) {
     YAML::Node range;
     for (const double end : {covered->lower, covered->upper}) range.push_back(end);

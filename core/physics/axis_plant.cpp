@@ -42,7 +42,8 @@ AxisPlant::AxisPlant(const AxisParameters& parameters, std::vector<AxisTerm> ter
       remembering_.emplace_back(&term, CurveMemory{});
       fastest = std::max(fastest, std::sqrt(CurveMemory::stiffness(term.curve) / parameters.mass));
     } else if (!term.curve.knots.empty()) {
-      auto& curves = term.kind->info->site == "actuator"      ? motor_curves_
+      auto& curves = term.acts == CurveActs::as_current       ? command_curves_
+                     : term.kind->info->site == "actuator"    ? motor_curves_
                      : term.kind->info->site == "measurement" ? reading_curves_
                      : term.acts == CurveActs::as_friction    ? friction_curves_
                      : term.acts == CurveActs::as_damping     ? damping_curves_
@@ -321,9 +322,26 @@ void AxisPlant::drive(double command, double dt) noexcept {
   }
 }
 
-void AxisPlant::step(double command, double dt) noexcept {
+double AxisPlant::commanded(double command, double dt) const noexcept {
   for (const auto* term : commands_)
     command = term->kind->command(command, time_, dt, term->parameters.data());
+  for (const auto& [term, code] : command_curves_)
+    command += term->curve(code == Variable::current ? command : time_);
+  return command;
+}
+
+double AxisPlant::applied(double command, double dt) const noexcept {
+  if (lag_ > 0.0) return current_;
+  if (!(delay_ > 0.0)) return commanded(command, dt);
+  const auto& past = commands_past_;
+  const std::size_t oldest = past.count - std::min(past.count, Past::size);
+  for (std::size_t i = past.count; i > oldest; --i)
+    if (past.time[(i - 1) % Past::size] + delay_ <= time_) return past.value[(i - 1) % Past::size];
+  return 0.0;
+}
+
+void AxisPlant::step(double command, double dt) noexcept {
+  command = commanded(command, dt);
   const double begin = time_, end = time_ + dt;
   if (delay_ > 0.0) {
     commands_past_.push(begin, command, 0.0);

@@ -16,8 +16,8 @@ struct AxisParameters {
 };
 
 /// What the curve of an `unmodelled` force is: a force [N], dry friction [N] against the motion, damping [N s/m], or moved
-/// mass [kg] that comes and goes.
-enum class CurveActs { as_force, as_friction, as_damping, as_mass };
+/// mass [kg] that comes and goes; of an `unmodelled` actuator: a current [A] that is added to the command.
+enum class CurveActs { as_force, as_friction, as_damping, as_mass, as_current };
 
 /// A term with its numbers, in the order of its info.
 struct AxisTerm {
@@ -60,6 +60,10 @@ class AxisPlant {
 
   /// Advances by dt [s] while `command` [A] is held. Real-time: no allocation, no lock.
   void step(double command, double dt) noexcept;
+
+  /// The current [A] that reaches the motor as `command` is given for a step of dt from now on: what would be measured there.
+  /// Real-time.
+  [[nodiscard]] double applied(double command, double dt) const noexcept;
 
   /// What the encoder shows now [m], without noise and resolution. Real-time. Backlash and measurement delay
   /// have memory: call it as often as you like between steps, the answer is the same.
@@ -122,8 +126,9 @@ class AxisPlant {
   [[nodiscard]] State advanced_with_mode(const State& s, double h, double direction,
                                          bool stuck) const noexcept;
   [[nodiscard]] double per_mass(const AxisPoint& at) const noexcept;  // acceleration of the carriage by force
-  void drive(double command, double dt) noexcept;                     // one held command behind the delay
-  void move(double h) noexcept;                                       // one sub-step with current_mean_
+  [[nodiscard]] double commanded(double command, double dt) const noexcept;  // before delay and lag
+  void drive(double command, double dt) noexcept;  // one held command behind the delay
+  void move(double h) noexcept;                    // one sub-step with current_mean_
   [[nodiscard]] double delayed_position(double age) const noexcept;
 
   AxisParameters parameters_;
@@ -132,7 +137,7 @@ class AxisPlant {
   std::vector<NumberEffect> frictions_, readings_;
   std::vector<const AxisTerm*> commands_, bristles_;
   std::vector<std::pair<const AxisTerm*, int>> force_curves_, friction_curves_, damping_curves_, mass_curves_,
-      motor_curves_, reading_curves_;
+      motor_curves_, reading_curves_, command_curves_;
   double per_carriage_mass_ = 0.0, per_swinging_mass_ = 0.0;  // [1/kg]
   bool has_motor_terms_ = false, has_force_terms_ = false;
   double delay_ = 0.0, lag_ = 0.0, age_ = 0.0;

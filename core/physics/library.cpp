@@ -136,6 +136,7 @@ const TermInfo* unmodelled(Plant plant, std::string_view site) {
 std::vector<std::string_view> multipliers_of(const TermInfo& unmodelled) {
   if (unmodelled.plant == Plant::axis && unmodelled.site == "force")
     return {"direction", "velocity", "acceleration"};
+  if (unmodelled.plant == Plant::axis && unmodelled.site == "actuator") return {"command"};
   if (unmodelled.plant == Plant::thermal && unmodelled.site == "source") return {"power"};
   if (unmodelled.plant == Plant::error_map) return {"direction", "position", "temperature"};
   if (unmodelled.plant == Plant::droplet) return {"height"};

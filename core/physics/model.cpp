@@ -49,6 +49,7 @@ AxisPlant make_axis(const Model& model, double longest_step) {
     const auto acts = term.with == "direction"      ? CurveActs::as_friction
                       : term.with == "velocity"     ? CurveActs::as_damping
                       : term.with == "acceleration" ? CurveActs::as_mass
+                      : term.with == "command"      ? CurveActs::as_current
                                                     : CurveActs::as_force;
     terms.push_back({axis_kind(*term.info), term.values, term.curve, acts});
   }

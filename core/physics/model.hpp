@@ -36,7 +36,8 @@ struct Term {
   std::array<double, most_parameters> usual{};  // as of a Parameter
   std::string on;                               // thermal: the node; equations: the state, input or output
   /// Thermal coupling: the other node; equations: the symbol that it couples to; a curve: the signal that multiplies it
-  /// (`multipliers_of`). The curve of a force is dry friction with "direction", damping with "velocity", mass with "acceleration".
+  /// (`multipliers_of`). The curve of a force is dry friction with "direction", damping with "velocity", mass with "acceleration";
+  /// that of an actuator is a current [A] added to the command with "command".
   std::string with;
   Curve curve;  // `unmodelled` alone
 };
@@ -96,6 +97,8 @@ struct Model {
   /// Where not every cycle of the controller has its row: whether the reference goes smoothly on between two rows or is held
   /// from one to the next. Nothing: not said, and held.
   std::optional<bool> reference_goes_on;
+  /// Of a loop: whether `current` is recorded behind what acts between controller and motor; false: the controller's command.
+  bool records_applied = false;
   ThermalLayout thermal;
   Baseline baseline;
   Equations equations;

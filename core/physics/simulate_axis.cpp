@@ -101,6 +101,7 @@ class ClosedLoop final : public Simulation {
       start_moves_ = (reference[1] - reference[0]) / (inputs.time[1] - inputs.time[0]) * period_;
     start_current_ = first_or(inputs, "current", std::numeric_limits<double>::quiet_NaN());
     limit_ = structure.controller->limit;
+    records_applied_ = structure.records_applied;
   }
 
   void run(const Model& model, Outputs& outputs) const override {
@@ -131,11 +132,12 @@ class ClosedLoop final : public Simulation {
           if (limit_ > 0.0) command = std::clamp(command, -limit_, limit_);
         }
         if (!temperature_.empty()) plant.set_temperature(temperature_[tick]);
+        const double recorded = records_applied_ ? plant.applied(command, period_) : command;
         double gone = 0.0;
         for (std::size_t r = row; r < next; ++r) {
           if (!behind_tick_.empty() && behind_tick_[r] > gone)
             plant.step(command, behind_tick_[r] - gone), gone = behind_tick_[r];
-          outputs[i][0][r] = gone > 0.0 ? plant.reading() : shown, outputs[i][1][r] = command;
+          outputs[i][0][r] = gone > 0.0 ? plant.reading() : shown, outputs[i][1][r] = recorded;
         }
         plant.step(command, period_ - gone);
       }
@@ -161,12 +163,15 @@ class ClosedLoop final : public Simulation {
     }
     if (std::isfinite(start_current_)) {  // a loop that has run before: its sum holds what the error does not
       AxisController fresh{*model.controller};
-      (void)loop.controller.shift(start_current_ - (forward_.empty() ? 0.0 : forward_.front()) -
-                                  fresh.step(reference_.front(), loop.plant.reading()));
+      const double command =
+          (forward_.empty() ? 0.0 : forward_.front()) + fresh.step(reference_.front(), loop.plant.reading());
+      (void)loop.controller.shift(start_current_ -
+                                  (records_applied_ ? loop.plant.applied(command, period_) : command));
     }
     return loop;
   }
 
+  bool records_applied_ = false;
   double period_ = 1e-3, start_time_ = 0.0, start_position_ = 0.0, start_velocity_ = 0.0, start_moves_ = 0.0,
          start_current_ = 0.0, limit_ = 0.0;
   std::vector<double> reference_, temperature_, forward_;  // a tick

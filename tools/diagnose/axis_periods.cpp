@@ -229,12 +229,8 @@ std::vector<double> pitches_along(const std::vector<std::vector<double>>& positi
   return pitches;
 }
 
-struct Lines {
-  std::vector<double> frequency;                   // [Hz]
-  std::vector<std::pair<double, double>> squares;  // frequency [Hz] and phase at time zero [rad]
-};
+}  // namespace
 
-/// Of a force over time, and the loop's answer to it.
 Lines lines_of(const std::vector<double>& time, std::vector<double> force,
                const std::vector<std::vector<double>>& responses) {
   Lines found;
@@ -270,6 +266,8 @@ Lines lines_of(const std::vector<double>& time, std::vector<double> force,
   }
   return found;
 }
+
+namespace {
 
 /// Jobs that do not wait for each other.
 void at_once(const std::vector<std::function<void()>>& jobs) {

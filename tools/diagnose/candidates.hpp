@@ -62,6 +62,14 @@ std::vector<double> long_pitches(const std::vector<double>& sums, const std::vec
                                  double span);
 /// Pitches of a sensor's residual along its position, best first.
 std::vector<double> sensor_pitches(const Case& data, const Fit& fitted);
+/// Waves that stand out of a series over time, of which `responses` are the answers to a push: sines best first by frequency
+/// [Hz], and square waves by frequency and phase at time zero [rad].
+struct Lines {
+  std::vector<double> frequency;
+  std::vector<std::pair<double, double>> squares;
+};
+Lines lines_of(const std::vector<double>& time, std::vector<double> series,
+               const std::vector<std::vector<double>>& responses);
 Periods axis_periods(const Case& data, const Weighing& weighing, const Fit& fitted);
 
 /// Rows of one signal, as the model sees them (positions measured, velocities differentiated). `node`: whose temperature;

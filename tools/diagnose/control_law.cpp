@@ -150,7 +150,7 @@ std::vector<LawRows> rows_of_law(const Case& data) {
     const auto& recording = data.recordings[stretch.recording];
     const auto& reference = recording.inputs.signals.at("reference");
     const auto* forward = recording.inputs.find("feedforward");
-    auto& [asked, beyond] = all[stretch.recording];
+    auto &asked = all[stretch.recording].asked, &beyond = all[stretch.recording].beyond;
     AxisController controller{settings};
     const std::size_t settled = stretch.begin + settling_of(settings);
     double sum = 0.0;
@@ -161,7 +161,10 @@ std::vector<LawRows> rows_of_law(const Case& data) {
       asked[i] = command, beyond[i] = recording.measured[at->current][i] - command;
       sum += beyond[i];
     }
-    const double began = has_sum(settings) ? sum / static_cast<double>(stretch.end - settled) : 0.0;
+    const bool is_open =
+        has_sum(settings) && (stretch.begin > 0 || recording.inputs.find("current") != nullptr);
+    all[stretch.recording].has_open_level = all[stretch.recording].has_open_level || is_open;
+    const double began = is_open ? sum / static_cast<double>(stretch.end - settled) : 0.0;
     for (std::size_t i = settled; i < stretch.end; ++i) asked[i] += began, beyond[i] -= began;
   }
   return all;

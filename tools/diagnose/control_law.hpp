@@ -10,9 +10,11 @@ namespace invar::diagnose {
 
 /// Of one recording, by row: the current that the model's law makes of what was recorded, whatever its limit, and what the
 /// recorded current is beyond that [A]. NaN where cycles are lost, where the current is at its limit and until the law's
-/// filter has settled. Of a law with a sum the mean of a stretch is taken off: the sum began somewhere.
+/// filter has settled. A law with a sum begins as the model does; behind a gap, and where the loop has run before, its sum is
+/// somewhere, and what is beyond the law has the mean zero there.
 struct LawRows {
   std::vector<double> asked, beyond;
+  bool has_open_level = false;  // of a part
 };
 /// By recording; empty of a plant without a controller, or where position or current is not recorded.
 std::vector<LawRows> rows_of_law(const Case& data);

@@ -59,6 +59,8 @@ struct Case {
     std::size_t forgetting = 0;  // rows behind gaps that are not compared
   };
   Windows windows;
+  std::optional<physics::Term>
+      beside_law;                 // what is added to the current or changed in it, as the recorded one shows
   std::size_t quiet_rows = 0;     // over which inputs were replaced by their running median; 0: as recorded
   double left_of_inputs = 0.0;    // log likelihood that what noise is left on these inputs may yield
   bool is_time_series = true;     // rows follow one another; false for droplets

@@ -15,6 +15,7 @@ controller: {kind: pid, rate: 1000.0, kp: 4.0e3, ki: 2.0e4, kd: 60.0, velocity_f
 # pid: u = clamp(kp e + ki sum(e) / rate + kd d, +-limit), e = reference - position; the sum holds e[k], which is not added where u clamps;
 #   kd acts on the error: d[k] = d[k-1] + a ((e[k] - e[k-1]) rate - d[k-1]), a = 1 - exp(-2 pi velocity_filter_hz / rate), 1 without a filter
 # cascade: u = clamp(kv (kp e - v), +-limit), v as d but of the measured position. Sum and filter begin at 0, e[-1] = e[0]; no limit: no clamp
+# current: `command`: the column holds the controller's output; `applied`: the current behind what acts on it before the motor
 # hold: where not every cycle of the controller has its row, `step`: the reference is held from row to row, `smooth`: it goes on
 parameters:
   mass: {value: 3.2, unit: kg, sigma: 0.06}

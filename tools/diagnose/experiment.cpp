@@ -43,6 +43,8 @@ constexpr std::array pairs{
     Pair{"force_ripple", "motor_constant_ripple",
          "cross the same places at high and at low current: the ripple of the motor constant goes with the "
          "current"},
+    Pair{"periodic_disturbance", "force_ripple",
+         "run at another speed: a ripple along the way keeps its pitch, a disturbance in time its frequency"},
     Pair{"periodic_disturbance", "additive_disturbance",
          "record with the motor switched off and the carriage free: a force shakes it still"},
     Pair{"delay", "lag",

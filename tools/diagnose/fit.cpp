@@ -414,8 +414,9 @@ Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Mo
           best.model.terms[t].info->index_of("phase") < physics::most_parameters)
         complexity += 0.7 * std::log(observations);
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    if (const auto& term = best.model.terms[t];
-        term.info->name == "additive_disturbance" && term.values[term.info->index_of("squareness")] < 0.5)
+    if (const auto& term = best.model.terms[t]; term.info->name == "additive_disturbance" &&
+                                                !believed.records_applied &&
+                                                term.values[term.info->index_of("squareness")] < 0.5)
       best.unlikely += price_of_current(term.values[term.info->index_of("frequency")]);
   for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
     best.unlikely += rarity(data, best.model, best.model.terms[t]);

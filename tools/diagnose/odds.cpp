@@ -82,7 +82,9 @@ double odds_of_another_cause(double gain, double left, double shape, double shar
 }
 
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
-  return odds_of_other_site(finding) + odds_of_other_lateness(data, best, place, finding) +
+  // Where the current is recorded behind what acts on it, a force does not stand in it.
+  return (data.model.records_applied ? 0.0 : odds_of_other_site(finding)) +
+         odds_of_other_lateness(data, best, place, finding) +
          odds_of_sliding_at_once(data, best, place, finding);
 }
 

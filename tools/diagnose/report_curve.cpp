@@ -11,7 +11,7 @@
 namespace invar::diagnose {
 
 bool is_multiplied(const physics::Term& term) {
-  if (term.curve.knots.empty() || term.with.empty()) return false;
+  if (term.curve.knots.empty() || term.with.empty() || term.with == "command") return false;  // added to that
   if (term.info->plant == physics::Plant::equations) return true;
   const auto known = physics::multipliers_of(*term.info);
   return std::find(known.begin(), known.end(), term.with) != known.end();
@@ -38,6 +38,7 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
                        : term.with == "acceleration"                             ? "kg"
                        : term.curve.memory == physics::Curve::Memory::relaxation ? "N/m"
                                                                                  : "N");
+      if (term.with == "command") return unit_of_variable(data, "current");
       return term.info->site == "measurement" ? counted("m") : "1";
     case Plant::thermal:
       if (term.with == "power") return "1";

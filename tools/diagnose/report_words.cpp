@@ -139,6 +139,8 @@ std::string place_of(const Case& data, const physics::Term& term) {
                                     Words{"droplet.camera", "camera"},
                                     Words{"sensor.measurement", "instrument"}};
   const auto site = site_of(data, term);
+  if (data.model.plant == physics::Plant::axis && term.with == "command")
+    return "current between controller and motor";
   if (data.model.plant == physics::Plant::equations) {
     for (const auto& input : data.model.equations.inputs)
       if (input.symbol == term.on) return "input " + term.on;

@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "tools/diagnose/added_to_command.hpp"
 #include "tools/diagnose/among_names.hpp"
 #include "tools/diagnose/claim.hpp"
 #include "tools/diagnose/detectable.hpp"
@@ -22,6 +23,7 @@
 #include "tools/diagnose/reference_hold.hpp"
 #include "tools/diagnose/screen.hpp"
 #include "tools/diagnose/shaken_loose.hpp"
+#include "tools/diagnose/steady_speed.hpp"
 #include "tools/diagnose/steps.hpp"
 #include "tools/diagnose/unknown_sizes.hpp"
 #include "tools/diagnose/unnamed.hpp"
@@ -154,6 +156,8 @@ class Search {
   /// What is said then: nothing of what lies behind it.
   void stop_at_the_law();
   void say_controller();
+  /// Claims what stands in the recorded current beside the law; false: nothing does.
+  bool add_applied();
   /// Takes off the readings what their noise makes of the claims so far, and fits anew. The share of rows that it leaves to
   /// chance.
   double quieten();
@@ -354,6 +358,8 @@ void Search::claim(Sought sought) {
       d_.reject(std::string{f.model.terms.back().info->name}, "another term explains the same better",
                 f.evidence - base.evidence);
   }
+  if (auto twin = twin_at_steady_speed(data_, best->with.model.terms.back()))
+    rivals.push_back(std::move(*twin));
   d_.weighing = std::move(best->weighing);
   d_.best = std::move(best->with);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
@@ -474,12 +480,14 @@ void Search::name(int first_round) {
 
 void Search::finish() {
   const auto named = std::tuple{d_.best, d_.weighing, d_.retuned, d_.findings};
+  const bool is_at_drive = d_.is_unnamed;  // what stands in the current has its curve already
   progress_(0.75, "trying other causes in place of names");
   const bool any = d_.best.model.terms.size() > given();
-  if (any && options_.refuses)
+  if (any && options_.refuses && !is_at_drive)
     take("other causes in place of names", [&] { return doubt(data_, d_, beside_), true; });
   progress_(0.78, "looking for physics without a name");
   take("physics without a name", [&] {
+    if (is_at_drive) return true;
     // Only of equations the spans go with the model; all else was looked at already.
     if (!beside_ || data_.model.plant == physics::Plant::equations)
       beside_ = courses_beside(data_, d_.best, &d_.best);
@@ -598,6 +606,28 @@ void Search::say_controller() {
   d_.suspect = Suspect{"axis.controller", "controller", {"reference", "position"}};
 }
 
+bool Search::add_applied() {
+  const auto& added = data_.beside_law;
+  if (!added || options_.without.contains(added->info->name)) return false;
+  progress_(0.06, "looking at the current beside the controller's law");
+  auto model = d_.best.model;
+  model.terms.push_back(*added);
+  for (const int iterations : {8, 6, 4}) {  // the nearer the fit, the finer its scale
+    const auto weighing = weigh(data_, simulate(data_, model), false);
+    model = fit(data_, weighing, model, data_.model, iterations).model;
+  }
+  d_.weighing = weigh(data_, simulate(data_, model));
+  d_.best = fit(data_, d_.weighing, model, data_.model, 4);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  if (added->curve.knots.empty()) {
+    rivals_.emplace_back();
+  } else {
+    d_.is_unnamed = true;
+    d_.findings.emplace_back().term = d_.best.model.terms.back();
+  }
+  return true;
+}
+
 Diagnosis Search::run() {
   data_.stopped = options_.stopped;
   try {
@@ -610,15 +640,24 @@ Diagnosis Search::run() {
     data_.stopped = options_.stopped;
     leave(own_numbers);
   }
-  if (options_.refuses && take("the controller's law", [&] { return is_another_controller(); })) {
+  const bool is_applied =
+      options_.refuses && take("the current beside the controller's law", [&] { return add_applied(); });
+  if (!is_applied && options_.refuses &&
+      take("the controller's law", [&] { return is_another_controller(); })) {
     stop_at_the_law();
+    return d_;
+  }
+  if (d_.is_unnamed) {
+    finish();
     return d_;
   }
   const Diagnosis begun = d_;
   const bool paired = is_equations() && take("two terms at once", [&] { return add_pair(); });
-  name(!paired ? 0 : take("one term in place of two", [&] { return put_one_in_place(begun); }) ? 1 : 2);
+  name(!paired                                                                     ? (is_applied ? 1 : 0)
+       : take("one term in place of two", [&] { return put_one_in_place(begun); }) ? 1
+                                                                                   : 2);
   finish();
-  if (!is_equations()) try_pairs(begun);
+  if (!is_equations() && !is_applied) try_pairs(begun);
   try_believed(begun);
   if (options_.refuses && !d_.is_partial) {
     const auto stated = d_;
@@ -682,6 +721,9 @@ Diagnosis search(Case& data, const std::function<void(double, const std::string&
   };
   if (data.model.plant == Plant::axis)
     unless_over("how the reference goes on between rows", [&] { return settle_hold(data), true; });
+  if (data.model.plant == Plant::axis)
+    unless_over("the current beside the controller's law",
+                [&] { return settle_recorded_current(data), true; });
   Case as_read = data;
   as_read.stopped = {};
   d = Search{data, progress, options}.run();
