@@ -18,7 +18,7 @@ std::vector<const TermInfo*> terms_of(Plant plant);
 const TermInfo* find_term(Plant plant, std::string_view name);
 /// The term that stands for physics without a name, at a site: its shape is a Curve.
 const TermInfo* unmodelled(Plant plant, std::string_view site);
-/// The signals that a curve at this site may be multiplied by.
+/// The signals that a curve at this site may be multiplied by; of an actuator the `command`, to which it is then added.
 std::vector<std::string_view> multipliers_of(const TermInfo& unmodelled);
 /// The plant by the name that model.yaml writes; false where there is none.
 bool plant_by_name(std::string_view name, Plant& plant);

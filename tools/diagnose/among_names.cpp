@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "tools/diagnose/claim.hpp"
+#include "tools/diagnose/instrument_noise.hpp"
 #include "tools/diagnose/kin.hpp"
 #include "tools/diagnose/other_cause.hpp"
+#include "tools/diagnose/steady_speed.hpp"
 
 namespace invar::diagnose {
 
@@ -23,6 +25,26 @@ std::vector<Model> with_friction(const Case& data, const Term& removed, const Mo
     if (model.terms[t].info->name == "constant" && model.terms[t].on == removed.on)
       for (auto& other : other_laws(data, model, t, without)) all.push_back(std::move(other));
   return all;
+}
+
+}  // namespace
+
+namespace {
+
+/// log odds of a force that repeats in time against one along the way, where a recording cannot tell them apart.
+constexpr double of_twins = -1.0;
+
+/// Were the two told apart at a steady speed by a tenth of a residual that is far above noise? What nobody listed does that too.
+bool looks_alike(const Case& data, const Fit& best, const Fit& rival, std::size_t place) {
+  constexpr double a_tenth = 0.9;
+  const auto twin = twin_at_steady_speed(data, best.model.terms[place]);
+  if (!twin || twin->info != rival.model.terms[place].info || least_ratio(data, best, rival) < a_tenth)
+    return false;
+  const auto simulated = simulate(data, best.model);
+  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  for (std::size_t o = 0; o < left.size(); ++o)
+    if (left[o].rms() > times_noise * instrument_noise(data, simulated, o)) return true;
+  return false;
 }
 
 }  // namespace
@@ -115,6 +137,7 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool ref
         }
         if (refuses && !stands(data, f, place)) continue;
         kept.push_back(f.model.terms[place]);
+        if (looks_alike(data, d.best, f, place)) odds = std::max(odds, of_twins);
         finding.alternatives.push_back({f.model.terms[place], odds});
       }
       rivals[i] = kept;
