@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/physics/axis_controller.hpp"
+#include "core/physics/library.hpp"
 
 namespace invar::diagnose {
 
@@ -138,9 +139,25 @@ double squares_with(const Eigen::MatrixXd& motion, const Eigen::VectorXd& left, 
 
 }  // namespace
 
+namespace {
+
+/// Does the model itself hold the current back on its way, so that what was recorded follows from the past?
+bool holds_back(const physics::Model& model) {
+  return model.records_applied &&
+         std::any_of(model.terms.begin(), model.terms.end(), [](const physics::Term& term) {
+           const auto memory = physics::axis_kind(*term.info)->memory;
+           return memory == physics::AxisMemory::transport_delay ||
+                  memory == physics::AxisMemory::amplifier_lag;
+         });
+}
+
+}  // namespace
+
 std::vector<LawRows> rows_of_law(const Case& data) {
   const auto at = places_of(data);
-  if (!at) return {};
+  if (!at || holds_back(data.model)) return {};
+  const double cycle = 1.0 / data.model.controller->rate;
+  auto plant = physics::make_axis(data.model, cycle);  // for what the model's own terms add to the command
   auto settings = *data.model.controller;
   settings.limit = 0.0;
   std::vector<LawRows> all(data.recordings.size());
@@ -155,9 +172,13 @@ std::vector<LawRows> rows_of_law(const Case& data) {
     const std::size_t settled = stretch.begin + settling_of(settings);
     double sum = 0.0;
     for (std::size_t i = stretch.begin; i < stretch.end; ++i) {
-      const double command = controller.step(reference[i], recording.measured[at->position][i]) +
-                             (forward != nullptr ? (*forward)[i] : 0.0);
+      double command = controller.step(reference[i], recording.measured[at->position][i]) +
+                       (forward != nullptr ? (*forward)[i] : 0.0);
       if (i < settled) continue;
+      if (data.model.records_applied) {
+        plant.rest_at(0.0, recording.inputs.time[i]);
+        command = plant.applied(command, cycle);
+      }
       asked[i] = command, beyond[i] = recording.measured[at->current][i] - command;
       sum += beyond[i];
     }
@@ -175,6 +196,7 @@ std::optional<LawOff> off_the_law(const Case& data) {
   if (!at) return std::nullopt;
   const auto stretches = stretches_of(data, *at);
   const auto law = rows_of_law(data);
+  if (law.empty()) return std::nullopt;
   const std::size_t settles = settling_of(*data.model.controller);
   Eigen::Index rows = 0;
   for (const auto& stretch : stretches)
@@ -242,7 +264,9 @@ Case told_what_law_leaves(const Case& data, const std::vector<LawRows>& rows) {
 double share_of_law(const Case& data, const physics::Model& retuned) {
   const auto at = places_of(data);
   if (!at) return 0.0;
-  const auto told = told_what_law_leaves(data, rows_of_law(data));
+  const auto rows = rows_of_law(data);
+  if (rows.empty()) return 0.0;
+  const auto told = told_what_law_leaves(data, rows);
   const auto left_by = [&](const Case& loop, const physics::Model& model) {
     double squares = 0.0;
     const auto simulated = simulate(loop, model);

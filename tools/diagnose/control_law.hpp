@@ -16,7 +16,9 @@ struct LawRows {
   std::vector<double> asked, beyond;
   bool has_open_level = false;  // of a part
 };
-/// By recording; empty of a plant without a controller, or where position or current is not recorded.
+/// Where the current is recorded behind what acts on it, what the model's own terms make of the command is counted to the law.
+/// By recording; empty of a plant without a controller, where position or current is not recorded, and where the model itself
+/// holds back what is recorded.
 std::vector<LawRows> rows_of_law(const Case& data);
 
 struct LawOff {

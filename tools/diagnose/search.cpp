@@ -529,7 +529,7 @@ void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better be
   auto before = std::exchange(d_, begun);
   auto readings = noise_->put_back();
   const auto screened = std::exchange(last_screen_, {});
-  rivals_.clear();
+  rivals_.assign(begun.best.model.terms.size() - given(), {});
   beside_.reset();
   data_.stopped = options_.stopped;
   if (take("the search begun anew", [&] { return start(before); })) {

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/physics/library.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/search.hpp"
@@ -198,6 +199,48 @@ TEST(AddedToCommand, TheCarriageFeelsWhatIsAddedAndNotWhatIsMisread) {
     ASSERT_EQ(misread.doubts.size(), 1U);
     EXPECT_NE(misread.doubts[0].find("does not feel"), std::string::npos);
   }
+}
+
+TEST(AddedToCommand, WhatTheModelAddsItselfIsNotFoundAgain) {
+  auto data = case_of({.is_cascade = true, .drive = square(0.3, 2.0, 0.3)});
+  settle_recorded_current(data);
+  ASSERT_TRUE(data.beside_law);
+  data.model.terms.push_back(*data.beside_law);
+  EXPECT_FALSE(added_to_command(data, rows_of_law(data)));
+  auto late = case_of({.late = 2});
+  settle_recorded_current(late);
+  ASSERT_TRUE(late.beside_law);
+  late.model.terms.push_back(*late.beside_law);
+  EXPECT_TRUE(rows_of_law(late).empty());
+}
+
+TEST(AddedToCommand, ThePatchedFileSaysWhereTheCurrentIsRecorded) {
+  const auto yaml = config::Yaml::parse(
+      "invar_model: 1\nplant: axis\ncolumns: {time: t, reference: r, position: y, current: u}\n"
+      "controller: {kind: cascade, rate: 1000, kp: 60, kv: 30}\n"
+      "parameters: {mass: {value: 5, unit: kg}, motor_constant: {value: 40, unit: N/A}, "
+      "viscous_damping: {value: 12, unit: N s/m}}\nterms: []\n",
+      "model.yaml");
+  auto changed = model::read(yaml);
+  EXPECT_FALSE(changed.records_applied);
+  EXPECT_EQ(model::patched(yaml, changed).find("applied"), std::string::npos);
+  changed.records_applied = true;
+  changed.terms.emplace_back();
+  auto& term = changed.terms.back();
+  term.info = physics::unmodelled(physics::Plant::axis, "actuator");
+  term.with = "command", term.curve.over = "current";
+  term.curve.knots = {-1.0, -0.3, 0.3, 1.0}, term.curve.values = {0.7, 0.0, 0.0, -0.7};
+  const auto again = test::model_of(model::patched(yaml, changed));
+  EXPECT_TRUE(again.records_applied);
+  ASSERT_EQ(again.terms.size(), 1U);
+  EXPECT_EQ(again.terms[0].with, "command");
+  // A loop that is asked to jump by 0.4 mm commands 0.72 A; what is recorded is the limit.
+  physics::Record inputs;
+  inputs.time = {0.0, 1e-3, 2e-3};
+  inputs.signals["reference"] = {0.0, 4e-4, 4e-4};
+  physics::Outputs recorded;
+  physics::prepare(again, inputs)->run(again, recorded);
+  EXPECT_NEAR(recorded[1][1], 0.3, 1e-9);
 }
 
 Diagnosis diagnosed(const Loop& loop) {
