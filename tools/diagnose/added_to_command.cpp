@@ -9,6 +9,7 @@
 
 #include "core/physics/library.hpp"
 #include "tools/diagnose/candidates.hpp"
+#include "tools/diagnose/late_command.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::diagnose {
@@ -21,8 +22,6 @@ using physics::Term;
 constexpr double most_of_it = 0.5;
 /// [log likelihood] that a kind must gain over noise: the margin of a claim, and the places a wave was looked for in.
 constexpr double least_gain = 30.0;
-/// Fewer say nothing of a loop.
-constexpr std::size_t least_rows = 1000;
 
 /// Cycles one behind the other of all recordings, with what the law asks for and what the current is beyond.
 struct Series {
@@ -105,8 +104,8 @@ double least_of(const std::vector<double>& values, const std::function<double(do
 }
 
 std::vector<double> evenly(double from, double to, double step) {
-  std::vector<double> values;
-  for (double v = from; v <= to; v += step) values.push_back(v);
+  std::vector<double> values{from};
+  for (double v = from + step; step > 0.0 && v <= to; v += step) values.push_back(v);
   return values;
 }
 
@@ -117,14 +116,6 @@ Term curve_on_command(std::vector<double> knots, std::vector<double> values, dou
   term.with = "command";
   term.curve.over = "current";
   term.curve.knots = std::move(knots), term.curve.values = std::move(values), term.curve.period = period;
-  return term;
-}
-
-Term named(const char* name) {
-  Term term;
-  term.info = physics::find_term(physics::Plant::axis, name);
-  for (std::size_t i = 0; i < term.info->parameter_count(); ++i)
-    term.values[i] = term.info->parameters[i].starts[0], term.given[i] = true;
   return term;
 }
 
@@ -171,7 +162,7 @@ Guess dead_zone(const Series& series) {
                                 [&](double w) { return left_by(series, lost(w)); });
   Guess guess;
   guess.becomes = lost(width);
-  guess.added.term = named("dead_zone");
+  guess.added.term = started("dead_zone");
   guess.added.term.values[0] = width;
   guess.added.words = "a dead zone of " + amperes(width) + " on each side of zero";
   return guess;
@@ -189,7 +180,9 @@ Guess steps(const Series& series) {
   // Steps whose count over the range is off by a quarter are lost: so fine a scan, from what noise hides to the range.
   const double rms = std::sqrt(series.squares / static_cast<double>(series.beyond.size()));
   std::vector<double> values;
-  for (double step = 2.0 * rms; step < std::min(top, 6.0 * rms); step *= 1.0 + 0.2 * step / top)
+  constexpr double finest = 2e-4;  // of the range: steps of 14 bits are no physics of a drive
+  for (double step = std::max(2.0 * rms, finest * top); step < std::min(top, 6.0 * rms);
+       step *= 1.0 + 0.2 * step / top)
     values.push_back(step);
   Guess guess;
   guess.left = series.squares;
@@ -243,7 +236,7 @@ Guess from_wave(const Series& series, const Wave& wave, double frequency, double
   const double amplitude = std::hypot(wave.cosine, wave.sine);
   Guess guess;
   guess.left = wave.left, guess.numbers = 4.0;
-  auto& term = guess.added.term = named("additive_disturbance");
+  auto& term = guess.added.term = started("additive_disturbance");
   const auto put = [&](const char* name, double value) { term.values[term.info->index_of(name)] = value; };
   // A row is the mean over its cycle, the term speaks of its beginning.
   put("amplitude", is_square ? amplitude : amplitude * half / std::sin(half));
@@ -308,88 +301,6 @@ std::vector<Guess> waves(const Case& data, const std::vector<LawRows>& law, cons
   for (const auto& [frequency, phase] : lines.squares)
     if (pays(square_at(series, frequency, phase))) all.push_back(square(series, frequency, phase, has_level));
   return all;
-}
-
-/// What the law asked for, as it would come late: some cycles later, or through a lag.
-struct Late {
-  Term term;
-  std::string words;
-  std::vector<std::vector<double>> asked;  // by recording
-};
-
-std::vector<double> lagged(const std::vector<double>& asked, double cycles) {
-  const double share = -std::expm1(-1.0 / cycles);
-  std::vector<double> late = asked;
-  for (std::size_t i = 1; i < late.size(); ++i)
-    if (std::isfinite(late[i]) && std::isfinite(asked[i - 1]))
-      late[i] = late[i - 1] + share * (asked[i - 1] - late[i - 1]);
-  return late;
-}
-
-constexpr std::size_t most_cycles_late = 30;
-
-/// The first is not late at all.
-std::vector<Late> late_commands(const Case& data, const std::vector<LawRows>& law) {
-  const double cycle = 1.0 / data.model.controller->rate;
-  std::vector<Late> all;
-  for (std::size_t d = 0; d <= most_cycles_late; ++d) {
-    auto& late = all.emplace_back(
-        Late{named("transport_delay"), "a delay of " + report::si(static_cast<double>(d) * cycle, "s"), {}});
-    late.term.values[0] = (static_cast<double>(d) - 0.5) * cycle;  // what is held for a cycle comes within it
-    for (const auto& rows : law) {
-      auto& asked = late.asked.emplace_back(rows.asked.size(), std::nan(""));
-      std::copy(rows.asked.begin(), rows.asked.end() - static_cast<std::ptrdiff_t>(std::min(d, asked.size())),
-                asked.begin() + static_cast<std::ptrdiff_t>(std::min(d, asked.size())));
-    }
-  }
-  constexpr double finer = 1.15;
-  for (double cycles = 0.3; cycles < static_cast<double>(most_cycles_late); cycles *= finer) {
-    auto& late =
-        all.emplace_back(Late{named("amplifier_lag"), "a lag of " + report::si(cycles * cycle, "s", 2), {}});
-    late.term.values[0] = cycles * cycle;
-    for (const auto& rows : law) late.asked.push_back(lagged(rows.asked, cycles));
-  }
-  return all;
-}
-
-/// The current is what the law asked for some time ago. Noise of the readings that the controller did not see makes a late
-/// law look better whatever is true: only what goes with the current that the model expects counts (instrumental variables).
-std::optional<Added> comes_late_from_law(const Case& data, const std::vector<LawRows>& law) {
-  constexpr Eigen::Index lags = 12;
-  const auto place = std::find(data.outputs.begin(), data.outputs.end(), "current") - data.outputs.begin();
-  const auto simulated = simulate(data, data.model);
-  const auto all = late_commands(data, law);
-  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(lags, lags),
-                  product = Eigen::MatrixXd::Zero(lags, static_cast<Eigen::Index>(all.size()));
-  Eigen::VectorXd white = Eigen::VectorXd::Zero(product.cols()), instruments(lags), left(product.cols());
-  double rows = 0.0;
-  for (std::size_t r = 0; r < law.size(); ++r)
-    for (std::size_t i = most_cycles_late; i < law[r].asked.size(); ++i) {
-      if (!std::isfinite(law[r].asked[i]) || !std::isfinite(law[r].asked[i - most_cycles_late])) continue;
-      const auto& expected = simulated[r][static_cast<std::size_t>(place)];
-      for (std::size_t j = 0; j < static_cast<std::size_t>(lags); ++j)
-        instruments(static_cast<Eigen::Index>(j)) = expected[i - j] - expected[i - j - 1];
-      for (std::size_t k = 0; k < all.size(); ++k)
-        left(static_cast<Eigen::Index>(k)) = law[r].asked[i] + law[r].beyond[i] - all[k].asked[r][i];
-      square += instruments * instruments.transpose(), product += instruments * left.transpose();
-      white += left.cwiseAbs2(), rows += 1.0;
-    }
-  if (rows < static_cast<double>(least_rows) || !(square.trace() > 0.0)) return std::nullopt;
-  square.diagonal().array() += 1e-9 * square.trace();
-  const Eigen::VectorXd goes_with = product.cwiseProduct(square.ldlt().solve(product)).colwise().sum();
-  Eigen::Index best = 0;
-  if (!goes_with.allFinite()) return std::nullopt;
-  goes_with.minCoeff(&best);
-  // By chance as many squares of a row go with the instruments as there are of these; a late command leaves no more.
-  constexpr double beyond_chance = 4.0, leaves = 0.2;
-  const auto by_chance = [&](Eigen::Index k) {
-    return beyond_chance * static_cast<double>(lags) * white(k) / rows;
-  };
-  if (best == 0 || goes_with(0) < by_chance(0) || goes_with(best) > leaves * goes_with(0) ||
-      goes_with(best) > by_chance(best))
-    return std::nullopt;
-  const auto& late = all[static_cast<std::size_t>(best)];
-  return Added{late.term, late.words, 1.0 - goes_with(best) / goes_with(0)};
 }
 
 /// Does the current stay at a limit while the command goes beyond it?
@@ -459,7 +370,10 @@ std::vector<Guess> guesses_of(const Case& data, const std::vector<LawRows>& law,
 std::optional<Added> added_to_command(const Case& data, const std::vector<LawRows>& law) {
   if (law.empty()) return std::nullopt;
   const auto series = series_of(data, law);
-  if (series.time.size() < least_rows || !(series.squares > 0.0)) return std::nullopt;
+  double asked = 0.0;
+  for (const double u : series.asked) asked += u * u;
+  constexpr double of_rounding = 1e-10;  // of the squares: no ammeter reads a hundred-thousandth
+  if (series.time.size() < fewest_rows_of_law || !(series.squares > of_rounding * asked)) return std::nullopt;
   const auto rows = static_cast<double>(series.time.size());
   for (auto& guess : guesses_of(data, law, series)) {
     const double noise = std::min(guess.left, rows * series.noise * series.noise),
