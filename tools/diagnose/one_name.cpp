@@ -102,7 +102,7 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   double evidence = advantage(data, own, with, without);
   // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
   // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
-  if (options.refuses && !noise.is_fed_back() && data.is_time_series &&
+  if (options.refuses && !noise.is_fed_back() && data.is_time_series && data.windows.count == 0 &&
       least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
     own = plain;
     with = fit(data, own, settled.model, data.model, 6, &settled);
@@ -117,8 +117,9 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
       (is_white(evidence, counted) || goes_with_recording(data, with, without)))
     gain = least;
   // Filters of a residual that still holds effects take a name for noise; who foretells what no fit saw is none.
+  // A wave was looked for at many frequencies, and goes with anything that is slow.
   if (options.refuses && gain < margin && !noise.is_fed_back() && counted > 0.0 &&
-      foretold(data, with, without).is_plain())
+      !is_sought(with.model.terms.back()) && foretold(data, with, without).is_plain())
     gain = std::max(gain, foretold_margins * margin);
   // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
   // not, where the noise is loud at other frequencies, if it pays when counted in independent rows; nor in a loop, where

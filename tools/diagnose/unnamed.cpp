@@ -75,6 +75,18 @@ bool is_within_noise(const Case& data, const Fit& fit) {
   return true;
 }
 
+/// Are the names three waves or more of one kind at one place? Those are the series of a curve.
+bool is_series(const Model& model, std::size_t given) {
+  constexpr std::ptrdiff_t waves = 3;
+  const auto begin = model.terms.begin() + static_cast<std::ptrdiff_t>(given);
+  return std::any_of(begin, model.terms.end(), [&](const physics::Term& one) {
+    return one.info->index_of("phase") < physics::most_parameters &&
+           std::count_if(begin, model.terms.end(), [&](const physics::Term& other) {
+             return other.info == one.info && other.on == one.on;
+           }) >= waves;
+  });
+}
+
 /// Would an engineer see it in the residual, or does it pay when counted in independent rows?
 bool shows(const Case& data, const Fit& with, const Fit& without) {
   const double ratio = least_ratio(data, with, without);
@@ -163,8 +175,9 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     if (instead.gain > margin) {
       const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
       if (instead.fit.evidence > named_there.evidence + margin &&
-          instead.fit.evidence - named_there.evidence > 0.25 * instead.gain &&
-          takes_far_more(data, d, instead.fit)) {
+          (is_series(d.best.model, given) ||
+           instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) &&
+          leaves_less(data, instead.fit, d.best)) {
         for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
           d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
                    1.0);

@@ -305,7 +305,8 @@ void cut_into_windows(Case& data, const Model& near) {
     estimate_starts(data);
     return;
   }
-  const std::size_t shortest = std::max(fewest_rows, all_rows * states / (2 * most_starts));
+  const std::size_t shortest =
+      std::max({fewest_rows, rows * states / most_starts, all_rows * states / (2 * most_starts)});
   std::size_t window = data.windows.few ? std::max(shortest, rows / long_windows) : shortest;
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
