@@ -103,20 +103,20 @@ TEST(CoursesInFiles, WhatAnOutputReadsWrongComesBack) {
   EXPECT_EQ(again.terms[0].curve.over, "t");
 }
 
-TEST(CoursesInFiles, AnOutputReadsWrongOverTimeOrOverWhatItReadsAlone) {
+TEST(CoursesInFiles, AnOutputReadsWrongOverOneVariableOfTheModel) {
   using ::testing::HasSubstr;
   const auto fault = [](const std::string& term) {
     return testing::fault_of([&] { (void)read_all(tank(term)); });
   };
   const std::string numbers = ", knots: [0, 1], values: [1, 2]}";
-  EXPECT_THAT(fault("{term: unmodelled, site: output, on: level, over: x" + numbers),
-              HasSubstr("`t` or over `level`"));
+  EXPECT_THAT(fault("{term: unmodelled, site: output, on: level, over: z" + numbers),
+              HasSubstr("no state, no input and not t"));
   EXPECT_THAT(fault("{term: unmodelled, site: output, on: level, over: t, with: x" + numbers),
-              HasSubstr("no `with`"));
+              HasSubstr("leave `with` out"));
   EXPECT_THAT(fault("{term: unmodelled, site: output, on: x, over: t" + numbers),
               HasSubstr("name an output"));
   EXPECT_THAT(fault("{term: unmodelled, site: state, on: level, over: t" + numbers),
-              HasSubstr("name a state"));
+              HasSubstr("no state and no output"));
 }
 
 }  // namespace
