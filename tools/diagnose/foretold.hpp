@@ -6,7 +6,7 @@
 namespace invar::diagnose {
 
 struct Foretold {
-  double share = 0.0;  // of the squares that `without` leaves in all quarters, in units of the noise
+  double share = 0.0;      // of the squares that `without` leaves in all quarters, in units of the noise
   std::size_t better = 0;  // quarters in which `with` leaves less
   std::size_t quarters = 0;
 
