@@ -45,7 +45,7 @@ finds_the_truth() {
 import json, sys
 found = {f["term"]: f["parameters"] for f in json.load(open(sys.argv[1]))["findings"]}
 print("found:", *found)
-for term, parameter, truth, tolerance in (("force_ripple", "pitch", 0.0317, 6e-5), ("force_ripple", "amplitude", 2.4, 0.12),
+for term, parameter, truth, tolerance in (("force_ripple", "pitch", 0.0317, 3e-5), ("force_ripple", "amplitude", 2.4, 0.12),
                                           ("coulomb_friction", "level", 3.0, 0.15)):
     assert abs(found[term][parameter]["value"] - truth) < tolerance, (term, parameter, found[term][parameter])
 PYTHON
