@@ -59,6 +59,9 @@ void write_thermal(ModelText& text, const ThermalError& model) {
         .number("spacing", term.spacing)
         .integer("centres", term.weights.rows())
         .numbers("weights", Eigen::VectorXd{term.weights.reshaped()});
+    if (term.trend.size() > 0)
+      text.comment("times 1, u, 1 - u^2 with u from -1 to 1 over the range of x, for each factor")
+          .numbers("trend", Eigen::VectorXd{term.trend.reshaped()});
   }
   text.close().open("sigma");
   const auto& axes = model.sigma_table.axes();
@@ -118,6 +121,11 @@ ThermalError read_thermal(const config::Node& root) {
     const int factors = metrology::factor_count(term.factor);
     const auto weights = exactly(node.required("weights"), static_cast<std::size_t>(centres * factors), "m");
     term.weights = Eigen::Map<const Eigen::MatrixXd>(weights.data(), centres, factors);
+    if (node.has("trend")) {
+      const auto trend =
+          exactly(node["trend"], static_cast<std::size_t>(metrology::trend_size * factors), "m");
+      term.trend = Eigen::Map<const Eigen::MatrixXd>(trend.data(), metrology::trend_size, factors);
+    }
     model.terms.push_back(std::move(term));
   }
   const auto sigma = root.required("sigma");

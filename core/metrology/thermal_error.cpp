@@ -66,16 +66,31 @@ double scaled_rate(const Range& range, double rate) noexcept {
   return range.width() > 0.0 && size > 0.0 ? range.clamp(rate) / size : 0.0;
 }
 
-double network(const ThermalTerm& term, double x, Eigen::Index factor) {
+/// The functions of `ThermalTerm::trend` at a place inside the range.
+Eigen::Vector3d trend_at(const Range& range, double x) noexcept {
+  const double half = 0.5 * range.width();
+  const double u = half > 0.0 ? (x - range.lower - half) / half : 0.0;
+  return {1.0, u, 1.0 - u * u};
+}
+
+/// What one factor is multiplied by at a place inside the range.
+double over_x(const ThermalTerm& term, const Range& range, double x, Eigen::Index factor) {
   double sum = 0.0;
   for (Eigen::Index k = 0; k < term.weights.rows(); ++k) {
     const double z = (x - term.first) / term.spacing - static_cast<double>(k);
     sum += term.weights(k, factor) * std::exp(-0.5 * z * z);
   }
-  return sum / std::sqrt(2.0 * std::numbers::pi);
+  sum /= std::sqrt(2.0 * std::numbers::pi);
+  return term.trend.size() == 0 ? sum : sum + trend_at(range, x).dot(term.trend.col(factor));
 }
 
 }  // namespace
+
+Eigen::VectorXd ThermalTerm::coefficients() const {
+  Eigen::VectorXd all(size());
+  all << weights.reshaped(), trend.reshaped();
+  return all;
+}
 
 std::string name_of(ThermalFactor factor) {
   for (const auto& [value, name] : names)
@@ -104,13 +119,17 @@ Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model
   const double x = model.x.clamp(at.x);
   const Eigen::Index centres = term.weights.rows();
   const int factors = factor_count(term.factor);
-  Eigen::VectorXd columns(centres * factors);
+  Eigen::VectorXd columns(term.size());
   for (Eigen::Index k = 0; k < centres; ++k) {
     const double z = (x - term.first) / term.spacing - static_cast<double>(k);
     const double phi = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
     for (int f = 0; f < factors; ++f)
       columns(f * centres + k) = phi * factor_value(term.factor, f, tau, rho, zone, direction);
   }
+  if (term.trend.size() > 0)
+    for (int f = 0; f < factors; ++f)
+      columns.segment<trend_size>(centres * factors + trend_size * f) =
+          factor_value(term.factor, f, tau, rho, zone, direction) * trend_at(model.x, x);
   return columns;
 }
 
@@ -125,7 +144,7 @@ double ThermalError::value(const ThermalState& at) const {
   double sum = 0.0;
   for (const ThermalTerm& term : terms)
     if (term.factor != ThermalFactor::direction)
-      sum += thermal_basis(term, *this, at).dot(term.weights.reshaped());
+      sum += thermal_basis(term, *this, at).dot(term.coefficients());
   return sum;
 }
 
@@ -158,12 +177,16 @@ CompiledThermalError::CompiledThermalError(const ThermalError& model, double mos
       slope_rate_{model.slope_rate},
       sigma_table_{model.sigma_table} {
   INVAR_EXPECTS(most_difference > 0.0, most_difference);
-  // |d2/dx2| of a network is at most sum |w| / (spacing^2 sqrt(2 pi)); factors are at most 1 in size.
+  // |d2/dx2| of a network is at most sum |w| / (spacing^2 sqrt(2 pi)), of a bow 2 |c| / half^2; factors are at most 1
+  // in size.
   double curvature = 0.0;
-  for (const ThermalTerm& term : model.terms)
-    if (term.factor != ThermalFactor::direction)
-      curvature +=
-          term.weights.cwiseAbs().sum() / (term.spacing * term.spacing * std::sqrt(2.0 * std::numbers::pi));
+  const double half = std::max(0.5 * x_.width(), 1e-12);
+  for (const ThermalTerm& term : model.terms) {
+    if (term.factor == ThermalFactor::direction) continue;
+    curvature +=
+        term.weights.cwiseAbs().sum() / (term.spacing * term.spacing * std::sqrt(2.0 * std::numbers::pi));
+    if (term.trend.size() > 0) curvature += 2.0 * term.trend.row(2).cwiseAbs().sum() / (half * half);
+  }
   const double intervals = std::ceil(x_.width() * std::sqrt(curvature / (8.0 * most_difference)));
   nodes_ = static_cast<std::size_t>(std::clamp(intervals, 1.0, 20000.0)) + 1;
   const double step = x_.width() / static_cast<double>(nodes_ - 1);
@@ -174,7 +197,7 @@ CompiledThermalError::CompiledThermalError(const ThermalError& model, double mos
     for (int f = 0; f < factor_count(term.factor); ++f) {
       layout_.push_back({term.factor, f, term.zone, columns_.size()});
       for (std::size_t i = 0; i < nodes_; ++i)
-        columns_.push_back(network(term, x_.lower + step * static_cast<double>(i), f));
+        columns_.push_back(over_x(term, x_, x_.lower + step * static_cast<double>(i), f));
     }
   }
   values_.assign(nodes_, 0.0);

@@ -45,15 +45,23 @@ enum class ThermalFactor {
 std::string name_of(ThermalFactor factor);
 std::optional<ThermalFactor> thermal_factor(const std::string& name);
 
-/// sum_k phi((x - first - k spacing) / spacing) / sqrt(2 pi) * (weights.row(k) . factors), a Gaussian network
-/// over x whose width is one spacing (it reproduces a constant to 5e-9).
+/// A constant, a slope and a bow over x, exact at any number of places, times the factors:
+/// trend.row(0) + trend.row(1) u + trend.row(2) (1 - u^2), with u from -1 to 1 over the model's range of x. Beside
+/// them sum_k phi((x - first - k spacing) / spacing) / sqrt(2 pi) * (weights.row(k) . factors), a Gaussian network
+/// over x whose width is one spacing, for all that is finer.
 struct ThermalTerm {
   ThermalFactor factor = ThermalFactor::geometry;
   double first = 0.0;       // centre [m]
   double spacing = 1.0;     // [m], also the width of the Gaussians
   Eigen::MatrixXd weights;  // centres x factors [m]
   std::size_t zone = 0;     // of factor `zone`: which
+  Eigen::MatrixXd trend{};  // 3 x factors [m]; empty: none
+
+  /// All numbers of the term, in the order of `thermal_basis`: weights, then trend, column by column.
+  [[nodiscard]] Eigen::VectorXd coefficients() const;
+  [[nodiscard]] Eigen::Index size() const { return weights.size() + trend.size(); }
 };
+inline constexpr Eigen::Index trend_size = 3;
 
 /// The identified error of one axis: actual minus commanded position. Set-up and offline use; the loop
 /// evaluates `CompiledThermalError`. Held at the end of each range outside it; sigma grows there by the
@@ -81,8 +89,8 @@ struct ThermalError {
   [[nodiscard]] bool inside(const ThermalState& at) const;
 };
 
-/// The columns of a term at a state: activations of its centres times its factors, in the order of
-/// `weights.reshaped()`.
+/// The columns of a term at a state: activations of its centres and its trend times its factors, in the order of
+/// `coefficients()`.
 Eigen::VectorXd thermal_basis(const ThermalTerm& term, const ThermalError& model, const ThermalState& at,
                               double direction = 0.0);
 int factor_count(ThermalFactor factor);

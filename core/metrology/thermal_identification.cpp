@@ -164,6 +164,21 @@ void set_slopes(ThermalError& model, bool temperature_varies) {
   if (!temperature_varies) model.slope_temperature = 20e-6 * std::max(model.x.width(), 0.1);  // 20 ppm/K
 }
 
+/// A term over x with its factor at one, at `count` places along the travel.
+Eigen::VectorXd along_travel(const ThermalTerm& term, const ThermalError& model) {
+  constexpr Eigen::Index count = 41;
+  ThermalTerm flat = term;
+  flat.factor = ThermalFactor::geometry;
+  return Eigen::VectorXd::LinSpaced(count, model.x.lower, model.x.upper).unaryExpr([&](double x) {
+    return thermal_basis(flat, model, {x, 0.0, 0.0, {}}).dot(flat.coefficients());
+  });
+}
+
+double size_of(const ThermalTerm& term, const ThermalError& model) {
+  const Eigen::VectorXd values = along_travel(term, model);
+  return values.norm() / std::sqrt(static_cast<double>(values.size()));
+}
+
 /// Zones that no term asks for are no inputs of the model; those that stay get the slope of their term over x.
 void keep_zones_in_use(ThermalError& model) {
   std::vector<ThermalZone> used;
@@ -171,8 +186,7 @@ void keep_zones_in_use(ThermalError& model) {
     if (term.factor != ThermalFactor::zone) continue;
     ThermalZone zone = model.zones[term.zone];
     term.zone = used.size();
-    zone.slope =
-        2.0 * term.weights.norm() / std::sqrt(static_cast<double>(term.weights.size())) / zone.range.width();
+    zone.slope = 2.0 * size_of(term, model) / zone.range.width();
     used.push_back(std::move(zone));
   }
   model.zones = std::move(used);
@@ -221,7 +235,7 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
   Tried best = attempt(identifier, temperature_varies ? "position and temperature" : "position", base,
                        identifier.typical(), 1.6);
   // With noise and lengths known, judge the outliers once more.
-  identifier.reweigh(identifier.judged(readings.error - identifier.predicted(best.posterior)));
+  identifier.reweigh(identifier.judged(readings.error - identifier.predicted(best.posterior)).weights);
   best = attempt(identifier, best.candidate.name, base, best.hyper, 0.4);
   Contest contest;
   if (temperature_varies) {
@@ -262,13 +276,15 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
   const double unexplained = last.unexplained(final.posterior);
   fit.model = last.model(final.posterior, noise, unexplained);
   fit.predicted = last.predicted(final.posterior);
-  fit.kept = last.judged(readings.error - fit.predicted).cwiseProduct(identifier.weights());
+  const LoneOutliers judged = last.judged(readings.error - fit.predicted);
+  fit.kept = judged.weights.cwiseProduct(identifier.weights());
+  fit.in_stretches = judged.in_stretches;
   set_slopes(fit.model, temperature_varies);
   keep_zones_in_use(fit.model);
 
   fit.candidates = contest.verdicts();
   for (const ThermalTerm& term : fit.model.terms)
-    if (term.factor == ThermalFactor::direction) fit.reversal = 2.0 * term.weights.mean() * 1.0;
+    if (term.factor == ThermalFactor::direction) fit.reversal = 2.0 * along_travel(term, fit.model).mean();
 
   if (!temperature_varies) fit.unidentified.emplace_back("temperature dependence");
   if (readings.heating_rate && !rate_varies) fit.unidentified.emplace_back("heating rate dependence");
@@ -283,6 +299,12 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
              1e9 * unexplained) +
         (readings.time ? "" : "; with the times `t [s]` a lag behind the thermistor could be told") +
         (readings.heating_rate ? "" : "; with `heating_rate [K/s]` heating and cooling could be told apart"));
+  if (fit.in_stretches > 0)
+    fit.notes.push_back(
+        text("%.0f readings lie more than 4.5 standard deviations off in stretches that the model does not "
+             "explain; "
+             "a stretch is no outlier, all of them are fitted",
+             static_cast<double>(fit.in_stretches)));
   if (auto branches = compare_branches(readings, readings.error - fit.predicted, fit.kept))
     fit.notes.push_back(*branches);
   return fit;

@@ -50,9 +50,10 @@ struct ThermalCandidate {
 struct ThermalFit {
   ThermalError model;
   std::vector<ThermalCandidate> candidates;
-  Eigen::VectorXd predicted;  // of each reading, its direction included [m]
-  Eigen::VectorXd kept;       // 1, or 0 for a reading rejected as outlier
-  double reversal = 0.0;      // mean of forward minus backward [m]
+  Eigen::VectorXd predicted;      // of each reading, its direction included [m]
+  Eigen::VectorXd kept;           // 1, or 0 for a reading that stands alone as an outlier
+  Eigen::Index in_stretches = 0;  // readings far from the model in stretches: they are kept
+  double reversal = 0.0;          // mean of forward minus backward [m]
   std::vector<std::string> unidentified;
   std::vector<std::string> notes;  // what the user should know, sentences
 };
@@ -60,7 +61,8 @@ struct ThermalFit {
 /// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
 /// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of further
 /// zones' temperatures, a lagged temperature, the heating rate and hysteresis are tried in turn and kept where the log
-/// evidence rises by more than three and passes that were not fitted are met no worse. Outliers (4.5 standard deviations) are rejected. At least four readings at two
+/// evidence rises by more than three and passes that were not fitted are met no worse. Outliers (4.5 standard deviations) are rejected,
+/// stretches of them are not. At least four readings at two
 /// positions.
 ThermalFit identify_thermal(const ThermalReadings& readings);
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <set>
+#include <numeric>
 #include <utility>
 
 #include "core/numerics/robust.hpp"
@@ -15,22 +15,52 @@ namespace {
 using numerics::NormalEquations;
 using numerics::Posterior;
 
-/// Cholesky factor of a Matern covariance over `count` uniform points, plus a constant and a slope of
-/// variance `free` times as large (what a function may do without being rough).
-Eigen::MatrixXd covariance_factor(Eigen::Index count, double step, double length, double free) {
+/// Cholesky factor of a Matern covariance over `count` uniform points, plus a constant of variance `constant`.
+Eigen::MatrixXd covariance_factor(Eigen::Index count, double step, double length, double constant) {
   Eigen::MatrixXd k(count, count);
-  const double middle = 0.5 * static_cast<double>(count - 1);
-  const double half = std::max(1.0, middle) * step;
   for (Eigen::Index i = 0; i < count; ++i)
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      const double u = (static_cast<double>(i) - middle) * step / half;
-      const double v = (static_cast<double>(j) - middle) * step / half;
-      k(i, j) = k(j, i) =
-          numerics::matern52(static_cast<double>(i - j) * step, length) + free * (1.0 + u * v);
-    }
-  k.diagonal().array() += 1e-9 * (1.0 + free);
+    for (Eigen::Index j = 0; j <= i; ++j)
+      k(i, j) = k(j, i) = constant + numerics::matern52(static_cast<double>(i - j) * step, length);
+  k.diagonal().array() += 1e-9 * (1.0 + constant);
   return k.llt().matrixL();
 }
+
+/// Each column of `outer` times each of `inner`: the factor of the product of two covariances.
+Eigen::MatrixXd product(const Eigen::MatrixXd& outer, const Eigen::MatrixXd& inner) {
+  Eigen::MatrixXd both = Eigen::MatrixXd::Zero(outer.rows() * inner.rows(), outer.rows() * inner.rows());
+  for (Eigen::Index i = 0; i < outer.rows(); ++i)
+    for (Eigen::Index j = 0; j <= i; ++j)
+      both.block(i * inner.rows(), j * inner.rows(), inner.rows(), inner.rows()) = outer(i, j) * inner;
+  return both;
+}
+
+/// Places that are apart by less than this share of the travel are one.
+constexpr double one_place = 1.0 / 400.0;
+
+/// Number of each reading's place along the travel, from 0.
+std::vector<int> places_of(const Eigen::VectorXd& x) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(x.size()));
+  std::iota(order.begin(), order.end(), 0U);
+  const auto at = [&](std::size_t i) { return x(static_cast<Eigen::Index>(i)); };
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return at(a) < at(b); });
+  std::vector<int> place(order.size(), 0);
+  double begin = at(order.front());
+  int number = 0;
+  for (const std::size_t i : order) {
+    if (at(i) - begin > one_place * (x.maxCoeff() - x.minCoeff())) {
+      begin = at(i);
+      ++number;
+    }
+    place[i] = number;
+  }
+  return place;
+}
+
+// How far a bow reaches in the middle, assumed where two places show none: this share of what the error spans, or of
+// what steel grows over the travel and the temperatures. A tenth is what an axis bends whose middle is warmer than its
+// ends by a tenth of the heating.
+constexpr double usual_bow = 0.1;
+constexpr double growth_of_steel = 12e-6;  // 1/K
 
 constexpr double finest = 1e-9;  // m, what no reading of a machine is better than
 
@@ -74,8 +104,8 @@ ThermalRegression::ThermalRegression(const ThermalReadings& readings, double lag
   shape_.lag = lag;
   temperature_ = temperature;
   scale_ = std::max(robust_size(readings.error), 1e-12);
-  const std::set<double> distinct{readings.x.begin(), readings.x.end()};
-  positions_ = static_cast<int>(std::clamp<std::size_t>(distinct.size(), 2, 41));
+  places_ = places_of(readings.x);
+  positions_ = std::clamp(*std::max_element(places_.begin(), places_.end()) + 1, 2, 41);
   weights_ = Eigen::VectorXd::Ones(readings.x.size());
 }
 
@@ -93,7 +123,8 @@ void ThermalRegression::use(const WantedTerms& factors) {
     term.spacing = shape_.x.width() / intervals;
     term.first = shape_.x.lower - term.spacing;  // one centre beyond either end
     term.weights = Eigen::MatrixXd::Zero(intervals + 3, factor_count(factor));
-    columns += term.weights.size();
+    term.trend = Eigen::MatrixXd::Zero(trend_size, factor_count(factor));
+    columns += term.size();
     terms_.push_back(std::move(term));
   }
   rows_.resize(readings_.x.size(), columns);
@@ -134,9 +165,8 @@ void ThermalRegression::search(ThermalHyper& hyper, double step) const {
   for (Eigen::Index k = 0; k < best.size(); ++k) hyper[names[static_cast<std::size_t>(k)]] = best(k);
 }
 
-Eigen::VectorXd ThermalRegression::judged(const Eigen::VectorXd& residual) const {
-  const double sigma = robust_size(residual);
-  return (residual.array().abs() <= 4.5 * std::max(sigma, finest)).cast<double>();
+LoneOutliers ThermalRegression::judged(const Eigen::VectorXd& residual) const {
+  return lone_outliers(residual, places_, 4.5 * std::max(robust_size(residual), finest));
 }
 
 void ThermalRegression::reject_outliers() {
@@ -149,7 +179,7 @@ void ThermalRegression::reject_outliers() {
     const double sigma = std::max(robust_size(residual), finest);
     reweigh((1.0 + (residual.array() / (2.0 * sigma)).square()).inverse());
   }
-  reweigh(judged(residual));
+  reweigh(judged(residual).weights);
 }
 
 ThermalHyper ThermalRegression::typical() const {
@@ -161,8 +191,7 @@ ThermalHyper ThermalRegression::typical() const {
                      {"rate_length", std::log(2.0)}};
   for (int f = 0; f <= static_cast<int>(ThermalFactor::direction); ++f) {
     const auto factor = static_cast<ThermalFactor>(f);
-    hyper["size_" + name_of(factor)] = std::log(
-        (factor == ThermalFactor::geometry || factor == ThermalFactor::temperature ? 0.5 : 0.05) * scale_);
+    hyper["size_" + name_of(factor)] = std::log(0.05 * scale_);
   }
   return hyper;
 }
@@ -233,11 +262,14 @@ ThermalError ThermalRegression::model(const Posterior& p, double noise, double u
   for (ThermalTerm& term : result.terms) {
     term.weights = p.mean.segment(at, term.weights.size()).reshaped(term.weights.rows(), term.weights.cols());
     at += term.weights.size();
+    term.trend = p.mean.segment(at, term.trend.size()).reshaped(trend_size, term.trend.cols());
+    at += term.trend.size();
   }
   const bool rate = result.heating_rate.width() > 0.0;
   const bool temperature = result.temperature.width() > 0.0;
+  const int between = (15 + positions_) / positions_;  // nodes from one place to the next: sigma grows there
   const std::array<numerics::GridAxis, 3> axes{
-      numerics::GridAxis{result.x, static_cast<std::size_t>(positions_)},
+      numerics::GridAxis{result.x, static_cast<std::size_t>((positions_ - 1) * between + 1)},
       numerics::GridAxis{result.temperature, temperature ? 9U : 1U},
       numerics::GridAxis{result.heating_rate, rate ? 5U : 1U}};
   result.sigma_table = numerics::LookupTable<3>{
@@ -254,12 +286,12 @@ ThermalError ThermalRegression::model(const Posterior& p, double noise, double u
 
 Eigen::VectorXd ThermalRegression::basis(const ThermalState& at, double direction) const {
   Eigen::Index total = 0;
-  for (const ThermalTerm& term : terms_) total += term.weights.size();
+  for (const ThermalTerm& term : terms_) total += term.size();
   Eigen::VectorXd columns(total);
   Eigen::Index begin = 0;
   for (const ThermalTerm& term : terms_) {
-    columns.segment(begin, term.weights.size()) = thermal_basis(term, shape_, at, direction);
-    begin += term.weights.size();
+    columns.segment(begin, term.size()) = thermal_basis(term, shape_, at, direction);
+    begin += term.size();
   }
   return columns;
 }
@@ -297,29 +329,28 @@ std::vector<std::string> ThermalRegression::needed() const {
 
 std::vector<Eigen::MatrixXd> ThermalRegression::prior(const ThermalHyper& hyper) const {
   std::vector<Eigen::MatrixXd> factors;
+  const double growth = growth_of_steel * shape_.x.width() * std::max(shape_.temperature.width(), 1.0);
+  const double unseen_bow = usual_bow * std::max(1.0, growth / scale_);
   for (const ThermalTerm& term : terms_) {
     const double size = std::exp(hyper.at("size_" + name_of(term.factor)));
     const bool geometry = term.factor == ThermalFactor::geometry;
-    // Offset and slope of the geometry and of the linear expansion are free; elsewhere they are like the
-    // rest.
+    const bool rate = term.factor == ThermalFactor::rate_curve;
+    const Eigen::MatrixXd over_x =
+        size * covariance_factor(term.weights.rows(), term.spacing,
+                                 std::exp(hyper.at(geometry ? "length" : "thermal_length")), 0.0);
+    const Eigen::MatrixXd over_factor =
+        term.weights.cols() == 1
+            ? Eigen::MatrixXd{Eigen::MatrixXd::Ones(1, 1)}
+            : covariance_factor(term.weights.cols(), 0.6,
+                                std::exp(hyper.at(rate ? "rate_length" : "temperature_length")), 0.0);
+    // Constant, slope and bow of the geometry and of the linear expansion are free; elsewhere they are like the rest.
     const bool free =
         geometry || term.factor == ThermalFactor::temperature || term.factor == ThermalFactor::zone;
-    const Eigen::MatrixXd over_x = covariance_factor(
-        term.weights.rows(), term.spacing, std::exp(hyper.at(geometry ? "length" : "thermal_length")),
-        free ? std::pow(10.0 * scale_ / size, 2) : 1.0);
-    if (term.weights.cols() == 1) {
-      factors.push_back(size * over_x);
-      continue;
-    }
-    const bool rate = term.factor == ThermalFactor::rate_curve;
-    const Eigen::MatrixXd over_factor = covariance_factor(
-        term.weights.cols(), 0.6, std::exp(hyper.at(rate ? "rate_length" : "temperature_length")), 0.0);
-    const Eigen::Index n = term.weights.rows();
-    Eigen::MatrixXd both = Eigen::MatrixXd::Zero(term.weights.size(), term.weights.size());
-    for (Eigen::Index i = 0; i < term.weights.cols(); ++i)
-      for (Eigen::Index j = 0; j <= i; ++j)
-        both.block(i * n, j * n, n, n) = size * over_factor(i, j) * over_x;
-    factors.push_back(std::move(both));
+    const Eigen::Vector3d trend =
+        free ? Eigen::Vector3d{10.0, 10.0, positions_ > 2 ? 10.0 : unseen_bow} * scale_
+             : Eigen::Vector3d{1.0, 1.0, 0.5} * size;
+    factors.push_back(product(over_factor, over_x));
+    factors.push_back(product(over_factor, trend.asDiagonal()));
   }
   return factors;
 }

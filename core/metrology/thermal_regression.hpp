@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/metrology/lone_outliers.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/metrology/thermal_identification.hpp"
 #include "core/numerics/gaussian_prior.hpp"
@@ -37,8 +38,9 @@ class ThermalRegression {
   [[nodiscard]] numerics::Posterior fit(const ThermalHyper& hyper, bool with_covariance) const;
   /// Fills in what is missing of `hyper`, then maximises evidence and hyperprior over all that matter.
   void search(ThermalHyper& hyper, double step) const;
-  /// Weights of one for readings within 4.5 standard deviations, zero for the others.
-  [[nodiscard]] Eigen::VectorXd judged(const Eigen::VectorXd& residual) const;
+  /// Weights of zero for readings that stand alone beyond 4.5 standard deviations, one for the others: a stretch of
+  /// readings beyond them is no outlier but something that the model lacks.
+  [[nodiscard]] LoneOutliers judged(const Eigen::VectorXd& residual) const;
   /// A first robust fit with typical hyperparameters and Cauchy weights, for readings with gross outliers.
   void reject_outliers();
   [[nodiscard]] ThermalHyper typical() const;
@@ -69,6 +71,7 @@ class ThermalRegression {
   ThermalError shape_;
   Eigen::VectorXd temperature_;
   double scale_ = 1.0;
+  std::vector<int> places_;  // of each reading
   int positions_ = 2;
   Eigen::VectorXd weights_;
   std::vector<ThermalTerm> terms_;
