@@ -292,7 +292,7 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
     fit.notes.push_back(text("the temperature varies by %.2f K only: its effect cannot be told",
                              identifier.shape().temperature.width()));
   if (unexplained > 0.0)
-    fit.notes.push_back(
+    fit.unexplained.push_back(
         text("%.0f nm RMS of what is left goes on from one reading to the next: something that these columns "
              "do not tell "
              "moves the axis (sigma holds it)",
@@ -300,10 +300,10 @@ ThermalFit identify_thermal(const ThermalReadings& readings) {
         (readings.time ? "" : "; with the times `t [s]` a lag behind the thermistor could be told") +
         (readings.heating_rate ? "" : "; with `heating_rate [K/s]` heating and cooling could be told apart"));
   if (fit.in_stretches > 0)
-    fit.notes.push_back(
+    fit.unexplained.push_back(
         text("%.0f readings lie more than 4.5 standard deviations off in stretches that the model does not "
              "explain; "
-             "a stretch is no outlier, all of them are fitted",
+             "a stretch is no outlier, all of these are fitted",
              static_cast<double>(fit.in_stretches)));
   if (auto branches = compare_branches(readings, readings.error - fit.predicted, fit.kept))
     fit.notes.push_back(*branches);

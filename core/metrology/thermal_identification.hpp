@@ -31,6 +31,7 @@ struct ThermalReadings {
     std::vector<double> temperature;  // [degC]
   };
   History history{};
+  std::size_t incomplete = 0;  // rows of the recording that lacked a value and are not here
 
   /// The temperature of a body behind the sensor at each reading [degC]. Needs `time`; `lag` [s] > 0.
   [[nodiscard]] Eigen::VectorXd lagged(double lag) const;
@@ -55,7 +56,8 @@ struct ThermalFit {
   Eigen::Index in_stretches = 0;  // readings far from the model in stretches: they are kept
   double reversal = 0.0;          // mean of forward minus backward [m]
   std::vector<std::string> unidentified;
-  std::vector<std::string> notes;  // what the user should know, sentences
+  std::vector<std::string> unexplained;  // what no term here explains, sentences
+  std::vector<std::string> notes;        // what else the user should know, sentences
 };
 
 /// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a

@@ -64,9 +64,11 @@ constexpr double growth_of_steel = 12e-6;  // 1/K
 
 constexpr double finest = 1e-9;  // m, what no reading of a machine is better than
 
+/// Standard deviation by the median deviation, or the plain one where half of the values are equal.
 double robust_size(const Eigen::VectorXd& values) {
   const std::vector<double> list{values.begin(), values.end()};
-  return numerics::robust_deviation(list, numerics::median(list));
+  const double robust = numerics::robust_deviation(list, numerics::median(list));
+  return robust > 0.0 ? robust : std::sqrt((values.array() - values.mean()).square().mean());
 }
 
 }  // namespace

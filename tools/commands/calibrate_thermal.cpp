@@ -76,6 +76,7 @@ ThermalReadings read_readings(const recording::Table& table) {
     }
   }
   ThermalReadings readings{vectors[0], vectors[1], vectors[2], std::nullopt, std::nullopt, std::nullopt, {}};
+  readings.incomplete = complete.size() - static_cast<std::size_t>(kept);
   for (std::size_t z = 0; z < zones.size(); ++z) {
     Eigen::VectorXd values(kept);
     Eigen::Index next = 0;
@@ -137,7 +138,9 @@ void calibrate(const Options& options) {
   nlohmann::json report;
   report["kind"] = "thermal";
   report["readings"] = readings.x.size();
-  report["rejected"] = figures.rejected;
+  report["rejected"] = figures.left_out.rows.size();
+  report["in_stretches"] = fit.in_stretches;
+  report["rows"] = report::json_of(figures.left_out);
   report["noise_m"] = fit.model.noise;
   report["before_rms_m"] = figures.before;
   report["after_left_out_rms_m"] = figures.after;
@@ -155,13 +158,15 @@ void calibrate(const Options& options) {
                                 {"verdict", candidate.verdict}});
   write_calibration(folder, text, report, thermal_page(file, readings, fit, figures));
 
-  std::cout << "thermal error from " << readings.x.size() << " readings, " << figures.rejected
-            << " rejected as outliers, noise " << si(fit.model.noise, "m") << '\n';
+  std::cout << "thermal error from " << readings.x.size() << " readings, noise " << si(fit.model.noise, "m")
+            << '\n'
+            << line_of(figures.left_out) << '\n';
   for (const auto& candidate : fit.candidates)
     std::cout << "  " << candidate.name << ": RMS " << si(candidate.left_out_rms, "m")
               << " on readings left out; " << candidate.verdict << '\n';
   std::cout << "RMS " << si(figures.before, "m") << " before, " << si(figures.after, "m")
             << " after (readings left out); systematic error known to " << si(figures.sigma, "m") << '\n';
+  for (const auto& what : fit.unexplained) std::cout << "not explained: " << what << '\n';
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
   std::cout << written(folder, "compensation.yaml") << '\n';

@@ -13,8 +13,8 @@
 #include <fstream>
 #include <iomanip>
 #include <limits>
+#include <span>
 #include <sstream>
-#include <stdexcept>
 
 #include "core/base/contract.hpp"
 #include "core/base/name.hpp"
@@ -166,8 +166,10 @@ std::string drawing(const Series& series, const std::string& name, const std::st
   return {};
 }
 
+/// The script has nine digits: ends that agree in them are one for gnuplot, which refuses an empty range.
 bool is_range(const std::optional<Range>& r) {
-  return r && std::isfinite(r->lower) && std::isfinite(r->upper) && r->lower < r->upper;
+  return r && std::isfinite(r->lower) && std::isfinite(r->upper) &&
+         r->width() > 1e-7 * std::max(std::abs(r->lower), std::abs(r->upper));
 }
 
 /// Whether a row of the series is to be seen: gnuplot refuses a plot without one.
@@ -283,7 +285,7 @@ std::string content_of(const std::filesystem::path& file) {
 }
 
 /// gnuplot on `script` in the folder, its complaints in `errors` there: no shell, none of the user's start files, and names of
-/// ours alone. False where it is missing or fails.
+/// ours alone. False where it is missing or fails (without words where it is missing).
 bool run_gnuplot(const std::filesystem::path& folder) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
@@ -312,10 +314,8 @@ void make_names_unique(std::string& svg, std::size_t number) {
   }
 }
 
-}  // namespace
-
-std::vector<std::string> draw(const std::vector<Plot>& plots) {
-  if (plots.empty()) return {};
+/// The drawings of plots by one gnuplot, or nothing and why.
+std::vector<std::string> drawn_together(std::span<const Plot> plots, std::string& fault) {
   const TemporaryFolder folder{"invar-plots"};
   const auto file = [&](std::size_t i) { return std::to_string(i) + ".svg"; };
   std::vector<Texts> texts(plots.size());
@@ -324,17 +324,35 @@ std::vector<std::string> draw(const std::vector<Plot>& plots) {
     script << std::setprecision(9) << "set encoding utf8\n";
     for (std::size_t i = 0; i < plots.size(); ++i) write_plot(script, plots[i], i, file(i), texts[i]);
   }
-  if (!run_gnuplot(folder.path()))
-    throw std::runtime_error{"gnuplot failed: " + printable(content_of(folder / "errors")) +
-                             " (is gnuplot-nox installed?)"};
+  if (!run_gnuplot(folder.path())) {
+    const std::string words = content_of(folder / "errors");
+    fault = words.empty() ? "gnuplot is not there; install gnuplot-nox" : "gnuplot says: " + printable(words);
+    return {};
+  }
   std::vector<std::string> drawings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
     std::string svg = content_of(folder / file(i));
     const auto begin = svg.find("<svg");
-    svg = begin == std::string::npos ? "" : svg.substr(begin);
-    make_names_unique(svg, i);
-    drawings.push_back(texts[i].written_into(svg));
+    drawings.push_back(begin == std::string::npos ? "" : texts[i].written_into(svg.substr(begin)));
   }
+  return drawings;
+}
+
+}  // namespace
+
+std::vector<std::string> draw(const std::vector<Plot>& plots) {
+  if (plots.empty()) return {};
+  std::string fault;
+  std::vector<std::string> drawings = drawn_together(plots, fault);
+  // One that gnuplot refuses must not take the others with it.
+  for (std::size_t i = 0; drawings.size() < plots.size(); ++i) {
+    const auto one = drawn_together(std::span{plots}.subspan(i, 1), fault);
+    drawings.push_back(!one.empty() ? one.front() : "");
+    if (drawings.back().empty())
+      drawings.back() =
+          "<p>The plot \"" + escaped(plots[i].title) + "\" is not drawn: " + escaped(fault) + "</p>";
+  }
+  for (std::size_t i = 0; i < drawings.size(); ++i) make_names_unique(drawings[i], i);
   return drawings;
 }
 

@@ -52,8 +52,8 @@ void add_curve(Plot& plot, const Range& range, const std::string& label, const s
 Series histogram(const std::vector<double>& values, double width, double unit);
 
 /// One <svg> element a plot, in order, drawn by one gnuplot process. Long lines are thinned to about 4000
-/// points by their local extremes, so that a peak is never lost. Throws std::runtime_error when gnuplot is
-/// missing or fails.
+/// points by their local extremes, so that a peak is never lost. Where gnuplot is missing or refuses a plot, a
+/// paragraph in its place says why: a report never fails on a plot.
 std::vector<std::string> draw(const std::vector<Plot>& plots);
 
 }  // namespace invar::report

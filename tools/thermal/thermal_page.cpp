@@ -13,12 +13,6 @@ using metrology::ThermalReadings;
 using report::number;
 using report::si;
 
-double rms(const std::vector<double>& values) {
-  double square = 0.0;
-  for (const double value : values) square += value * value;
-  return std::sqrt(square / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
-}
-
 /// Indices of the readings within so many kelvin of a temperature.
 std::vector<Eigen::Index> near(const ThermalReadings& readings, double temperature, double within) {
   std::vector<Eigen::Index> rows;
@@ -92,8 +86,15 @@ std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const 
   report::Series cold_all = cold;
   report::Series whole_all = whole;
   const double middle = range.lower + 0.5 * range.width();
+  report::Series apart = whole;
+  apart.label = "left out of the fit";
+  apart.colour = "#d1495b";
   for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
-    if (fit.kept(i) <= 0.0) continue;
+    if (fit.kept(i) <= 0.0) {
+      apart.x.push_back(readings.time ? (*readings.time)(i) : static_cast<double>(i));
+      apart.y.push_back(1e6 * (readings.error(i) - fit.predicted(i)));
+      continue;
+    }
     const double at_cold = 1e6 * (readings.error(i) - fit.model.value({readings.x(i), range.lower, 0.0}));
     const double left = 1e6 * (readings.error(i) - fit.predicted(i));
     const double t = readings.time ? (*readings.time)(i) : static_cast<double>(i);
@@ -109,7 +110,7 @@ std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const 
   }
   fixed.y_label = varying.y_label = "residual [um]";
   fixed.series = {std::move(cold), std::move(whole)};
-  varying.series = {std::move(cold_all), std::move(whole_all)};
+  varying.series = {std::move(cold_all), std::move(whole_all), std::move(apart)};
   return {std::move(fixed), std::move(varying)};
 }
 
@@ -117,23 +118,33 @@ std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const 
 
 ThermalFigures thermal_figures(const ThermalReadings& readings, const ThermalFit& fit) {
   ThermalFigures figures;
-  std::vector<double> before;
-  std::vector<double> after;
+  std::vector<double> before, used, all;
+  report::LeftOut& left_out = figures.left_out;
+  left_out.header = {"reading", "x", "temperature", "error", "model", "apart"};
   for (Eigen::Index i = 0; i < readings.x.size(); ++i) {
+    const double apart = readings.error(i) - fit.predicted(i);
+    all.push_back(apart);
     if (fit.kept(i) <= 0.0) {
-      ++figures.rejected;
+      left_out.rows.push_back({std::to_string(i + 1), si(readings.x(i), "m", 4),
+                               number(readings.temperature(i), 4) + " degC", si(readings.error(i), "m"),
+                               si(fit.predicted(i), "m"), si(apart, "m")});
       continue;
     }
     before.push_back(readings.error(i) - fit.model.value({readings.x(i), fit.model.temperature.lower, 0.0}));
-    after.push_back(readings.error(i) - fit.predicted(i));
+    used.push_back(apart);
     figures.sigma += fit.model.sigma(fit.model.typical(readings.x(i), readings.temperature(i)));
   }
-  figures.sigma /= static_cast<double>(std::max<std::size_t>(after.size(), 1));
-  figures.before = rms(before);
+  figures.sigma /= static_cast<double>(std::max<std::size_t>(used.size(), 1));
+  figures.before = report::rms_of(before);
   for (const auto& candidate : fit.candidates)
     if (candidate.chosen) figures.after = candidate.left_out_rms;
-  const auto [low, high] = std::minmax_element(after.begin(), after.end());
-  figures.spread = after.empty() ? 0.0 : *high - *low;
+  left_out.given = all.size() + readings.incomplete;
+  left_out.used = used.size();
+  left_out.reasons = {{readings.incomplete, "with an empty cell"},
+                      {left_out.rows.size(), "that stand alone more than 4.5 standard deviations off"}};
+  left_out.rms_used = report::rms_of(used);
+  left_out.rms_all = report::rms_of(all);
+  left_out.unexplained = fit.unexplained;
   return figures;
 }
 
@@ -145,9 +156,11 @@ report::Page thermal_page(const std::filesystem::path& file, const ThermalReadin
                    si(figures.after, "m") +
                    " on readings left out of the fit; the systematic error is known to " +
                    si(figures.sigma, "m") + " (1 sigma)",
-               "good");
+               fit.unexplained.empty() ? "good" : "warn");
   for (const auto& what : fit.unidentified) page.callout("Not identified: " + what, "warn");
+  for (const auto& what : fit.unexplained) page.callout(what, "warn");
   for (const auto& note : fit.notes) page.paragraph(note);
+  report::show(page, figures.left_out);
   page.heading("Models tried");
   std::vector<std::vector<std::string>> rows;
   for (const auto& candidate : fit.candidates)

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "core/metrology/thermal_identification.hpp"
+#include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -11,9 +12,8 @@ namespace invar::tools {
 struct ThermalFigures {
   double before = 0.0;  // m, readings against the model of the coldest temperature
   double after = 0.0;   // m, RMS of readings left out
-  double spread = 0.0;  // m, peak to peak after
   double sigma = 0.0;   // m, mean sigma of the systematic value
-  int rejected = 0;
+  report::LeftOut left_out;
 };
 
 ThermalFigures thermal_figures(const metrology::ThermalReadings& readings, const metrology::ThermalFit& fit);

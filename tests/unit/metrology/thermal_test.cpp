@@ -2,10 +2,12 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
 
 #include "core/metrology/heat_trace.hpp"
+#include "core/metrology/lone_outliers.hpp"
 #include "core/metrology/thermal_error.hpp"
 #include "core/metrology/thermal_identification.hpp"
 #include "core/metrology/thermistor.hpp"
@@ -186,7 +188,7 @@ TEST(ThermalIdentification, SigmaHoldsWhatTheColumnsDoNotTell) {
         ++total;
       }
   EXPECT_GT(static_cast<double>(covered) / total, 0.88);
-  EXPECT_THAT(fit.notes, Contains(HasSubstr("heating_rate [K/s]")));
+  EXPECT_THAT(fit.unexplained, Contains(HasSubstr("heating_rate [K/s]")));
 }
 
 TEST(ThermalIdentification, HoldsTheValueOutsideAndLetsSigmaGrow) {
@@ -379,6 +381,92 @@ TEST(ThermalIdentification, TakesAZoneThatMattersAndLeavesOutOneThatDoesNot) {
   EXPECT_NEAR(compiled.value(0.15), fit.model.value(outside), 5e-9);
   EXPECT_FALSE(compiled.inside());
   EXPECT_GT(fit.model.sigma(outside), fit.model.sigma({0.15, 28.2, 0.0, {23.0}}));
+}
+
+/// Readings at a few places, in turn, while the temperature rises by ten kelvin.
+ThermalReadings at_places(int places, unsigned seed, double noise,
+                          const std::function<double(double u, double dt)>& error) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  constexpr int rounds = 150;
+  ThermalReadings readings;
+  const Eigen::Index n = rounds * places;
+  readings.x.resize(n), readings.temperature.resize(n), readings.error.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double u = 2.0 * static_cast<double>(i % places) / (places - 1) - 1.0;
+    const double dt = 10.0 * static_cast<double>(i / places) / (rounds - 1);
+    readings.x(i) = 0.3 + 0.3 * u;
+    readings.temperature(i) = 21.0 + dt;
+    readings.error(i) = error(u, dt) + noise * normal(random);
+  }
+  return readings;
+}
+
+double worst_between(const ThermalFit& fit, const std::function<double(double u, double dt)>& error) {
+  double worst = 0.0;
+  for (double u = -1.0; u <= 1.0; u += 0.05)
+    for (double dt = 0.0; dt <= 10.0; dt += 1.0)
+      worst = std::max(worst, std::abs(fit.model.value({0.3 + 0.3 * u, 21.0 + dt, 0.0}) - error(u, dt)));
+  return worst;
+}
+
+TEST(ThermalIdentification, KnowsAConstantAScaleAndABowBetweenTheFewPlacesRead) {
+  using Error = std::function<double(double, double)>;
+  const Error constant = [](double, double dt) { return 4e-5 - 2.5e-5 * dt; };
+  const Error scale = [](double u, double dt) { return 7e-6 * (1.0 + u) * dt - 2e-5 * u; };
+  const Error bow = [](double u, double dt) { return 3e-6 * (1.0 - u * u) * dt + 1e-6 * u; };
+  constexpr double noise = 3e-7;  // a fit of six numbers knows each to 0.05 um
+  for (const int places : {2, 3, 4, 6})
+    for (const Error* error : {&constant, &scale, &bow}) {
+      if (places == 2 && error == &bow) continue;
+      const ThermalFit fit = identify_thermal(at_places(places, 7, noise, *error));
+      EXPECT_LT(worst_between(fit, *error), noise) << places << " places";
+    }
+}
+
+TEST(ThermalIdentification, SigmaGrowsBetweenTwoPlacesForTheBowThatTheyDoNotShow) {
+  const auto bow = [](double u, double dt) { return 1e-6 * (1.0 - u * u) * dt + 1e-5 * u * dt; };
+  const ThermalFit fit = identify_thermal(at_places(2, 7, 3e-7, bow));
+  const double apart = std::abs(fit.model.value({0.3, 31.0, 0.0}) - bow(0.0, 10.0));
+  EXPECT_GT(apart, 9e-6);
+  EXPECT_LT(apart, 2.0 * fit.model.sigma({0.3, 31.0, 0.0}));
+  EXPECT_LT(fit.model.sigma({0.0, 31.0, 0.0}), 2e-7);
+}
+
+// The mount of a laser that warms for a while: a quarter of the readings lie far off, one after another.
+TEST(ThermalIdentification, AStretchIsNoOutlier) {
+  const auto plain = [](double u, double dt) { return 2e-6 * (1.0 + u) * dt; };
+  ThermalReadings readings = at_places(5, 3, 2e-7, plain);
+  const Eigen::Index n = readings.x.size();
+  for (Eigen::Index i = n / 4; i < n / 2; ++i)
+    readings.error(i) +=
+        2e-5 * std::sin(std::numbers::pi * static_cast<double>(i - n / 4) / static_cast<double>(n / 4));
+  readings.error(n - 20) += 4e-4;
+  const ThermalFit fit = identify_thermal(readings);
+  EXPECT_EQ(static_cast<Eigen::Index>(fit.kept.sum()), n - 1);
+  EXPECT_EQ(fit.kept(n - 20), 0.0);
+  EXPECT_THAT(fit.unexplained, ::testing::Not(IsEmpty()));
+  int covered = 0;
+  for (Eigen::Index i = 0; i < n; ++i)
+    covered += std::abs(readings.error(i) - fit.predicted(i)) <=
+                       2.0 * fit.model.sigma({readings.x(i), readings.temperature(i), 0.0})
+                   ? 1
+                   : 0;
+  EXPECT_GT(covered, 0.85 * static_cast<double>(n));
+}
+
+TEST(LoneOutliers, AreToldFromStretchesInTimeAndAtOnePlace) {
+  // Three places in turn; the last of them deviates four times running, two glitches stand beside one another.
+  const std::vector<int> place{0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1, 2};
+  Eigen::VectorXd residual = Eigen::VectorXd::Constant(15, 0.1);
+  for (const Eigen::Index i : {2, 5, 8, 11}) residual(i) = 6.0;
+  residual(12) = 40.0, residual(13) = -30.0;
+  const LoneOutliers judged = lone_outliers(residual, place, 1.0);
+  EXPECT_EQ(judged.outliers, 2);
+  EXPECT_EQ(judged.in_stretches, 4);
+  EXPECT_EQ(judged.weights(12), 0.0);
+  EXPECT_EQ(judged.weights(13), 0.0);
+  EXPECT_EQ(judged.weights.sum(), 13.0);
 }
 
 TEST(HeatTrace, KnowsTheRateAndTheLaggedTemperatureOfWhatItWasGiven) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <string>
 #include <vector>
@@ -134,6 +135,49 @@ TEST(Plots, AreDrawnWhateverTheNumbers) {
   point.x_range = Range{1.0, 1.0};
   point.y_range = Range{nan, infinite};
   EXPECT_EQ(draw({empty, logarithmic, nowhere, point}).size(), 4u);
+}
+
+/// PATH for as long as it lives.
+struct Path {
+  explicit Path(const std::string& now) { setenv("PATH", now.c_str(), 1); }
+  ~Path() { setenv("PATH", before.c_str(), 1); }
+  std::string before = std::getenv("PATH");
+};
+
+TEST(Plots, OneThatCannotBeDrawnSaysSoAndLeavesTheOthers) {
+  const TemporaryFolder folder{"invar-test-plots"};
+  {
+    std::ofstream fake{folder / "gnuplot"};  // refuses any script with a grid
+    fake << "#!/bin/sh\ngrep -q 'with image' script && echo no grids here >&2 && exit 1\n"
+            "PATH=/usr/bin:/bin exec gnuplot \"$@\"\n";
+  }
+  std::filesystem::permissions(folder / "gnuplot", std::filesystem::perms::owner_all);
+  Plot grid = plot_of("a grid");
+  grid.series.resize(1);
+  grid.series[0].style = Series::Style::heat;
+  grid.series[0].u = grid.series[0].x;
+  const Path path{folder.path().string() + ":/usr/bin:/bin"};
+  const auto drawings = draw({plot_of("a"), grid, plot_of("b")});
+  ASSERT_EQ(drawings.size(), 3u);
+  EXPECT_TRUE(drawings[0].starts_with("<svg"));
+  EXPECT_NE(drawings[1].find("a grid\" is not drawn: gnuplot says: no grids here"), std::string::npos)
+      << drawings[1];
+  EXPECT_TRUE(drawings[2].starts_with("<svg"));
+}
+
+TEST(Plots, AreDrawnInARangeThatIsNone) {
+  Plot narrow = plot_of("narrow");
+  narrow.x_range = narrow.y_range = Range{1.0, 1.0 + 1e-12};
+  EXPECT_TRUE(draw({narrow}).front().starts_with("<svg"));
+}
+
+TEST(Plots, APageIsWrittenWithoutGnuplot) {
+  const TemporaryFolder folder{"invar-test-plots"};
+  const Path path{folder.path().string()};
+  Page page{"Title"};
+  page.plot(plot_of("a"));
+  const std::string text = page.text();
+  EXPECT_NE(text.find("is not drawn: gnuplot is not there; install gnuplot-nox"), std::string::npos);
 }
 
 TEST(Pages, ShowNamesAsLetters) {

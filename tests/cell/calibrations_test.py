@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""What `invar calibrate` says of files: what it left out, what that costs, and what it does not claim.
+
+Usage: calibrations_test.py INVAR [TEST]
+Each test makes its own file, of a machine whose truth it knows.
+"""
+import json
+import math
+import pathlib
+import random
+import subprocess
+import sys
+import tempfile
+import unittest
+
+INVAR = pathlib.Path(sys.argv.pop(1)).resolve()
+
+
+class Calibrations(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory(prefix="invar-calibrations-")
+        self.addCleanup(self.folder.cleanup)
+        self.here = pathlib.Path(self.folder.name)
+
+    def call(self, *arguments, status=0):
+        done = subprocess.run([INVAR, *map(str, arguments)], cwd=self.here, capture_output=True, text=True, timeout=120)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done.stdout if status == 0 else done.stderr
+
+    def write(self, name, header, rows):
+        text = header + "\n" + "".join(",".join(str(value) for value in row) + "\n" for row in rows)
+        (self.here / name).write_text(text)
+
+    def report(self, folder="out"):
+        return json.loads((self.here / folder / "report.json").read_text())
+
+    def page(self, folder="out"):
+        return (self.here / folder / "report.html").read_text()
+
+    def predicted(self, header, rows):
+        self.write("inputs.csv", header, rows)
+        self.call("predict", "--model", "out/compensation.yaml", "--inputs", "inputs.csv", "--output", "predicted.csv")
+        lines = (self.here / "predicted.csv").read_text().splitlines()
+        names = [name.split(" [")[0] for name in lines[0].split(",")]
+        return [dict(zip(names, map(float, line.split(",")))) for line in lines[1:]]
+
+
+class Thermal(Calibrations):
+    HEADER = "t [s],x [mm],temperature [degC],error [um]"
+
+    def heated(self, error, noise=0.4, places=(0, 100), rounds=120):
+        draw = random.Random(5)
+        rows = []
+        for k in range(rounds):
+            temperature = 22 + 9 * k / (rounds - 1)
+            for x in places:
+                rows.append([60 * k, x, f"{temperature:.3f}", f"{error(x, temperature) + draw.gauss(0, noise):.3f}"])
+        return rows
+
+    def test_an_error_that_is_equal_everywhere_is_so_between_the_places(self):
+        self.write("t.csv", self.HEADER, self.heated(lambda x, t: -25 * (t - 22)))
+        self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+        for row in self.predicted("x [mm],temperature [degC]", [[x, 31] for x in range(0, 101, 10)]):
+            self.assertLess(abs(row["error"] + 225e-6), 0.4e-6)
+
+    def test_what_was_left_out_is_shown_with_the_error_over_all(self):
+        rows = self.heated(lambda x, t: 0.01 * x * (t - 22), places=(0, 50, 100))
+        rows[100][3], rows[200][3] = 400, ""
+        self.write("t.csv", self.HEADER, rows)
+        said = self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+        self.assertIn("360 readings, 358 used (left out: 1 with an empty cell, 1 that stand alone more than 4.5", said)
+        counts = self.report()["rows"]
+        self.assertEqual((counts["given"], counts["used"]), (360, 358))
+        self.assertAlmostEqual(counts["rms_used"], 0.4e-6, delta=0.06e-6)
+        self.assertGreater(counts["rms_all"], 19e-6)  # 390 um / sqrt(359)
+        page = self.page()
+        self.assertIn("What was left out, and what it costs", page)
+        self.assertIn("400 um", page)
+
+    def test_a_stretch_is_fitted_and_said(self):
+        rows = self.heated(lambda x, t: 0.01 * x * (t - 22), places=(0, 50, 100))
+        for i in range(90, 180):
+            rows[i][3] = float(rows[i][3]) + 30 * math.sin(math.pi * (i - 90) / 90)
+        self.write("t.csv", self.HEADER, rows)
+        said = self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+        self.assertIn("360 readings, all used", said)
+        self.assertIn("not explained: ", said)
+        self.assertNotIn('class="callout good"', self.page())
+
+    def test_two_temperatures_make_a_report(self):
+        for noise in (0, 0.3):
+            draw = random.Random(1)
+            self.write("t.csv", "x [mm],temperature [degC],error [um]",
+                       [[x, t, f"{0.01 * x * (t - 20) + noise * draw.gauss(0, 1):.5f}"]
+                        for _ in range(3) for t in (20, 30) for x in (0, 20, 40, 60)])
+            self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+            row, = self.predicted("x [mm],temperature [degC]", [[60, 30]])
+            self.assertLess(abs(row["error"] - 6e-6), 0.5e-6)
+
+
+if __name__ == "__main__":
+    unittest.main()
