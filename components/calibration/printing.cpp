@@ -380,7 +380,9 @@ Task Printing::watch_drift(const PrintJob& job, const TrajectoryFit& fit) {
     Prints prints;
     co_await print(job, height, "", prints);
     const double time = (owner_.now() - calibrated).in_seconds();
-    for (const Print& one : prints) tracker.add(time, height, one.velocity, one.landed - one.jetted);
+    for (const Print& one : prints)
+      tracker.add(time, height, one.velocity,
+                  one.landed - one.jetted - fit.trajectory.over_field(one.jetted));
     all.insert(all.end(), prints.begin(), prints.end());
     write_prints(all, folder / "drift.csv");
     if (!tracker.within_limit(height, {job.velocity, 0.0}))

@@ -201,12 +201,16 @@ std::string Dispenser::fill(const PatternCommand& command, TriggerPattern& patte
     if (!(path.offset(height).norm() <= parameters_.bound))
       return "the model moves targets beyond its bound at this height; calibrate there";
   }
-  const Eigen::Vector2d offset = path.offset(height);
   const std::int64_t lead_ns = Duration::seconds(path.lead(height)).ns;
   for (const Eigen::Vector2d& target : found->second) {
+    const Eigen::Vector2d aimed = path.aim(target, height);
+    if (model_.active() != nullptr && !((aimed - target).norm() <= parameters_.bound))
+      return "the model moves a target of this pattern beyond its bound; calibrate over the pattern";
+    if (model_.active() != nullptr && !(path.sigma(height, aimed) <= parameters_.largest_sigma))
+      return "the model is not certain enough over this pattern; calibrate over the pattern";
     TriggerPoint point;
     point.target({target.x(), target.y(), 0.0});
-    point.position({target.x() - offset.x(), target.y() - offset.y(), height});
+    point.position({aimed.x(), aimed.y(), height});
     point.lead_ns(lead_ns);
     pattern.points().push_back(point);
   }

@@ -1,15 +1,14 @@
 #include "core/metrology/droplet_trajectory.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <numbers>
 
 #include "core/base/contract.hpp"
+#include "core/metrology/droplet_fit.hpp"
 #include "core/numerics/robust.hpp"
 
 namespace invar::metrology {
@@ -17,6 +16,7 @@ namespace invar::metrology {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
+constexpr double chance_of_no_field = 1e-4;  // two tests, on droplets that the fits themselves chose
 
 /// Groups of equal height: indices by the group's number; heights within 1 % of the largest are one.
 std::vector<int> height_groups(const Eigen::VectorXd& height, std::vector<double>& levels) {
@@ -54,105 +54,6 @@ Eigen::Vector2d spatial_median(const Eigen::Matrix2Xd& points, const std::vector
   return at;
 }
 
-/// Which columns there are beside the placement: slope x, y; delay; slowness (in this order).
-struct Form {
-  bool tilt = false;
-  bool delay = false;
-  bool carry = false;
-  [[nodiscard]] Eigen::Index columns() const {
-    return 2 + (tilt ? 2 : 0) + (delay ? 1 : 0) + (carry ? 1 : 0);
-  }
-};
-
-struct Solution {
-  Eigen::VectorXd theta;
-  Eigen::MatrixXd covariance;  // for unit weights' variance
-};
-
-/// Rows of both components of each kept droplet, weighted.
-Solution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, const Eigen::VectorXd& kept,
-               const Eigen::VectorXd& deviation, const Form& form) {
-  const Eigen::Index n = drops.height.size();
-  const Eigen::Index columns = form.columns();
-  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(2 * n, columns);
-  Eigen::VectorXd y = Eigen::VectorXd::Zero(2 * n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    if (kept(i) <= 0.0) continue;
-    for (Eigen::Index k = 0; k < 2; ++k) {
-      const double weight = 1.0 / deviation(i);
-      a(2 * i + k, k) = weight;
-      if (form.tilt) a(2 * i + k, 2 + k) = weight * drops.height(i);
-      if (form.delay) a(2 * i + k, columns - 2) = weight * drops.stage_velocity(k, i);
-      if (form.carry) a(2 * i + k, columns - 1) = weight * drops.height(i) * drops.stage_velocity(k, i);
-      y(2 * i + k) = weight * offset(k, i);
-    }
-  }
-  Solution solution;
-  // Heights are a thousandth of what placements are counted in: scale the columns before the decomposition.
-  const Eigen::VectorXd scale = a.colwise().norm().cwiseMax(1e-300);
-  const Eigen::MatrixXd scaled = a * scale.cwiseInverse().asDiagonal();
-  solution.theta = scaled.colPivHouseholderQr().solve(y).cwiseQuotient(scale);
-  const Eigen::MatrixXd inverse =
-      (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
-  solution.covariance = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
-  return solution;
-}
-
-Eigen::Matrix2Xd predicted(const Droplets& drops, const Eigen::VectorXd& theta, const Form& form) {
-  Eigen::Matrix2Xd offset(2, drops.height.size());
-  for (Eigen::Index i = 0; i < drops.height.size(); ++i) {
-    Eigen::Vector2d at = theta.head<2>();
-    if (form.tilt) at += drops.height(i) * theta.segment<2>(2);
-    if (form.delay) at += theta(theta.size() - 2) * drops.stage_velocity.col(i);
-    if (form.carry) at += drops.height(i) * theta(theta.size() - 1) * drops.stage_velocity.col(i);
-    offset.col(i) = at;
-  }
-  return offset;
-}
-
-/// Scatter of one component in each height's group, from the kept droplets (mean taken off, so n - 1).
-void scatter_model(const Eigen::Matrix2Xd& residual, const Eigen::VectorXd& kept,
-                   const std::vector<int>& group, const std::vector<double>& levels, double& at_nozzle,
-                   double& per_height) {
-  // var = s0^2 + (s1 h)^2, by weighted least squares over the groups, both not negative.
-  double sw = 0.0, sx = 0.0, sy = 0.0, sxx = 0.0, sxy = 0.0;
-  double pooled = 0.0;
-  double pooled_count = 0.0;
-  for (std::size_t g = 0; g < levels.size(); ++g) {
-    double squares = 0.0;
-    double count = 0.0;
-    for (Eigen::Index i = 0; i < residual.cols(); ++i)
-      if (group[static_cast<std::size_t>(i)] == static_cast<int>(g) && kept(i) > 0.0) {
-        squares += residual.col(i).squaredNorm();
-        count += 2.0;
-      }
-    pooled += squares;
-    pooled_count += count;
-    if (count < 4.0) continue;
-    const double variance = std::max(squares / (count - 2.0), 1e-18);
-    const double weight = count / (variance * variance);
-    const double x = levels[g] * levels[g];
-    sw += weight, sx += weight * x, sy += weight * variance, sxx += weight * x * x,
-        sxy += weight * x * variance;
-  }
-  const double flat = pooled / std::max(pooled_count - 2.0, 1.0);
-  at_nozzle = std::sqrt(std::max(flat, 1e-18));
-  per_height = 0.0;
-  const double determinant = sw * sxx - sx * sx;
-  if (determinant <= 1e-9 * sw * sxx) return;  // one height
-  double slope = (sw * sxy - sx * sy) / determinant;
-  double constant = (sy - slope * sx) / sw;
-  if (slope <= 0.0) {
-    slope = 0.0;
-    constant = sy / sw;
-  } else if (constant < 0.0) {
-    constant = 0.0;
-    slope = sxy / sxx;
-  }
-  at_nozzle = std::sqrt(std::max(constant, 1e-18));
-  per_height = std::sqrt(slope);
-}
-
 std::string text(const char* format, double a, double b = 0.0) {
   std::array<char, 200> buffer{};
   std::snprintf(buffer.data(), buffer.size(), format, a, b);
@@ -164,6 +65,17 @@ std::string text(const char* format, double a, double b = 0.0) {
 double DropletTrajectory::sigma(double height) const {
   const Eigen::Vector2d row{1.0, height};
   return std::sqrt(std::max(0.0, row.dot(covariance * row)));
+}
+
+double DropletTrajectory::sigma(double height, const Eigen::Vector2d& aimed) const {
+  const Eigen::Vector2d d = aimed - field_centre;
+  return std::hypot(sigma(height), std::sqrt(std::max(0.0, d.dot(field_covariance * d))));
+}
+
+Eigen::Vector2d DropletTrajectory::aim(const Eigen::Vector2d& target, double height,
+                                       const Eigen::Vector2d& stage_velocity) const {
+  const Eigen::Matrix2d turned = Eigen::Matrix2d::Identity() + field;
+  return field_centre + turned.inverse() * (target - field_centre - offset(height, stage_velocity));
 }
 
 double DropletTrajectory::tilt() const { return std::atan(slope.norm()); }
@@ -201,7 +113,6 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
     moved = largest > 1e-6;
     moving = moved && (drops.stage_velocity.colwise() - mean).cwiseAbs().maxCoeff() > 0.05 * largest;
   }
-  const Form form{.tilt = tilt, .delay = tilt && moving, .carry = moving};
   fit.kept = Eigen::VectorXd::Ones(n);
 
   // A satellite is far smaller than its fellows.
@@ -213,8 +124,7 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
       const double usual = numerics::median(sizes);
       const double spread = std::max(numerics::robust_deviation(sizes, usual), 0.02 * usual);
       for (Eigen::Index i = 0; i < n; ++i)
-        if (std::isfinite(drops.diameter(i)) && std::abs(drops.diameter(i) - usual) > 5.0 * spread)
-          fit.kept(i) = 0.0;
+        if (std::isfinite(drops.diameter(i)) && usual - drops.diameter(i) > 5.0 * spread) fit.kept(i) = 0.0;
     }
   }
   if (fit.kept.sum() < 1.0) fit.kept.setOnes();
@@ -231,45 +141,29 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
       if (group[static_cast<std::size_t>(i)] == static_cast<int>(g))
         from_median.col(i) = offset.col(i) - middle;
   }
-  Eigen::VectorXd deviation = Eigen::VectorXd::Ones(n);
   const Eigen::VectorXd sound = fit.kept;
-  Eigen::Matrix2Xd residual = from_median;
-  Solution solution;
-  // Where the stage carries droplets to both sides there is no middle: least sum of distances over the whole model.
-  for (int round = 0; moving && round < 30; ++round) {
-    solution = solve(drops, offset, sound, deviation, form);
-    residual = offset - predicted(drops, solution.theta, form);
-    deviation = residual.colwise().norm().cwiseMax(1e-8).cwiseSqrt();
+  const DropletStart start{drops, offset, sound, from_median, group, levels};
+  DropletForm form{.tilt = tilt, .delay = tilt && moving, .carry = moving};
+  DropletFit robust = fit_robustly(start, form);
+  for (const FieldForm field : {FieldForm::rotation_and_scale, FieldForm::any}) {
+    DropletForm wider = form;
+    wider.field = field;
+    wider.centre = centre_of(drops.target, sound);
+    if (!spans_field(drops.target, sound, field)) continue;
+    DropletFit other = fit_robustly(start, wider);
+    const double chance = chance_of_field(start, form, other, wider);
+    if (chance >= chance_of_no_field) continue;
+    form = wider;
+    robust = std::move(other);
+    fit.field_form = field;
+    fit.field_probability = chance;
   }
-  for (int round = 0; round < 6; ++round) {
-    // Reject by distance in units of the height's own robust scatter (Rayleigh: 3.9 sigma in a plane is 1 in 2000).
-    std::vector<double> level_scatter(levels.size(), 0.0);
-    std::vector<double> all;
-    for (std::size_t g = 0; g < levels.size(); ++g) {
-      std::vector<double> components;
-      for (Eigen::Index i = 0; i < n; ++i)
-        if (group[static_cast<std::size_t>(i)] == static_cast<int>(g) && sound(i) > 0.0)
-          components.insert(components.end(), {residual(0, i), residual(1, i)});
-      all.insert(all.end(), components.begin(), components.end());
-      const auto count = static_cast<double>(components.size()) / 2.0;
-      if (count < 3.0) continue;  // too few to judge by themselves
-      // Few droplets tell their scatter badly: correct for the median that was taken off.
-      level_scatter[g] = numerics::robust_deviation(components, 0.0) * std::sqrt(count / (count - 1.0)) *
-                         (1.0 + 1.0 / count);
-    }
-    const double typical = std::max(2.0 * numerics::robust_deviation(all, 0.0), 1e-7);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const double own = level_scatter[static_cast<std::size_t>(group[static_cast<std::size_t>(i)])];
-      const double scale = own > 0.0 ? std::max(own, 0.1 * typical) : typical;
-      fit.kept(i) = sound(i) > 0.0 && residual.col(i).norm() <= 3.9 * scale ? 1.0 : 0.0;
-    }
-    if (fit.kept.sum() < (tilt ? 2.0 : 1.0)) fit.kept = sound;
-    scatter_model(residual, fit.kept, group, levels, fit.scatter_at_nozzle, fit.scatter_per_height);
-    for (Eigen::Index i = 0; i < n; ++i)
-      deviation(i) = std::hypot(fit.scatter_at_nozzle, fit.scatter_per_height * drops.height(i));
-    solution = solve(drops, offset, fit.kept, deviation, form);
-    residual = offset - predicted(drops, solution.theta, form);
-  }
+  fit.kept = robust.kept;
+  fit.scatter_at_nozzle = robust.at_nozzle;
+  fit.scatter_per_height = robust.per_height;
+  const DropletSolution& solution = robust.solution;
+  const Eigen::Matrix2Xd& residual = robust.residual;
+  fit.scatter = test_scatter(start, form, robust);
   fit.residual = residual;
 
   DropletTrajectory& path = fit.trajectory;
@@ -297,6 +191,19 @@ TrajectoryFit identify_trajectory(const Droplets& drops) {
         text("the offset holds for a height of %.2f mm; print at a second height to tell "
              "placement from tilt",
              1e3 * h));
+  }
+  if (form.field != FieldForm::none) {
+    const Eigen::Index at = form.field_begin();
+    const auto numbers = solution.theta.segment(at, form.field_columns());
+    const auto covariance = solution.covariance.block(at, at, form.field_columns(), form.field_columns());
+    path.field_centre = form.centre;
+    if (form.field == FieldForm::any) {
+      path.field << numbers(0), numbers(1), numbers(2), numbers(3);
+      path.field_covariance = covariance.topLeftCorner<2, 2>();
+    } else {
+      path.field << numbers(0), -numbers(1), numbers(1), numbers(0);
+      path.field_covariance = covariance(0, 0) * Eigen::Matrix2d::Identity();
+    }
   }
   if (moving) {
     path.slowness = solution.theta(solution.theta.size() - 1);

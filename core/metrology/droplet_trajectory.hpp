@@ -18,8 +18,10 @@ struct Droplets {
   Eigen::VectorXd diameter;
 };
 
-/// landed - aimed = placement + height * slope + stage_velocity * (delay + height / ejection_speed).
+/// landed - aimed = placement + height * slope + field (aimed - field_centre)
+///                  + stage_velocity * (delay + height / ejection_speed).
 ///
+/// The field is what grows over the targets: a frame that is turned or scaled against another.
 /// Linear in placement and slope (a, b) = tan(tilt) (cos azimuth, sin azimuth), in which everything is done,
 /// since the azimuth is undefined at zero tilt. The seed's theta is the elevation: tilt = 90 deg - theta
 /// (erratum E23). Golden numbers: tilt 0.304 deg, azimuth 0.9739 deg, placement (2.0, 118.2) um land at
@@ -33,17 +35,31 @@ struct DropletTrajectory {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   double slowness_sigma = std::numeric_limits<double>::infinity();
   double delay_sigma = std::numeric_limits<double>::infinity();
+  Eigen::Matrix2d field = Eigen::Matrix2d::Zero();         // [m/m]; zero: none identified
+  Eigen::Vector2d field_centre = Eigen::Vector2d::Zero();  // [m], where the placement holds
+  /// Of one row of `field`: the variance that it adds to a component at `d` from the centre is d' covariance d.
+  Eigen::Matrix2d field_covariance = Eigen::Matrix2d::Zero();
   double least_height = 0.0;  // of the droplets it was identified from [m]
   double most_height = 0.0;
 
+  /// Landed minus aimed at the centre of the field.
   [[nodiscard]] Eigen::Vector2d offset(
       double height, const Eigen::Vector2d& stage_velocity = Eigen::Vector2d::Zero()) const {
     return placement + height * slope + lead(height) * stage_velocity;
   }
+  /// What the field adds to it for a droplet aimed here.
+  [[nodiscard]] Eigen::Vector2d over_field(const Eigen::Vector2d& aimed) const {
+    return field * (aimed - field_centre);
+  }
+  /// Where to aim so that a droplet lands on the target.
+  [[nodiscard]] Eigen::Vector2d aim(const Eigen::Vector2d& target, double height,
+                                    const Eigen::Vector2d& stage_velocity = Eigen::Vector2d::Zero()) const;
   /// By how much earlier a moving stage has to trigger [s].
   [[nodiscard]] double lead(double height) const { return delay + height * slowness; }
   /// Standard deviation of each component of the predicted offset at rest [m].
   [[nodiscard]] double sigma(double height) const;
+  /// The same for a droplet aimed here.
+  [[nodiscard]] double sigma(double height, const Eigen::Vector2d& aimed) const;
   [[nodiscard]] double tilt() const;     // [rad]
   [[nodiscard]] double azimuth() const;  // [rad]
 };
@@ -61,8 +77,24 @@ struct DropletStatistics {
 /// Needs eight diameters at least.
 DropletStatistics droplet_statistics(const Eigen::Ref<const Eigen::VectorXd>& diameters);
 
+/// Whether what a fit leaves is scatter alone: tested against a field that is curved over the targets and against
+/// droplets that deviate as the one before them.
+struct ScatterTest {
+  bool tested = false;         // false: too few droplets
+  double probability = 1.0;    // that scatter alone makes what a test found
+  std::string pattern;         // what the likelier of the two would be
+  double explained_rms = 0.0;  // of what is left, by the curved field [m]
+};
+inline constexpr double significant = 0.01;  // a pattern is said below this probability of chance
+
+/// What the field is: nothing, a rotation and one scale, or a rotation, two scales and a squareness.
+enum class FieldForm { none, rotation_and_scale, any };
+
 struct TrajectoryFit {
   DropletTrajectory trajectory;
+  FieldForm field_form = FieldForm::none;
+  double field_probability = 1.0;  // that chance alone makes the field's gain
+  ScatterTest scatter;
   double scatter_at_nozzle = 0.0;   // s0 of var = s0^2 + (s1 h)^2, one component [m]
   double scatter_per_height = 0.0;  // s1 [m/m]
   Eigen::VectorXd kept;             // 1, or 0 for a satellite
@@ -76,7 +108,8 @@ struct TrajectoryFit {
 };
 
 /// Robust weighted least squares: droplets weighted by the scatter of their height, satellites rejected (by
-/// their landing and, where measured, by their diameter). Heights closer than 1 % of the largest count as one;
+/// their landing and, where measured, by their diameter). A field is identified where an F-test says so (chance below
+/// 1 in 10 000). Heights closer than 1 % of the largest count as one;
 /// with one height placement and tilt cannot be told apart, and the offset is predicted for that height.
 TrajectoryFit identify_trajectory(const Droplets& droplets);
 

@@ -22,7 +22,7 @@ class TrajectoryTracker {
   TrajectoryTracker(const TrajectoryFit& fit, const TrajectoryDrift& drift);
 
   /// A droplet measured `time` [s] after the calibration, at which the offset from where the nozzle stood when it
-  /// was triggered is `offset` [m]. False: it is no droplet of this trajectory (farther than 4 sigma) and was left out.
+  /// was triggered is `offset` [m], without what the field adds there. False: it is no droplet of this trajectory (farther than 4 sigma) and was left out.
   /// Times never go back.
   bool add(double time, double height, const Eigen::Vector2d& stage_velocity, const Eigen::Vector2d& offset);
 

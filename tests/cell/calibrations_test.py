@@ -98,5 +98,36 @@ class Thermal(Calibrations):
             self.assertLess(abs(row["error"] - 6e-6), 0.5e-6)
 
 
+class Dispenser(Calibrations):
+    HEADER = "target_x [mm],target_y [mm],height [mm],landed_x [mm],landed_y [mm]"
+
+    def plate(self, curved=0.0):
+        draw = random.Random(8)
+        rows = []
+        for i in range(70):
+            x, y = 20 * (i % 10), 20 * (i // 10)
+            rows.append([x, y, 3, f"{x + 0.04 - 0.0007 * y + draw.gauss(0, 0.006):.5f}",
+                         f"{y - 0.07 + 0.0007 * x + curved * (x / 90 - 1) ** 2 + draw.gauss(0, 0.006):.5f}"])
+        return rows
+
+    def test_a_turned_field_is_found(self):
+        self.write("d.csv", self.HEADER, self.plate())
+        said = self.call("calibrate", "dispenser", "--droplets", "d.csv", "--out", "out")
+        self.assertIn("field turned by 0.040", said)  # 0.7 mrad
+        self.assertIn("find scatter alone", said)
+        row, = self.predicted("target_x [mm],target_y [mm],height [mm]", [[180, 120, 3]])
+        x, y = 1e3 * row["command_x"], 1e3 * row["command_y"]
+        self.assertAlmostEqual(x + 0.04 - 0.0007 * y, 180, delta=0.004)
+        self.assertAlmostEqual(y - 0.07 + 0.0007 * x, 120, delta=0.004)
+        self.assertLess(row["sigma"], 3e-6)
+
+    def test_a_curved_field_is_not_called_scatter(self):
+        self.write("d.csv", self.HEADER, self.plate(curved=0.05))
+        said = self.call("calibrate", "dispenser", "--droplets", "d.csv", "--out", "out")
+        self.assertIn("what is left is more than scatter", said)
+        self.assertNotIn('class="callout good"', self.page())
+        self.assertEqual(len(self.report()["rows"]["unexplained"]), 1)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -26,7 +26,8 @@ constexpr double degree = std::numbers::pi / 180.0;
 
 /// Droplets as printing.cpp writes them, in the order of printing.
 struct Prints {
-  std::vector<double> time, height, x, y, jetted_x, jetted_y, velocity_x, velocity_y, diameter;
+  std::vector<double> time, height, x, y, jetted_x, jetted_y, nozzle_x, nozzle_y, velocity_x, velocity_y,
+      diameter;
 
   explicit Prints(const std::filesystem::path& file) {
     const auto table = recording::Table::read(file);
@@ -45,6 +46,8 @@ struct Prints {
     y = less("landed_y", "target_y");
     jetted_x = less("landed_x", "jetted_x");
     jetted_y = less("landed_y", "jetted_y");
+    nozzle_x = table.in("jetted_x", "m");
+    nozzle_y = table.in("jetted_y", "m");
   }
   [[nodiscard]] std::vector<double> heights() const {
     std::vector<double> levels{height};
@@ -156,7 +159,8 @@ void add_drift(const std::filesystem::path& file, const metrology::DropletTrajec
     auto& sums = by_print[prints.time[i]];
     const Eigen::Vector2d fixed =
         Eigen::Vector2d{prints.jetted_x[i], prints.jetted_y[i]} -
-        calibrated.offset(prints.height[i], {prints.velocity_x[i], prints.velocity_y[i]});
+        calibrated.offset(prints.height[i], {prints.velocity_x[i], prints.velocity_y[i]}) -
+        calibrated.over_field({prints.nozzle_x[i], prints.nozzle_y[i]});
     sums[0] += prints.x[i] * prints.x[i] + prints.y[i] * prints.y[i];
     sums[1] += fixed.squaredNorm();
     sums[2] += 1.0;

@@ -8,6 +8,7 @@
 #include "core/metrology/droplet_trajectory.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/report/left_out.hpp"
 
 namespace invar::tools {
 
@@ -110,6 +111,73 @@ std::vector<std::vector<std::string>> before_and_after(const Droplets& drops, co
   return rows;
 }
 
+/// Rows that were left out and the error with them: as it is to expect of new droplets, not of those fitted.
+report::LeftOut left_out_of(const Droplets& drops, const TrajectoryFit& fit) {
+  report::LeftOut left_out;
+  left_out.row = "droplet";
+  left_out.given = static_cast<std::size_t>(fit.kept.size());
+  left_out.used = static_cast<std::size_t>(fit.kept.sum());
+  left_out.reasons = {{left_out.given - left_out.used, "as satellites, by their size or their place"}};
+  left_out.header = {"droplet", "target x", "target y", "height", "left x", "left y"};
+  std::vector<double> used, all;
+  for (Eigen::Index i = 0; i < fit.kept.size(); ++i) {
+    all.push_back(fit.residual.col(i).norm());
+    if (fit.kept(i) > 0.0) {
+      used.push_back(all.back());
+      continue;
+    }
+    left_out.rows.push_back({std::to_string(i + 1), si(drops.target(0, i), "m", 4),
+                             si(drops.target(1, i), "m", 4), si(drops.height(i), "m"),
+                             si(fit.residual(0, i), "m"), si(fit.residual(1, i), "m")});
+  }
+  left_out.rms_used = report::rms_of(used);
+  left_out.rms_all = report::rms_of(all);
+  if (fit.scatter.tested && fit.scatter.probability < metrology::significant)
+    left_out.unexplained.push_back("What is left is more than scatter: " + fit.scatter.pattern +
+                                   " explains a part of it that chance would in " +
+                                   number(100.0 * fit.scatter.probability, 2) +
+                                   " % of cases; no model here has it.");
+  return left_out;
+}
+
+/// What the tests of the residual allow to say of it.
+std::string left_words(const TrajectoryFit& fit) {
+  const auto& test = fit.scatter;
+  if (!test.tested) return "too few droplets to test whether what is left is scatter";
+  const std::string chance = "(p = " + number(test.probability, 2) + ")";
+  if (test.probability < metrology::significant)
+    return "what is left is more than scatter " + chance + ": " + test.pattern;
+  return "tests of what is left, over the targets and in order, find scatter alone " + chance;
+}
+
+/// Rotation, scale and squareness of the field, with their sigmas.
+void add_field(const metrology::DropletTrajectory& path, const TrajectoryFit& fit,
+               std::vector<std::vector<std::string>>& rows, nlohmann::json& report) {
+  if (fit.field_form == metrology::FieldForm::none) return;
+  const auto& m = path.field;
+  const double sigma_x = std::sqrt(path.field_covariance(0, 0)),
+               sigma_y = std::sqrt(path.field_covariance(1, 1));
+  const double rotation = 0.5 * (m(1, 0) - m(0, 1));
+  const bool any = fit.field_form == metrology::FieldForm::any;
+  const double rotation_sigma = any ? 0.5 * std::hypot(sigma_x, sigma_y) : sigma_x;
+  const auto ppm = [](double value) { return number(1e6 * value, 4) + " ppm"; };
+  rows.push_back({"rotation of the field", "", number(rotation / degree, 4) + " deg",
+                  number(rotation_sigma / degree) + " deg"});
+  rows.push_back({any ? "scale of the field along x" : "scale of the field", "", ppm(m(0, 0)), ppm(sigma_x)});
+  if (any) {
+    rows.push_back({"scale of the field along y", "", ppm(m(1, 1)), ppm(sigma_y)});
+    rows.push_back({"squareness of the field", "", number((m(0, 1) + m(1, 0)) / degree, 4) + " deg",
+                    number(2.0 * rotation_sigma / degree) + " deg"});
+  }
+  report["field"] = {{"rotation_rad", rotation},
+                     {"rotation_sigma_rad", rotation_sigma},
+                     {"scale", {m(0, 0), m(1, 1)}},
+                     {"scale_sigma", {sigma_x, sigma_y}},
+                     {"squareness_rad", m(0, 1) + m(1, 0)},
+                     {"centre_m", {path.field_centre.x(), path.field_centre.y()}},
+                     {"chance", fit.field_probability}};
+}
+
 void calibrate(const std::filesystem::path& file, const std::filesystem::path& folder) {
   const auto table = recording::Table::read(file, {"image", "status"});
   const Droplets drops = read_droplets(table);
@@ -131,15 +199,19 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
   report["scatter_m"] = {{"at_nozzle", fit.scatter_at_nozzle}, {"per_height", fit.scatter_per_height}};
   report["unidentified"] = fit.unidentified;
   report["notes"] = fit.notes;
+  report["scatter_test"] = {
+      {"tested", fit.scatter.tested}, {"probability", fit.scatter.probability}, {"words", left_words(fit)}};
+  const report::LeftOut left_out = left_out_of(drops, fit);
+  report["rows"] = report::json_of(left_out);
   report::Page page{"Dispenser calibration", file.filename().string() + ", " +
                                                  std::to_string(drops.height.size()) + " droplets, " +
                                                  std::to_string(rejected) + " rejected as satellites"};
   page.callout("Droplets land " + si(fit.before_rms, "m") + " from their targets (RMS), " +
-                   si(fit.after_rms, "m") +
-                   " after compensation; what is left is the scatter of single droplets",
-               "good");
+                   si(fit.after_rms, "m") + " after compensation; " + left_words(fit),
+               left_out.unexplained.empty() ? "good" : "warn");
   for (const auto& what : fit.unidentified) page.callout("Not identified: " + what, "warn");
   for (const auto& note : fit.notes) page.paragraph(note);
+  report::show(page, left_out);
   page.heading("Trajectory");
   const double sigma_placement = std::sqrt(path.covariance(0, 0));
   std::vector<std::vector<std::string>> rows;
@@ -160,6 +232,7 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
     rows.push_back(
         {"offset y at this height", "", si(path.placement.y(), "m"), si(path.sigma(path.least_height), "m")});
   }
+  add_field(path, fit, rows, report);
   if (std::isfinite(path.slowness_sigma)) {
     rows.push_back({"ejection speed", "u", si(1.0 / path.slowness, "m/s"),
                     si(path.slowness_sigma / (path.slowness * path.slowness), "m/s")});
@@ -199,15 +272,19 @@ void calibrate(const std::filesystem::path& file, const std::filesystem::path& f
   }
   write_calibration(folder, text, report, page);
 
-  std::cout << "droplet trajectory from " << drops.height.size() << " droplets, " << rejected
-            << " rejected as satellites\n";
+  std::cout << "droplet trajectory: " << line_of(left_out) << '\n';
   if (tilt_known)
     std::cout << "placement (" << si(path.placement.x(), "m") << ", " << si(path.placement.y(), "m")
               << ") +- " << si(sigma_placement, "m") << ", tilt " << number(path.tilt() / degree) << " +- "
               << number(fit.tilt_sigma / degree) << " deg, azimuth " << number(path.azimuth() / degree)
               << " +- " << number(fit.azimuth_sigma / degree) << " deg\n";
   std::cout << "RMS distance from the target " << si(fit.before_rms, "m") << " before, "
-            << si(fit.after_rms, "m") << " after (to expect of new droplets, their scatter included)\n";
+            << si(fit.after_rms, "m") << " after (to expect of new droplets)\n";
+  if (fit.field_form != metrology::FieldForm::none)
+    std::cout << "field turned by " << number(0.5 * (path.field(1, 0) - path.field(0, 1)) / degree)
+              << " deg, scaled by " << number(1e6 * path.field(0, 0)) << " and "
+              << number(1e6 * path.field(1, 1)) << " ppm along x and y\n";
+  std::cout << left_words(fit) << '\n';
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
   std::cout << written(folder, "compensation.yaml") << '\n';
@@ -249,9 +326,9 @@ recording::Table predict_dispenser(const config::Yaml& file, const recording::Ta
   std::vector<double> columns[5];
   for (std::size_t i = 0; i < x.size(); ++i) {
     const Eigen::Vector2d velocity{vx ? (*vx)[i] : 0.0, vy ? (*vy)[i] : 0.0};
-    const Eigen::Vector2d offset = path.offset(height[i], velocity);
-    const double values[] = {x[i] - offset.x(), y[i] - offset.y(), offset.x(), offset.y(),
-                             path.sigma(height[i])};
+    const Eigen::Vector2d aimed = path.aim({x[i], y[i]}, height[i], velocity);
+    const double values[] = {aimed.x(), aimed.y(), x[i] - aimed.x(), y[i] - aimed.y(),
+                             path.sigma(height[i], aimed)};
     for (std::size_t k = 0; k < 5; ++k) columns[k].push_back(values[k]);
   }
   recording::Table output;

@@ -35,13 +35,15 @@ TEST(Dispenser, AnswersWithTargetsAsTheyAreWhereNoModelIsInUse) {
 
 /// compensation.yaml of the seed's head with a delay of 0.3 ms and 2 m/s.
 fs::path write_model(const invar::testing::TemporaryFolder& folder, double placement_y = 118.2e-6,
-                     double slope_sigma = 1e-4) {
+                     double slope_sigma = 1e-4, const Eigen::Matrix2d& field = Eigen::Matrix2d::Zero()) {
   metrology::DropletTrajectory path;
   path.placement << 2.0e-6, placement_y;
   path.slope << 5.30508e-3, 9.01832e-5;
   path.slowness = 0.5;
   path.delay = 3e-4;
   path.covariance << 1e-12, 0.0, 0.0, slope_sigma * slope_sigma;
+  path.field = field;
+  path.field_centre << 0.05, 0.06;
   path.least_height = 2e-3;
   path.most_height = 20e-3;
   const auto source = folder.write("droplets.csv", "made up\n");
@@ -68,6 +70,25 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
   }
   EXPECT_EQ(bench.change(compensation::MODEL_ROLLBACK).state(), compensation::MODEL_NONE);
   EXPECT_EQ(bench.ask("grid", 20e-3).points()[0].lead_ns(), 0);
+}
+
+TEST(Dispenser, AimsByTheFieldOfItsModel) {
+  invar::testing::TemporaryFolder folder;
+  Bench bench;
+  bench.bring_up();
+  Eigen::Matrix2d field;
+  field << 2e-4, -7e-4, 8e-4, -1e-4;
+  bench.change(compensation::MODEL_STAGE, write_model(folder, 118.2e-6, 1e-4, field));
+  EXPECT_EQ(bench.change(compensation::MODEL_ACTIVATE).state(), compensation::MODEL_ACTIVE);
+  const TriggerPattern pattern = bench.ask("grid", 20e-3);
+  ASSERT_GT(pattern.points().size(), 3U);
+  for (const TriggerPoint& point : pattern.points()) {
+    const Eigen::Vector2d aimed{point.position()[0], point.position()[1]};
+    const Eigen::Vector2d lands =
+        aimed + Eigen::Vector2d{108.102e-6, 120.004e-6} + field * (aimed - Eigen::Vector2d{0.05, 0.06});
+    EXPECT_NEAR(lands.x(), point.target()[0], 1e-9);
+    EXPECT_NEAR(lands.y(), point.target()[1], 1e-9);
+  }
 }
 
 // What `invar diagnose` writes of the same head: patched.yaml of plant droplet.

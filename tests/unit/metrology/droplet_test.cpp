@@ -223,6 +223,80 @@ TEST(TrajectoryIdentification, AcceptsOneDropletAtEachOfSeveralHeights) {
   EXPECT_LT((fit.trajectory.offset(10e-3) - truth.offset(10e-3)).norm(), 15e-6);
 }
 
+/// Droplets over a plate of 200 by 120 mm whose frame is turned and scaled against the stage's, and curved by `bow` at
+/// the ends.
+Droplets over_plate(const Eigen::Matrix2d& field, double bow, double scatter, unsigned seed,
+                    int satellite = 0) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  constexpr Eigen::Index n = 77;
+  Droplets drops{Eigen::Matrix2Xd(2, n), Eigen::Matrix2Xd(2, n), Eigen::VectorXd::Constant(n, 3e-3), {}, {}};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector2d at{0.02 * static_cast<double>(i % 11), 0.02 * static_cast<double>(i / 11)};
+    drops.target.col(i) = at;
+    drops.landed.col(i) = at + Eigen::Vector2d{4e-5, -7e-5} + field * at +
+                          Eigen::Vector2d{0.0, bow * std::pow(at.x() / 0.1 - 1.0, 2)} +
+                          scatter * Eigen::Vector2d{normal(random), normal(random)};
+    if (satellite > 0 && i % satellite == 1) drops.landed.col(i) += Eigen::Vector2d{3e-4, -2e-4};
+  }
+  return drops;
+}
+
+TEST(TrajectoryIdentification, FindsRotationAndScaleOfTheFieldWithTheSigmasItStates) {
+  Eigen::Matrix2d turned, any;
+  turned << 1e-4, -6e-4, 6e-4, 1e-4;
+  any << 3e-4, -6e-4, 9e-4, -2e-4;
+  for (const auto& [field, form] :
+       {std::pair{turned, FieldForm::rotation_and_scale}, std::pair{any, FieldForm::any}}) {
+    int within = 0;
+    for (unsigned seed = 1; seed <= 40; ++seed) {
+      const TrajectoryFit fit = identify_trajectory(over_plate(field, 0.0, 8e-6, seed, 9));
+      ASSERT_EQ(fit.field_form, form) << seed;
+      const auto& path = fit.trajectory;
+      const Eigen::Vector2d target{0.2, 0.12};
+      const Eigen::Vector2d aimed = path.aim(target, 3e-3);
+      const Eigen::Vector2d lands = aimed + Eigen::Vector2d{4e-5, -7e-5} + field * aimed;
+      within += (lands - target).cwiseAbs().maxCoeff() <= 2.0 * path.sigma(3e-3, aimed) ? 1 : 0;
+      EXPECT_LT((lands - target).norm(), 1e-5) << seed;
+      EXPECT_NEAR(fit.after_rms, 8e-6 * std::sqrt(2.0), 2.5e-6) << seed;
+      for (Eigen::Index i = 1; i < 77; i += 9) EXPECT_EQ(fit.kept(i), 0.0) << seed;
+      EXPECT_GE(fit.kept.sum(), 77.0 - 9.0 - 3.0) << seed;
+    }
+    EXPECT_GT(within, 30);  // both components within two sigma: 0.91 of 40
+  }
+}
+
+TEST(TrajectoryIdentification, CallsWhatIsLeftScatterOnlyWhereATestDoes) {
+  int called_pattern = 0;
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    const TrajectoryFit fit = identify_trajectory(over_plate(Eigen::Matrix2d::Zero(), 0.0, 8e-6, seed));
+    EXPECT_EQ(fit.field_form, FieldForm::none) << seed;
+    EXPECT_TRUE(fit.scatter.tested);
+    called_pattern += fit.scatter.probability < significant ? 1 : 0;
+  }
+  EXPECT_LE(called_pattern, 3);
+  const TrajectoryFit curved = identify_trajectory(over_plate(Eigen::Matrix2d::Zero(), 3e-5, 8e-6, 1));
+  EXPECT_LT(curved.scatter.probability, 1e-6);
+  EXPECT_THAT(curved.scatter.pattern, ::testing::HasSubstr("curved"));
+  Droplets drifting = over_plate(Eigen::Matrix2d::Zero(), 0.0, 2e-6, 1);
+  for (Eigen::Index i = 0; i < 77; ++i)
+    drifting.landed(0, i) += 1e-5 * std::sin(0.5 * static_cast<double>(i));
+  const TrajectoryFit drift = identify_trajectory(drifting);
+  EXPECT_LT(drift.scatter.probability, significant);
+  EXPECT_THAT(drift.scatter.pattern, ::testing::HasSubstr("from one droplet to the next"));
+  EXPECT_FALSE(identify_trajectory(print(seed_trajectory(), {2e-3}, 4, 1e-5, 0.0, 0, 1)).scatter.tested);
+}
+
+TEST(TrajectoryIdentification, KeepsDropletsThatAreLargerThanTheirFellows) {
+  Droplets drops = over_plate(Eigen::Matrix2d::Zero(), 0.0, 8e-6, 4);
+  drops.diameter = Eigen::VectorXd::Constant(77, 5e-4);
+  drops.diameter.head(20).setConstant(8e-4);
+  drops.diameter(70) = 1e-4;
+  const TrajectoryFit fit = identify_trajectory(drops);
+  EXPECT_GE(fit.kept.head(20).sum(), 18.0);
+  EXPECT_EQ(fit.kept(70), 0.0);
+}
+
 TEST(DropletStatistics, AreThoseOfTheSeedsSecondCase) {
   // 400 readings of a normal distribution: 68.3 and 95.4 %, compatible with normal.
   std::mt19937 random{6};
