@@ -65,14 +65,15 @@ FusionFit identify_fusion(const std::vector<FusionRun>& given, const std::vector
   for (int degree = 2; options.polynomial && degree <= highest_degree; ++degree)
     ways.push_back({.degree = degree, .delays = {}});
 
+  fit.nothing_held_out = runs.size() < 2;
   const std::size_t folds = std::min(most_folds, runs.size());
   fit.held_out.resize(runs.size());
   Squares observer_squares(runs.size());
   std::vector<Squares> squares(ways.size(), Squares(runs.size()));
-  for (std::size_t fold = 0; fold < folds && runs.size() > 1; ++fold) {
+  for (std::size_t fold = 0; fold < folds; ++fold) {
     std::vector<FusionRun> train;
     for (std::size_t r = 0; r < runs.size(); ++r)
-      if (r % folds != fold) train.push_back(runs[r]);
+      if (fit.nothing_held_out || r % folds != fold) train.push_back(runs[r]);
     const FusionModel sensors = identify_sensors(train, position_names, velocity_names, nullptr);
     FusionObserver observer{sensors};
     for (std::size_t r = fold; r < runs.size(); r += folds) {
@@ -94,21 +95,28 @@ FusionFit identify_fusion(const std::vector<FusionRun>& given, const std::vector
   fit.observer_rms = rms_of(observer_squares);
   fit.weights_rms = rms_of(squares[0]);
   if (by_speed > 0) fit.noise_by_speed_rms = rms_of(squares[by_speed]);
-  std::size_t best = by_speed > 0 && surely_less(squares[by_speed], squares[0]) ? by_speed : 0;
+  // What was fitted to a run is better on it the more numbers it has: with nothing held out nothing is chosen by that.
+  std::size_t best =
+      !fit.nothing_held_out && by_speed > 0 && surely_less(squares[by_speed], squares[0]) ? by_speed : 0;
   WeightOptions chosen = ways[best];
   for (std::size_t w = orders; w < ways.size(); ++w) {
     const double rms = rms_of(squares[w]);
     if (fit.polynomial_rms == 0.0 || rms < fit.polynomial_rms) fit.polynomial_rms = rms;
-    if (!surely_less(squares[w], squares[0]) || rms >= rms_of(squares[best])) continue;
+    if (fit.nothing_held_out || !surely_less(squares[w], squares[0]) || rms >= rms_of(squares[best]))
+      continue;
     best = w;
     chosen = ways[w];
   }
   fit.degree = chosen.degree;
   chosen.delays = delays_of(fit.sensors);
   fit.weights = identify_weights(runs, chosen);
-  fit.method = fit.observer_rms <= rms_of(squares[best]) ? FusionMethod::observer : FusionMethod::weights;
-  if (runs.size() < 2)
-    fit.notes.emplace_back("one run only: nothing could be held out, the observer is taken");
+  fit.method = fit.nothing_held_out || fit.observer_rms <= rms_of(squares[best]) ? FusionMethod::observer
+                                                                                 : FusionMethod::weights;
+  if (fit.nothing_held_out)
+    fit.notes.emplace_back(
+        "one run only: nothing was held out, and what other runs will show is not known; the observer is "
+        "taken, which "
+        "knows the sensors; record a second run");
   return fit;
 }
 

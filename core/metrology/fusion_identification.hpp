@@ -18,7 +18,7 @@ struct FusionOptions {
 
 enum class FusionMethod { observer, weights };
 
-/// One run as both methods fused it when it was held out.
+/// One run as both methods fused it when it was held out; of a single run, as fused by what was fitted to it.
 struct HeldOut {
   double speed = 0.0;        // RMS of the run [m/s]
   double noise_level = 0.0;  // as given or estimated
@@ -32,6 +32,7 @@ struct FusionFit {
   FusionModel sensors;
   WeightModel weights;
   FusionMethod method = FusionMethod::observer;
+  bool nothing_held_out = false;  // one run only: all errors here are those of the run that was fitted
   std::vector<HeldOut> held_out;
   double observer_rms = 0.0;  // over the held-out runs [m]
   double weights_rms = 0.0;

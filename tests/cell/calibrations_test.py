@@ -129,5 +129,63 @@ class Dispenser(Calibrations):
         self.assertEqual(len(self.report()["rows"]["unexplained"]), 1)
 
 
+class Thermistor(Calibrations):
+    @staticmethod
+    def resistance(temperature):
+        """An NTC by Steinhart-Hart (100 kOhm at 25 degC), solved by bisection."""
+        low, high = 0.0, 20.0
+        for _ in range(80):
+            x = (low + high) / 2
+            warm = 1 / (7.203283552e-4 + 2.171656865e-4 * x + 0.8706070062e-7 * x ** 3) - 273.15 > temperature
+            low, high = (x, high) if warm else (low, x)
+        return math.exp(x)
+
+    def test_the_equation_is_chosen_by_readings_left_out_and_residuals_are_shown(self):
+        draw = random.Random(4)
+        self.write("n.csv", "temperature [degC],resistance [ohm]",
+                   [[t, f"{self.resistance(t + draw.gauss(0, 0.05)):.3f}"] for t in range(-10, 131, 10)])
+        said = self.call("calibrate", "thermistor", "--readings", "n.csv", "--out", "out")
+        self.assertIn("Steinhart-Hart", said)
+        self.assertGreater(self.report()["held_out_b_law_K"], 0.5)
+        self.assertLess(self.report()["held_out_steinhart_hart_K"], 0.15)
+        self.assertIn("by the equation", self.page())
+        inside, outside = self.predicted("resistance [ohm]", [[self.resistance(t)] for t in (45, 200)])
+        self.assertLess(abs(inside["temperature"] - 45), 0.1)
+        self.assertLess(abs(outside["temperature"] - 200), 2 * outside["sigma"])
+        self.assertGreater(outside["sigma"], 5 * inside["sigma"])
+
+    def test_residuals_that_go_on_are_no_noise(self):
+        self.write("n.csv", "temperature [degC],resistance [ohm]",
+                   [[t, f"{self.resistance(t + 0.5 * math.sin(t / 12)):.3f}"] for t in range(-10, 131, 4)])
+        self.call("calibrate", "thermistor", "--readings", "n.csv", "--out", "out")
+        self.assertIn("goes on from one temperature to the next", self.report()["rows"]["unexplained"][0])
+
+
+class Fusion(Calibrations):
+    def run_at(self, speed, seed):
+        draw = random.Random(seed)
+        rows = []
+        for k in range(800):
+            t = k / 1000
+            x = min(speed * t, 0.2)
+            velocity = (speed if x < 0.2 else 0.0) + 0.05 * speed * draw.uniform(-1, 1)
+            rows.append([seed, f"{t:.4f}", f"{x:.7f}", f"{0.002 * math.floor(x / 0.002):.4f}", f"{velocity:.5f}"])
+        return rows
+
+    def test_one_run_never_claims_to_have_held_one_out(self):
+        header = "run,t [s],reference [m],position_encoder [m],velocity_tacho [m/s]"
+        self.write("one.csv", header, self.run_at(0.1, 1))
+        said = self.call("calibrate", "fusion", "--recording", "one.csv", "--noise", "estimated", "--out", "out")
+        self.assertNotIn("held out:", said)
+        self.assertIn("RMS on the one run, to which it was fitted", said)
+        self.assertNotIn("held_out_rms_m", self.report())
+        self.assertGreater(self.report()["fitted_rms_m"]["observer"], 0)
+        self.assertNotIn("callout good", self.page())
+        self.write("two.csv", header, self.run_at(0.1, 1) + self.run_at(0.2, 2))
+        said = self.call("calibrate", "fusion", "--recording", "two.csv", "--noise", "estimated", "--out", "out")
+        self.assertIn("RMS on runs held out", said)
+        self.assertGreater(self.report()["held_out_rms_m"]["observer"], 0)
+
+
 if __name__ == "__main__":
     unittest.main()

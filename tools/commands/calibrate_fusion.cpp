@@ -9,6 +9,7 @@
 #include "core/metrology/fusion_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/report/left_out.hpp"
 
 namespace invar::tools {
 
@@ -159,18 +160,52 @@ Recordings read_recordings(const Options& options) {
   return all;
 }
 
-report::Page page_of(const Options& options, const Recordings& all, const FusionFit& fit) {
+/// Which runs the errors are of.
+std::string where_of(const FusionFit& fit) {
+  return fit.nothing_held_out ? "on the one run, to which it was fitted" : "on runs held out";
+}
+
+/// Every row is fused; weights are learnt from rows in which all sensors read.
+report::LeftOut rows_of(const Recordings& all, const FusionFit& fit, metrology::FusionEstimator& estimator) {
+  report::LeftOut rows;
+  rows.row = "row";
+  std::vector<double> used, every;
+  for (const FusionRun& run : all.runs) {
+    const auto fused = metrology::fuse(estimator, run);
+    std::vector<bool> complete(fused.size(), false);
+    for (const Eigen::Index i : metrology::complete_rows(metrology::integrated(run)))
+      complete[static_cast<std::size_t>(i)] = true;
+    for (std::size_t i = 0; i < fused.size(); ++i) {
+      every.push_back(fused[i].position - run.reference(static_cast<Eigen::Index>(i)));
+      if (complete[i]) used.push_back(every.back());
+    }
+  }
+  rows.given = every.size();
+  rows.used = used.size();
+  rows.reasons = {{rows.given - rows.used,
+                   "of the weights, since a sensor is missing there; they are fused all the same"}};
+  if (!used.empty()) rows.rms_used = report::rms_of(used);
+  rows.rms_all = report::rms_of(every);
+  rows.unexplained.push_back(
+      fit.nothing_held_out ? "These errors are of the run that was fitted: nothing was held out."
+                           : "These errors are of the runs that were fitted; those held out stand above.");
+  return rows;
+}
+
+report::Page page_of(const Options& options, const Recordings& all, const FusionFit& fit,
+                     const report::LeftOut& left_out) {
   const bool observer = fit.method == metrology::FusionMethod::observer;
   report::Page page{"Sensor fusion", std::to_string(all.runs.size()) + " runs from " +
                                          std::to_string(options.recordings.size()) + " recordings"};
   page.callout(std::string{"Chosen: the "} +
-                   (observer ? "structured observer" : "weights over speed and noise") +
-                   "; RMS error on runs held out " + si(fit.observer_rms, "m") + " (observer), " +
+                   (observer ? "structured observer" : "weights over speed and noise") + "; RMS error " +
+                   where_of(fit) + " " + si(fit.observer_rms, "m") + " (observer), " +
                    si(fit.weights_rms, "m") + " (weights)" +
                    (fit.polynomial_rms > 0.0 ? ", " + si(fit.polynomial_rms, "m") + " (polynomial)" : ""),
-               "good");
+               fit.nothing_held_out ? "warn" : "good");
   for (const auto& what : fit.unidentified) page.callout("Not identified: " + what, "warn");
   for (const auto& note : fit.notes) page.paragraph(note);
+  report::show(page, left_out);
   page.heading("Sensors");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < fit.sensors.positions.size(); ++i) {
@@ -193,7 +228,7 @@ report::Page page_of(const Options& options, const Recordings& all, const Fusion
   page.heading("Where each method wins");
   rows.clear();
   report::Plot plot;
-  plot.title = "Error of runs held out";
+  plot.title = fit.nothing_held_out ? "Error of the run that was fitted" : "Error of runs held out";
   plot.x_label = "noise level";
   plot.y_label = "RMS error [mm]";
   plot.log_x = plot.log_y = true;
@@ -237,15 +272,17 @@ report::Page page_of(const Options& options, const Recordings& all, const Fusion
   return page;
 }
 
-nlohmann::json report_of(const Recordings& all, const FusionFit& fit) {
+nlohmann::json report_of(const Recordings& all, const FusionFit& fit, const report::LeftOut& left_out) {
   nlohmann::json report;
   report["kind"] = "fusion";
   report["runs"] = all.runs.size();
   report["method"] = fit.method == metrology::FusionMethod::observer ? "observer" : "weights";
-  report["held_out_rms_m"] = {{"observer", fit.observer_rms}, {"weights", fit.weights_rms}};
-  if (fit.polynomial_rms > 0.0) report["held_out_rms_m"]["polynomial"] = fit.polynomial_rms;
+  const std::string errors = fit.nothing_held_out ? "fitted_rms_m" : "held_out_rms_m";
+  report[errors] = {{"observer", fit.observer_rms}, {"weights", fit.weights_rms}};
+  if (fit.polynomial_rms > 0.0) report[errors]["polynomial"] = fit.polynomial_rms;
   report["polynomial_degree"] = fit.degree;
-  if (fit.noise_by_speed_rms > 0.0) report["held_out_rms_m"]["noise_by_speed"] = fit.noise_by_speed_rms;
+  if (fit.noise_by_speed_rms > 0.0) report[errors]["noise_by_speed"] = fit.noise_by_speed_rms;
+  report["rows"] = report::json_of(left_out);
   report["unidentified"] = fit.unidentified;
   report["notes"] = fit.notes;
   for (std::size_t i = 0; i < fit.sensors.positions.size(); ++i) {
@@ -266,12 +303,13 @@ nlohmann::json report_of(const Recordings& all, const FusionFit& fit) {
                                     {"offset_m_s", sensor.offset}});
   }
   for (const auto& held : fit.held_out)
-    report["runs_held_out"].push_back({{"noise_level", held.noise_level},
-                                       {"speed_m_s", held.speed},
-                                       {"observer_m", held.observer},
-                                       {"weights_m", held.weights},
-                                       {"best_single_m", held.best_single},
-                                       {"weights", held.fitted}});
+    report[fit.nothing_held_out ? "runs_fitted" : "runs_held_out"].push_back(
+        {{"noise_level", held.noise_level},
+         {"speed_m_s", held.speed},
+         {"observer_m", held.observer},
+         {"weights_m", held.weights},
+         {"best_single_m", held.best_single},
+         {"weights", held.fitted}});
   return report;
 }
 
@@ -287,9 +325,11 @@ void calibrate(const Options& options) {
   const bool observer = fit.method == metrology::FusionMethod::observer;
   compensation::ModelText text{"fusion", options.recordings};
   const bool noise_given = !how.noise_estimated && all.runs.front().noise_level.size() > 0;
-  compensation::write_fusion(
-      text, {observer ? "observer" : "weights", noise_given, fit.sensors, fit.weights, all.selector});
-  write_calibration(options.out, text, report_of(all, fit), page_of(options, all, fit));
+  const compensation::FusionFile model{observer ? "observer" : "weights", noise_given, fit.sensors,
+                                       fit.weights, all.selector};
+  compensation::write_fusion(text, model);
+  const report::LeftOut left_out = rows_of(all, fit, *compensation::make_estimator(model));
+  write_calibration(options.out, text, report_of(all, fit, left_out), page_of(options, all, fit, left_out));
 
   std::cout << "fusion of " << all.positions.size() << " position and " << all.velocities.size()
             << " velocity sensors from " << all.runs.size() << " runs\n";
@@ -299,7 +339,7 @@ void calibrate(const Options& options) {
     single += held.best_single * held.best_single / static_cast<double>(fit.held_out.size());
     wins += held.observer <= held.weights ? 1U : 0U;
   }
-  std::cout << "RMS on runs held out: best single sensor (hindsight) " << si(std::sqrt(single), "m")
+  std::cout << "RMS " << where_of(fit) << ": best single sensor (hindsight) " << si(std::sqrt(single), "m")
             << ", weights " << si(fit.weights_rms, "m") << ", observer " << si(fit.observer_rms, "m");
   if (fit.noise_by_speed_rms > 0.0)
     std::cout << ", weights with the noise from the speed " << si(fit.noise_by_speed_rms, "m");
@@ -307,6 +347,7 @@ void calibrate(const Options& options) {
     std::cout << ", polynomial " << si(fit.polynomial_rms, "m") << " (order taken: " << fit.degree << ")";
   std::cout << "\nchosen: " << (observer ? "observer" : "weights") << "; the observer is better on " << wins
             << " of " << fit.held_out.size() << " runs\n";
+  std::cout << line_of(left_out) << '\n';
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
   std::cout << written(options.out, "compensation.yaml") << '\n';

@@ -6,9 +6,11 @@
 #include <memory>
 
 #include "core/metrology/thermistor.hpp"
+#include "core/numerics/significance.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/positive.hpp"
+#include "tools/report/left_out.hpp"
 
 namespace invar::tools {
 
@@ -67,6 +69,37 @@ double sigma_of(const ThermistorFit& fit) {
   return std::isfinite(held_out) ? held_out : fit.rms;
 }
 
+/// How fast sigma grows outside the readings [K/K]: what the B law is off by at their ends, over half of their range. Two
+/// readings show no bend of the curve: there a data-sheet NTC bends by 0.8 K over 45 K.
+double growth_of(const ThermistorFit& fit, const std::vector<double>& temperature) {
+  constexpr double of_data_sheets = 0.8 / 45.0;
+  const auto [low, high] = std::minmax_element(temperature.begin(), temperature.end());
+  return std::isfinite(fit.held_out_b) ? 2.0 * fit.held_out_b / (*high - *low) : of_data_sheets;
+}
+
+/// Every reading is used: what is told is whether the equation's residuals are noise.
+report::LeftOut rows_of(const std::vector<double>& temperature, const std::vector<double>& resistance,
+                        const ThermistorFit& fit) {
+  std::vector<std::pair<double, double>> by_temperature;
+  for (std::size_t i = 0; i < resistance.size(); ++i)
+    by_temperature.emplace_back(temperature[i], fit.thermistor.temperature(resistance[i]) - temperature[i]);
+  std::sort(by_temperature.begin(), by_temperature.end());
+  std::vector<double> residual;
+  for (const auto& [at, apart] : by_temperature) residual.push_back(apart);
+  report::LeftOut rows;
+  rows.given = rows.used = resistance.size();
+  rows.unit = "K";
+  rows.rms_used = rows.rms_all = fit.rms;
+  const double chance = numerics::chance_of_alike_neighbours(residual);
+  if (residual.size() < 10)
+    rows.unexplained.emplace_back("Fewer than ten readings: whether what is left is noise was not tested.");
+  else if (chance < 0.01)
+    rows.unexplained.push_back(
+        "What is left goes on from one temperature to the next (p = " + number(chance, 2) +
+        "): neither equation here follows this thermistor to the noise of its readings.");
+  return rows;
+}
+
 report::Page page_of(const Options& options, const std::vector<double>& temperature,
                      const std::vector<double>& resistance, const ThermistorFit& fit) {
   report::Page page{"Thermistor", options.readings.filename().string()};
@@ -76,6 +109,9 @@ report::Page page_of(const Options& options, const std::vector<double>& temperat
                    "; the readings are met to " + si(fit.rms, "K") + " RMS, the worst to " +
                    si(fit.largest, "K") + "; " + held_out_text(fit) + ".",
                "plain");
+  const report::LeftOut rows = rows_of(temperature, resistance, fit);
+  for (const auto& what : rows.unexplained) page.callout(what, "warn");
+  report::show(page, rows);
   report::Plot curve;
   curve.title = "Resistance";
   curve.x_label = "temperature [degC]";
@@ -102,6 +138,13 @@ report::Page page_of(const Options& options, const std::vector<double>& temperat
   curve.series = {std::move(line), std::move(points)};
   left.series = {std::move(residual)};
   page.plots({std::move(curve), std::move(left)});
+  std::vector<std::vector<std::string>> table;
+  for (std::size_t i = 0; i < resistance.size(); ++i) {
+    const double by_equation = fit.thermistor.temperature(resistance[i]);
+    table.push_back({number(temperature[i], 5) + " degC", si(resistance[i], "ohm", 5),
+                     number(by_equation, 6) + " degC", si(by_equation - temperature[i], "K")});
+  }
+  page.table({"temperature", "resistance", "by the equation", "residual"}, table);
   return page;
 }
 
@@ -114,6 +157,7 @@ void calibrate(const Options& options) {
                      "two readings are needed at least, better five"};
   const ThermistorFit fit = fit_of(options, temperature, resistance);
   const Thermistor& found = fit.thermistor;
+  const auto [low, high] = std::minmax_element(temperature.begin(), temperature.end());
   compensation::ModelText text{"thermistor", {options.readings}};
   text.comment(
           "1/T = 1/T_B + (x - x_B) / B + C (x^3 - x_B^3 - 3 x_B^2 (x - x_B)), T in kelvin, x = ln(R / 1 "
@@ -123,7 +167,10 @@ void calibrate(const Options& options) {
       .number("base_temperature", found.base_temperature)
       .number("coefficient", found.coefficient_percent)
       .number("third_order", found.third_order)
-      .number("sigma", sigma_of(fit));
+      .number("sigma", sigma_of(fit))
+      .comment("the readings' temperatures, and how fast sigma grows outside them [K/K]")
+      .range("range", Range{*low, *high})
+      .number("growth", growth_of(fit, temperature));
   const bool known = std::isfinite(fit.sigma_coefficient);
   nlohmann::json report{{"kind", "thermistor"},
                         {"readings", table.rows()},
@@ -133,6 +180,7 @@ void calibrate(const Options& options) {
                         {"third_order_per_K", found.third_order},
                         {"rms_K", fit.rms},
                         {"largest_K", fit.largest},
+                        {"rows", report::json_of(rows_of(temperature, resistance, fit))},
                         {"unidentified", nlohmann::json::array()}};
   if (known) report["sigma_coefficient_percent_per_K"] = fit.sigma_coefficient;
   if (std::isfinite(fit.held_out_b)) report["held_out_b_law_K"] = fit.held_out_b;
@@ -142,6 +190,7 @@ void calibrate(const Options& options) {
   std::cout << "thermistor from " << table.rows() << " readings, " << law_of(fit) << ", met to "
             << si(fit.rms, "K") << " RMS, the worst to " << si(fit.largest, "K") << '\n'
             << held_out_text(fit) << '\n'
+            << line_of(rows_of(temperature, resistance, fit)) << '\n'
             << "in the cell file: thermistor: {resistance: " << number(found.resistance_at_base, 7)
             << ", base_temperature: " << number(found.base_temperature, 5)
             << ", coefficient: " << number(found.coefficient_percent, 6)
@@ -171,16 +220,28 @@ recording::Table predict_thermistor(const config::Yaml& file, const recording::T
                          file.root().number("coefficient", "1", Range::positive()),
                          file.root().has("third_order") ? file.root().number("third_order", "1/K") : 0.0};
   const double rms = file.root().number("sigma", "K", Range::not_negative());
+  const bool ranged = file.root().has("range");
+  const auto ends =
+      ranged ? compensation::exactly(file.root()["range"], 2, "1") : std::vector<double>{-1e9, 1e9};
+  const double growth = ranged ? file.root().number("growth", "1", Range::not_negative()) : 0.0;
   file.finish();
+  const Range range{ends[0], ends[1]};
   std::vector<double> temperature = inputs.in("resistance", "ohm");
   expect_finite(inputs.file, "resistance", temperature, 1e9);
+  std::vector<double> sigma;
+  std::size_t outside = 0;
   for (double& value : temperature) {
     if (value <= 0.0)
       throw InputError{inputs.file.string(), "a resistance is not above 0", "check the readings"};
     value = found.temperature(value);
+    sigma.push_back(std::hypot(rms, growth * (value - range.clamp(value))));
+    outside += std::abs(value - range.clamp(value)) > 3.0 * rms ? 1U : 0U;
   }
+  if (outside > 0)
+    std::cerr << "warning: " << outside << " of " << temperature.size()
+              << " readings lie outside the calibrated temperatures; sigma grows there\n";
   recording::Table output;
-  output.add("sigma", "K", std::vector<double>(temperature.size(), rms));
+  output.add("sigma", "K", std::move(sigma));
   output.add("temperature", "degC", std::move(temperature));
   return output;
 }
