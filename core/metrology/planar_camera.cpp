@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 namespace invar::metrology {
 
@@ -305,6 +306,20 @@ std::optional<ViewFit> fit_pose(const PinholeCamera& camera, const Matrix2Xd& ta
   const auto fit = adjust(target, {view}, first, {});
   if (!fit) return std::nullopt;
   return view_fit(target, view, fit->camera, fit->poses.front());
+}
+
+double homography_rms(const Matrix2Xd& target, const Matrix2Xd& view) {
+  const auto map = usable(target, view) ? homography(target, view) : std::nullopt;
+  if (!map) return std::numeric_limits<double>::infinity();
+  const Matrix2Xd seen = (*map * target.colwise().homogeneous()).colwise().hnormalized();
+  const double rms = std::sqrt((seen - view).squaredNorm() / static_cast<double>(view.cols()));
+  return std::isfinite(rms) ? rms : std::numeric_limits<double>::infinity();
+}
+
+Matrix2Xd project_target(const PinholeCamera& camera, const TargetPose& pose, const Matrix2Xd& target) {
+  VectorXd p(intrinsics + 6);
+  p << pack(camera), pose.rotation, pose.position;
+  return project(target, p);
 }
 
 std::optional<std::vector<double>> leave_one_view_out(const Matrix2Xd& target,

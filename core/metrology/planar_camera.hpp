@@ -56,6 +56,14 @@ std::optional<PlanarCalibration> calibrate_planar(const Eigen::Matrix2Xd& target
 std::optional<ViewFit> fit_pose(const PinholeCamera& camera, const Eigen::Matrix2Xd& target,
                                 const Eigen::Matrix2Xd& view);
 
+/// What the best map of the target's plane onto the view leaves [px, RMS distance]: the lens, noise, and points that are wrong.
+/// Infinite where there is none.
+double homography_rms(const Eigen::Matrix2Xd& target, const Eigen::Matrix2Xd& view);
+
+/// Where each point of the target is seen [px].
+Eigen::Matrix2Xd project_target(const PinholeCamera& camera, const TargetPose& pose,
+                                const Eigen::Matrix2Xd& target);
+
 /// Each view left out once: the camera from the others, the pose from the view itself. RMS distance [px] a view; nothing
 /// where one calibration fails.
 std::optional<std::vector<double>> leave_one_view_out(const Eigen::Matrix2Xd& target,

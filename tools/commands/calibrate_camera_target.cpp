@@ -7,10 +7,14 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "core/metrology/bad_views.hpp"
 #include "core/metrology/planar_camera.hpp"
+#include "core/numerics/robust.hpp"
+#include "core/numerics/significance.hpp"
 #include "core/recording/table.hpp"
 #include "tools/commands/calibrate_camera.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -83,8 +87,64 @@ std::string pinhole_yaml(const Rival& best) {
          entry("p2", c.tangential[1], s.tangential[1], "\"1\"");
 }
 
+/// What each view left out is wrong with, by its file.
+std::vector<std::string> bad_views_of(const metrology::SortedViews& sorted, const CameraOptions& options) {
+  std::vector<std::string> out;
+  for (const auto& bad : sorted.bad)
+    out.push_back(options.views[bad.view].filename().string() + ": " + bad.why);
+  return out;
+}
+
+/// Whether the residuals are noise: along the rows of each view's points neighbours must not deviate alike.
+double chance_of_noise(const metrology::PlanarCalibration& fit) {
+  std::array<std::vector<double>, 2> residual;
+  for (const auto& view : fit.views)
+    for (Index i = 0; i < view.residuals.cols(); ++i)
+      for (std::size_t axis = 0; axis < 2; ++axis)
+        residual[axis].push_back(view.residuals(static_cast<Index>(axis), i));
+  return std::min(1.0, 2.0 * std::min(numerics::chance_of_alike_neighbours(residual[0]),
+                                      numerics::chance_of_alike_neighbours(residual[1])));
+}
+
+report::LeftOut rows_of(const Rival& best, const metrology::SortedViews& sorted, Index points,
+                        const CameraOptions& options) {
+  report::LeftOut rows;
+  rows.row = "view";
+  rows.unit = "px";
+  rows.given = sorted.good.size() + sorted.bad.size();
+  rows.used = sorted.good.size();
+  rows.reasons = {{sorted.bad.size(), "since they do not go with the others"}};
+  rows.rms_used = rows.rms_all = best.fit.rms;
+  rows.header = {"view", "why", "error by this camera"};
+  double squares = best.fit.rms * best.fit.rms * static_cast<double>(sorted.good.size());
+  for (const auto& bad : sorted.bad) {
+    const std::string file = options.views[bad.view].filename().string();
+    rows.rows.push_back({file, bad.why, std::isnan(bad.rms) ? "cannot be told" : report::si(bad.rms, "px")});
+    squares += bad.rms * bad.rms;
+  }
+  rows.rms_all = std::sqrt(squares / static_cast<double>(rows.given));
+  // A view that is met far worse than others is used, and said.
+  constexpr double uncertain = 3.0;
+  const double usual = numerics::median(best.left_out);
+  for (std::size_t k = 0; k < best.left_out.size(); ++k)
+    if (best.left_out[k] > uncertain * usual)
+      rows.unexplained.push_back(options.views[sorted.good[k]].filename().string() + " is met to " +
+                                 report::si(best.left_out[k], "px") +
+                                 " by the camera of the others, a typical view to " +
+                                 report::si(usual, "px") + ": its corners are less certain; it is used.");
+  const double chance = chance_of_noise(best.fit);
+  if (chance < 0.01)
+    rows.unexplained.push_back(
+        "What is left of the " + std::to_string(points) +
+        " points goes on from one point to the next (p = " + report::number(chance, 2) +
+        "): no lens here, or the target, is as it is to the noise of the corners; the sigmas "
+        "count the points as independent.");
+  return rows;
+}
+
 report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
-                       const std::vector<Matrix2Xd>& views, const CameraOptions& options) {
+                       const std::vector<Matrix2Xd>& views, const CameraOptions& options,
+                       const metrology::SortedViews& sorted, const report::LeftOut& left_out) {
   using report::number;
   report::Page page{"Camera",
                     "Pinhole and lens from " + std::to_string(views.size()) + " views of a flat target"};
@@ -92,7 +152,9 @@ report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
   page.callout("Held-out views: " + number(nominal.held_out, 4) + " px with an ideal pinhole, " +
                    number(best.held_out, 4) + " px with " + metrology::name(best.fit.lens) +
                    " (chosen by it)",
-               "good");
+               sorted.bad.empty() ? "good" : "warn");
+  for (const auto& what : bad_views_of(sorted, options)) page.callout("Left out: " + what, "warn");
+  report::show(page, left_out);
   std::vector<std::vector<std::string>> rows;
   for (const Rival& r : rivals) {
     std::vector<std::string> row{metrology::name(r.fit.lens), number(r.fit.rms, 4), number(r.held_out, 4)};
@@ -100,7 +162,8 @@ report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
     rows.push_back(row);
   }
   std::vector<std::string> header{"lens", "fitted RMS [px]", "held-out RMS [px]"};
-  for (const auto& view : options.views) header.push_back("without " + view.stem().string());
+  for (const std::size_t view : sorted.good)
+    header.push_back("without " + options.views[view].stem().string());
   page.table(header, rows);
   const metrology::PinholeCamera &c = best.fit.camera, &s = best.fit.sigma;
   const auto row = [](const char* name, double value, double sigma, const char* unit) {
@@ -157,6 +220,14 @@ void calibrate_by_target(const CameraOptions& options) {
     throw InputError{options.views.empty() ? std::string{"--view"} : options.views.back().string(),
                      "only " + std::to_string(views.size()) + " views are given",
                      "three fix a camera, a fourth tells whether it holds: give at least 4"};
+  const metrology::SortedViews sorted = metrology::sort_views(target, views);
+  if (sorted.good.size() < 4 && !sorted.bad.empty())
+    throw InputError{options.views[sorted.bad.front().view].string(), sorted.bad.front().why,
+                     "mend it or give another: " + std::to_string(sorted.good.size()) +
+                         " views are left without those that do not go with the others, 4 are needed"};
+  std::vector<Matrix2Xd> good;
+  for (const std::size_t v : sorted.good) good.push_back(std::move(views[v]));
+  views = std::move(good);
   std::vector<Rival> rivals;
   for (const metrology::Lens lens : metrology::lenses) {
     const auto fit = metrology::calibrate_planar(target, views, lens);
@@ -180,16 +251,23 @@ void calibrate_by_target(const CameraOptions& options) {
   json["rms_px"] = best.fit.rms;
   json["held_out_rms_px"] = best.held_out;
   json["unidentified"] = nlohmann::json::array();
+  const report::LeftOut left_out = rows_of(best, sorted, target.cols(), options);
+  json["rows"] = report::json_of(left_out);
+  for (const auto& what : bad_views_of(sorted, options)) json["views_left_out"].push_back(what);
   for (const Rival& r : rivals)
     json["lenses"].push_back({{"lens", metrology::name(r.fit.lens)},
                               {"rms_px", r.fit.rms},
                               {"held_out_rms_px", r.held_out},
                               {"left_out_px", r.left_out}});
-  write_camera_result(options.out, pinhole_yaml(best), json.dump(2), make_page(rivals, best, views, options));
+  write_camera_result(options.out, pinhole_yaml(best), json.dump(2),
+                      make_page(rivals, best, views, options, sorted, left_out));
+  for (const auto& what : bad_views_of(sorted, options)) std::cout << "left out: " << what << '\n';
   for (const Rival& r : rivals)
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"
               << (&r == &best ? "  <- chosen" : "") << '\n';
+  std::cout << line_of(left_out) << '\n';
+  for (const auto& what : left_out.unexplained) std::cout << "note: " << what << '\n';
   std::cout << written(options.out, "camera.yaml") << '\n';
 }
 

@@ -11,6 +11,8 @@
 #include <random>
 #include <string>
 
+#include "core/metrology/bad_views.hpp"
+
 namespace invar::metrology {
 namespace {
 
@@ -141,6 +143,64 @@ TEST(PlanarCamera, WhatDoesNotDetermineACameraIsRefused) {
   Matrix2Xd line = grid();
   line.row(1).setZero();
   EXPECT_FALSE(calibrate_planar(line, seen, Lens::pinhole));
+}
+
+// Nine views, each turned at random about all axes.
+std::vector<Matrix2Xd> nine_views(const PinholeCamera& camera, double noise, unsigned seed) {
+  std::mt19937_64 random{seed};
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> turn{-0.5, 0.5};
+  std::vector<Matrix2Xd> out;
+  while (out.size() < 9) {
+    const Vector3d axis{turn(random), turn(random), turn(random)};
+    const Eigen::Matrix3d rotation = Eigen::AngleAxisd{axis.norm(), axis.normalized()}.toRotationMatrix();
+    const Vector3d middle{0.05 * turn(random), 0.05 * turn(random), 0.38 + 0.1 * turn(random)};
+    Matrix2Xd view(2, 64);
+    for (Index i = 0; i < 64; ++i) {
+      const Vector3d point{grid()(0, i) - 0.07, grid()(1, i) - 0.07, 0.0};
+      view.col(i) = camera.project(rotation * point + middle);
+      view.col(i) += noise * Eigen::Vector2d{normal(random), normal(random)};
+    }
+    out.push_back(view);
+  }
+  return out;
+}
+
+// A view in which something is wrong is found and named, whatever it is.
+TEST(BadViews, AreFoundAndNamed) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    const auto sound = nine_views(camera(), 0.2, seed);
+    EXPECT_TRUE(sort_views(grid(), sound).bad.empty()) << seed;
+    const std::size_t which = seed % sound.size();
+    const auto with = [&](const Matrix2Xd& view) {
+      auto given = sound;
+      given[which] = view;
+      return sort_views(grid(), given);
+    };
+    const auto expect = [&](const SortedViews& sorted, const std::string& why) {
+      ASSERT_EQ(sorted.bad.size(), 1u) << seed << ' ' << why;
+      EXPECT_EQ(sorted.bad.front().view, which) << seed;
+      EXPECT_THAT(sorted.bad.front().why, ::testing::HasSubstr(why)) << seed;
+      EXPECT_EQ(sorted.good.size(), sound.size() - 1);
+    };
+    Matrix2Xd doubled = sound[which];
+    doubled.col(12) = doubled.col(11);
+    expect(with(doubled), "point 13 lies where point 12 should");
+    Matrix2Xd exchanged = sound[which];
+    exchanged.col(30).swap(exchanged.col(31));
+    expect(with(exchanged), "point 31 lies where point 32 should");
+    expect(with(sound[which].colwise().reverse()), "u and v are exchanged");
+    Matrix2Xd shifted(2, 64);
+    for (Index i = 0; i < 64; ++i) shifted.col(i) = sound[which].col((i + 5) % 64);
+    expect(with(shifted), "not in the order");
+  }
+}
+
+TEST(BadViews, ALensThatBendsOneViewMostIsNoBadView) {
+  PinholeCamera bent = camera();
+  bent.radial = {-0.35, 0.15, 0.0};
+  for (unsigned seed = 1; seed <= 5; ++seed)
+    EXPECT_TRUE(sort_views(grid(), nine_views(bent, 0.05, seed)).bad.empty()) << seed;
 }
 
 }  // namespace
