@@ -2,15 +2,26 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "components/vision/camera.hpp"
 
 namespace invar::vision {
 
-/// Throws InputError for what is missing or wrong, and where the file's checksum does not fit its text. Only `scale` is
-/// required.
-CameraModel read_camera(const std::filesystem::path& file);
+/// Throws InputError for what is missing or wrong, and where the file's checksum does not fit its text. Of model `scale` only
+/// `scale` is required. A pinhole camera needs the plane that it looks at: its file's, or one straight below it at `distance`
+/// [m] (0: none is given).
+CameraModel read_camera(const std::filesystem::path& file, double distance = 0.0);
+
+/// The plane that a pinhole camera looks at, and how well the scale there is known.
+struct CameraPlane {
+  PinholeView view;
+  double scale_sigma = 0.0;  // m/px
+};
+/// The text of a pinhole camera.yaml, with standard deviations; `lens` names its terms; `plane` where it is known.
+std::string camera_yaml(const metrology::PinholeCamera& camera, const metrology::PinholeCamera& sigma,
+                        const std::string& lens, const std::optional<CameraPlane>& plane);
 
 /// The text of a camera.yaml; its last line is a checksum of those above it.
 std::string camera_yaml(const CameraModel& camera);

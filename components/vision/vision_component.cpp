@@ -54,13 +54,13 @@ Vision::Vision(const Parameters& parameters) : parameters_{parameters} {
   if (parameters.camera.empty() && parameters.ruler.empty())
     throw InputError{"camera", "missing, and no `ruler` to calibrate by", "name camera.yaml or ruler.yaml"};
   if (!parameters.ruler.empty()) radii_ = radii_of(read_ruler(parameters.ruler));
-  if (!parameters.camera.empty()) camera_ = read_camera(parameters.camera);
+  if (!parameters.camera.empty()) camera_ = read_camera(parameters.camera, parameters.distance);
 }
 
 void Vision::configure() {
   (void)library();
   camera_.reset();
-  if (!parameters_.camera.empty()) camera_ = read_camera(parameters_.camera);
+  if (!parameters_.camera.empty()) camera_ = read_camera(parameters_.camera, parameters_.distance);
 }
 
 void Vision::activate() {

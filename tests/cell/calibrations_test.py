@@ -187,5 +187,94 @@ class Fusion(Calibrations):
         self.assertGreater(self.report()["held_out_rms_m"]["observer"], 0)
 
 
+class Camera(Calibrations):
+    """A pinhole camera of 900 px focal length that sees a flat target of 7 x 6 points, 12 mm apart."""
+    FOCAL, CENTRE = 900.0, (320.0, 240.0)
+
+    def see(self, turn, foot, point):
+        a, b = turn
+        x, y = point
+        x, z = x * math.cos(b), -x * math.sin(b)
+        y, z = y * math.cos(a) - z * math.sin(a), y * math.sin(a) + z * math.cos(a)
+        x, y, z = x + foot[0], y + foot[1], z + foot[2]
+        return self.CENTRE[0] + self.FOCAL * x / z, self.CENTRE[1] + self.FOCAL * y / z
+
+    def setUp(self):
+        super().setUp()
+        draw = random.Random(2)
+        target = [(0.012 * (i % 7) - 0.036, 0.012 * (i // 7) - 0.03) for i in range(42)]
+        self.write("target.csv", "x [m],y [m]", target)
+        self.views = []
+        for k, turn in enumerate([(0.4, 0.1), (-0.3, 0.4), (0.1, -0.5), (-0.5, -0.2), (0.3, 0.5), (0.05, -0.03),
+                                  (0.5, -0.4), (-0.2, -0.4)]):
+            points = [self.see(turn, (0.002 * k - 0.008, 0.003, 0.16), point) for point in target]
+            points = [(u + draw.gauss(0, 0.05), v + draw.gauss(0, 0.05)) for u, v in points]
+            self.write(f"view{k}.csv", "u [px],v [px]", [(f"{u:.4f}", f"{v:.4f}") for u, v in points])
+            self.views += ["--view", f"view{k}.csv"]
+
+    def test_a_view_with_a_doubled_corner_is_named_and_left_out(self):
+        lines = (self.here / "view3.csv").read_text().splitlines()
+        lines[20] = lines[19]
+        (self.here / "view3.csv").write_text("\n".join(lines) + "\n")
+        said = self.call("calibrate", "camera", "--target", "target.csv", *self.views, "--out", "out")
+        self.assertIn("left out: view3.csv: point 20 lies where point 19 should", said)
+        report = self.report()
+        self.assertLess(abs(report["camera"]["fx"] - self.FOCAL), 3 * report["sigma"]["fx"])
+        self.assertEqual((report["rows"]["given"], report["rows"]["used"]), (8, 7))
+        self.assertGreater(report["rows"]["rms_all"], 5 * report["rows"]["rms_used"])
+        self.assertIn("view3.csv", self.page())
+
+    def test_droplets_are_measured_in_the_plane_of_the_target(self):
+        """The target lies on the substrate in view 5; five drops of 3 mm, 20 mm apart."""
+        self.call("calibrate", "camera", "--target", "target.csv", *self.views, "--plane", "view5.csv", "--out", "out")
+        width, height = 640, 480
+        turn, foot = (0.05, -0.03), (0.002, 0.003, 0.16)
+        drops = [(0.0, 0.0), (0.02, 0.0), (-0.02, 0.0), (0.0, 0.02), (0.0, -0.02)]
+        image = [230.0] * (width * height)
+        for at in drops:
+            edge = [self.see(turn, foot, (at[0] + 1.5e-3 * math.cos(0.1 * k), at[1] + 1.5e-3 * math.sin(0.1 * k)))
+                    for k in range(63)]
+            cu, cv = self.see(turn, foot, at)
+            for v in range(int(cv) - 14, int(cv) + 15):
+                for u in range(int(cu) - 14, int(cu) + 15):
+                    share = sum(self.inside(edge, u + du / 8 - 0.4375, v + dv / 8 - 0.4375)
+                                for du in range(8) for dv in range(8)) / 64
+                    image[v * width + u] = 230 - 190 * share
+        for step in (1, width):  # a lens blurs: [1 2 1] along rows, then along columns
+            image = [(image[i - step] + 2 * image[i] + image[(i + step) % len(image)]) / 4 for i in range(len(image))]
+        image = [round(value) for value in image]
+        (self.here / "drops.pgm").write_bytes(b"P5 640 480 255\n" + bytes(image))
+        self.call("measure", "droplets", "--image", "drops.pgm", "--camera", "out/camera.yaml", "--output", "d.csv")
+        lines = (self.here / "d.csv").read_text().splitlines()
+        names = lines[0].split(",")
+        rows = [dict(zip(names, line.split(","))) for line in lines[1:]]
+        self.assertEqual(len(rows), 5)
+        found = [(float(row["x [m]"]), float(row["y [m]"])) for row in rows]
+        for row in rows:
+            self.assertAlmostEqual(float(row["diameter [m]"]), 3e-3, delta=3e-5)
+        middle = min(found, key=lambda p: sum(math.dist(p, q) for q in found))
+        for point in found:
+            if point != middle:
+                self.assertAlmostEqual(math.dist(point, middle), 0.02, delta=2e-5)
+
+    def test_a_pinhole_camera_without_a_plane_asks_for_one(self):
+        self.call("calibrate", "camera", "--target", "target.csv", *self.views, "--out", "out")
+        (self.here / "grey.pgm").write_bytes(b"P5 64 64 255\n" + bytes([200] * 4096))
+        for more, status in (([], 2), (["--distance", "0.16"], 0)):
+            said = self.call("measure", "droplets", "--image", "grey.pgm", "--camera", "out/camera.yaml", *more,
+                             "--output", "d.csv", status=status)
+            if status == 2:
+                self.assertEqual(said.count("\n"), 1)
+                self.assertIn("plane", said)
+
+    @staticmethod
+    def inside(edge, u, v):
+        odd = False
+        for (u0, v0), (u1, v1) in zip(edge, edge[1:] + edge[:1]):
+            if (v0 > v) != (v1 > v) and u < u0 + (v - v0) * (u1 - u0) / (v1 - v0):
+                odd = not odd
+        return odd
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -168,6 +168,9 @@ void add_calibrate_camera(CLI::App& group) {
                    "the same points in one picture: u [px], v [px]; at least four times")
       ->type_size(1)
       ->expected(-1);
+  command->add_option(
+      "--plane", options->plane,
+      "the --view in which the target lies on the substrate: droplets are measured in its plane");
   command->add_option("--out", options->out, "folder for camera.yaml, report.json and report.html")
       ->required();
   command->callback([options] {

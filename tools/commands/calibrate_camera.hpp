@@ -14,6 +14,7 @@ struct CameraOptions {
   std::optional<std::filesystem::path> image, ruler;  // a ruler of circles
   std::optional<std::filesystem::path> target;        // a flat target in several views
   std::vector<std::filesystem::path> views;
+  std::optional<std::filesystem::path> plane;  // the view of the target that lies on the substrate
   std::filesystem::path out;
 };
 

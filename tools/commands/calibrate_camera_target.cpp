@@ -1,4 +1,5 @@
 // `invar calibrate camera --target --view`: a pinhole camera with its lens from views of a flat target.
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -7,6 +8,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "components/vision/camera_file.hpp"
 #include "core/metrology/bad_views.hpp"
 #include "core/metrology/planar_camera.hpp"
 #include "core/numerics/robust.hpp"
@@ -61,30 +63,51 @@ struct Rival {
   double held_out = 0.0;         // px, RMS over the views
 };
 
-nlohmann::json numbers(const metrology::PinholeCamera& c) {
-  return {{"fx", c.fx},
-          {"fy", c.fy},
-          {"u0", c.u0},
-          {"v0", c.v0},
-          {"skew", c.skew},
-          {"radial", c.radial},
-          {"tangential", c.tangential}};
+/// The numbers that the lens has: what was not fitted is not there.
+nlohmann::json numbers(const metrology::PinholeCamera& c, metrology::Lens lens) {
+  using metrology::Lens;
+  const std::size_t radial = lens == Lens::pinhole    ? 0
+                             : lens == Lens::radial_1 ? 1
+                             : lens == Lens::radial_3 ? 3
+                                                      : 2;
+  nlohmann::json json{{"fx", c.fx}, {"fy", c.fy}, {"u0", c.u0}, {"v0", c.v0}, {"skew", c.skew}};
+  json["radial"] =
+      std::vector<double>(c.radial.begin(), c.radial.begin() + static_cast<std::ptrdiff_t>(radial));
+  if (lens == Lens::radial_2_tangential) json["tangential"] = c.tangential;
+  return json;
 }
 
-std::string pinhole_yaml(const Rival& best) {
-  const metrology::PinholeCamera &c = best.fit.camera, &s = best.fit.sigma;
-  const auto digits = [](double v) { return report::number(v, 10); };
-  const auto entry = [&](const char* name, double value, double sigma, const char* unit) {
-    return "  " + std::string{name} + ": {value: " + digits(value) + ", unit: " + unit +
-           ", sigma: " + report::number(sigma, 3) + "}\n";
-  };
-  return "invar_camera: 1\nmodel: pinhole  # lens " + std::string{metrology::name(best.fit.lens)} +
-         "\npinhole:\n" + entry("fx", c.fx, s.fx, "px") + entry("fy", c.fy, s.fy, "px") +
-         entry("u0", c.u0, s.u0, "px") + entry("v0", c.v0, s.v0, "px") + entry("skew", c.skew, s.skew, "px") +
-         entry("k1", c.radial[0], s.radial[0], "\"1\"") + entry("k2", c.radial[1], s.radial[1], "\"1\"") +
-         entry("k3", c.radial[2], s.radial[2], "\"1\"") +
-         entry("p1", c.tangential[0], s.tangential[0], "\"1\"") +
-         entry("p2", c.tangential[1], s.tangential[1], "\"1\"");
+/// The plane of the target in one view, and how well the target fixes the scale there.
+vision::CameraPlane plane_of(const Rival& best, const metrology::TargetPose& pose, const Matrix2Xd& view,
+                             double rms) {
+  const double angle = pose.rotation.norm();
+  const Eigen::Matrix3d rotation = angle > 0.0
+                                       ? Eigen::AngleAxisd{angle, pose.rotation / angle}.toRotationMatrix()
+                                       : Eigen::Matrix3d::Identity();
+  vision::CameraPlane plane;
+  plane.view.camera = best.fit.camera;
+  plane.view.normal = rotation.col(2);
+  if (plane.view.normal.z() < 0.0) plane.view.normal = -plane.view.normal;
+  plane.view.distance = plane.view.normal.dot(pose.position) / plane.view.normal.z();
+  // One component of a point is off by rms / sqrt 2; a scale is fitted to the distances from their middle.
+  const double spread = (view.colwise() - view.rowwise().mean()).norm();
+  plane.scale_sigma = plane.view.scale() * rms / std::sqrt(2.0) / spread;
+  return plane;
+}
+
+/// The plane of `--plane`; nothing where none is named.
+std::optional<vision::CameraPlane> plane_of(const CameraOptions& options, const Rival& best,
+                                            const metrology::SortedViews& sorted,
+                                            const std::vector<Matrix2Xd>& good) {
+  if (!options.plane) return std::nullopt;
+  for (std::size_t k = 0; k < sorted.good.size(); ++k)
+    if (options.views[sorted.good[k]] == *options.plane)
+      return plane_of(best, best.fit.views[k].pose, good[k], best.fit.views[k].rms);
+  const bool given =
+      std::find(options.views.begin(), options.views.end(), *options.plane) != options.views.end();
+  throw InputError{options.plane->string(),
+                   given ? "was left out: it does not go with the other views" : "is no --view",
+                   "name the view of the target that lies on the substrate"};
 }
 
 /// What each view left out is wrong with, by its file.
@@ -169,12 +192,16 @@ report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
   const auto row = [](const char* name, double value, double sigma, const char* unit) {
     return std::vector<std::string>{name, number(value, 7), number(sigma, 2), unit};
   };
-  page.table({"", "value", "sigma", "unit"},
-             {row("fx", c.fx, s.fx, "px"), row("fy", c.fy, s.fy, "px"), row("u0", c.u0, s.u0, "px"),
-              row("v0", c.v0, s.v0, "px"), row("skew", c.skew, s.skew, "px"),
-              row("k1", c.radial[0], s.radial[0], ""), row("k2", c.radial[1], s.radial[1], ""),
-              row("k3", c.radial[2], s.radial[2], ""), row("p1", c.tangential[0], s.tangential[0], ""),
-              row("p2", c.tangential[1], s.tangential[1], "")});
+  std::vector<std::vector<std::string>> camera{row("fx", c.fx, s.fx, "px"), row("fy", c.fy, s.fy, "px"),
+                                               row("u0", c.u0, s.u0, "px"), row("v0", c.v0, s.v0, "px"),
+                                               row("skew", c.skew, s.skew, "px")};
+  const char* radial[] = {"k1", "k2", "k3"};
+  const char* tangential[] = {"p1", "p2"};
+  for (std::size_t k = 0; k < 3; ++k)
+    if (s.radial[k] > 0.0) camera.push_back(row(radial[k], c.radial[k], s.radial[k], ""));
+  for (std::size_t k = 0; k < 2; ++k)
+    if (s.tangential[k] > 0.0) camera.push_back(row(tangential[k], c.tangential[k], s.tangential[k], ""));
+  page.table({"", "value", "sigma", "unit"}, camera);
   constexpr double exaggeration = 30.0;
   const auto arrows = [&](const Rival& rival, const std::string& title) {
     report::Series series{"", report::Series::Style::vectors, {}, {}, {}, {}, ""};
@@ -246,8 +273,8 @@ void calibrate_by_target(const CameraOptions& options) {
 
   nlohmann::json json;
   json["model"] = metrology::name(best.fit.lens);
-  json["camera"] = numbers(best.fit.camera);
-  json["sigma"] = numbers(best.fit.sigma);
+  json["camera"] = numbers(best.fit.camera, best.fit.lens);
+  json["sigma"] = numbers(best.fit.sigma, best.fit.lens);
   json["rms_px"] = best.fit.rms;
   json["held_out_rms_px"] = best.held_out;
   json["unidentified"] = nlohmann::json::array();
@@ -259,13 +286,28 @@ void calibrate_by_target(const CameraOptions& options) {
                               {"rms_px", r.fit.rms},
                               {"held_out_rms_px", r.held_out},
                               {"left_out_px", r.left_out}});
-  write_camera_result(options.out, pinhole_yaml(best), json.dump(2),
-                      make_page(rivals, best, views, options, sorted, left_out));
+  const auto plane = plane_of(options, best, sorted, views);
+  if (plane)
+    json["plane"] = {{"distance_m", plane->view.distance},
+                     {"normal", {plane->view.normal.x(), plane->view.normal.y(), plane->view.normal.z()}},
+                     {"scale_m_px", plane->view.scale()},
+                     {"scale_sigma_m_px", plane->scale_sigma}};
+  write_camera_result(
+      options.out,
+      vision::camera_yaml(best.fit.camera, best.fit.sigma, metrology::name(best.fit.lens), plane),
+      json.dump(2), make_page(rivals, best, views, options, sorted, left_out));
   for (const auto& what : bad_views_of(sorted, options)) std::cout << "left out: " << what << '\n';
   for (const Rival& r : rivals)
     std::cout << metrology::name(r.fit.lens) << ": fitted " << report::number(r.fit.rms, 4)
               << " px, held-out views " << report::number(r.held_out, 4) << " px"
               << (&r == &best ? "  <- chosen" : "") << '\n';
+  if (plane)
+    std::cout << "plane " << report::si(plane->view.distance, "m", 5) << " away, "
+              << report::with_sigma(1e6 * plane->view.scale(), 1e6 * plane->scale_sigma, "um/px")
+              << " there\n";
+  else
+    std::cout << "note: without --plane VIEW a picture measured by this camera needs the distance of the "
+                 "substrate\n";
   std::cout << line_of(left_out) << '\n';
   for (const auto& what : left_out.unexplained) std::cout << "note: " << what << '\n';
   std::cout << written(options.out, "camera.yaml") << '\n';

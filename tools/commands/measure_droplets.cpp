@@ -17,6 +17,7 @@ namespace {
 struct Options {
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> camera;
+  double distance = 0.0;
   std::filesystem::path output;
   std::optional<std::filesystem::path> report;
 };
@@ -28,7 +29,7 @@ struct Rows {
 
 void measure(const Options& options) {
   std::optional<vision::CameraModel> camera;
-  if (options.camera) camera = vision::read_camera(*options.camera);
+  if (options.camera) camera = vision::read_camera(*options.camera, options.distance);
   // Every image is read before anything is measured: a bad one must not cost the time of the good ones.
   std::vector<vision::Pixels> images;
   for (const auto& file : options.images) images.push_back(vision::library().read(file));
@@ -101,6 +102,11 @@ void add_measure(CLI::App& program) {
       ->type_size(1)
       ->expected(-1);
   command->add_option("--camera", options->camera, "camera.yaml: adds positions and diameters in m");
+  command
+      ->add_option(
+          "--distance", options->distance,
+          "of the substrate straight below a pinhole camera [m]; not needed where camera.yaml has its plane")
+      ->check(CLI::PositiveNumber);
   command->add_option("--output", options->output, "table to write, .csv or .csv.gz")->required();
   command->add_option("--report", options->report, "page to write: annotated images, sizes (.html)");
   command->callback([options] { measure(*options); });

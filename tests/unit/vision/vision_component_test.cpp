@@ -136,6 +136,34 @@ struct Sight {
       : camera{(measuring.camera = sound_camera(folder), change(*this), seeing)}, vision{measuring} {}
 };
 
+// The same sight through a pinhole camera whose plane is 0.1 m away: 0.1 / 7751.938 is the 12.9 um/px of the simulated one.
+TEST(Vision, ReadsAPinholeCamera) {
+  Sight sight{[](Sight& s) {
+    metrology::PinholeCamera pinhole{7751.938, 7751.938, 299.5, 199.5, 0.0, {}, {}}, sigma;
+    sigma.fx = 1.0;
+    s.measuring.camera = s.folder.write("pinhole.yaml", camera_yaml(pinhole, sigma, "pinhole", std::nullopt));
+    EXPECT_THAT([&] { (void)read_camera(s.measuring.camera); },
+                ::testing::ThrowsMessage<InputError>(::testing::HasSubstr("plane")));
+    s.measuring.distance = 0.1;
+  }};
+  Bench& bench = sight.bench;
+  const std::vector<std::array<double, 2>> truth{{0.1, 0.1}, {0.1015, 0.1012}, {0.0985, 0.0991}};
+  for (const auto& at : truth) bench.drop(at[0], at[1], 6e-4);
+  bench.stand(0.1, 0.1, 0.0, 0.0);
+  bench.ask(1);
+  const auto* seen = bench.droplets.latest();
+  ASSERT_NE(seen, nullptr) << bench.said();
+  ASSERT_EQ(seen->droplets().size(), truth.size());
+  for (const auto& droplet : seen->droplets()) {
+    double nearest = 1.0;
+    for (const auto& at : truth)
+      nearest = std::min(nearest, std::hypot(at[0] - droplet.position()[0], at[1] - droplet.position()[1]));
+    EXPECT_LT(nearest, 0.1 * 1.29e-5);
+    EXPECT_NEAR(droplet.diameter(), 6e-4, 2e-6);
+  }
+  EXPECT_NEAR(bench.status.latest()->scale(), 1.29e-5, 1e-10);
+}
+
 TEST(Vision, FindsDropletsWhereTheyLieOnTheSubstrate) {
   Sight sight{[](Sight& s) {
     s.seeing.mount.offset = {0.031, -0.012};
