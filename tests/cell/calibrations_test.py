@@ -161,6 +161,49 @@ class Thermistor(Calibrations):
         self.assertIn("goes on from one temperature to the next", self.report()["rows"]["unexplained"][0])
 
 
+class Ripple(Calibrations):
+    MODEL = """invar_model: 1
+plant: axis
+parameters:
+  mass: {value: 0.002, unit: kg m2, sigma: 0.0001}
+  motor_constant: {value: 0.3, unit: N m/A, sigma: 0.01}
+  viscous_damping: {value: 0.02, unit: N m s/rad, sigma: 0.002}
+columns:
+  time: t
+  reference: reference
+  position: position
+  current: current
+"""
+
+    def test_every_family_of_a_rotary_axis_in_its_own_units(self):
+        """Cogging of 24 poles, a gear of 67 teeth, friction; two turns forth and back at half a radian a second."""
+        draw = random.Random(3)
+        (self.here / "model.yaml").write_text(self.MODEL)
+        rows, at, t = [], 0.0, 0.0
+        for run in range(4):
+            way = 0.5 if run % 2 == 0 else -0.5
+            for k in range(2600):
+                moving = 0 if k < 50 or k >= 2563 else way
+                at, t = at + 0.01 * moving, t + 0.01
+                torque = 0.05 * math.sin(24 * at + 0.4) + 0.02 * math.sin(67 * at - 1.1)
+                current = (0.02 * moving + 0.1 * (moving > 0) - 0.1 * (moving < 0) - torque) / 0.3
+                deg = math.degrees(at)
+                rows.append([f"{t:.3f}", f"{deg:.6f}", f"{deg:.6f}", f"{current + draw.gauss(0, 0.01):.5f}"])
+        self.write("runs.csv", "t [s],reference [deg],position [deg],current [A]", rows)
+        said = self.call("calibrate", "ripple", "--model", "model.yaml", "--recording", "runs.csv", "--out", "out")
+        self.assertIn("24 a turn", said)
+        families = self.report()["families"]
+        self.assertEqual(len(families), 2)
+        for family, teeth, amplitude in zip(families, (24, 67), (0.05, 0.02)):
+            self.assertEqual(family["pitch"]["unit"], "rad")
+            self.assertAlmostEqual(2 * math.pi / family["pitch"]["value"], teeth, delta=0.02)
+            self.assertAlmostEqual(family["harmonics"][0]["amplitude_Nm"], amplitude, delta=0.002)
+        self.assertIn("not at a constant velocity", said)
+        patched = (self.here / "out" / "patched.yaml").read_text()
+        self.assertEqual(patched.count("force_ripple"), 2)
+        self.call("simulate", "--model", "out/patched.yaml", "--inputs", "runs.csv", "--output", "simulated.csv")
+
+
 class Fusion(Calibrations):
     def run_at(self, speed, seed):
         draw = random.Random(seed)

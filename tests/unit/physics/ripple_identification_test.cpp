@@ -10,6 +10,7 @@
 
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
+#include "core/physics/counted_units.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::physics {
@@ -153,6 +154,60 @@ TEST(RippleIdentification, ClaimsNoneWhereThereIsNone) {
   double largest = 0.0;
   for (const auto& harmonic : fit.harmonics) largest = std::max(largest, harmonic.amplitude);
   EXPECT_LT(largest, 0.02);
+}
+
+TEST(RippleIdentification, FindsEveryFamilyThatStandsOut) {
+  // A screw of 5 mm and a rack of 7.7 mm beside the magnets: none is a harmonic of another.
+  Model three = with(truth(), "force_ripple", {0.5, 5.0e-3, 0.3});
+  three = with(three, "force_ripple", {0.2, 7.7e-3, -1.0});
+  const RippleFit fit = identify_ripple(nominal(), runs(three, 0.02, 4));
+  ASSERT_EQ(fit.families.size(), 3U);
+  EXPECT_NEAR(fit.families[0].pitch, pitch, 2e-5);
+  EXPECT_NEAR(fit.families[1].pitch, 5.0e-3, 2e-6);
+  EXPECT_NEAR(fit.families[1].harmonics.front().amplitude, 0.5, 0.03);
+  EXPECT_NEAR(fit.families[2].pitch, 7.7e-3, 5.0 * fit.families[2].pitch_sigma);
+  EXPECT_LT(fit.families[2].pitch_sigma, 5e-6);
+  EXPECT_NEAR(fit.families[2].harmonics.front().amplitude, 0.2, 0.03);
+  EXPECT_EQ(ripple_terms(fit).size(), 4U);
+  EXPECT_EQ(identify_ripple(nominal(), runs(truth(), 0.02, 4)).families.size(), 1U);
+}
+
+/// Two slow turns forth and back of a rotary axis with cogging of 24 poles and a gear of 67 teeth.
+RippleSamples turns(unsigned seed, double noise) {
+  std::mt19937 random{seed};
+  std::normal_distribution<double> normal;
+  RippleSamples samples;
+  for (int run = 0; run < 4; ++run)
+    for (int k = 0; k < 1200; ++k) {
+      const double way = run % 2 == 0 ? 1.0 : -1.0;
+      const double share = static_cast<double>(run % 2 == 0 ? k : 1200 - k) / 1200.0;
+      const double at = 4.0 * std::numbers::pi * share;
+      const double ripple = 0.05 * std::sin(24.0 * at + 0.4) + 0.02 * std::sin(67.0 * at - 1.1);
+      samples.position.push_back(at);
+      samples.velocity.push_back(0.5 * way);
+      samples.current.push_back((0.02 * 0.5 * way + 0.1 * way - ripple + noise * normal(random)) / 0.3);
+      samples.run.push_back(run);
+    }
+  return samples;
+}
+
+TEST(RippleIdentification, CountsARotaryAxisInAngles) {
+  Model rotary;
+  rotary.plant = Plant::axis;
+  rotary.parameters = {{"mass", "kg m2", 2e-3, {}, {}},
+                       {"motor_constant", "N m/A", 0.3, {}, {}},
+                       {"viscous_damping", "N m s/rad", 0.02, {}, {}}};
+  rotary.signals = {{"position", "position", "rad"}};
+  ASSERT_TRUE(is_rotary(rotary));
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    const RippleFit fit = identify_ripple(rotary, turns(seed, 0.01));
+    ASSERT_EQ(fit.families.size(), 2U) << seed;
+    EXPECT_NEAR(fit.families[0].pitch, 2.0 * std::numbers::pi / 24.0, 2e-4) << seed;
+    EXPECT_NEAR(fit.families[0].harmonics.front().amplitude, 0.05, 0.003) << seed;
+    EXPECT_NEAR(fit.families[0].harmonics.front().phase, 0.4, 0.05) << seed;
+    EXPECT_NEAR(fit.families[1].pitch, 2.0 * std::numbers::pi / 67.0, 1e-4) << seed;
+    EXPECT_NEAR(fit.families[1].harmonics.front().amplitude, 0.02, 0.003) << seed;
+  }
 }
 
 TEST(RippleIdentification, FedForwardItLowersTheFollowingErrorOfAnotherMotion) {
