@@ -10,6 +10,7 @@ using metrology::squareness_count;
 namespace {
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
+constexpr double most_reversal = 1e-2;  // m, beyond it a model is refused
 std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
 
 }  // namespace
@@ -69,6 +70,59 @@ void read_squareness(const config::Node& root, metrology::Squareness& squareness
     const auto quantity = one.as_quantity("rad", {-0.1, 0.1});
     squareness[index(pair)] = metrology::squareness_cosine_from_angle(pair, quantity.value);
     sigma[index(pair)] = quantity.sigma.value_or(0.0);
+  }
+}
+
+void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 3>& reversal) {
+  std::array<double, 3> means{};
+  for (std::size_t k = 0; k < 3; ++k) means[k] = reversal[k].mean();
+  text.comment("Lost motion of each axis [m], forward minus backward: mean over the travel, then over position");
+  text.comment("(cubic B-splines, the standard deviation at each knot); half of it to either side of the error.");
+  text.numbers("reversal", means.data(), 3);
+  if (std::all_of(reversal.begin(), reversal.end(), [](const auto& curve) { return curve.empty(); })) return;
+  text.open("reversal_over_position");
+  for (int k = 0; k < 3; ++k) {
+    const metrology::ReversalCurve& curve = reversal[index(k)];
+    if (curve.empty()) continue;
+    text.open(letter(k)).range("interval", curve.spline.interval());
+    text.numbers("coefficients", curve.coefficients).numbers("sigma", curve.sigma).close();
+  }
+  text.close();
+}
+
+void read_reversal(const config::Node& root, const metrology::Chain& chain,
+                   const std::array<Range, 3>& travel, std::array<metrology::ReversalCurve, 3>& reversal) {
+  const Range allowed{-most_reversal, most_reversal};
+  const auto means = exactly(root.required("reversal"), 3, "m");
+  const config::Node curves = root["reversal_over_position"];
+  for (int k = 0; k < 3; ++k) {
+    const config::Node one = curves[letter(k)];
+    if (!chain.has(k)) {
+      if (one.exists()) one.fault("the chain has no such axis", "remove it");
+      continue;
+    }
+    if (!one.exists()) {
+      if (!allowed.contains(means[index(k)]))
+        root["reversal"].fault("a reversal beyond 10 mm", "calibrate again");
+      else if (means[index(k)] != 0.0)
+        reversal[index(k)] = metrology::constant_reversal(travel[index(k)], means[index(k)], 0.0);
+      continue;
+    }
+    const Range interval = one.required("interval").as_range("m");
+    const auto values = one.required("coefficients").as_numbers("m");
+    if (values.size() < 4 || values.size() > 1000 || !(interval.width() > 0.0)) {
+      one["coefficients"].fault("holds " + std::to_string(values.size()) + " numbers",
+                                "a spline has 4 to 1000");
+      continue;
+    }
+    if (!std::all_of(values.begin(), values.end(), [&](double v) { return allowed.contains(v); })) {
+      one["coefficients"].fault("a reversal beyond 10 mm", "calibrate again");
+      continue;
+    }
+    const auto sigma = exactly(one.required("sigma"), values.size() - 2, "m");
+    reversal[index(k)] = {numerics::CubicBSpline{interval, static_cast<int>(values.size()) - 3},
+                          Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<long>(values.size())),
+                          Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<long>(sigma.size()))};
   }
 }
 

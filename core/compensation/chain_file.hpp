@@ -4,6 +4,7 @@
 #include <array>
 
 #include "core/compensation/model_file.hpp"
+#include "core/metrology/axis_reversal.hpp"
 #include "core/metrology/volumetric.hpp"
 
 namespace invar::compensation {
@@ -19,5 +20,11 @@ void write_squareness(ModelText& text, const metrology::Squareness& squareness,
                       const metrology::Squareness& sigma);
 void read_squareness(const config::Node& root, metrology::Squareness& squareness,
                      metrology::Squareness& sigma);
+
+/// The mean of each axis under `reversal`, the curves under `reversal_over_position`. A file without curves holds the means
+/// everywhere; a mean of 0 without a curve was not measured.
+void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 3>& reversal);
+void read_reversal(const config::Node& root, const metrology::Chain& chain,
+                   const std::array<Range, 3>& travel, std::array<metrology::ReversalCurve, 3>& reversal);
 
 }  // namespace invar::compensation

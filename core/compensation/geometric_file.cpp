@@ -29,8 +29,7 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
       "Components by ISO 230-1; squareness by ISO sign; the frame is fixed by zero error at the origin.");
   write_chain(text, model.chain, model.travel, model.tool);
   text.text("outside", "end values are held");
-  text.comment("Lost motion of each axis [m], forward minus backward.");
-  text.numbers("reversal", model.reversal.data(), 3);
+  write_reversal(text, model.reversal);
   if (model.reference_temperature) {
     text.comment("All else holds at the reference; an axis grows by expansion * (T - reference) * position.");
     text.open("temperature").number("reference", *model.reference_temperature).text("unit", "degC");
@@ -69,8 +68,7 @@ GeometricModel read_geometric(const config::Node& root) {
   GeometricModel model;
   for (const char* key : {"identified_from", "outside", "identification"}) root[key].accept_all();
   read_chain(root, model.chain, model.travel, model.tool);
-  const auto reversal = exactly(root.required("reversal"), 3, "m");
-  for (std::size_t k = 0; k < 3; ++k) model.reversal[k] = reversal[k];
+  read_reversal(root, model.chain, model.travel, model.reversal);
   if (const config::Node temperature = root["temperature"]; temperature.exists()) {
     model.reference_temperature = temperature.number("reference", "degC", {-50.0, 200.0});
     (void)temperature.choice("unit", {"degC"});

@@ -94,7 +94,16 @@ metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& c
     errors.squareness[static_cast<std::size_t>(pair)] =
         metrology::squareness_cosine_from_angle(pair, child.as_number("rad", {-0.1, 0.1}));
   }
-  read_each_axis(node["reversal"], chain, "m", {-1e-3, 1e-3}, errors.reversal);
+  for (const Node& child : node["reversal"].children()) {
+    const auto axis = metrology::axis_named(child.key());
+    if (!axis || !chain.has(*axis))
+      child.fault("`" + child.key() + "` is no axis of this machine", "use the axes of its chain");
+    else
+      errors.reversal[static_cast<std::size_t>(*axis)] =
+          child.is_map() && !child.has("value")
+              ? read_function(child, "m")
+              : ErrorFunction{child.as_number("m", {-1e-3, 1e-3})};
+  }
   read_each_axis(node["expansion"], chain, "1/K", {-1e-3, 1e-3}, errors.expansion);
   read_each_axis(node["bending"], chain, "m/K", {-1e-3, 1e-3}, errors.bending);
   read_each_axis(node["base_expansion"], chain, "1/K", {-1e-3, 1e-3}, errors.base_expansion);

@@ -22,7 +22,7 @@ namespace invar::machine {
 ///       EYX: {polynomial: [0, 2e-5], harmonics: [{amplitude: 2e-6, period: 0.13, phase: 0.4}]}
 ///       ECX: {table: {position: [0, 0.1, 0.2], value: [0, 4e-6, 1e-5]}}
 ///       EC0Y: {value: 30, unit: arcsec}                      # squareness, ISO sign (EB0Z, EA0Z likewise)
-///       reversal: {x: 1.5e-6}                                # m, lost motion of an axis
+///       reversal: {x: 1.5e-6}                                # m, lost motion of an axis; or a function as above
 ///       expansion: {x: 11.5e-6}                              # 1/K, with the slide's temperature
 ///       bending: {x: 2e-6}                                   # m/K at mid travel, likewise
 ///       base_expansion: {x: 3e-6}                            # 1/K, with the base's temperature

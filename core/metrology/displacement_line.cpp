@@ -111,6 +111,7 @@ LineFit prepare(const DisplacementLine& line) {
         0.125 * (35.0 * t2 * t2 - 30.0 * t2 + 3.0);
   }
   add_expansion(work);
+  add_reversal(work);
   return work;
 }
 
@@ -120,6 +121,49 @@ double roughness(const LineFit& work) {
   for (int i = 3; i < work.rows(); ++i)
     size.push_back(std::abs(work.y[i] - 3 * work.y[i - 1] + 3 * work.y[i - 2] - work.y[i - 3]));
   return size.empty() ? 0.0 : 1.4826 * numerics::median(size) / std::sqrt(20.0);
+}
+
+/// What the readings tell of the reversal at its places, the points' means and all other nuisances marginalised.
+LineReversal reversal_of(const LineFit& work, const Eigen::VectorXd& prior_variance) {
+  LineReversal result;
+  const auto count = static_cast<Eigen::Index>(work.reversal_places.size());
+  if (count == 0) return result;
+  result.places = Eigen::Map<const Eigen::VectorXd>(work.reversal_places.data(), count);
+  result.values = Eigen::VectorXd::Constant(count, work.nuisance[0]);
+  if (work.reversal_shape.cols() > 0)
+    result.values += work.reversal_shape * work.nuisance.segment(work.first_shape, work.reversal_shape.cols());
+  // The others: drift, expansion and steps; the offset of the zero point lies in the points' means.
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index k = 1; k < work.regressors.cols(); ++k)
+    if (k < work.first_shape || k >= work.first_shape + work.reversal_shape.cols()) others.push_back(k);
+  const auto rest = static_cast<Eigen::Index>(others.size());
+  Eigen::MatrixXd rows(work.rows(), count + rest);
+  rows << reversal_rows(work), work.regressors(Eigen::all, others);
+  Eigen::VectorXd mass = Eigen::VectorXd::Zero(work.points());
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(work.points());
+  Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(work.points(), rows.cols());
+  for (int i = 0; i < work.rows(); ++i) {
+    const int j = work.point_of[static_cast<std::size_t>(i)];
+    mass[j] += work.weights[i];
+    sum[j] += work.weights[i] * work.y[i];
+    cross.row(j) += work.weights[i] * rows.row(i);
+  }
+  for (int i = 0; i < work.rows(); ++i) {
+    const int j = work.point_of[static_cast<std::size_t>(i)];
+    rows.row(i) -= cross.row(j) / std::max(mass[j], 1e-12);
+  }
+  const double variance = work.scale * work.scale;
+  const Eigen::MatrixXd weighted = work.weights.asDiagonal() * rows;
+  Eigen::MatrixXd normal = rows.transpose() * weighted / variance;
+  const Eigen::VectorXd right = weighted.transpose() * work.y / variance;
+  for (Eigen::Index k = 0; k < rest; ++k)
+    normal(count + k, count + k) += 1.0 / prior_variance[others[static_cast<std::size_t>(k)]];
+  const Eigen::LDLT<Eigen::MatrixXd> factor{normal.bottomRightCorner(rest, rest)};
+  const Eigen::MatrixXd told = factor.solve(normal.bottomLeftCorner(rest, count));
+  result.information = normal.topLeftCorner(count, count) - normal.topRightCorner(count, rest) * told;
+  result.information = 0.5 * (result.information + result.information.transpose().eval());
+  result.weighted = right.head(count) - told.transpose() * right.tail(rest);
+  return result;
 }
 
 CondensedLine finish(LineFit& work, const Eigen::VectorXd& prior_variance) {
@@ -172,8 +216,8 @@ CondensedLine finish(LineFit& work, const Eigen::VectorXd& prior_variance) {
   LineNoise& noise = result.noise;
   noise.noise = work.scale;
   noise.degrees = work.degrees;
-  noise.reversal = work.nuisance[0];
-  noise.reversal_sigma = work.scale * std::sqrt(work.nuisance_covariance(0, 0));
+  result.reversal = reversal_of(work, prior_variance);
+  noise.reversal = result.reversal.values.size() > 0 ? result.reversal.values.mean() : 0.0;
   noise.drift = 2.0 * (work.nuisance[1] + work.nuisance[3]);
   if (work.expanding) {
     const double own = 1.0 / (variance * work.nuisance_covariance(nuisances, nuisances));
@@ -208,6 +252,41 @@ Beam beam_of(const DisplacementLine& line) {
   return beam;
 }
 
+namespace {
+
+/// How much the lines drift, and their reversal varies, by what their fits with either free say beyond their noise.
+NuisancePrior pooled_prior(const std::vector<LineFit>& works) {
+  NuisancePrior pooled;
+  int lines = 0;
+  std::vector<std::pair<double, double>> shapes;  // square and variance of what a fit found
+  for (const LineFit& work : works) {
+    if (work.degrees < 15.0 || !work.revisited) continue;
+    const auto beyond_noise = [&](Eigen::Index k) {
+      return work.nuisance[k] * work.nuisance[k] - work.scale * work.scale * work.nuisance_covariance(k, k);
+    };
+    ++lines;
+    for (int k = 0; k < drift_terms; ++k) pooled.drift[static_cast<std::size_t>(k)] += beyond_noise(1 + k);
+    for (Eigen::Index k = work.first_shape; k < work.first_shape + work.reversal_shape.cols(); ++k)
+      shapes.emplace_back(work.nuisance[k] * work.nuisance[k],
+                          work.scale * work.scale * work.nuisance_covariance(k, k));
+  }
+  for (auto& variance : pooled.drift) variance = std::max(variance / std::max(lines, 1), 0.0);
+  // Shapes that the readings hardly tell count little: each by the square of its own variance about the common one.
+  for (int round = 0; round < 5; ++round) {
+    double sum = 0.0;
+    double mass = 1e-300;
+    for (const auto& [square, variance] : shapes) {
+      const double w = 1.0 / std::pow(variance + pooled.reversal, 2);
+      sum += w * (square - variance);
+      mass += w;
+    }
+    pooled.reversal = std::max(sum / mass, 0.0);
+  }
+  return pooled;
+}
+
+}  // namespace
+
 std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, double resolution) {
   const double floor = std::max(resolution / std::sqrt(12.0), 1e-9);
   std::vector<LineFit> works;
@@ -215,21 +294,11 @@ std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, 
     if (LineFit work = prepare(line); work.beam.length > 0.0) works.push_back(std::move(work));
 
   // First every line for itself with free drift, then with the drift that the lines show together.
-  std::array<double, drift_terms> drift;
-  drift.fill(1e-10);
-  std::array<double, drift_terms> pooled{};
-  int pooled_lines = 0;
-  for (LineFit& work : works) {
-    fit_robustly(work, drift, floor * 0.1);
-    if (work.degrees < 15.0 || !work.revisited) continue;
-    ++pooled_lines;
-    for (int k = 0; k < drift_terms; ++k) {
-      const double c = work.nuisance[1 + k];
-      pooled[static_cast<std::size_t>(k)] +=
-          c * c - work.scale * work.scale * work.nuisance_covariance(1 + k, 1 + k);
-    }
-  }
-  for (auto& variance : pooled) variance = std::max(variance / std::max(pooled_lines, 1), 0.0);
+  NuisancePrior free;
+  free.drift.fill(1e-10);
+  free.reversal = 1e-10;
+  for (LineFit& work : works) fit_robustly(work, free, floor * 0.1);
+  const NuisancePrior pooled = pooled_prior(works);
   double sum = 0.0;
   double degrees = 0.0;
   for (LineFit& work : works) {

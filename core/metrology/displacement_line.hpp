@@ -38,8 +38,7 @@ Beam beam_of(const DisplacementLine& line);
 struct LineNoise {
   double noise = 0.0;           // m, sd of one reading
   double degrees = 0.0;         // degrees of freedom behind it
-  double reversal = 0.0;        // m, reading forward minus reading backward
-  double reversal_sigma = 0.0;  // m
+  double reversal = 0.0;        // m, reading forward minus reading backward, mean over the line
   double drift = 0.0;           // m, end minus beginning of the measurement
   /// 1/K, of the length along the beam, from temperatures that changed within the line, with what the line tells of it
   /// (K^2): readings are reduced to the line's mean temperature by it. Information 0 where the temperature stood still.
@@ -48,6 +47,16 @@ struct LineNoise {
   int readings = 0;
   int outliers = 0;
   std::vector<int> breaks;  // rows (of this line) before which the count jumped
+};
+
+/// What a line tells of its reversal [m], reading forward minus backward at `places` along the beam and straight in between:
+/// -2 log likelihood = constant - 2 weighted'r + r' information r, all else marginalised. Empty where no place was read both
+/// ways.
+struct LineReversal {
+  Eigen::VectorXd places;  // m from the start
+  Eigen::VectorXd values;  // m, smoothed by what the lines expect together
+  Eigen::MatrixXd information;
+  Eigen::VectorXd weighted;
 };
 
 /// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points, the readings
@@ -66,6 +75,7 @@ struct CondensedLine {
   Eigen::VectorXd deviation;        // J, mean of reading minus nominal after the nuisances, m
   Eigen::VectorXd deviation_sigma;  // J, of that mean, m
   LineNoise noise;
+  LineReversal reversal;
   std::vector<int> point_of;  // of each reading
   Eigen::VectorXd weights;    // of each reading, 0..1; 0 is rejected
 };

@@ -18,6 +18,8 @@ class ErrorFunction {
   };
 
   ErrorFunction() = default;
+  /// The same value everywhere.
+  explicit ErrorFunction(double constant) : ErrorFunction{{constant}, {}} {}
   /// Precondition: periods above 0; table positions ascending, as many values as positions, none or at least
   /// two.
   ErrorFunction(std::vector<double> polynomial, std::vector<Harmonic> harmonics,

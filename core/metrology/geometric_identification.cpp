@@ -196,24 +196,6 @@ void fill_sigma(Identification& work) {
   }
 }
 
-/// Lost motion of each axis from the lines along it, weighted by their precision.
-void fill_reversal(Identification& work) {
-  for (int k = 0; k < 3; ++k) {
-    double sum = 0.0;
-    double mass = 0.0;
-    for (const auto& line : work.lines) {
-      if (std::abs(line.beam.direction[k]) < 0.999999) continue;
-      const LineNoise& noise = line.noise;
-      if (!(noise.reversal_sigma > 0.0) || noise.reversal_sigma > 1e-5) continue;
-      const double w = 1.0 / (noise.reversal_sigma * noise.reversal_sigma);
-      // Moving forward along a beam that points backward is moving the axis backward; the displacement turns its sign too.
-      sum += w * noise.reversal;
-      mass += w;
-    }
-    work.model.reversal[index(k)] = mass > 0.0 ? sum / mass : 0.0;
-  }
-}
-
 void fill_model(Identification& work, const Machine& machine, const std::array<Range, 3>& ranges) {
   GeometricModel& model = work.model;
   model.chain = machine.chain;
@@ -224,7 +206,7 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
     model.coefficients[index(block.component)] =
         work.basis.spline_coefficients(block.component, work.posterior.mean);
   model.squareness = work.basis.squareness(work.posterior.mean);
-  fill_reversal(work);
+  model.reversal = axis_reversals(work.lines, model.chain, model.travel);
   fill_sigma(work);
   if (work.basis.expanding.empty()) return;
   model.reference_temperature = work.basis.reference_temperature;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/range.hpp"
+#include "core/metrology/axis_reversal.hpp"
 #include "core/metrology/volumetric.hpp"
 #include "core/numerics/bspline.hpp"
 
@@ -32,9 +33,9 @@ struct GeometricModel {
   std::array<Eigen::VectorXd, component_count> sigma;  // of the component at its splines' knots
   Squareness squareness{};
   Squareness squareness_sigma{};
-  /// Lost motion of each axis [m]: where it stands after moving forward minus after moving backward, half to either side
-  /// of `error`. Zero where no line along the axis was measured both ways.
-  std::array<double, 3> reversal{};
+  /// Lost motion of each axis over its position, half to either side of `error`. Empty where no line along the axis was
+  /// measured both ways.
+  std::array<ReversalCurve, 3> reversal;
   /// Where temperatures were measured: all else holds at the reference; an axis grows by expansion * (T - reference) * q.
   std::optional<double> reference_temperature;  // degC
   std::array<double, 3> expansion{};            // 1/K, of each axis with its scale
@@ -53,6 +54,12 @@ struct GeometricModel {
   /// convention. Another tool than the calibration's adds the angles' share as if independent.
   [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position,
                                          const Eigen::Vector3d& tool) const noexcept;
+  /// What the sense of the last motion adds to `error` [m]: `moving` holds +1 or -1 by axis, 0 for the mean of both.
+  [[nodiscard]] Eigen::Vector3d reversal_at(const Eigen::Vector3d& position,
+                                            const Eigen::Vector3d& moving) const noexcept;
+  /// Standard deviation [m] of that.
+  [[nodiscard]] Eigen::Vector3d reversal_sigma_at(const Eigen::Vector3d& position,
+                                                  const Eigen::Vector3d& moving) const noexcept;
   /// What another temperature [degC] adds to `error` [m], and its standard deviation about mid travel; zero without a
   /// reference.
   [[nodiscard]] Eigen::Vector3d expansion_at(const Eigen::Vector3d& position,

@@ -141,11 +141,11 @@ void add_promising(std::vector<double> gains, std::vector<int>& rows) {
   }
 }
 
-LineFit with_step(LineFit work, int row, const std::array<double, drift_terms>& drift) {
+LineFit with_step(LineFit work, int row, const NuisancePrior& expected) {
   work.breaks.push_back(row);
   work.regressors.conservativeResize(Eigen::NoChange, work.regressors.cols() + 1);
   for (int i = 0; i < work.rows(); ++i) work.regressors(i, work.regressors.cols() - 1) = i >= row ? 1.0 : 0.0;
-  const Eigen::VectorXd prior = prior_variances(work, drift);
+  const Eigen::VectorXd prior = prior_variances(work, expected);
   for (int i = 0; i < 5; ++i) {
     fit(work, prior);
     huber_weights(work);
@@ -155,8 +155,8 @@ LineFit with_step(LineFit work, int row, const std::array<double, drift_terms>& 
 
 /// Adds the step that explains most, if it explains more than chance: returns whether one was found. Where the fit
 /// without it is torn, neither its residuals nor those of plain least squares need point at it: each row they name is tried.
-bool find_break(LineFit& work, const std::array<double, drift_terms>& drift) {
-  const Eigen::VectorXd prior = prior_variances(work, drift);
+bool find_break(LineFit& work, const NuisancePrior& expected) {
+  const Eigen::VectorXd prior = prior_variances(work, expected);
   const double bound = 2.0 * work.scale;
   LineFit plain = work;
   plain.weights.setOnes();
@@ -168,8 +168,8 @@ bool find_break(LineFit& work, const std::array<double, drift_terms>& drift) {
   double least = before;
   LineFit best;
   const auto consider = [&](int row) {
-    LineFit trial = with_step(work, row, drift);
-    const double after = cost(trial, prior_variances(trial, drift));
+    LineFit trial = with_step(work, row, expected);
+    const double after = cost(trial, prior_variances(trial, expected));
     if (!(after < least)) return false;
     least = after;
     best = std::move(trial);
@@ -190,7 +190,7 @@ bool find_break(LineFit& work, const std::array<double, drift_terms>& drift) {
 
 /// Adds the largest step of a line that was read once, if between two readings it changes by 30 times what neighbours
 /// differ by and the readings beside do not: no rail does that. How large it is, the other lines tell.
-bool find_tear(LineFit& work, const std::array<double, drift_terms>& drift) {
+bool find_tear(LineFit& work, const NuisancePrior& expected) {
   constexpr double limit = 30.0;
   const auto change = [&](int i) { return std::abs(work.y[i] - work.y[i - 1]); };
   double largest = limit * work.neighbours;
@@ -203,7 +203,7 @@ bool find_tear(LineFit& work, const std::array<double, drift_terms>& drift) {
     row = i;
   }
   if (row == 0) return false;
-  work = with_step(std::move(work), row, drift);
+  work = with_step(std::move(work), row, expected);
   return true;
 }
 
@@ -221,8 +221,18 @@ void fit(LineFit& work, const Eigen::VectorXd& prior_variance) {
     sum[j] += work.weights[i] * work.y[i];
     cross.row(j) += work.weights[i] * work.regressors.row(i);
   }
+  double seen = 0.0;
+  for (const double m : mass) seen += m > 1e-9 ? 1.0 : 0.0;
+  Eigen::VectorXd least = Eigen::VectorXd::Zero(work.points());  // of a point whose readings all count nothing
+  for (int i = 0; i < work.rows(); ++i) {
+    const int j = work.point_of[static_cast<std::size_t>(i)];
+    if (mass[j] > 1e-9) continue;
+    least[j] += 1.0;
+    sum[j] += work.y[i];
+    cross.row(j) += work.regressors.row(i);
+  }
   for (int j = 0; j < work.points(); ++j) {
-    const double m = std::max(mass[j], 1e-12);
+    const double m = least[j] > 0.0 ? least[j] : mass[j];
     sum[j] /= m;
     cross.row(j) /= m;
   }
@@ -243,9 +253,9 @@ void fit(LineFit& work, const Eigen::VectorXd& prior_variance) {
     const int j = work.point_of[static_cast<std::size_t>(i)];
     work.residual[i] = work.y[i] - sum[j] - (work.regressors.row(i) - cross.row(j)).dot(work.nuisance);
   }
-  double seen = 0.0;
-  for (int j = 0; j < work.points(); ++j) seen += mass[j] > 1e-9 ? 1.0 : 0.0;
-  work.degrees = work.weights.sum() - seen - static_cast<double>(work.breaks.size()) - 2.0;
+  // A nuisance that its expectation holds costs no degree of freedom.
+  const double held = variance * work.nuisance_covariance.diagonal().cwiseQuotient(prior_variance).sum();
+  work.degrees = work.weights.sum() - seen - (static_cast<double>(q) - held);
 }
 
 void tukey_weights(LineFit& work) {
@@ -255,31 +265,38 @@ void tukey_weights(LineFit& work) {
   }
 }
 
-Eigen::VectorXd prior_variances(const LineFit& work, const std::array<double, drift_terms>& drift) {
+Eigen::VectorXd prior_variances(const LineFit& work, const NuisancePrior& expected) {
   Eigen::VectorXd variance = Eigen::VectorXd::Constant(work.regressors.cols(), wide * wide);
   for (int k = 0; k < drift_terms; ++k)
-    variance[1 + k] = std::max(work.revisited ? drift[static_cast<std::size_t>(k)] : 0.0, 1e-22);
+    variance[1 + k] = std::max(work.revisited ? expected.drift[static_cast<std::size_t>(k)] : 0.0, 1e-22);
+  variance.segment(work.first_shape, work.reversal_shape.cols()).setConstant(std::max(expected.reversal, 1e-22));
   if (work.expanding) variance[nuisances] = expansion_sd * expansion_sd;
   return variance;
 }
 
-void fit_robustly(LineFit& work, const std::array<double, drift_terms>& drift, double floor) {
+void fit_robustly(LineFit& work, const NuisancePrior& expected, double floor) {
   // The scale stands still while steps are looked for: it would grow with them, and hide them.
   work.scale = std::max(first_scale(work), floor);
   huber_weights(work);
-  for (int i = 0; i < 5; ++i) {
-    fit(work, prior_variances(work, drift));
+  // Huber's sum has one minimum; a reversal of many scales takes some rounds to reach it.
+  constexpr int most_rounds = 30;
+  constexpr double settled = 0.02;
+  double moved = 1.0;
+  for (int i = 0; i < most_rounds && moved > settled; ++i) {
+    const Eigen::VectorXd before = work.weights;
+    fit(work, prior_variances(work, expected));
     huber_weights(work);
+    moved = (work.weights - before).cwiseAbs().maxCoeff();
   }
   order_points(work);
   const bool repeats = work.rows() - work.points() >= 10;
   for (int attempt = 0; attempt < 4; ++attempt)
-    if (!(repeats ? find_break(work, drift) : find_tear(work, drift))) break;
+    if (!(repeats ? find_break(work, expected) : find_tear(work, expected))) break;
   for (int i = 0; i < 6; ++i) {
     if (const double scale = standardised_scale(work); std::isfinite(scale))
       work.scale = std::max(scale, floor);
     tukey_weights(work);
-    fit(work, prior_variances(work, drift));
+    fit(work, prior_variances(work, expected));
   }
 }
 

@@ -26,7 +26,7 @@ Eigen::Vector3d simulated_error(const Machine& machine, const Eigen::Matrix3d& d
   for (int axis = 0; axis < 3; ++axis) {
     if (!machine.chain.has(axis)) continue;
     const auto a = static_cast<std::size_t>(axis);
-    motions[a].translation[axis] += growth[axis] + 0.5 * errors.reversal[a] * moving[axis];
+    motions[a].translation[axis] += growth[axis] + 0.5 * errors.reversal[a](position[axis]) * moving[axis];
   }
   return exact_error(machine.chain, directions, position, motions, tool);
 }

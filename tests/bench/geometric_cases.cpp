@@ -222,7 +222,7 @@ Case random_case(unsigned seed) {
   one.squareness = 4.848e-6 * log_uniform(random, 30, 900);
   for (double& s : errors.squareness) s = one.squareness * normal(random);
   if (chance(random, 0.5))
-    for (double& r : errors.reversal) r = 1e-6 * uniform(random, 0.0, 4.0);
+    for (auto& r : errors.reversal) r = ErrorFunction{1e-6 * uniform(random, 0.0, 4.0)};
   machine.errors = errors;
   const auto planned = line_set(machine, random, one.lines_name);
   const double interval = std::array<double, 5>{0.005, 0.01, 0.0125, 0.02,

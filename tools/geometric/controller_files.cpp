@@ -69,7 +69,7 @@ std::string linuxcnc_compensation(const metrology::GeometricModel& model, int ax
     Eigen::Vector3d position = home_of(model);
     position[axis] = range.lower + range.width() * i / (points - 1);
     const double actual = position[axis] + model.error(position, model.tool)[axis];
-    const double half = 0.5 * model.reversal[index(axis)];
+    const double half = 0.5 * model.reversal[index(axis)].value(position[axis]);
     out << 1e3 * position[axis] << ' ' << 1e3 * (actual + half) << ' ' << 1e3 * (actual - half) << '\n';
   }
   // The controller stops reading at the first line that is no triplet, so words can only stand at the end.

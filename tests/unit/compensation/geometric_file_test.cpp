@@ -51,7 +51,8 @@ TEST_F(GeometricFileTest, ReadsBackTheSameField) {
     EXPECT_LT((read.error(position, model.tool) - model.error(position, model.tool)).norm(), 1e-15);
     EXPECT_EQ(read.sigma_at(position, model.tool).head<2>(), model.sigma_at(position, model.tool).head<2>());
   }
-  EXPECT_EQ(read.reversal, model.reversal);
+  for (const double x : {0.0, 0.07, 0.2})
+    EXPECT_EQ(read.reversal_at({x, x, 0.0}, {1, -1, 0}), model.reversal_at({x, x, 0.0}, {1, -1, 0}));
   ASSERT_TRUE(read.reference_temperature);
   EXPECT_EQ(*read.reference_temperature, *model.reference_temperature);
   EXPECT_EQ(read.expansion_at({0.1, 0.05, 0.0}, 25.0), model.expansion_at({0.1, 0.05, 0.0}, 25.0));

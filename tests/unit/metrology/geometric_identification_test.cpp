@@ -94,7 +94,7 @@ TEST(Identification, SurvivesOutliersReversalDriftAndABeamBreak) {
   EXPECT_LT(left_over(machine, &found.model).rms, 1.0e-6);
   EXPECT_EQ(found.lines[3].noise.breaks.size(), 1U);
   EXPECT_NEAR(found.lines[3].noise.breaks.front(), 60, 2);
-  EXPECT_NEAR(found.model.reversal[0], 3e-6, 4e-7);
+  EXPECT_NEAR(found.model.reversal[0].mean(), 3e-6, 4e-7);
   EXPECT_NEAR(found.lines[0].noise.drift, 2e-6, 1e-6);
   EXPECT_NEAR(found.noise, std::hypot(1e-6, 0.5e-6), 0.2e-6);
 }

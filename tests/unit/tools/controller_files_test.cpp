@@ -61,11 +61,11 @@ TEST(ControllerFiles, TheLinuxCncFileHoldsBothDirectionsInAtMost256Points) {
   EXPECT_GE(triplets, 2);
   EXPECT_LE(triplets, 256);
   EXPECT_EQ(line.rfind("# joint of X: nominal, actual", 0), 0U) << line;
-  EXPECT_NEAR(model.reversal[0], 2e-6, 5e-7);
+  EXPECT_NEAR(model.reversal[0].mean(), 2e-6, 5e-7);
   for (const double x : {0.0, 0.033, 0.1, 0.171, 0.2}) {
     const double error = model.error({x, 0.0, 0.0}, model.tool).x();
-    EXPECT_NEAR(linuxcnc_error(text, x, 1), error + 0.5 * model.reversal[0], 5e-8);
-    EXPECT_NEAR(linuxcnc_error(text, x, -1), error - 0.5 * model.reversal[0], 5e-8);
+    EXPECT_NEAR(linuxcnc_error(text, x, 1), error + 0.5 * model.reversal[0].value(x), 5e-8);
+    EXPECT_NEAR(linuxcnc_error(text, x, -1), error - 0.5 * model.reversal[0].value(x), 5e-8);
   }
 }
 

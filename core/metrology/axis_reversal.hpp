@@ -1,0 +1,37 @@
+// The lost motion of each axis over its position, from displacement lines read in both directions.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "core/base/range.hpp"
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/volumetric.hpp"
+#include "core/numerics/bspline.hpp"
+
+namespace invar::metrology {
+
+/// Where an axis stands after moving forward minus after moving backward [m], over its position; ISO 230-2 calls its value
+/// at a target the reversal. Empty: no line read the axis in both directions.
+struct ReversalCurve {
+  numerics::CubicBSpline spline;
+  Eigen::VectorXd coefficients;  // m
+  Eigen::VectorXd sigma;         // m, at the spline's knots
+  [[nodiscard]] bool empty() const noexcept { return coefficients.size() == 0; }
+  /// Real-time, as the others; 0 for an empty curve.
+  [[nodiscard]] double value(double position) const noexcept;
+  [[nodiscard]] double sigma_at(double position) const noexcept;  // infinity for an empty curve
+  /// Over the interval.
+  [[nodiscard]] double mean() const noexcept;
+};
+
+/// The same value everywhere.
+ReversalCurve constant_reversal(Range travel, double value, double sigma);
+
+/// All lines at once: along a beam with direction d a line shows the sum of |d_k| times the reversal of axis k. Each curve
+/// is a constant with waves, whose strength and length the readings decide: both are averaged over, by their evidence.
+std::array<ReversalCurve, 3> axis_reversals(const std::vector<CondensedLine>& lines, const Chain& chain,
+                                            const std::array<Range, 3>& travel);
+
+}  // namespace invar::metrology
