@@ -59,6 +59,31 @@ void GeometricBasis::add_expansion(double temperature) {
   size += static_cast<int>(expanding.size());
 }
 
+void GeometricBasis::set_waves(std::vector<AxisWave> found) {
+  size += wave_unknowns * (static_cast<int>(found.size()) - static_cast<int>(waves.size()));
+  waves = std::move(found);
+}
+
+AxisWave GeometricBasis::wave(std::size_t i, const Eigen::VectorXd& unknowns) const {
+  AxisWave result = waves[i];
+  const Eigen::Vector3d own = unknowns.segment<3>(first_wave() + wave_unknowns * static_cast<int>(i));
+  result.cosine = own[0];
+  result.sine = own[1];
+  result.number += own[2];
+  return result;
+}
+
+Eigen::RowVector3d GeometricBasis::wave_row(const AxisWave& wave, double q) const {
+  const Range range = splines[index(wave.axis)].interval();
+  const auto at = [&](double place) {
+    const double u = range.clamp(place) - 0.5 * (range.lower + range.upper);
+    const double c = std::cos(wave.number * u);
+    const double s = std::sin(wave.number * u);
+    return Eigen::RowVector3d{c, s, u * (wave.sine * c - wave.cosine * s)};
+  };
+  return at(q) - at(origin[index(wave.axis)]);
+}
+
 Eigen::VectorXd GeometricBasis::spline_coefficients(int component, const Eigen::VectorXd& unknowns) const {
   for (const Block& block : blocks)
     if (block.component == component) return block.coefficients * unknowns.segment(block.first, block.size());
@@ -149,6 +174,11 @@ Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squaren
     for (int i = 1; i < 4; ++i) row += w.value[index(i)] * block.coefficients.row(w.first + i);
     for (int k = 0; k < 3; ++k)
       if (term.effect[k] != 0.0) map.row(k).segment(block.first, block.size()) = term.effect[k] * row;
+  }
+  for (std::size_t i = 0; i < basis.waves.size(); ++i) {
+    const int axis = basis.waves[i].axis;
+    map.row(axis).segment<3>(basis.first_wave() + wave_unknowns * static_cast<int>(i)) =
+        basis.wave_row(basis.waves[i], position[axis]);
   }
   map.middleCols(basis.first_squareness(), static_cast<Eigen::Index>(basis.pairs.size())) =
       squareness_map(basis, squareness, position);

@@ -11,6 +11,17 @@
 
 namespace invar::metrology {
 
+/// A periodic error of positioning, as a screw's: cosine cos(number u) + sine sin(number u), u from mid travel. Its unknowns
+/// are cosine, sine and, about the number given, how far off that is.
+struct AxisWave {
+  int axis = 0;
+  double number = 0.0;  // rad/m
+  double cosine = 0.0;  // m, about which the number's own effect is taken
+  double sine = 0.0;    // m
+  [[nodiscard]] double period() const { return 6.283185307179586 / number; }  // m
+};
+inline constexpr int wave_unknowns = 3;
+
 /// Cubic B-splines of every error motion that can show, in the canonical gauge (metrology.md 3.1): each motion is zero
 /// at the origin of its axis, straightness has no end-point slope as well, and three squareness constants hold
 /// what is left. Displacements cannot see rigid motions of the frame; this gauge is one choice among them.
@@ -26,16 +37,25 @@ struct GeometricBasis {
   std::array<numerics::CubicBSpline, 3> splines;  // by axis letter
   std::array<double, 3> origin{};                 // m, of the gauge
   std::vector<Block> blocks;
-  std::vector<int> pairs;  // squareness constants, after the blocks
+  std::vector<AxisWave> waves;  // after the blocks, three unknowns each
+  std::vector<int> pairs;       // squareness constants, after the waves
   std::vector<int>
       expanding;  // axes with an expansion coefficient [1/K], after the squareness; none without temperatures
   double reference_temperature = 0.0;  // degC, at which all the others hold
   int size = 0;                        // unknowns in all
 
+  [[nodiscard]] int first_wave() const {
+    return first_squareness() - wave_unknowns * static_cast<int>(waves.size());
+  }
   [[nodiscard]] int first_squareness() const { return first_expansion() - static_cast<int>(pairs.size()); }
   [[nodiscard]] int first_expansion() const { return size - static_cast<int>(expanding.size()); }
   /// One more unknown an axis of the chain.
   void add_expansion(double reference_temperature);
+  void set_waves(std::vector<AxisWave> found);
+  /// A wave as found: its numbers by `unknowns`, the change of the number taken in.
+  [[nodiscard]] AxisWave wave(std::size_t i, const Eigen::VectorXd& unknowns) const;
+  /// What a wave's unknowns do to positioning at `q` [m]: zero at the origin of the axis.
+  [[nodiscard]] Eigen::RowVector3d wave_row(const AxisWave& wave, double q) const;
   /// Coefficients of a component's spline; zeros for one that cannot show.
   [[nodiscard]] Eigen::VectorXd spline_coefficients(int component, const Eigen::VectorXd& unknowns) const;
   [[nodiscard]] Squareness squareness(const Eigen::VectorXd& unknowns) const;

@@ -29,8 +29,14 @@ BlockPrior block_prior(const GeometricBasis& basis, const GeometricPrior& prior,
   return result;
 }
 
-/// Of a squareness or expansion, the unknowns after the blocks.
+/// Of a wave, a squareness or an expansion, the unknowns after the blocks.
 double constant_sd(const GeometricBasis& basis, const GeometricPrior& prior, int unknown) {
+  if (unknown < basis.first_squareness()) {
+    const int own = unknown - basis.first_wave();
+    if (own % wave_unknowns < 2) return prior.wave_amplitude;
+    const int axis = basis.waves[static_cast<std::size_t>(own / wave_unknowns)].axis;
+    return prior.wave_turn / basis.splines[static_cast<std::size_t>(axis)].interval().width();
+  }
   return unknown < basis.first_expansion() ? prior.squareness : prior.expansion;
 }
 
@@ -51,7 +57,7 @@ System build(const NormalEquations& equations, const GeometricBasis& basis, cons
     h.block(block.first, block.first, block.size(), block.size()) += system.blocks.back().precision;
     log_prior += system.blocks.back().log_determinant;
   }
-  for (int i = basis.first_squareness(); i < basis.size; ++i) {
+  for (int i = basis.first_wave(); i < basis.size; ++i) {
     const double sd = constant_sd(basis, prior, i);
     h(i, i) += 1.0 / (sd * sd);
     log_prior -= 2.0 * std::log(sd);
@@ -93,6 +99,47 @@ LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const S
     if (all.col(c).cwiseAbs().maxCoeff() > 1e-14) result.unknowns.push_back(c);
   result.rows = all(Eigen::all, result.unknowns);
   return result;
+}
+
+void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBasis& basis,
+                      std::vector<LineRows>& rows) {
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const CondensedLine& line = lines[l];
+    LineRows& own = rows[l];
+    // The waves stand between the blocks and the constants, whose columns move behind them.
+    const auto moved = basis.size - static_cast<int>(own.expansion.size());
+    std::vector<int> unknowns;
+    std::vector<Eigen::Index> kept;
+    for (std::size_t i = 0; i < own.unknowns.size(); ++i) {
+      const int u = own.unknowns[i];
+      const bool constant = u >= basis.first_squareness() - moved;
+      if (!constant && u >= basis.first_wave()) continue;
+      unknowns.push_back(constant ? u + moved : u);
+      kept.push_back(static_cast<Eigen::Index>(i));
+    }
+    std::vector<std::size_t> waves;
+    for (std::size_t w = 0; w < basis.waves.size(); ++w)
+      if (std::abs(line.beam.direction[basis.waves[w].axis]) > 1e-9) waves.push_back(w);
+    Eigen::MatrixXd all(own.rows.rows(), static_cast<Eigen::Index>(kept.size() + wave_unknowns * waves.size()));
+    all.leftCols(static_cast<Eigen::Index>(kept.size())) = own.rows(Eigen::all, kept);
+    for (std::size_t w = 0; w < waves.size(); ++w) {
+      const AxisWave& wave = basis.waves[waves[w]];
+      const double along = line.beam.direction[wave.axis];
+      const Eigen::RowVector3d start = basis.wave_row(wave, line.beam.start[wave.axis]);
+      const auto first = static_cast<Eigen::Index>(kept.size() + wave_unknowns * w);
+      for (Eigen::Index j = 0; j < all.rows(); ++j)
+        all.row(j).segment<3>(first) =
+            along * (basis.wave_row(wave, line.points[static_cast<std::size_t>(j)][wave.axis]) - start);
+      for (int u = 0; u < wave_unknowns; ++u)
+        unknowns.push_back(basis.first_wave() + wave_unknowns * static_cast<int>(waves[w]) + u);
+    }
+    Eigen::VectorXd expansion = Eigen::VectorXd::Zero(basis.size);
+    const auto constants = static_cast<Eigen::Index>(basis.expanding.size());
+    expansion.tail(constants) = own.expansion.tail(constants);
+    own.rows = std::move(all);
+    own.unknowns = std::move(unknowns);
+    own.expansion = std::move(expansion);
+  }
 }
 
 LineInformation information_of(const CondensedLine& line, const LineRows& rows, double misfit,
@@ -170,7 +217,7 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
     posterior.prior_covariance.block(block.first, block.first, block.size(), block.size()) =
         system.blocks[k].precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
   }
-  for (int i = basis.first_squareness(); i < basis.size; ++i)
+  for (int i = basis.first_wave(); i < basis.size; ++i)
     posterior.prior_covariance(i, i) = std::pow(constant_sd(basis, prior, i), 2);
   return posterior;
 }
@@ -182,6 +229,13 @@ Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& bas
   posterior.mean = system.mean;
   posterior.log_evidence = system.log_evidence;
   return posterior;
+}
+
+Eigen::LLT<Eigen::MatrixXd> factored(const NormalEquations& equations, const GeometricBasis& basis,
+                                     const GeometricPrior& prior, Eigen::VectorXd& mean) {
+  System system = build(equations, basis, prior);
+  mean = system.mean;
+  return std::move(system.factor);
 }
 
 Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, double misfit,

@@ -1,6 +1,7 @@
 // The equations that displacement lines give for the unknowns of a basis, and how well a prior explains them.
 #pragma once
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
@@ -18,6 +19,9 @@ struct LineRows {
   Eigen::VectorXd expansion;  // size, the line's own expansion (`LineNoise`) by those of the axes
 };
 LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const Squareness& squareness);
+/// The columns of the basis' waves, their number as it stands; all other columns as they are. `rows` may be of fewer waves.
+void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBasis& basis,
+                      std::vector<LineRows>& rows);
 
 /// What a line says of its rows * unknowns once `misfit` [m], the sd of what repeats at a point but no smooth model explains
 /// (encoder counts, pitch errors finer than the data), and points that do not fit are counted in:
@@ -57,6 +61,10 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
 /// The same without the covariances, which cost most.
 Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& basis,
                      const GeometricPrior& prior);
+
+/// H = A'C^-1 A + Q, factored, and the mean.
+Eigen::LLT<Eigen::MatrixXd> factored(const NormalEquations& equations, const GeometricBasis& basis,
+                                     const GeometricPrior& prior, Eigen::VectorXd& mean);
 
 /// What the other lines alone, at the same prior, say of a line that was among those solved: its rows * unknowns, m.
 Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, double misfit,

@@ -105,6 +105,9 @@ FieldVariance::FieldVariance(const GeometricBasis& basis, const Squareness& squa
     size += block.coefficients.rows();
   }
   first_.push_back(size);
+  const auto waves = static_cast<Eigen::Index>(basis.first_squareness() - basis.first_wave());
+  size += waves;
+  first_.push_back(size);
   const auto pairs = static_cast<Eigen::Index>(basis.pairs.size());
   size += pairs;
   // From the left, then from the right.
@@ -115,6 +118,7 @@ FieldVariance::FieldVariance(const GeometricBasis& basis, const Squareness& squa
       result.middleRows(first_[b], block.coefficients.rows()) =
           block.coefficients * of_unknowns.middleRows(block.first, block.size());
     }
+    result.middleRows(first_[basis.blocks.size()], waves) = of_unknowns.middleRows(basis.first_wave(), waves);
     result.bottomRows(pairs) = of_unknowns.middleRows(basis.first_squareness(), pairs);
     return result;
   };
@@ -140,6 +144,14 @@ Eigen::Vector3d FieldVariance::at(const Eigen::Vector3d& position, const Eigen::
       for (int i = 0; i < 4; ++i) {
         place.push_back(first_[term.block] + term.weights.first + i);
         weight.push_back(term.effect[k] * term.weights.value[index(i)]);
+      }
+    }
+    for (std::size_t i = 0; i < basis_.waves.size(); ++i) {
+      if (basis_.waves[i].axis != k) continue;
+      const Eigen::RowVector3d row = basis_.wave_row(basis_.waves[i], position[k]);
+      for (Eigen::Index u = 0; u < wave_unknowns; ++u) {
+        place.push_back(first_[basis_.blocks.size()] + wave_unknowns * static_cast<Eigen::Index>(i) + u);
+        weight.push_back(row[u]);
       }
     }
     for (Eigen::Index i = 0; i < square.cols(); ++i) {

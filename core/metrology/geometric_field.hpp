@@ -49,7 +49,7 @@ class FieldVariance {
  private:
   const GeometricBasis& basis_;
   Squareness squareness_;
-  std::vector<Eigen::Index> first_;  // coefficient of each block; last: the squareness
+  std::vector<Eigen::Index> first_;  // coefficient of each block; then the waves, the squareness
   Eigen::MatrixXd covariance_;       // of the coefficients and the squareness
   Eigen::MatrixXd cross_;            // of the rigid motion with them: 6 x coefficients
   Eigen::MatrixXd rigid_;            // of the rigid motion: 6 x 6

@@ -8,6 +8,7 @@
 #include "core/base/contract.hpp"
 #include "core/metrology/geometric_field.hpp"
 #include "core/metrology/geometric_stages.hpp"
+#include "core/metrology/geometric_waves.hpp"
 
 namespace invar::metrology {
 
@@ -145,9 +146,70 @@ void widen_by_strengths(Identification& work) {
     product.middleCols(block.first, block.size()) =
         std::sqrt(growth) * prior.matrixL().solve(columns.transpose()).transpose();
   }
-  product.rightCols(work.basis.size - work.basis.first_squareness()).setZero();  // their prior is wide open
+  product.rightCols(work.basis.size - work.basis.first_wave()).setZero();  // their prior is wide open
   const Eigen::MatrixXd effects = strength_effects(work.basis, work.prior, work.posterior);
   work.posterior.widened = h + product * product.transpose() + effects * strengths * effects.transpose();
+}
+
+/// Share of the unknowns in a component at a place: place and weight of each.
+struct Share {
+  std::vector<Eigen::Index> unknowns;
+  std::vector<double> weights;
+};
+Share share_of(const GeometricBasis& basis, const GeometricBasis::Block& block, double q) {
+  Share share;
+  const int axis = axis_of(block.component);
+  const auto w = basis.splines[index(axis)].at(q);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(block.size());
+  for (int k = 0; k < 4; ++k) row += w.value[index(k)] * block.coefficients.row(w.first + k);
+  for (int i = 0; i < block.size(); ++i) {
+    share.unknowns.push_back(block.first + i);
+    share.weights.push_back(row[i]);
+  }
+  for (std::size_t i = 0; i < basis.waves.size() && is_positioning(block.component); ++i) {
+    if (basis.waves[i].axis != axis) continue;
+    const Eigen::RowVector3d wave = basis.wave_row(basis.waves[i], q);
+    for (int u = 0; u < wave_unknowns; ++u) {
+      share.unknowns.push_back(basis.first_wave() + wave_unknowns * static_cast<int>(i) + u);
+      share.weights.push_back(wave[u]);
+    }
+  }
+  return share;
+}
+
+/// Splines of the model: fine enough to carry the waves of their axis to a thousandth.
+numerics::CubicBSpline spline_for_waves(const GeometricBasis& basis, int axis) {
+  constexpr double knots_a_period = 8.0;
+  numerics::CubicBSpline spline = basis.splines[index(axis)];
+  for (const AxisWave& wave : basis.waves)
+    while (wave.axis == axis && spline.spacing() > wave.period() / knots_a_period) spline = spline.halved();
+  return spline;
+}
+
+/// Coefficients of a component on its axis' spline, waves included.
+Eigen::VectorXd coefficients_with_waves(const GeometricBasis& basis, const Eigen::VectorXd& unknowns,
+                                        const GeometricBasis::Block& block,
+                                        const numerics::CubicBSpline& spline) {
+  const int axis = axis_of(block.component);
+  Eigen::VectorXd result = basis.spline_coefficients(block.component, unknowns);
+  for (numerics::CubicBSpline coarse = basis.splines[index(axis)]; coarse.intervals() < spline.intervals();
+       coarse = coarse.halved())
+    result = coarse.halved(result);
+  if (!is_positioning(block.component)) return result;
+  const Range range = spline.interval();
+  for (std::size_t i = 0; i < basis.waves.size(); ++i) {
+    if (basis.waves[i].axis != axis) continue;
+    const AxisWave wave = basis.wave(i, unknowns);
+    const auto at = [&](double q) {
+      const double u = wave.number * (q - 0.5 * (range.lower + range.upper));
+      return wave.cosine * std::cos(u) + wave.sine * std::sin(u);
+    };
+    // A spline of these coefficients meets the wave at each knot.
+    const double stronger = 3.0 / (2.0 + std::cos(wave.number * spline.spacing()));
+    for (int k = 0; k < spline.size(); ++k)
+      result[k] += stronger * at(spline.place(k)) - at(basis.origin[index(axis)]);
+  }
+  return result;
 }
 
 /// Component and field standard deviations from the posterior.
@@ -155,15 +217,14 @@ void fill_sigma(Identification& work) {
   GeometricModel& model = work.model;
   const Eigen::MatrixXd& all = work.posterior.widened;
   for (const auto& block : work.basis.blocks) {
-    const auto& spline = work.basis.splines[index(axis_of(block.component))];
-    const Eigen::MatrixXd covariance = all.block(block.first, block.first, block.size(), block.size());
+    const auto& spline = model.splines[index(axis_of(block.component))];
     Eigen::VectorXd& sigma = model.sigma[index(block.component)];
     sigma.resize(spline.intervals() + 1);
     for (int i = 0; i <= spline.intervals(); ++i) {
-      const auto w = spline.at(spline.interval().lower + i * spline.spacing());
-      Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(block.size());
-      for (int k = 0; k < 4; ++k) row += w.value[index(k)] * block.coefficients.row(w.first + k);
-      sigma[i] = std::sqrt(std::max(row.dot(row * covariance), 0.0));
+      const Share share = share_of(work.basis, block, spline.interval().lower + i * spline.spacing());
+      const Eigen::Map<const Eigen::VectorXd> row{share.weights.data(),
+                                                  static_cast<Eigen::Index>(share.weights.size())};
+      sigma[i] = std::sqrt(std::max(row.dot(all(share.unknowns, share.unknowns) * row), 0.0));
     }
   }
   for (std::size_t i = 0; i < work.basis.pairs.size(); ++i) {
@@ -186,7 +247,7 @@ void fill_sigma(Identification& work) {
       if (!model.chain.has(k)) continue;
       const Range r = model.travel[index(k)];
       position[k] +=
-          (position[k] < r.lower + 0.5 * r.width() ? 0.35 : -0.35) * model.splines[index(k)].spacing();
+          (position[k] < r.lower + 0.5 * r.width() ? 0.35 : -0.35) * work.basis.splines[index(k)].spacing();
     }
     // What repeats but no smooth model explains is error of the machine too, at every point.
     Eigen::Vector3d sigma = (variance.at(position, model.tool).array() + work.misfit * work.misfit).sqrt();
@@ -201,10 +262,12 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
   model.chain = machine.chain;
   model.travel = ranges;
   model.tool = machine.tool;
-  model.splines = work.basis.splines;
+  for (int k = 0; k < 3; ++k)
+    model.splines[index(k)] =
+        model.chain.has(k) ? spline_for_waves(work.basis, k) : work.basis.splines[index(k)];
   for (const auto& block : work.basis.blocks)
-    model.coefficients[index(block.component)] =
-        work.basis.spline_coefficients(block.component, work.posterior.mean);
+    model.coefficients[index(block.component)] = coefficients_with_waves(
+        work.basis, work.posterior.mean, block, model.splines[index(axis_of(block.component))]);
   model.squareness = work.basis.squareness(work.posterior.mean);
   model.reversal = axis_reversals(work.lines, model.chain, model.travel);
   fill_sigma(work);
@@ -220,6 +283,42 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
 void make_rows(Identification& work, const Squareness& squareness) {
   work.rows.clear();
   for (const auto& line : work.lines) work.rows.push_back(rows_of(line, work.basis, squareness));
+}
+
+/// Periodic errors beyond the smooth curves; true where there are more of them than before.
+bool look_for_waves(Identification& work) {
+  auto waves = find_waves(work.lines, work.rows, work.point_weights, work.misfit, work.basis, work.prior);
+  if (waves.size() <= work.basis.waves.size()) return false;
+  work.basis.set_waves(std::move(waves));
+  update_wave_rows(work.lines, work.basis, work.rows);
+  // Points stood off because of them.
+  for (auto& weights : work.point_weights) weights.setOnes();
+  work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+  return true;
+}
+
+/// The prior that the readings make most evident, with what repeats but is not smooth, and the waves beside.
+void search_prior(Identification& work, const GeometricPrior& expected, double misfit,
+                  const std::function<void(double, const std::string&)>& say) {
+  constexpr int least_rounds = 2;
+  constexpr int most_rounds = 4;
+  bool more = true;
+  for (int round = 0; round < least_rounds || (more && round < most_rounds); ++round) {
+    say(0.2 + 0.15 * round, "searching the prior");
+    const EvidentPrior found = most_evident(work.equations, work.basis, expected, work.prior);
+    work.prior = found.prior;
+    work.strengths = found.covariance;
+    work.misfit = most_evident_misfit(work, misfit, round == 0 ? 0.8 : 0.4);
+    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+    if (more && round + 1 < most_rounds) {
+      say(0.3 + 0.15 * round, "looking for periods");
+      more = look_for_waves(work);
+      if (more) continue;
+    }
+    const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
+    if (!weaken_outlying_points(work, mean) && round > 0) break;
+    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
+  }
 }
 
 }  // namespace
@@ -255,6 +354,7 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
     warm_lines += 1.0;
   }
   if (warm_lines > 0.0) work.basis.add_expansion(warmth / warm_lines);
+  work.basis.set_waves(options.waves);
   work.prior = options.prior;
   if (options.search_prior) work.prior.stretch = expected_stretch(ranges);
   work.misfit = options.misfit;
@@ -274,17 +374,7 @@ Identification identify(const Machine& machine, const std::vector<DisplacementLi
 
   const GeometricPrior expected = work.prior;
   work.strengths = options.strengths;
-  for (int round = 0; round < 2 && options.search_prior; ++round) {
-    say(0.2 + 0.4 * round, "searching the prior");
-    const EvidentPrior found = most_evident(work.equations, work.basis, expected, work.prior);
-    work.prior = found.prior;
-    work.strengths = found.covariance;
-    work.misfit = most_evident_misfit(work, options.misfit, round == 0 ? 0.8 : 0.4);
-    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
-    const auto mean = solve_mean(work.equations, work.basis, work.prior).mean;
-    if (!weaken_outlying_points(work, mean) && round > 0) break;
-    work.equations = assemble(work.lines, work.rows, work.basis.size, work.misfit, work.point_weights);
-  }
+  if (options.search_prior) search_prior(work, expected, options.misfit, say);
   work.posterior = solve(work.equations, work.basis, work.prior);
   widen_by_strengths(work);
   if (options.method == IdentificationMethod::displacement) {

@@ -78,6 +78,8 @@ Eigen::VectorXd mean_in_stages(const std::vector<CondensedLine>& lines, const st
     if (step == Role::plane_diagonal)
       for (int i = basis.first_squareness(); i < basis.first_expansion(); ++i) unknown.push_back(i);
     if (step == Role::axis)
+      for (int i = basis.first_wave(); i < basis.first_squareness(); ++i) unknown.push_back(i);
+    if (step == Role::axis)
       for (int i = basis.first_expansion(); i < basis.size; ++i) unknown.push_back(i);
     if (chosen_lines.empty() || unknown.empty()) continue;
     const NormalEquations equations = assemble(chosen_lines, chosen_rows, basis.size, misfit);

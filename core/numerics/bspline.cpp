@@ -24,6 +24,17 @@ CubicBSpline::Weights CubicBSpline::at(double x) const noexcept {
   return w;
 }
 
+Eigen::VectorXd CubicBSpline::halved(const Eigen::VectorXd& coefficients) const {
+  // The two-scale relation, 1 4 6 4 1 over 8; the outermost coefficient of the finer spline lies on the first knot's left.
+  Eigen::VectorXd finer(2 * intervals_ + 3);
+  for (Eigen::Index i = 0; i < finer.size(); ++i) {
+    const Eigen::Index k = (i + 1) / 2;
+    finer[i] = i % 2 == 1 ? (coefficients[k - 1] + 6.0 * coefficients[k] + coefficients[k + 1]) / 8.0
+                          : (coefficients[k] + coefficients[k + 1]) / 2.0;
+  }
+  return finer;
+}
+
 double CubicBSpline::value(const Eigen::VectorXd& coefficients, double x) const noexcept {
   const Weights w = at(x);
   double sum = 0.0;

@@ -30,6 +30,9 @@ class CubicBSpline {
   /// these places is that straight line.
   [[nodiscard]] double place(int i) const noexcept { return interval_.lower + (i - 1) * spacing_; }
 
+  /// The same curve by twice as many pieces.
+  [[nodiscard]] CubicBSpline halved() const { return {interval_, 2 * intervals_}; }
+  [[nodiscard]] Eigen::VectorXd halved(const Eigen::VectorXd& coefficients) const;
   [[nodiscard]] Weights at(double x) const noexcept;
   [[nodiscard]] double value(const Eigen::VectorXd& coefficients, double x) const noexcept;
   /// The largest |f''|: f'' is linear between knots, so its largest value stands at a knot.

@@ -146,6 +146,7 @@ void study_intervals(GeometricResult& result) {
     how.prior = all.prior;
     how.strengths = all.strengths;
     how.misfit = all.misfit;
+    how.waves = all.basis.waves;
     for (const auto& spline : all.basis.splines)
       how.least_intervals = std::max(how.least_intervals, spline.intervals());
     const auto found = metrology::identify(result.machine, kept, how);

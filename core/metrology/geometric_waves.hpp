@@ -1,0 +1,18 @@
+// Waves of a screw, a rack or a scale: periodic errors of positioning whose period nobody told.
+#pragma once
+
+#include <vector>
+
+#include "core/metrology/displacement_line.hpp"
+#include "core/metrology/geometric_equations.hpp"
+
+namespace invar::metrology {
+
+/// Waves that the lines show beyond what the smooth curves of `basis` explain, strongest first: found one by one over the
+/// wave number by their evidence, each with what the others left. `basis` may hold waves already; they are not found again.
+/// Where all places are so regular that two periods look alike, the longer one is taken. Set-up only.
+std::vector<AxisWave> find_waves(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
+                                 const std::vector<Eigen::VectorXd>& points, double misfit,
+                                 const GeometricBasis& basis, const GeometricPrior& prior);
+
+}  // namespace invar::metrology
