@@ -76,8 +76,10 @@ void read_squareness(const config::Node& root, metrology::Squareness& squareness
 void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 3>& reversal) {
   std::array<double, 3> means{};
   for (std::size_t k = 0; k < 3; ++k) means[k] = reversal[k].mean();
-  text.comment("Lost motion of each axis [m], forward minus backward: mean over the travel, then over position");
-  text.comment("(cubic B-splines, the standard deviation at each knot); half of it to either side of the error.");
+  text.comment(
+      "Lost motion of each axis [m], forward minus backward: mean over the travel, then over position");
+  text.comment(
+      "(cubic B-splines, the standard deviation at each knot); half of it to either side of the error.");
   text.numbers("reversal", means.data(), 3);
   if (std::all_of(reversal.begin(), reversal.end(), [](const auto& curve) { return curve.empty(); })) return;
   text.open("reversal_over_position");

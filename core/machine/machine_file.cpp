@@ -100,9 +100,8 @@ metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& c
       child.fault("`" + child.key() + "` is no axis of this machine", "use the axes of its chain");
     else
       errors.reversal[static_cast<std::size_t>(*axis)] =
-          child.is_map() && !child.has("value")
-              ? read_function(child, "m")
-              : ErrorFunction{child.as_number("m", {-1e-3, 1e-3})};
+          child.is_map() && !child.has("value") ? read_function(child, "m")
+                                                : ErrorFunction{child.as_number("m", {-1e-3, 1e-3})};
   }
   read_each_axis(node["expansion"], chain, "1/K", {-1e-3, 1e-3}, errors.expansion);
   read_each_axis(node["bending"], chain, "m/K", {-1e-3, 1e-3}, errors.bending);

@@ -11,12 +11,12 @@ namespace invar::metrology {
 
 namespace {
 
-constexpr int pieces = 12;                  // of a curve's spline
-constexpr double wide = 1e-3;               // m, sd of the constant beforehand
-constexpr double nugget = 1e-6;             // of the waves' variance: keeps long waves well conditioned
-constexpr double weakest = 3e-9;            // m, sd of waves that nobody would see
-constexpr double stronger = 1.7782794100;   // by a quarter of a decade
-constexpr int strengths = 19;               // up to 95 um
+constexpr int pieces = 12;                 // of a curve's spline
+constexpr double wide = 1e-3;              // m, sd of the constant beforehand
+constexpr double nugget = 1e-6;            // of the waves' variance: keeps long waves well conditioned
+constexpr double weakest = 3e-9;           // m, sd of waves that nobody would see
+constexpr double stronger = 1.7782794100;  // by a quarter of a decade
+constexpr int strengths = 19;              // up to 95 um
 constexpr std::array<double, 4> lengths{0.12, 0.25, 0.5, 1.0};  // of the travel, over which waves change
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
@@ -131,8 +131,8 @@ Solution averaged(const Equations& equations, std::vector<Waves> axes, std::size
       axes[which].length = length;
       axes[which].strength = weakest * std::pow(stronger, s);
       const Solution whole = solve(equations, splines.front(), axes, splines);
-      all.push_back({whole.mean.segment(first, n), whole.covariance.block(first, first, n, n),
-                     whole.log_evidence});
+      all.push_back(
+          {whole.mean.segment(first, n), whole.covariance.block(first, first, n, n), whole.log_evidence});
       most = std::max(most, whole.log_evidence);
     }
   Solution sum{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), 0.0};

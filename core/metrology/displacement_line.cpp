@@ -131,7 +131,8 @@ LineReversal reversal_of(const LineFit& work, const Eigen::VectorXd& prior_varia
   result.places = Eigen::Map<const Eigen::VectorXd>(work.reversal_places.data(), count);
   result.values = Eigen::VectorXd::Constant(count, work.nuisance[0]);
   if (work.reversal_shape.cols() > 0)
-    result.values += work.reversal_shape * work.nuisance.segment(work.first_shape, work.reversal_shape.cols());
+    result.values +=
+        work.reversal_shape * work.nuisance.segment(work.first_shape, work.reversal_shape.cols());
   // The others: drift, expansion and steps; the offset of the zero point lies in the points' means.
   std::vector<Eigen::Index> others;
   for (Eigen::Index k = 1; k < work.regressors.cols(); ++k)
@@ -198,11 +199,6 @@ CondensedLine finish(LineFit& work, const Eigen::VectorXd& prior_variance) {
   }
   for (Eigen::Index k = 0; k + 1 < q; ++k) normal(k, k) += 1.0 / prior_variance[k];
   normal(q - 1, q - 1) += 1.0 / (wide * wide);
-  const Eigen::LDLT<Eigen::MatrixXd> factor = normal.ldlt();
-  result.information = -cross * factor.solve(cross.transpose());
-  result.information.diagonal() += mass;
-  result.weighted = sum - cross * factor.solve(right);
-  result.constant = square - right.dot(factor.solve(right));
   result.deviation.resize(points);
   result.deviation_sigma.resize(points);
   for (int j = 0; j < points; ++j) {
@@ -212,6 +208,12 @@ CondensedLine finish(LineFit& work, const Eigen::VectorXd& prior_variance) {
     result.deviation[j] = value;
     result.deviation_sigma[j] = seen ? 1.0 / std::sqrt(mass[j]) : std::numeric_limits<double>::infinity();
   }
+  result.mass = std::move(mass);
+  result.sum = std::move(sum);
+  result.cross = std::move(cross);
+  result.inner = std::move(normal);
+  result.right = std::move(right);
+  result.square = square;
   for (int j = points - 1; j >= 0; --j) result.deviation[j] -= result.deviation[0];
   LineNoise& noise = result.noise;
   noise.noise = work.scale;

@@ -36,10 +36,10 @@ Beam beam_of(const DisplacementLine& line);
 
 /// How one line disturbs its readings y = mean of its point + reversal + drift + expansion + steps + noise.
 struct LineNoise {
-  double noise = 0.0;           // m, sd of one reading
-  double degrees = 0.0;         // degrees of freedom behind it
-  double reversal = 0.0;        // m, reading forward minus reading backward, mean over the line
-  double drift = 0.0;           // m, end minus beginning of the measurement
+  double noise = 0.0;     // m, sd of one reading
+  double degrees = 0.0;   // degrees of freedom behind it
+  double reversal = 0.0;  // m, reading forward minus reading backward, mean over the line
+  double drift = 0.0;     // m, end minus beginning of the measurement
   /// 1/K, of the length along the beam, from temperatures that changed within the line, with what the line tells of it
   /// (K^2): readings are reduced to the line's mean temperature by it. Information 0 where the temperature stood still.
   double expansion = 0.0;
@@ -59,9 +59,10 @@ struct LineReversal {
   Eigen::VectorXd weighted;
 };
 
-/// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points, the readings
-/// say  -2 log likelihood = constant - 2 weighted'e + e' information e,  zero noise, reversal, drift, steps and expansion
-/// about the mean temperature marginalised. Units 1/m^2, 1/m.
+/// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points and n its q
+/// nuisances (reversal, drift, steps, expansion, zero point; the prior of them in `inner`), the readings say
+///   -2 log likelihood = square - 2 sum'e - 2 right'n + e' mass e + 2 e' cross n + n' inner n.
+/// Units 1/m^2, 1/m. What is left once n is marginalised, and points that do not fit are counted in: `information_of`.
 struct CondensedLine {
   std::string name;
   Beam beam;
@@ -69,9 +70,12 @@ struct CondensedLine {
   std::vector<Eigen::Vector3d> tools;   // J
   double temperature =
       std::numeric_limits<double>::quiet_NaN();  // degC, mean over the readings; NaN: not measured
-  Eigen::MatrixXd information;                   // J x J, symmetric, rank J less the offset
-  Eigen::VectorXd weighted;                      // J
-  double constant = 0.0;
+  Eigen::VectorXd mass;                          // J, diagonal
+  Eigen::VectorXd sum;                           // J
+  Eigen::MatrixXd cross;                         // J x q
+  Eigen::MatrixXd inner;                         // q x q
+  Eigen::VectorXd right;                         // q
+  double square = 0.0;
   Eigen::VectorXd deviation;        // J, mean of reading minus nominal after the nuisances, m
   Eigen::VectorXd deviation_sigma;  // J, of that mean, m
   LineNoise noise;

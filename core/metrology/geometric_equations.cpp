@@ -120,7 +120,8 @@ void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBa
     std::vector<std::size_t> waves;
     for (std::size_t w = 0; w < basis.waves.size(); ++w)
       if (std::abs(line.beam.direction[basis.waves[w].axis]) > 1e-9) waves.push_back(w);
-    Eigen::MatrixXd all(own.rows.rows(), static_cast<Eigen::Index>(kept.size() + wave_unknowns * waves.size()));
+    Eigen::MatrixXd all(own.rows.rows(),
+                        static_cast<Eigen::Index>(kept.size() + wave_unknowns * waves.size()));
     all.leftCols(static_cast<Eigen::Index>(kept.size())) = own.rows(Eigen::all, kept);
     for (std::size_t w = 0; w < waves.size(); ++w) {
       const AxisWave& wave = basis.waves[waves[w]];
@@ -142,37 +143,54 @@ void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBa
   }
 }
 
+Eigen::MatrixXd LineInformation::times(const Eigen::MatrixXd& columns) const {
+  return mass.asDiagonal() * columns - cross * inner.solve(cross.transpose() * columns);
+}
+
+Eigen::MatrixXd LineInformation::square(const Eigen::MatrixXd& rows) const {
+  Eigen::MatrixXd nuisances = cross.transpose() * rows;
+  inner.matrixL().solveInPlace(nuisances);
+  const Eigen::MatrixXd scaled = mass.cwiseSqrt().asDiagonal() * rows;
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(rows.cols(), rows.cols());
+  result.selfadjointView<Eigen::Lower>().rankUpdate(scaled.transpose());
+  result.selfadjointView<Eigen::Lower>().rankUpdate(nuisances.transpose(), -1.0);
+  result.triangularView<Eigen::StrictlyUpper>() = result.transpose();
+  return result;
+}
+
 LineInformation information_of(const CondensedLine& line, const LineRows& rows, double misfit,
                                const Eigen::VectorXd* points) {
-  LineInformation result{line.information, line.weighted, line.constant, 0.0};
-  Eigen::MatrixXd& information = result.information;
-  Eigen::VectorXd& weighted = result.weighted;
+  const auto log_determinant = [](const Eigen::LLT<Eigen::MatrixXd>& factor) {
+    return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  };
+  // About what the squareness' linear form leaves out.
   const Eigen::VectorXd& h = rows.remainder;
-  weighted -= information * h;
-  result.constant += h.dot(information * h) - 2.0 * h.dot(line.weighted);
-  const auto identity = Eigen::MatrixXd::Identity(information.rows(), information.rows());
-  if (points != nullptr && points->minCoeff() < 1.0) {
-    // A point of weight w counts as if its reading had variance 1/w: extra variance in front of the information.
-    const Eigen::VectorXd extra = (points->cwiseInverse().array() - 1.0) *
-                                  information.diagonal().cwiseMax(1e-300).cwiseInverse().array();
-    const Eigen::VectorXd root = extra.cwiseSqrt();
-    const Eigen::LLT<Eigen::MatrixXd> factor{identity + root.asDiagonal() * information * root.asDiagonal()};
-    const Eigen::MatrixXd left = information * root.asDiagonal();
-    const Eigen::VectorXd moved = factor.solve(root.cwiseProduct(weighted));
-    result.constant -= root.cwiseProduct(weighted).dot(moved);
-    weighted -= left * moved;
-    information -= left * factor.solve(left.transpose());
-  }
-  if (misfit > 0.0) {
-    const double variance = misfit * misfit;
-    const Eigen::LLT<Eigen::MatrixXd> factor{identity + variance * information};
-    result.log_misfit = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
-    const Eigen::VectorXd moved = factor.solve(weighted);
-    result.constant -= variance * weighted.dot(moved);
-    weighted = moved;
-    information = factor.solve(information).eval();
-    information = 0.5 * (information + information.transpose().eval());
-  }
+  const Eigen::VectorXd sum = line.sum - line.mass.cwiseProduct(h);
+  const Eigen::VectorXd right = line.right - line.cross.transpose() * h;
+  const double square = line.square - 2.0 * h.dot(line.sum) + h.dot(line.mass.cwiseProduct(h));
+  // A point of weight w counts as if its reading had variance 1/w. Extra variance v at a point of mass m: its mean counts
+  // m / (1 + m v), and the nuisances lose what it told of them.
+  const Eigen::ArrayXd m = line.mass.array();
+  Eigen::ArrayXd extra = Eigen::ArrayXd::Zero(m.size());
+  if (points != nullptr) extra = (points->array().inverse() - 1.0) / m.max(1e-300);
+  const auto inner_with = [&](const Eigen::ArrayXd& variance) -> Eigen::LLT<Eigen::MatrixXd> {
+    const Eigen::VectorXd lost = variance / (1.0 + m * variance);
+    return Eigen::LLT<Eigen::MatrixXd>{line.inner - line.cross.transpose() * lost.asDiagonal() * line.cross};
+  };
+  LineInformation result;
+  const Eigen::ArrayXd all = extra + misfit * misfit;
+  const Eigen::VectorXd share = 1.0 / (1.0 + m * all);
+  const Eigen::VectorXd lost = all * share.array();
+  result.mass = line.mass.cwiseProduct(share);
+  result.cross = share.asDiagonal() * line.cross;
+  result.inner = inner_with(all);
+  const Eigen::VectorXd left = right - line.cross.transpose() * lost.cwiseProduct(sum);
+  const Eigen::VectorXd nuisances = result.inner.solve(left);
+  result.weighted = share.cwiseProduct(sum) - result.cross * nuisances;
+  result.constant = square - sum.dot(lost.cwiseProduct(sum)) - left.dot(nuisances);
+  if (misfit > 0.0)
+    result.log_misfit = ((1.0 + m * all) / (1.0 + m * extra)).log().sum() + log_determinant(result.inner) -
+                        log_determinant(inner_with(extra));
   return result;
 }
 
@@ -191,8 +209,7 @@ NormalEquations assemble(const std::vector<CondensedLine>& lines, const std::vec
       sum.normal += rows[l].expansion * expansion * rows[l].expansion.transpose();
       sum.right += expansion * lines[l].noise.expansion * rows[l].expansion;
     }
-    const Eigen::MatrixXd product = line.information * rows[l].rows;
-    const Eigen::MatrixXd normal = rows[l].rows.transpose() * product;
+    const Eigen::MatrixXd normal = line.square(rows[l].rows);
     const Eigen::VectorXd right = rows[l].rows.transpose() * line.weighted;
     const auto& columns = rows[l].unknowns;
     for (std::size_t i = 0; i < columns.size(); ++i) {
@@ -249,7 +266,7 @@ Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, 
     all.col(rows.unknowns[i]).head(n) = rows.rows.col(static_cast<Eigen::Index>(i));
   all.row(n) = rows.expansion.transpose();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(n + 1, n + 1);
-  information.topLeftCorner(n, n) = own.information;
+  information.topLeftCorner(n, n) = own.times(Eigen::MatrixXd::Identity(n, n));
   information(n, n) = line.noise.expansion_information;
   Eigen::VectorXd weighted(n + 1);
   weighted << own.weighted, line.noise.expansion_information * line.noise.expansion;

@@ -24,13 +24,19 @@ void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBa
                       std::vector<LineRows>& rows);
 
 /// What a line says of its rows * unknowns once `misfit` [m], the sd of what repeats at a point but no smooth model explains
-/// (encoder counts, pitch errors finer than the data), and points that do not fit are counted in:
-/// -2 log likelihood = constant - 2 weighted'e + e' information e + log_misfit.
+/// (encoder counts, pitch errors finer than the data), and points that do not fit are counted in, and the nuisances
+/// marginalised: -2 log likelihood = constant - 2 weighted'e + e'G e + log_misfit,  G = mass - cross inner^-1 cross'.
 struct LineInformation {
-  Eigen::MatrixXd information;
+  Eigen::VectorXd mass;
+  Eigen::MatrixXd cross;
+  Eigen::LLT<Eigen::MatrixXd> inner;
   Eigen::VectorXd weighted;
   double constant = 0.0;
   double log_misfit = 0.0;  // log|I + misfit^2 G|
+  /// G times some columns: far cheaper than G itself where a line has hundreds of points.
+  [[nodiscard]] Eigen::MatrixXd times(const Eigen::MatrixXd& columns) const;
+  /// rows' G rows.
+  [[nodiscard]] Eigen::MatrixXd square(const Eigen::MatrixXd& rows) const;
 };
 /// `points` [0..1], by point, weakens points that do not fit; nullptr: all fit.
 LineInformation information_of(const CondensedLine& line, const LineRows& rows, double misfit,

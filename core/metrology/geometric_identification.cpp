@@ -177,41 +177,6 @@ Share share_of(const GeometricBasis& basis, const GeometricBasis::Block& block, 
   return share;
 }
 
-/// Splines of the model: fine enough to carry the waves of their axis to a thousandth.
-numerics::CubicBSpline spline_for_waves(const GeometricBasis& basis, int axis) {
-  constexpr double knots_a_period = 8.0;
-  numerics::CubicBSpline spline = basis.splines[index(axis)];
-  for (const AxisWave& wave : basis.waves)
-    while (wave.axis == axis && spline.spacing() > wave.period() / knots_a_period) spline = spline.halved();
-  return spline;
-}
-
-/// Coefficients of a component on its axis' spline, waves included.
-Eigen::VectorXd coefficients_with_waves(const GeometricBasis& basis, const Eigen::VectorXd& unknowns,
-                                        const GeometricBasis::Block& block,
-                                        const numerics::CubicBSpline& spline) {
-  const int axis = axis_of(block.component);
-  Eigen::VectorXd result = basis.spline_coefficients(block.component, unknowns);
-  for (numerics::CubicBSpline coarse = basis.splines[index(axis)]; coarse.intervals() < spline.intervals();
-       coarse = coarse.halved())
-    result = coarse.halved(result);
-  if (!is_positioning(block.component)) return result;
-  const Range range = spline.interval();
-  for (std::size_t i = 0; i < basis.waves.size(); ++i) {
-    if (basis.waves[i].axis != axis) continue;
-    const AxisWave wave = basis.wave(i, unknowns);
-    const auto at = [&](double q) {
-      const double u = wave.number * (q - 0.5 * (range.lower + range.upper));
-      return wave.cosine * std::cos(u) + wave.sine * std::sin(u);
-    };
-    // A spline of these coefficients meets the wave at each knot.
-    const double stronger = 3.0 / (2.0 + std::cos(wave.number * spline.spacing()));
-    for (int k = 0; k < spline.size(); ++k)
-      result[k] += stronger * at(spline.place(k)) - at(basis.origin[index(axis)]);
-  }
-  return result;
-}
-
 /// Component and field standard deviations from the posterior.
 void fill_sigma(Identification& work) {
   GeometricModel& model = work.model;
@@ -262,13 +227,7 @@ void fill_model(Identification& work, const Machine& machine, const std::array<R
   model.chain = machine.chain;
   model.travel = ranges;
   model.tool = machine.tool;
-  for (int k = 0; k < 3; ++k)
-    model.splines[index(k)] =
-        model.chain.has(k) ? spline_for_waves(work.basis, k) : work.basis.splines[index(k)];
-  for (const auto& block : work.basis.blocks)
-    model.coefficients[index(block.component)] = coefficients_with_waves(
-        work.basis, work.posterior.mean, block, model.splines[index(axis_of(block.component))]);
-  model.squareness = work.basis.squareness(work.posterior.mean);
+  take_unknowns(model, work.basis, work.posterior.mean);
   model.reversal = axis_reversals(work.lines, model.chain, model.travel);
   fill_sigma(work);
   if (work.basis.expanding.empty()) return;
@@ -300,10 +259,9 @@ bool look_for_waves(Identification& work) {
 /// The prior that the readings make most evident, with what repeats but is not smooth, and the waves beside.
 void search_prior(Identification& work, const GeometricPrior& expected, double misfit,
                   const std::function<void(double, const std::string&)>& say) {
-  constexpr int least_rounds = 2;
-  constexpr int most_rounds = 4;
+  constexpr int most_rounds = 5;
   bool more = true;
-  for (int round = 0; round < least_rounds || (more && round < most_rounds); ++round) {
+  for (int round = 0; round < most_rounds; ++round) {
     say(0.2 + 0.15 * round, "searching the prior");
     const EvidentPrior found = most_evident(work.equations, work.basis, expected, work.prior);
     work.prior = found.prior;

@@ -24,8 +24,8 @@ struct IdentificationOptions {
   int most_intervals = 24;   // and at most
   bool search_prior = true;  // by evidence; false keeps `prior`, `strengths` and `misfit`
   StrengthMatrix strengths = StrengthMatrix::Zero();  // how well the prior's log strengths are known
-  GeometricPrior prior;  // expected beforehand; a search begins with the `stretch` of the travels
-  double misfit = 5e-8;  // m
+  GeometricPrior prior;         // expected beforehand; a search begins with the `stretch` of the travels
+  double misfit = 5e-8;         // m
   std::vector<AxisWave> waves;  // to begin with; a search of the prior looks for more
   std::function<void(double part, const std::string& what)> progress;  // may be empty
 };

@@ -21,12 +21,12 @@ struct GeometricPrior {
   /// On top of it what repeats over a few centimetres, as a screw's pitch does. Angles have none: it would move nothing.
   std::array<double, 3> fine_amplitude{3e-7, 2e-7, 0.0};  // m, m, rad
   double fine_length = 0.012;                             // m
-  double wave_amplitude = 2e-6;                           // m, sd of the cosine and the sine of a periodic error
-  double wave_turn = 1.0;                                 // rad over the travel, sd of its number when first found
-  double positioning_slope = 2e-4;                        // sd of the scale error of an axis
-  double angle_slope = 2.0;  // sd of an angle's linear part over the axis' range, in amplitudes
-  double squareness = 5e-3;  // rad, sd
-  double expansion = 2e-5;   // 1/K, sd: steel 1.2e-5, aluminium 2.3e-5
+  double wave_amplitude = 2e-6;     // m, sd of the cosine and the sine of a periodic error
+  double wave_turn = 1.0;           // rad over the travel, sd of its number when first found
+  double positioning_slope = 2e-4;  // sd of the scale error of an axis
+  double angle_slope = 2.0;         // sd of an angle's linear part over the axis' range, in amplitudes
+  double squareness = 5e-3;         // rad, sd
+  double expansion = 2e-5;          // 1/K, sd: steel 1.2e-5, aluminium 2.3e-5
   /// Of the amplitude of its kind, by component: no two axes of a machine are equally good.
   std::array<double, component_count> relative = [] {
     std::array<double, component_count> ones{};

@@ -5,6 +5,7 @@
 
 #include "core/metrology/displacement_line.hpp"
 #include "core/metrology/geometric_equations.hpp"
+#include "core/metrology/geometric_model.hpp"
 
 namespace invar::metrology {
 
@@ -14,5 +15,9 @@ namespace invar::metrology {
 std::vector<AxisWave> find_waves(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
                                  const std::vector<Eigen::VectorXd>& points, double misfit,
                                  const GeometricBasis& basis, const GeometricPrior& prior);
+
+/// Splines, coefficients and squareness of a model from the unknowns: axes with waves get splines that are fine enough to
+/// carry them to a thousandth.
+void take_unknowns(GeometricModel& model, const GeometricBasis& basis, const Eigen::VectorXd& unknowns);
 
 }  // namespace invar::metrology

@@ -223,7 +223,8 @@ void fit(LineFit& work, const Eigen::VectorXd& prior_variance) {
   }
   double seen = 0.0;
   for (const double m : mass) seen += m > 1e-9 ? 1.0 : 0.0;
-  Eigen::VectorXd least = Eigen::VectorXd::Zero(work.points());  // of a point whose readings all count nothing
+  Eigen::VectorXd least =
+      Eigen::VectorXd::Zero(work.points());  // of a point whose readings all count nothing
   for (int i = 0; i < work.rows(); ++i) {
     const int j = work.point_of[static_cast<std::size_t>(i)];
     if (mass[j] > 1e-9) continue;
@@ -269,7 +270,8 @@ Eigen::VectorXd prior_variances(const LineFit& work, const NuisancePrior& expect
   Eigen::VectorXd variance = Eigen::VectorXd::Constant(work.regressors.cols(), wide * wide);
   for (int k = 0; k < drift_terms; ++k)
     variance[1 + k] = std::max(work.revisited ? expected.drift[static_cast<std::size_t>(k)] : 0.0, 1e-22);
-  variance.segment(work.first_shape, work.reversal_shape.cols()).setConstant(std::max(expected.reversal, 1e-22));
+  variance.segment(work.first_shape, work.reversal_shape.cols())
+      .setConstant(std::max(expected.reversal, 1e-22));
   if (work.expanding) variance[nuisances] = expansion_sd * expansion_sd;
   return variance;
 }
@@ -289,7 +291,8 @@ void fit_robustly(LineFit& work, const NuisancePrior& expected, double floor) {
     moved = (work.weights - before).cwiseAbs().maxCoeff();
   }
   order_points(work);
-  const bool repeats = work.rows() - work.points() >= 10;
+  // Neighbours that stand for one point are no repeats: what jumps between them may be the place.
+  const bool repeats = work.revisited && work.rows() - work.points() >= 10;
   for (int attempt = 0; attempt < 4; ++attempt)
     if (!(repeats ? find_break(work, expected) : find_tear(work, expected))) break;
   for (int i = 0; i < 6; ++i) {

@@ -14,7 +14,7 @@ inline constexpr int drift_terms = 4;              // Legendre polynomials 1..4 
 inline constexpr int nuisances = 1 + drift_terms;  // reversal first
 inline constexpr double wide = 1e-3;  // m, sd of what is not known beforehand: offset, reversal, steps
 inline constexpr int most_reversal_places = 20;  // a lost motion is smoother than an error
-inline constexpr double expansion_sd = 2e-5;  // 1/K, beforehand: steel 1.2e-5, aluminium 2.3e-5
+inline constexpr double expansion_sd = 2e-5;     // 1/K, beforehand: steel 1.2e-5, aluminium 2.3e-5
 
 /// y = mean of its point + regressors * nuisance + noise.
 struct LineFit {
@@ -63,6 +63,5 @@ void fit_robustly(LineFit& work, const NuisancePrior& prior, double floor);
 void add_reversal(LineFit& work);
 /// Readings by the reversal's values at its places.
 Eigen::MatrixXd reversal_rows(const LineFit& work);
-
 
 }  // namespace invar::metrology

@@ -147,9 +147,11 @@ CondensedLine planned_equations(const PlannedLine& planned, const Effort& effort
     result.tools.push_back(planned.tool);
   }
   const double mass = effort.passes / (effort.noise * effort.noise);
-  result.information = -mass / points * Eigen::MatrixXd::Ones(points, points);
-  result.information.diagonal().array() += mass;
-  result.weighted = Eigen::VectorXd::Zero(points);
+  result.mass = Eigen::VectorXd::Constant(points, mass);
+  result.sum = Eigen::VectorXd::Zero(points);
+  result.cross = Eigen::MatrixXd::Constant(points, 1, mass);  // the zero point
+  result.inner = Eigen::MatrixXd::Constant(1, 1, mass * points);
+  result.right = Eigen::VectorXd::Zero(1);
   result.deviation = Eigen::VectorXd::Zero(points);
   result.deviation_sigma = Eigen::VectorXd::Constant(points, 1.0 / std::sqrt(mass));
   result.noise.noise = effort.noise;

@@ -12,10 +12,11 @@ namespace {
 
 constexpr double wave = 1.0 / 3.0;  // of the line, over which a reversal changes as a rule
 constexpr double rough = 0.05;      // of its variance: what is each place's own
-constexpr int repeats = 3;          // readings beyond the first of their points, for each place of the reversal
+constexpr int repeats = 3;  // readings beyond the first of their points, for each place of the reversal
 
 double along(const LineFit& work, int row) {
-  return work.beam.direction.dot(work.line->readings[static_cast<std::size_t>(row)].position - work.beam.start);
+  return work.beam.direction.dot(work.line->readings[static_cast<std::size_t>(row)].position -
+                                 work.beam.start);
 }
 
 /// Places of the points that were read both ways, in their order.
@@ -64,9 +65,8 @@ void add_reversal(LineFit& work) {
     return;
   }
   for (int i = 0; i < count; ++i)
-    work.reversal_places.push_back(
-        all[static_cast<std::size_t>(std::lround(static_cast<double>(i) * static_cast<double>(all.size() - 1) /
-                                                 (count - 1)))]);
+    work.reversal_places.push_back(all[static_cast<std::size_t>(
+        std::lround(static_cast<double>(i) * static_cast<double>(all.size() - 1) / (count - 1)))]);
   Eigen::MatrixXd covariance(count, count);
   for (int i = 0; i < count; ++i)
     for (int j = 0; j < count; ++j)

@@ -104,7 +104,7 @@ struct Laser {
   double noise = 1e-6;            // m, white, each reading
   double repeatability = 0.5e-6;  // m, of the machine, each stop
   int passes = 6;                 // forward and backward in turn
-  double reversal = 0.0;          // m
+  double reversal = 0.0;          // m, of each axis
   double drift = 0.0;             // m over the line
   double outliers = 0.0;          // share of readings 20 um off
   double temperature =
@@ -141,11 +141,15 @@ inline DisplacementLine measure(const Machine& machine, const std::string& name,
     reading.temperature = laser.temperature + laser.warming * row / rows;
     const double warmth =
         std::isnan(laser.temperature) ? machine.errors->reference_temperature : reading.temperature;
+    Eigen::Vector3d moving = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k)
+      if (std::abs(beam[k]) > 1e-9) moving[k] = reading.direction * (beam[k] > 0.0 ? 1.0 : -1.0);
     const Eigen::Vector3d actual =
-        reading.position + simulated_error(machine, directions, reading.position, tool, {0, 0, 0},
+        reading.position + simulated_error(machine, directions, reading.position, tool, moving,
                                            grown(machine, reading.position, warmth));
     double value = beam.dot(actual) + laser.noise * normal(random) + laser.repeatability * normal(random) +
-                   0.5 * laser.reversal * reading.direction + laser.drift * row / rows;
+                   0.5 * laser.reversal * beam.cwiseAbs().sum() * reading.direction +
+                   laser.drift * row / rows;
     if (row > 0 && uniform(random) < laser.outliers) value += 20e-6;
     if (row == 0) zero = value;
     reading.displacement = value - zero;
