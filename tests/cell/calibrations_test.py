@@ -319,5 +319,88 @@ class Camera(Calibrations):
         return odd
 
 
+class History(Calibrations):
+    def thermal(self, name, warm, draw):
+        rows = [[60 * k, x, f"{22 + 9 * k / 59:.3f}",
+                 f"{(0.011 + warm) * x * (9 * k / 59) + draw.gauss(0, 0.3):.4f}"] for k in range(60) for x in (0, 50, 100)]
+        self.write("t.csv", Thermal.HEADER, rows)
+        self.call("calibrate", "thermal", "--recording", "t.csv", "--out", f"machine/{name}/thermal")
+
+    def thermistor(self, name, warmer, draw):
+        self.write("n.csv", "temperature [degC],resistance [ohm]",
+                   [[t, f"{Thermistor.resistance(t + warmer + draw.gauss(0, 0.02)):.3f}"] for t in range(0, 101, 10)])
+        self.call("calibrate", "thermistor", "--readings", "n.csv", "--out", f"machine/{name}/thermistor")
+
+    def make(self):
+        """An axis whose expansion at 31 degC grows by 0.9 um a month at x = 100 mm; a thermistor that stays."""
+        draw = random.Random(6)
+        for month in range(5):
+            self.thermal(f"2026-0{month + 1}-15", 0.001 * month, draw)
+            self.thermistor(f"2026-0{month + 1}-15", 0.0, draw)
+
+    def test_what_moved_and_when_the_next_is_due(self):
+        self.make()
+        said = self.call("calibrate", "history", "machine", "--accuracy", "2e-6", "--out", "history")
+        self.assertIn("thermal: 5 calibrations, 2026-01-15 00:00 to 2026-05-15 00:00", said)
+        kinds = {kind["kind"]: kind for kind in self.report("history")["kinds"]}
+        names = {name["name"]: name for name in kinds["thermal"]["names"]}
+        hot = names["error at 31 degC"]
+        self.assertTrue(hot["has_moved"])
+        x = float(hot["where"].split()[2])  # "x = 87.5 mm"
+        self.assertAlmostEqual(hot["moved"], 0.036e-6 * x, delta=0.3e-6)
+        self.assertAlmostEqual(hot["rate_per_day"], 0.0003e-6 * x, delta=0.003e-6)
+        self.assertFalse(names["error at 22 degC"]["has_moved"])
+        # RMS over x of 0.9 um x / 100 mm a month is 0.55 um; two sigma of it reach 2 um after 55 days.
+        self.assertAlmostEqual(kinds["thermal"]["due"]["days_after_last"], 55, delta=8)
+        self.assertFalse(any(name["has_moved"] for name in kinds["thermistor"]["names"]))
+        page = self.page("history")
+        for words in ("Due 2026-07-", "moved", "What was left out, and what it costs", "<svg"):
+            self.assertIn(words, page)
+
+    def test_json_and_what_was_left_out(self):
+        self.make()
+        broken = self.here / "machine/2026-02-15/thermal/compensation.yaml"
+        broken.write_text(broken.read_text().replace("lag: 0", "lag: 1", 1))
+        report = json.loads(self.call("calibrate", "history", "machine", "--json"))
+        self.assertEqual((report["rows"]["given"], report["rows"]["used"]), (10, 9))
+        said = self.call("calibrate", "history", "machine")
+        self.assertIn("left out: machine/2026-02-15/thermal/compensation.yaml", said)
+        self.assertIn("checksum", said)
+
+    def test_a_folder_without_calibrations_is_said_in_one_line(self):
+        (self.here / "empty").mkdir()
+        for folder in ("empty", "none"):
+            said = self.call("calibrate", "history", folder, "--out", "history", status=2)
+            self.assertEqual(said.count("\n"), 1)
+            self.assertIn(folder, said)
+            self.assertFalse((self.here / "history").exists())
+
+    def test_one_calibration_tells_no_movement(self):
+        self.thermistor("2026-01-15", 0.0, random.Random(1))
+        self.assertIn("what moves cannot be told", self.call("calibrate", "history", "machine", "--accuracy", "0.1"))
+
+    def test_a_geometric_machine_that_warped(self):
+        (self.here / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+        for month, scale in ((1, 0.0), (4, 15e-6)):
+            draw = random.Random(month)
+            rows = []
+            for name, (x0, y0), (x1, y1) in (("X", (0, 0), (200, 0)), ("Y", (0, 0), (0, 200)), ("Y far", (200, 0), (200, 200)),
+                                             ("D", (0, 0), (200, 200)), ("A", (0, 200), (200, 0)), ("H", (0, 0), (200, 100))):
+                for i in range(21):
+                    x, y = x0 + (x1 - x0) * i / 20, y0 + (y1 - y0) * i / 20
+                    way = math.hypot(x - x0, y - y0)
+                    along = (x1 - x0) / math.hypot(x1 - x0, y1 - y0)
+                    rows.append([name, x, y, f"{way + scale * (x - x0) * along + draw.gauss(0, 1e-4):.6f}"])
+            self.write("lines.csv", "line,x [mm],y [mm],displacement [mm]", rows)
+            self.call("calibrate", "geometric", "--machine", "machine.yaml", "--lines", "lines.csv", "--out",
+                      f"machine/2026-0{month}-01")
+        report = json.loads(self.call("calibrate", "history", "machine", "--accuracy", "2e-6", "--json"))
+        names = {name["name"]: name for name in report["kinds"][0]["names"]}
+        self.assertTrue(names["EXX"]["has_moved"])
+        self.assertAlmostEqual(names["EXX"]["moved"], 3e-6, delta=0.5e-6)  # 15 ppm of 200 mm
+        self.assertFalse(names["EYY"]["has_moved"])
+        self.assertTrue(report["kinds"][0]["due"]["known"])
+
+
 if __name__ == "__main__":
     unittest.main()

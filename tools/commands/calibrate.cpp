@@ -20,6 +20,7 @@ void add_calibrate(CLI::App& program) {
   add_calibrate_components(*group);
   add_calibrate_controller(*group);
   add_calibrate_ripple(*group);
+  add_calibrate_history(*group);
 }
 
 }  // namespace invar::tools

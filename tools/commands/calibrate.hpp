@@ -31,5 +31,6 @@ void add_calibrate_components(CLI::App& group);
 recording::Table predict_components(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_camera(CLI::App& group);
 void add_calibrate_ripple(CLI::App& group);
+void add_calibrate_history(CLI::App& group);
 
 }  // namespace invar::tools

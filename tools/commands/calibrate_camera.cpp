@@ -29,6 +29,7 @@ nlohmann::json report_json(const Results& r) {
   nlohmann::json out;
   out["scale"] = {{"value", camera.scale}, {"unit", "m/px"}, {"sigma", camera.scale_sigma}};
   out["residual_px"] = r.fit.residual;
+  out["calibrated_at"] = calibrated_at();
   out["unidentified"] = nlohmann::json::array();
   const double corner = camera.center.squaredNorm();
   if (r.fit.distortion_identified) {

@@ -273,6 +273,7 @@ void calibrate_by_target(const CameraOptions& options) {
 
   nlohmann::json json;
   json["model"] = metrology::name(best.fit.lens);
+  json["calibrated_at"] = calibrated_at();
   json["camera"] = numbers(best.fit.camera, best.fit.lens);
   json["sigma"] = numbers(best.fit.sigma, best.fit.lens);
   json["rms_px"] = best.fit.rms;

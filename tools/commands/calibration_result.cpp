@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <ctime>
 #include <iostream>
 
 #include "core/base/new_file.hpp"
@@ -18,6 +19,15 @@ Progress::~Progress() {
   if (isatty(STDERR_FILENO) != 0) steer(std::cerr, clear_line);
 }
 
+std::string calibrated_at() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
 namespace {
 
 void write_reports(const std::filesystem::path& folder, const nlohmann::json& report,
@@ -27,7 +37,9 @@ void write_reports(const std::filesystem::path& folder, const nlohmann::json& re
   if (failed || !std::filesystem::is_directory(folder))
     throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
   page.write(folder / "report.html");
-  write_file(folder / "report.json", report.dump(1) + "\n");
+  nlohmann::json dated = report;
+  dated["calibrated_at"] = calibrated_at();
+  write_file(folder / "report.json", dated.dump(1) + "\n");
 }
 
 }  // namespace
