@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Dependencies point one way: checks every #include against the table of what a room may use."""
+"""Dependencies point one way: checks every #include against the table of what a room may use, and that no modules (a header
+with its source) include one another in a circle."""
 import pathlib
 import re
 import sys
@@ -37,11 +38,36 @@ MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "compensation": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
 
+# The rooms of core/diagnosis by stage: each may use those before it.
+STAGES = ["dataset", "estimate", "segments", "locate", "checks", "candidates", "evidence", "search", "report"]
+DIAGNOSIS = ["core/base", "core/config", "core/numerics", "core/physics", "core/model", "core/recording", "Eigen"]
+for at, stage in enumerate(STAGES):
+    ROOMS[f"core/diagnosis/{stage}"] = DIAGNOSIS + [f"core/diagnosis/{earlier}" for earlier in STAGES[:at]]
+ROOMS["core/diagnosis/report"].append("nlohmann-json")
+
+# Modules that still include one another; no further ones may, and a set that is cut leaves the list.
+CIRCLES = [
+    {"core/component/component", "core/component/port"},
+    {"core/config/yaml", "core/config/yaml_document"},
+    {"core/physics/simulation", "core/physics/simulate_plants"},
+    {"core/metrology/thermal_identification", "core/metrology/thermal_regression"},
+    {"core/metrology/displacement_line", "core/metrology/line_fit"},
+    {"core/modbus/map", "core/modbus/codec"},
+    {"components/vision/outline", "components/vision/outline_curve"},
+    {"core/dds/rtps_message", "core/dds/rtps_parameters", "core/dds/sequence_guard"},
+    {"core/dds/node", "core/dds/connection", "core/dds/participant"},
+    {"core/recording/recording_reader", "core/recording/mcap_scan"},
+    {"tools/cell/connections", "tools/cell/drives", "tools/cell/loaded_cell", "tools/cell/qos"},
+    {"tools/geometric/components_file", "tools/geometric/components_page"},
+]
+
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 
 def room_of(path: str):
     parts = path.split("/")
+    if parts[:2] == ["core", "diagnosis"] and len(parts) > 3:
+        return "/".join(parts[:3])
     if parts[0] == "core" and len(parts) > 2:
         return "core/" + parts[1]
     if parts[0] == "components" and len(parts) > 2:
@@ -66,8 +92,38 @@ def allowed(room: str):
     return ROOMS.get(room, "unknown")
 
 
+def module_of(path: str):
+    return path.rsplit(".", 1)[0]
+
+
+def circles(uses: dict):
+    """Sets of modules that reach one another; `uses`: module -> modules that it includes (Tarjan 1972)."""
+    found, number, low, stack = [], {}, {}, []
+
+    def visit(module):
+        number[module] = low[module] = len(number)
+        stack.append(module)
+        for other in sorted(uses.get(module, ())):
+            if other not in number:
+                visit(other)
+            if other in stack:
+                low[module] = min(low[module], low[other])
+        if low[module] == number[module]:
+            circle = stack[stack.index(module):]
+            del stack[stack.index(module):]
+            if len(circle) > 1:
+                found.append(circle)
+
+    sys.setrecursionlimit(10000)
+    for module in sorted(uses):
+        if module not in number:
+            visit(module)
+    return found
+
+
 def main() -> int:
     faults = 0
+    uses = {}
     for folder in ("core", "components", "tools"):
         for path in sorted((ROOT / folder).rglob("*")):
             if path.suffix not in (".hpp", ".cpp", ".h"):
@@ -84,10 +140,20 @@ def main() -> int:
             for number, line in enumerate(path.read_text().splitlines(), 1):
                 match = INCLUDE.match(line)
                 used = used_room(match.group(1)) if match else None
+                if match and (ROOT / match.group(1)).exists() and module_of(match.group(1)) != module_of(name):
+                    uses.setdefault(module_of(name), set()).add(module_of(match.group(1)))
                 if used is None or used == room or may is None or used in may:
                     continue
                 print(f"{name}:{number}: {room} may not use {used}; it may use: {', '.join(may) or 'nothing'}")
                 faults += 1
+    found = circles(uses)
+    for circle in CIRCLES:
+        if not any(circle == set(one) for one in found):
+            print(f"tests/check_includes.py: strike {sorted(circle)} from CIRCLES: nothing includes in this circle any more")
+            faults += 1
+    for circle in (one for one in found if set(one) not in CIRCLES):
+        print("these modules include one another in a circle: " + ", ".join(circle))
+        faults += 1
     return 1 if faults else 0
 
 

@@ -46,8 +46,10 @@ struct TermInfo {
   /// The signals on which the effect depends, as reports name them; empty places at the end.
   std::array<std::string_view, 4> depends_on{};
   std::array<ParameterInfo, most_parameters> parameters{};  // unnamed ones at the end
-  std::string_view description;  // what happens in the machine, in a sentence or two
-  std::string_view source;       // equation, textbook, standard
+  std::string_view description;         // what happens in the machine, in a sentence or two
+  std::string_view source;              // equation, textbook, standard
+  bool is_friction = false;             // a law of dry friction: sliding or springing first
+  bool sticks_and_slips = is_friction;  // holds a carriage, a reading or a current still until it slips
 
   [[nodiscard]] constexpr std::size_t parameter_count() const {
     std::size_t n = 0;

@@ -8,11 +8,16 @@
 #include <fstream>
 #include <optional>
 
+#include "core/diagnosis/dataset/statistics.hpp"
+#include "core/diagnosis/evidence/claim.hpp"
+#include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/search/options.hpp"
+#include "core/diagnosis/search/search.hpp"
 #include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/crowd.hpp"
 #include "tests/support/mismatch/marks.hpp"
-#include "tools/diagnose/claim.hpp"
 
 namespace invar::test::mismatch {
 namespace {
@@ -23,7 +28,7 @@ struct Row {
   std::vector<double> beside;  // of each effect beside the others
   Marks marks;
   std::string verdict, findings, rejected;
-  std::vector<diagnose::Finding> claims;
+  std::vector<diagnosis::Finding> claims;
   double still_follows = 0.0;
 };
 
@@ -48,7 +53,7 @@ std::set<std::string, std::less<>> all_but(std::size_t keep, const Machine& mach
 
 Row run(const std::string& plant, const std::string& effect, double size, unsigned seed,
         const Trouble& trouble, bool leave_out, std::optional<std::size_t> keep, bool crowded) {
-  diagnose::Options options;
+  diagnosis::Options options;
   Row row;
   row.machine =
       crowded ? make_crowded(plant, effect, size, seed, trouble) : make(plant, effect, size, seed, trouble);
@@ -64,11 +69,11 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
   if (row.machine.missing.size() > 1) row.beside = to_be_won_beside(row.machine, seed, trouble);
   const std::clock_t begin = std::clock();  // of all threads: what it costs, however busy the host
   auto data = case_of(row.machine);
-  const auto d = diagnose::search(
+  const auto d = diagnosis::search(
       data, [](double, const std::string&) {}, options);
   row.marks = mark(row.machine, data, d, row.win, row.beside);
   row.marks.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-  row.verdict = diagnose::name_of(d.verdict);
+  row.verdict = diagnosis::name_of(d.verdict);
   row.still_follows = d.still_follows;
   for (const auto& r : d.rejected)
     row.rejected += "    " + r.term + " " + std::to_string(r.gain) + ": " + r.why + "\n";
@@ -82,7 +87,7 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
     row.findings += text;
     std::snprintf(text, sizeof text,
                   "    %s: gain %.1f share %.2g left %.2g shape %.2g, odds %.2g, of relatives %.2g\n",
-                  diagnose::label(finding.term).c_str(), finding.gain, finding.share, row.still_follows,
+                  diagnosis::label(finding.term).c_str(), finding.gain, finding.share, row.still_follows,
                   finding.other_shape, finding.other_cause, finding.relatives);
     row.rejected += text;
     for (std::size_t i = 0; i < finding.term.info->parameter_count(); ++i)

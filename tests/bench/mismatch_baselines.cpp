@@ -5,15 +5,22 @@
 #include <cstdio>
 #include <numbers>
 
+#include "core/diagnosis/candidates/candidates.hpp"
+#include "core/diagnosis/dataset/case.hpp"
+#include "core/diagnosis/estimate/weighing.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/evidence/wander.hpp"
+#include "core/diagnosis/search/options.hpp"
+#include "core/diagnosis/search/search.hpp"
 #include "core/model/record_file.hpp"
+#include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/marks.hpp"
-#include "tools/diagnose/screen.hpp"
 
 namespace invar::test::mismatch {
 namespace {
 
-using diagnose::Case;
-using diagnose::Fit;
+using diagnosis::Case;
+using diagnosis::Fit;
 
 /// What a method says of a machine.
 struct Answer {
@@ -32,12 +39,12 @@ Answer of_model(const Machine& machine, const Case& data, const physics::Model& 
 }
 
 /// The believed model with its own numbers refitted, every row alike.
-Fit refitted(const Case& data, diagnose::Weighing& weighing) {
+Fit refitted(const Case& data, diagnosis::Weighing& weighing) {
   Fit best;
   best.model = data.model;
   for (int again = 0; again < 3; ++again) {
-    weighing = diagnose::weigh(data, diagnose::simulate(data, best.model), false);
-    best = diagnose::fit(data, weighing, best.model, data.model, 10);
+    weighing = diagnosis::weigh(data, diagnosis::simulate(data, best.model), false);
+    best = diagnosis::fit(data, weighing, best.model, data.model, 10);
   }
   return best;
 }
@@ -91,7 +98,7 @@ class ResidualProcess {
       }
   }
 
-  [[nodiscard]] bool claims() const { return gain_ > diagnose::claim_margin; }
+  [[nodiscard]] bool claims() const { return gain_ > diagnosis::claim_margin; }
 
  private:
   static Eigen::MatrixXd features_of(const physics::Record& inputs, const physics::Outputs& simulated) {
@@ -168,17 +175,17 @@ Answer gaussian_process(const Machine& machine, const Case& data, const Fit& ref
 
 /// Sequentially thresholded least squares over the first-order effect of every candidate (SINDy); the threshold by
 /// cross-validation over five blocks of rows.
-Answer sparse_regression(const Machine& machine, const Case& data, const diagnose::Weighing& weighing,
+Answer sparse_regression(const Machine& machine, const Case& data, const diagnosis::Weighing& weighing,
                          const Fit& refit) {
   auto screened =
-      diagnose::screen(data, weighing, refit, diagnose::named_starts(data, weighing, refit, {}), 60);
+      diagnosis::screen(data, weighing, refit, diagnosis::named_starts(data, weighing, refit, {}), 60);
   std::erase_if(screened, [](const auto& s) { return s.columns.size() == 0; });
-  Eigen::MatrixXd all = diagnose::whitened(data, weighing, refit.columns);
+  Eigen::MatrixXd all = diagnosis::whitened(data, weighing, refit.columns);
   const auto own = all.cols();
   std::vector<Eigen::Index> begins;
   for (const auto& s : screened) {
     begins.push_back(all.cols());
-    const Eigen::MatrixXd columns = diagnose::whitened(data, weighing, s.columns);
+    const Eigen::MatrixXd columns = diagnosis::whitened(data, weighing, s.columns);
     all.conservativeResize(Eigen::NoChange, all.cols() + columns.cols());
     all.rightCols(columns.cols()) = columns;
   }
@@ -229,7 +236,7 @@ Answer sparse_regression(const Machine& machine, const Case& data, const diagnos
     if (loss < least) least = loss, threshold = t;
   }
   const Eigen::VectorXd w = solve(whole, whole_slope, threshold);
-  std::vector<const diagnose::Screened*> chosen;
+  std::vector<const diagnosis::Screened*> chosen;
   for (std::size_t s = 0; s < screened.size(); ++s) {
     const auto count = begins[s + 1] - begins[s];
     const Eigen::VectorXd part = w.segment(begins[s], count);
@@ -237,35 +244,35 @@ Answer sparse_regression(const Machine& machine, const Case& data, const diagnos
     screened[s].strength = part.cwiseQuotient(norms.segment(begins[s], count).transpose());
     chosen.push_back(&screened[s]);
   }
-  auto model = diagnose::with(refit, chosen);
+  auto model = diagnosis::with(refit, chosen);
   for (Eigen::Index c = 0; c < own; ++c) {
     const auto& f = refit.free[static_cast<std::size_t>(c)];
-    diagnose::set(model, f, f.bounds.clamp(diagnose::get(model, f) + w(c) / norms(c)));
+    diagnosis::set(model, f, f.bounds.clamp(diagnosis::get(model, f) + w(c) / norms(c)));
   }
   return of_model(machine, data, model);
 }
 
 /// The candidate of most evidence, again and again, while the Bayesian information criterion falls.
-Answer stepwise(const Machine& machine, const Case& data, diagnose::Weighing weighing, Fit best) {
+Answer stepwise(const Machine& machine, const Case& data, diagnosis::Weighing weighing, Fit best) {
   for (int terms = 0; terms < 5; ++terms) {
     const auto screened =
-        diagnose::screen(data, weighing, best, diagnose::named_starts(data, weighing, best, {}), 0);
+        diagnosis::screen(data, weighing, best, diagnosis::named_starts(data, weighing, best, {}), 0);
     Fit next = best;
     for (std::size_t i = 0; i < std::min<std::size_t>(3, screened.size()); ++i)
-      if (auto tried = diagnose::fit_with(data, weighing, best, screened[i], 8);
+      if (auto tried = diagnosis::fit_with(data, weighing, best, screened[i], 8);
           tried.evidence > next.evidence)
         next = std::move(tried);
     if (next.model.terms.size() == best.model.terms.size()) break;
-    weighing = diagnose::weigh(data, diagnose::simulate(data, next.model), false);
-    best = diagnose::fit(data, weighing, next.model, data.model, 6, &next);
+    weighing = diagnosis::weigh(data, diagnosis::simulate(data, next.model), false);
+    best = diagnosis::fit(data, weighing, next.model, data.model, 6, &next);
   }
   return of_model(machine, data, best.model);
 }
 
 Answer ours(const Machine& machine, Case data, bool refuses) {
-  diagnose::Options options;
+  diagnosis::Options options;
   options.refuses = refuses;
-  const auto d = diagnose::search(
+  const auto d = diagnosis::search(
       data, [](double, const std::string&) {}, options);
   return of_model(machine, data, d.best.model);
 }
@@ -327,7 +334,7 @@ int main(int argc, char** argv) {
       trouble.colour = draw.once_in(2.0) ? static_cast<Colour>(1 + draw.index(4)) : Colour::white;
       const auto machine = make(plant, effect, size, number, trouble);
       const auto data = case_of(machine);
-      diagnose::Weighing weighing;
+      diagnosis::Weighing weighing;
       const auto refit = refitted(data, weighing);
       const std::array answers{of_model(machine, data, refit.model),
                                gaussian_process(machine, data, refit),

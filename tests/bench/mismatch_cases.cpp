@@ -8,9 +8,13 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/diagnosis/dataset/load.hpp"
+#include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/search/options.hpp"
+#include "core/diagnosis/search/search.hpp"
 #include "core/model/model_file.hpp"
 #include "tests/support/mismatch/claims.hpp"
-#include "tools/diagnose/search.hpp"
 
 namespace {
 
@@ -50,10 +54,10 @@ struct Study {
       if (entry.path().filename().string().starts_with("recording")) files.push_back(entry.path());
     std::sort(files.begin(), files.end());
     const std::clock_t begin = std::clock();
-    auto data = diagnose::load_case(model, files);
-    diagnose::Options options;
+    auto data = diagnosis::load_case(model, files);
+    diagnosis::Options options;
     options.without = without;
-    const auto d = diagnose::search(
+    const auto d = diagnosis::search(
         data, [](double, const std::string&) {}, options);
     seconds.push_back(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     std::string missing, found;
@@ -75,7 +79,7 @@ struct Study {
       found += text;
     }
     std::printf("%-12s%s: %s%s  [%.1f s]\n", folder.filename().c_str(), missing.c_str(),
-                diagnose::name_of(d.verdict).c_str(), found.c_str(), seconds.back());
+                diagnosis::name_of(d.verdict).c_str(), found.c_str(), seconds.back());
     std::fflush(stdout);
   }
 };

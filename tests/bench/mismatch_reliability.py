@@ -2,7 +2,7 @@
 """Do stated probabilities mean what they say? Reads the claims that bench_mismatch and bench_mismatch_cases wrote with
 --claims (case, name, probability, odds of the other names, gain, share left, credit, share of a freer shape, share of the
 mismatch, odds of relatives), prints a reliability table, and
-with --fit the numbers of tools/diagnose/odds.cpp that make these claims likeliest.
+with --fit the numbers of core/diagnosis/evidence/odds.cpp that make these claims likeliest.
 
     tests/bench/mismatch_reliability.py claims.txt [...] [--fit]
 """
@@ -27,7 +27,7 @@ USUAL = (0.18, 0.52, 28.0, 0.5, 5e-4)
 
 
 def odds(numbers, c):
-    """Of another cause: `odds_of_another_cause` in tools/diagnose/odds.cpp."""
+    """Of another cause: `odds_of_another_cause` in core/diagnosis/evidence/odds.cpp."""
     at_100, slope, by_left, by_shape, ideal = numbers
     return (at_100 * (max(c.gain, 1.0) / 100.0) ** -slope + by_left * (c.left + c.shape)
             + by_shape * min(1.0, c.shape / 0.005) + (ideal / max(c.share, 1e-6) if c.share < 1.0 else 0.0))

@@ -1,5 +1,5 @@
 // `invar diagnose`: what physics does the model leave out? Writes report.json, report.html and patched.yaml.
-#include "tools/diagnose/data.hpp"
+#include "core/diagnosis/dataset/load.hpp"
 
 #include <malloc.h>
 #include <unistd.h>
@@ -13,14 +13,19 @@
 #include <memory>
 #include <sstream>
 
+#include "core/diagnosis/checks/clock.hpp"
+#include "core/diagnosis/dataset/case.hpp"
+#include "core/diagnosis/evidence/claim.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/report/report.hpp"
+#include "core/diagnosis/search/other_run.hpp"
+#include "core/diagnosis/search/search.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
-#include "tools/diagnose/clock.hpp"
 #include "tools/diagnose/example.hpp"
-#include "tools/diagnose/other_run.hpp"
-#include "tools/diagnose/report.hpp"
 #include "tools/diagnose/report_folder.hpp"
+#include "tools/diagnose/report_page.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/patience.hpp"
 #include "tools/live/terminal.hpp"
@@ -118,44 +123,44 @@ int run(const Options& options) {
   const ProgressLine line;
   const auto progress = [&](double share, const std::string& what) { line.show(share, what); };
   progress(0.0, "reading");
-  auto data = diagnose::load_case(model, options.recordings);
-  diagnose::check_runs(data, model, 0.5, options.model);  // the fit may mend a model that runs away late
-  diagnose::check_clock(data);
-  std::vector<diagnose::OtherRun> checks;  // read before the search: what is unusable is said at once
+  auto data = diagnosis::load_case(model, options.recordings);
+  diagnosis::check_runs(data, model, 0.5, options.model);  // the fit may mend a model that runs away late
+  diagnosis::check_clock(data);
+  std::vector<diagnosis::OtherRun> checks;  // read before the search: what is unusable is said at once
   for (std::size_t i = 0; i < options.checks.size(); ++i)
-    checks.push_back(diagnose::read_other_run(
+    checks.push_back(diagnosis::read_other_run(
         model, {options.checks[i], options.check_outputs.empty() ? "" : options.check_outputs[i],
                 options.fits_check_start}));
   // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
-  diagnose::Options how;
+  diagnosis::Options how;
   how.stopped = [&] {
     const std::chrono::duration<double> took = Clock::now() - began;
     return interrupted() || took.count() > for_search * options.budget;
   };
   (void)interrupted();
-  diagnose::ReportFolder{options.out};
+  diagnosis::ReportFolder{options.out};
   auto patience =
       std::make_unique<Patience>("invar: stopped before there was anything to say; no report was written");
-  auto diagnosis = diagnose::search(data, progress, how);
+  auto diagnosis = diagnosis::search(data, progress, how);
   line.clear();
   if (diagnosis.is_partial && !interrupted()) diagnosis.budget = options.budget;
-  diagnose::check_runs(data, diagnosis.best.model, 0.0, options.model);
+  diagnosis::check_runs(data, diagnosis.best.model, 0.0, options.model);
   for (auto& run : checks) {
-    diagnose::compare(data, diagnosis, run);
+    diagnosis::compare(data, diagnosis, run);
     diagnosis.other_runs.push_back(std::move(run));
   }
-  const auto json = diagnose::report_json(data, diagnosis);
-  const auto page = diagnose::page_text(data, diagnosis, options.model.string());
+  const auto json = diagnosis::report_json(data, diagnosis);
+  const auto page = diagnosis::page_text(data, diagnosis, options.model.string());
   patience.reset();
-  diagnose::ReportFolder folder{options.out};
-  const auto of_one = diagnose::of_one_recording(diagnosis);
+  diagnosis::ReportFolder folder{options.out};
+  const auto of_one = diagnosis::of_one_recording(diagnosis);
   for (const bool is_retuned : {true, false}) {
-    auto changed = is_retuned ? diagnosis.retuned.model : diagnose::best_without(data, diagnosis, of_one);
+    auto changed = is_retuned ? diagnosis.retuned.model : diagnosis::best_without(data, diagnosis, of_one);
     changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
     for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
       if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
     if (model.plant == physics::Plant::error_map)
-      if (const auto range = diagnose::covered(data, "temperature")) changed.baseline.temperature = range;
+      if (const auto range = diagnosis::covered(data, "temperature")) changed.baseline.temperature = range;
     for (std::size_t i = 0; !is_retuned && i < diagnosis.findings.size(); ++i) {
       const auto& sigmas = diagnosis.findings[i].sigmas;
       const std::size_t place = model.terms.size() + i;
@@ -168,9 +173,9 @@ int run(const Options& options) {
     std::string made_of =
         "# " + options.model.filename().string() +
         (is_retuned ? ", its own parameters refitted, no physics added\n"
-                    : " after `invar diagnose`. " + diagnose::verdict_sentence(data, diagnosis) + "\n");
+                    : " after `invar diagnose`. " + diagnosis::verdict_sentence(data, diagnosis) + "\n");
     for (const auto& run : diagnosis.other_runs)
-      if (const auto worse = diagnose::worse_on(diagnosis, run); !worse.empty())
+      if (const auto worse = diagnosis::worse_on(diagnosis, run); !worse.empty())
         made_of += "# " + worse + "\n";
     for (std::size_t k = 0; !is_retuned && k < of_one.size(); ++k)
       made_of += "# Without the curve over " + diagnosis.best.model.terms[of_one[k]].curve.over +
@@ -183,7 +188,7 @@ int run(const Options& options) {
   if (options.json)
     std::cout << json << '\n';
   else
-    print(diagnose::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
+    print(diagnosis::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
   return diagnosis.is_partial && diagnosis.budget == 0.0 ? 130 : 0;
 }
 
@@ -214,7 +219,7 @@ void add_diagnose(CLI::App& program) {
             if (!physics::plant_by_name(name, plant))
               throw InputError{"--example", "`" + name + "` is no plant",
                                "name axis, thermal, error_map, droplet, sensor or equations"};
-            std::cout << diagnose::example_model(plant);
+            std::cout << diagnosis::example_model(plant);
             throw CLI::Success{};
           },
           "print a model.yaml to begin with, and no more: axis, thermal, error_map, droplet, sensor or "

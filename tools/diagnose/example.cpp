@@ -2,7 +2,7 @@
 
 #include "core/physics/library.hpp"
 
-namespace invar::diagnose {
+namespace invar::diagnosis {
 
 namespace {
 
@@ -131,4 +131,4 @@ std::string example_model(Plant plant) {
          terms(plant);
 }
 
-}  // namespace invar::diagnose
+}  // namespace invar::diagnosis

@@ -5,9 +5,9 @@
 
 #include "core/physics/term.hpp"
 
-namespace invar::diagnose {
+namespace invar::diagnosis {
 
 /// model.yaml of a made-up machine, with what each line means and, as comments, the terms that may stand under `terms`.
 std::string example_model(physics::Plant plant);
 
-}  // namespace invar::diagnose
+}  // namespace invar::diagnosis

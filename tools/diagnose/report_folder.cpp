@@ -4,7 +4,7 @@
 
 #include "core/base/fault.hpp"
 
-namespace invar::diagnose {
+namespace invar::diagnosis {
 
 ReportFolder::ReportFolder(std::filesystem::path folder) : folder_{std::move(folder)} {
   std::error_code failed;
@@ -41,4 +41,4 @@ void ReportFolder::forget() {
   if (is_new_) std::filesystem::remove(folder_, ignored);
 }
 
-}  // namespace invar::diagnose
+}  // namespace invar::diagnosis

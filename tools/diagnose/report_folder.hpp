@@ -8,7 +8,7 @@
 
 #include "core/base/new_file.hpp"
 
-namespace invar::diagnose {
+namespace invar::diagnosis {
 
 class ReportFolder {
  public:
@@ -29,4 +29,4 @@ class ReportFolder {
   std::vector<std::unique_ptr<NewFile>> files_;
 };
 
-}  // namespace invar::diagnose
+}  // namespace invar::diagnosis

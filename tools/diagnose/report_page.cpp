@@ -1,14 +1,17 @@
-#include "tools/report/page.hpp"
+#include "tools/diagnose/report_page.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "tools/diagnose/candidates.hpp"
-#include "tools/diagnose/region.hpp"
-#include "tools/diagnose/report.hpp"
-#include "tools/diagnose/windows.hpp"
+#include "core/diagnosis/candidates/candidates.hpp"
+#include "core/diagnosis/dataset/starts.hpp"
+#include "core/diagnosis/dataset/variables.hpp"
+#include "core/diagnosis/report/region.hpp"
+#include "core/diagnosis/report/report.hpp"
+#include "core/diagnosis/segments/windows.hpp"
+#include "tools/report/page.hpp"
 
-namespace invar::diagnose {
+namespace invar::diagnosis {
 
 namespace {
 
@@ -125,7 +128,7 @@ void add_bars(report::Page& page, const FitRow& row, bool any_found) {
     std::string text = error_of(value, row);
     if (text == "runs away") return report::Page::Bar{label, 0.0, text, colour};
     if (row.noise_floor > 0.0 && value != row.noise_floor)
-      text += " (" + report::number(value / row.noise_floor) + " x noise)";
+      text += " (" + number(value / row.noise_floor) + " x noise)";
     return report::Page::Bar{label, value, text, colour};
   };
   std::vector<report::Page::Bar> bars{bar("model as it is", row.before, grey),
@@ -140,8 +143,8 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   Names missing;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
-    missing.push_back({title_of(finding), where_of(data, d, i),
-                       report::number(100.0 * finding.probability, 3) + " %", sizes_of(data, d, finding)});
+    missing.push_back({title_of(finding), where_of(data, d, i), number(100.0 * finding.probability, 3) + " %",
+                       sizes_of(data, d, finding)});
   }
   if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
   std::string fit;
@@ -150,9 +153,9 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
     fit += (fit.empty() ? "" : "; ") + row.signal + " " + error_of(row.before, row) + " as it is, " +
            error_of(row.retuned, row) + " with its own parameters refitted" +
            (d.findings.empty() ? "" : ", " + error_of(row.after, row) + " with what was found") + " (noise " +
-           report::si(row.noise_floor, row.unit) + ")";
+           si(row.noise_floor, row.unit) + ")";
   }
-  const std::string rest = report::number(d.unexplained, 3) + " times the noise";
+  const std::string rest = number(d.unexplained, 3) + " times the noise";
   Names rows;
   if (d.is_partial)
     rows.push_back({"what is missing", missing.empty()
@@ -247,7 +250,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
                  std::string{in_file.name} + " at " + site_of(data, finding.term) +
                  "): " + description_of(d, finding) + " [" + std::string{in_file.source} + "] " +
                  (leaves ? "Without it alone the model runs away from the machine."
-                         : "Of the mismatch, " + report::number(100.0 * finding.share, 3) +
+                         : "Of the mismatch, " + number(100.0 * finding.share, 3) +
                                " % comes back when it alone is taken out."));
   // The output that it moves most, seen from its noise.
   std::size_t shown = 0;
@@ -326,10 +329,9 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
   if (!plots.empty()) page.plots(plots, "Averaged over cells of the variable with which it goes.");
   Names numbers;
   for (std::size_t i = 0; i < info.parameter_count(); ++i)
-    numbers.push_back(
-        {readable(info.parameters[i].name),
-         report::with_sigma(finding.term.values[i], finding.sigmas[i], unit_of(data, finding.term, i)),
-         std::string{info.parameters[i].description}});
+    numbers.push_back({readable(info.parameters[i].name),
+                       with_sigma(finding.term.values[i], finding.sigmas[i], unit_of(data, finding.term, i)),
+                       std::string{info.parameters[i].description}});
   if (!numbers.empty()) page.table({"parameter", "value +- 1 sigma", "meaning"}, numbers);
 }
 
@@ -342,10 +344,9 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
     if (is_start(p)) continue;
     const double to = get(d.best.model, f), sigma = d.best.sigma(static_cast<Eigen::Index>(k));
     corrections.push_back(
-        {p.name,
-         f.sigma > 0.0 ? report::with_sigma(p.value, f.sigma, p.unit) : report::si(p.value, p.unit, 4),
-         report::with_sigma(to, sigma, p.unit),
-         f.sigma > 0.0 ? report::number(std::round(1e3 * std::abs(to - f.center) / f.sigma) / 1e3, 2) +
+        {p.name, f.sigma > 0.0 ? with_sigma(p.value, f.sigma, p.unit) : si(p.value, p.unit, 4),
+         with_sigma(to, sigma, p.unit),
+         f.sigma > 0.0 ? number(std::round(1e3 * std::abs(to - f.center) / f.sigma) / 1e3, 2) +
                              " sigma of what was believed"
                        : "nothing was believed beyond a start value"});
   }
@@ -366,8 +367,8 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
           {readable(a.term.info->name) + " (" + place_of(data, a.term) + ")",
            "in place of " + readable(finding.term.info->name) +
                (a.explains_as_well() ? ": explains the recording as well" : ": explains the recording worse"),
-           report::number(a.log_odds)});
-  for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, report::number(r.gain)});
+           number(a.log_odds)});
+  for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, number(r.gain)});
   if (considered.empty()) {
     page.paragraph(d.is_partial ? "The search ended before anything else was weighed."
                                 : "No other term of the library came near: none had a gain worth a fit.");
@@ -377,7 +378,7 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
   page.paragraph(
       "Log evidence: for a rival, against what it would replace (each unit makes it e times less likely); "
       "otherwise what the effect gained by itself, of which claims need " +
-      report::number(claim_margin_of(d.weighing)) + " and a gain on held-out data.");
+      number(claim_margin_of(d.weighing)) + " and a gain on held-out data.");
 }
 
 }  // namespace
@@ -437,11 +438,10 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
     page.heading("The smallest effects that this recording would have shown");
     Names smallest;
     for (const auto& entry : d.detectable)
-      smallest.push_back({readable(entry.term), readable(entry.parameter),
-                          report::si(entry.value, entry.unit == "*" ? "" : entry.unit),
-                          entry.at
-                              ? readable(entry.at->name) + " " + report::si(entry.at->value, entry.at->unit)
-                              : std::string{}});
+      smallest.push_back(
+          {readable(entry.term), readable(entry.parameter),
+           si(entry.value, entry.unit == "*" ? "" : entry.unit),
+           entry.at ? readable(entry.at->name) + " " + si(entry.at->value, entry.at->unit) : std::string{}});
     page.table({"effect", "parameter", "smallest", "at"}, smallest);
     page.paragraph(
         "To first order, each by itself: more than noise, a wander of the instrument or a parameter within "
@@ -451,7 +451,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   page.heading("What remains, and what to do next");
   std::string with;
   for (const auto& one : d.unexplained_over) with += (with.empty() ? ", and goes with " : ", ") + one;
-  page.paragraph("After all that, the residual on held-out data is " + report::number(d.unexplained, 3) +
+  page.paragraph("After all that, the residual on held-out data is " + number(d.unexplained, 3) +
                  " times the noise" + with + ".");
   page.callout("Next experiment: " + next_experiment(data, d),
                d.verdict == Verdict::ambiguous ? "warn" : "plain");
@@ -460,4 +460,4 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
   return page.text();
 }
 
-}  // namespace invar::diagnose
+}  // namespace invar::diagnosis

@@ -5,9 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "core/base/quantity.hpp"
 #include "tools/report/plot.hpp"
 
 namespace invar::report {
+
+using invar::number;
+using invar::si;
+using invar::with_sigma;
 
 /// Texts are plain and are escaped here. Plots are drawn together when the page is written.
 class Page {
@@ -54,15 +59,7 @@ class Page {
   std::vector<Part> parts_;
 };
 
-/// "12.3" with the given number of significant digits; "-" for NaN.
-std::string number(double value, int digits = 3);
-/// A value with its unit in the handiest prefix: si(4.1e-6, "m") is "4.1 um". Units that take none ("1", "kg", "1/A2",
-/// "degC") stand as they are.
-std::string si(double value, const std::string& unit, int digits = 3);
 /// Both axes in the handiest prefix of the unit that ends their label: 4e-7 over "error [m]" becomes 400 over "error [nm]".
 /// Seconds and hertz are left as they are: nobody reads kiloseconds.
 void in_handy_units(Plot& plot);
-/// A value with its standard deviation, two digits of which are shown: "19.40 +- 0.78 s".
-std::string with_sigma(double value, double sigma, const std::string& unit);
-
 }  // namespace invar::report

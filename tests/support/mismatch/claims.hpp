@@ -7,7 +7,8 @@
 #include <fstream>
 #include <string>
 
-#include "tools/diagnose/diagnosis.hpp"
+#include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
 
 namespace invar::test::mismatch {
 
@@ -17,7 +18,7 @@ inline constexpr double confident = 0.9;
 class Claims {
  public:
   /// `credit` of the name: 1 right, 0.5 a relative, 0 wrong. What goes without a name is no claim.
-  void add(const diagnose::Finding& finding, double still_follows, double credit, const std::string& of,
+  void add(const diagnosis::Finding& finding, double still_follows, double credit, const std::string& of,
            bool of_many) {
     if (!finding.term.curve.knots.empty() || finding.stand_in != nullptr) return;
     const double p = finding.probability, held = credit > 0.9 ? 1.0 : 0.0;

@@ -4,9 +4,16 @@
 #include <limits>
 #include <sstream>
 
+#include "core/diagnosis/candidates/place.hpp"
+#include "core/diagnosis/dataset/case.hpp"
+#include "core/diagnosis/dataset/load.hpp"
+#include "core/diagnosis/dataset/statistics.hpp"
+#include "core/diagnosis/estimate/weighing.hpp"
+#include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/report/report.hpp"
 #include "core/model/model_file.hpp"
 #include "core/model/record_file.hpp"
-#include "tools/diagnose/report.hpp"
+#include "core/physics/simulation.hpp"
 
 namespace invar::test::mismatch {
 
@@ -17,27 +24,27 @@ physics::Model model_of(const Machine& machine) {
   return model;
 }
 
-diagnose::Case case_of(const Machine& machine) {
-  return diagnose::make_case(model_of(machine), machine.recordings);
+diagnosis::Case case_of(const Machine& machine) {
+  return diagnosis::make_case(model_of(machine), machine.recordings);
 }
 
 namespace {
 
-double to_be_won(const Machine& machine, diagnose::Case quiet) {
-  auto weighing = diagnose::weigh(quiet, diagnose::simulate(quiet, quiet.model), false);
+double to_be_won(const Machine& machine, diagnosis::Case quiet) {
+  auto weighing = diagnosis::weigh(quiet, diagnosis::simulate(quiet, quiet.model), false);
   for (std::size_t o = 0; o < quiet.outputs.size(); ++o) {
     const auto& column = quiet.model.signal(quiet.outputs[o])->column;
-    weighing.filters[o] = diagnose::fit_whitening({machine.noise.at(column)}, 16);
+    weighing.filters[o] = diagnosis::fit_whitening({machine.noise.at(column)}, 16);
   }
-  auto best = diagnose::fit(quiet, weighing, quiet.model, quiet.model, 10);
-  best = diagnose::fit(quiet, weighing, best.model, quiet.model, 10);
+  auto best = diagnosis::fit(quiet, weighing, quiet.model, quiet.model, 10);
+  best = diagnosis::fit(quiet, weighing, best.model, quiet.model, 10);
   return best.cost;
 }
 
 }  // namespace
 
 double to_be_won(const Machine& machine) {
-  return to_be_won(machine, diagnose::make_case(model_of(machine), machine.quiet));
+  return to_be_won(machine, diagnosis::make_case(model_of(machine), machine.quiet));
 }
 
 std::vector<double> to_be_won_beside(const Machine& machine, unsigned seed, const Trouble& trouble) {
@@ -48,10 +55,10 @@ std::vector<double> to_be_won_beside(const Machine& machine, unsigned seed, cons
     auto as_is = trouble;
     as_is.muted = part;
     const auto without = make(machine.plant, machine.effect, machine.size, seed, as_is);
-    auto quiet = diagnose::make_case(model_of(machine), machine.quiet);
+    auto quiet = diagnosis::make_case(model_of(machine), machine.quiet);
     // What the user's model gives, and on top of it what the effect changes.
-    const auto other = diagnose::make_case(model_of(machine), without.quiet);
-    const auto nominal = diagnose::simulate(quiet, quiet.model);
+    const auto other = diagnosis::make_case(model_of(machine), without.quiet);
+    const auto nominal = diagnosis::simulate(quiet, quiet.model);
     bool same = without.yaml == machine.yaml && other.recordings.size() == quiet.recordings.size();
     for (std::size_t r = 0; same && r < nominal.size(); ++r)
       for (std::size_t o = 0; o < nominal[r].size(); ++o) {
@@ -110,10 +117,10 @@ double fit_on_test(const Machine& machine, const physics::Model& believed, const
   return n > 0.0 ? sum / n : 1.0;
 }
 
-Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win,
+Marks mark(const Machine& machine, const diagnosis::Case& data, const diagnosis::Diagnosis& d, double win,
            const std::vector<double>& beside) {
   Marks marks;
-  const auto verdict = diagnose::name_of(d.verdict);
+  const auto verdict = diagnosis::name_of(d.verdict);
   if (const auto at = machine.verdicts.find(verdict); at != machine.verdicts.end())
     marks.verdict = at->second;
   const bool modest = verdict == "no_mismatch" || verdict == "parameters_only";
@@ -123,13 +130,13 @@ Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::D
     const auto& missing = machine.missing[m];
     double named = 0.0, located = 0.0;
     for (const auto& finding : d.findings) {
-      const auto site = diagnose::site_of(data, finding.term);
+      const auto site = diagnosis::site_of(data, finding.term);
       if (const auto at = missing.names.find(std::string{finding.term.info->name}); at != missing.names.end())
         named = std::max(named, at->second);
       if (!missing.sites.empty() &&
           std::find(missing.sites.begin(), missing.sites.end(), site) == missing.sites.end())
         continue;
-      const auto over = diagnose::dependence(data, finding.term);
+      const auto over = diagnosis::dependence(data, finding.term);
       const bool meets =
           missing.depends_on.empty() || std::any_of(over.begin(), over.end(), [&](const auto& name) {
             return std::find(missing.depends_on.begin(), missing.depends_on.end(), name) !=

@@ -1,8 +1,11 @@
 // Marks: how well a diagnosis answers for a made machine.
 #pragma once
 
+#include "core/diagnosis/dataset/case.hpp"
+#include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/search/search.hpp"
+#include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/machine.hpp"
-#include "tools/diagnose/search.hpp"
 
 namespace invar::test::mismatch {
 
@@ -23,9 +26,9 @@ struct Marks {
 };
 
 physics::Model model_of(const Machine& machine);
-diagnose::Case case_of(const Machine& machine);
+diagnosis::Case case_of(const Machine& machine);
 /// `win` is to_be_won, `beside` to_be_won_beside where there are several effects: one below `plain` need not be found.
-Marks mark(const Machine& machine, const diagnose::Case& data, const diagnose::Diagnosis& d, double win,
+Marks mark(const Machine& machine, const diagnosis::Case& data, const diagnosis::Diagnosis& d, double win,
            const std::vector<double>& beside = {});
 /// The share of what a perfect model would gain on the test run over the believed one.
 double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched);

@@ -17,7 +17,8 @@ struct Backlash {
       .parameters = {{{"width", "m", {0.0, 1e-2}, Role::amplitude, {1e-6}, "the whole gap"}}},
       .description =
           "The encoder is driven through a gap: after a reversal it stands still until the gap is crossed.",
-      .source = "play operator: y stays within x - width/2 .. x + width/2"};
+      .source = "play operator: y stays within x - width/2 .. x + width/2",
+      .sticks_and_slips = true};
   static double play(double last, double position, const double* p) {
     const double half = 0.5 * p[0];
     return last < position - half ? position - half : (last > position + half ? position + half : last);

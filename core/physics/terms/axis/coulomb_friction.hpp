@@ -18,7 +18,8 @@ struct CoulombFriction {
       .description =
           "Dry friction of guideway and seals: of constant size, against the motion; it also holds the "
           "carriage at rest up to that size.",
-      .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 1"};
+      .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 1",
+      .is_friction = true};
   static double friction(double /*speed*/, const double* p) { return p[0]; }
   static constexpr AxisTermKind kind{.info = &info, .friction = friction};
 };

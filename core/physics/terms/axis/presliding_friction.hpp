@@ -28,7 +28,8 @@ struct PreslidingFriction {
           "the last reversal, with hysteresis, and reaches its level after some level / stiffness.",
       .source =
           "LuGre at constant level; Dahl, AIAA Journal 14 (1976), exponent 1: dF/dx = stiffness (1 - F/level "
-          "sign(v))"};
+          "sign(v))",
+      .is_friction = true};
   /// The bristle deflection after moving by `way` from a deflection `z` (both m): the exact solution for one
   /// direction of motion, whatever the speed.
   static double deflection(double z, double way, const double* p) {

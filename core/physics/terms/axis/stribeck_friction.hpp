@@ -25,7 +25,8 @@ struct StribeckFriction {
       .description =
           "Dry friction that falls from its value at rest to the Coulomb level as a lubricant film "
           "builds up.",
-      .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 4, exponent 2"};
+      .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 4, exponent 2",
+      .is_friction = true};
   static double friction(double speed, const double* p) {
     const double s = speed / p[2];
     return p[0] + (p[1] - p[0]) * std::exp(-s * s);

@@ -18,7 +18,8 @@ struct DeadZone {
       .description = "Play, overlap of a valve, cross-over of an amplifier.",
       .source =
           "s - width sign(s) where |s| > width, else 0; of a state: in all rates, or (`with: others`) in all "
-          "but its own"};
+          "but its own",
+      .sticks_and_slips = true};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dead_zone};
 };
 

@@ -18,7 +18,8 @@ struct DryFriction {
       .description = "Coulomb friction: constant size, against the motion, and it holds at rest.",
       .source =
           "-level sign(s), or -level sign(ds/dt) with the state itself; at rest whatever holds it, up to the "
-          "level; at an output +level sign(s) of the variable that it goes with"};
+          "level; at an output +level sign(s) of the variable that it goes with",
+      .is_friction = true};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dry_friction};
 };
 

@@ -1,0 +1,12 @@
+// Gaps of a closed loop: which rows behind one say nothing.
+#pragma once
+
+#include "core/diagnosis/dataset/case.hpp"
+
+namespace invar::diagnosis {
+
+/// In a gap nobody knows what the reference did, and the loop goes on to feel it for a while. What its bridge by a cubic
+/// and by a straight line make different in the simulation shows where: there nothing is compared.
+void bridge_gaps(const physics::Model& model, Recording& recording, double step);
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,201 @@
+#include "core/diagnosis/dataset/outliers.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "core/diagnosis/dataset/statistics.hpp"
+#include "core/diagnosis/dataset/variables.hpp"
+
+namespace invar::diagnosis {
+
+namespace {
+
+constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+
+/// Each value less the median of its neighbours to this reach.
+std::vector<double> off_median(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> off(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::size_t a = i < reach ? 0 : i - reach, b = std::min(values.size(), i + reach + 1);
+    off[i] = values[i] - median({values.begin() + static_cast<std::ptrdiff_t>(a),
+                                 values.begin() + static_cast<std::ptrdiff_t>(b)});
+  }
+  return off;
+}
+
+/// Each value less the median of the middles of the three pairs of neighbours about it.
+std::vector<double> off_lines(const std::vector<double>& values) {
+  std::vector<double> off(values.size(), 0.0);
+  for (std::size_t i = 3; i + 3 < values.size(); ++i) {
+    const auto middle = [&](std::size_t by) { return 0.5 * (values[i - by] + values[i + by]); };
+    off[i] = values[i] - median({middle(1), middle(2), middle(3)});
+  }
+  return off;
+}
+
+/// Which are alone far from zero; nothing where most are zero.
+std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off, double scale,
+                                                 bool is_time_series) {
+  if (!(scale > 0.0)) return std::nullopt;
+  const double limit = (is_time_series ? 6.0 : 5.0) * scale;
+  // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
+  // lone value.
+  const auto beside = [&](std::size_t i, std::size_t j) {
+    return is_time_series && j < off.size() &&
+           off[j] * std::copysign(1.0, off[i]) > std::max(0.5 * limit, 0.2 * std::abs(off[i]));
+  };
+  std::vector<std::size_t> lone;
+  for (std::size_t i = 0; i < off.size(); ++i)
+    if (std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) lone.push_back(i);
+  // Where many are alone, some fall beside another by chance; no more of them than that.
+  std::vector<std::size_t> pairs;
+  for (std::size_t i = 1; i + 2 < off.size(); ++i)
+    if (std::abs(off[i]) > limit && std::abs(off[i + 1]) > limit && beside(i, i + 1) && !beside(i, i - 1) &&
+        !beside(i + 1, i + 2))
+      pairs.push_back(i);
+  const auto alone = static_cast<double>(lone.size());
+  const double expected = 0.5 * alone * alone / static_cast<double>(off.size());
+  if (expected > 0.02 && static_cast<double>(pairs.size()) < expected + 1.0 + 4.0 * std::sqrt(expected))
+    for (const std::size_t i : pairs) lone.push_back(i), lone.push_back(i + 1);
+  return lone;
+}
+
+bool is_static(physics::Plant plant) {
+  return plant == physics::Plant::error_map || plant == physics::Plant::droplet ||
+         plant == physics::Plant::sensor;
+}
+
+/// Does the value go on as the four before it, or those behind it, which lie on a straight line themselves? The last of a
+/// sweep does, however far the next begins.
+bool goes_on(const std::vector<double>& values, std::size_t i, double scale, double within) {
+  for (const int side : {-1, 1}) {
+    const auto at = [&](int k) { return static_cast<std::ptrdiff_t>(i) + side * k; };
+    if (at(4) < 0 || at(4) >= static_cast<std::ptrdiff_t>(values.size())) continue;
+    const auto value = [&](int k) { return values[static_cast<std::size_t>(at(k))]; };
+    double mean = 0.0, slope = 0.0;
+    for (int k = 1; k <= 4; ++k) mean += 0.25 * value(k), slope += (k - 2.5) / 5.0 * value(k);
+    const auto apart = [&](int k) { return std::abs(value(k) - mean - slope * (k - 2.5)); };
+    if (apart(0) < within && std::max({apart(1), apart(2), apart(3), apart(4)}) < 3.0 * scale) return true;
+  }
+  return false;
+}
+
+void forget_continued(std::vector<std::size_t>& lone, const std::vector<double>& values,
+                      const std::vector<double>& off) {
+  const double scale = robust_sigma(off);
+  std::erase_if(lone, [&](std::size_t i) {
+    return goes_on(values, i, scale, std::max(3.0 * scale, 0.3 * std::abs(off[i])));
+  });
+}
+
+/// What is recorded of the machine where a reading was taken, at these rows. Time is not among it: an instrument may fail
+/// for a while.
+std::vector<std::vector<double>> recorded_at(const Case& data, std::size_t recording,
+                                             const std::vector<std::size_t>& rows) {
+  std::vector<std::string> names;
+  for (const auto& [name, values] : data.recordings[recording].inputs.signals) names.push_back(name);
+  if (data.model.plant == physics::Plant::sensor) names.insert(names.end(), {"velocity", "acceleration"});
+  std::vector<std::vector<double>> all;
+  for (const auto& name : names) {
+    const auto values = variable_values(data, recording, name);
+    if (values.empty()) continue;
+    auto& some = all.emplace_back();
+    for (const std::size_t row : rows) some.push_back(std::isfinite(values[row]) ? values[row] : 0.0);
+  }
+  return all;
+}
+
+/// Slips come anywhere. What comes together at like values of something that was recorded, oftener than chance would and to
+/// one side, is an effect: those stay.
+void keep_effects(std::vector<std::size_t>& lone, const std::vector<double>& off,
+                  const std::vector<std::vector<double>>& recorded) {
+  std::vector<int> sign(off.size(), 0);
+  double up = 0.0, down = 0.0;
+  for (const std::size_t i : lone) sign[i] = off[i] > 0.0 ? 1 : -1, (off[i] > 0.0 ? up : down) += 1.0;
+  const double expected = (up * up + down * down) / static_cast<double>(off.size());
+  std::vector<bool> stays(off.size(), false);
+  for (const auto& values : recorded) {
+    std::vector<std::size_t> order(off.size());
+    std::iota(order.begin(), order.end(), 0);
+    // Rows of one value stand in no order, for theirs would be that of time.
+    const auto mixed = [](std::size_t i) { return (i * 2654435761U) % 4294967296U; };
+    std::sort(order.begin(), order.end(), [&](auto a, auto b) {
+      return values[a] != values[b] ? values[a] < values[b] : mixed(a) < mixed(b);
+    });
+    std::vector<std::size_t> together;
+    double pairs = 0.0;
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      const double one = std::abs(off[order[k - 1]]), two = std::abs(off[order[k]]);
+      if (sign[order[k]] == 0 || sign[order[k]] != sign[order[k - 1]]) continue;
+      pairs += 1.0;
+      if (one < 3.0 * two && two < 3.0 * one) together.insert(together.end(), {order[k - 1], order[k]});
+    }
+    if (pairs < expected + 3.0 + 4.0 * std::sqrt(expected)) continue;
+    for (const std::size_t i : together) stays[i] = true;
+  }
+  std::erase_if(lone, [&](std::size_t i) { return stays[i]; });
+}
+
+/// Of a residual that still holds effects: what is far beyond nine in ten.
+double wider_scale(std::vector<double> off) {
+  std::erase_if(off, [](double v) { return !std::isfinite(v); });
+  for (double& v : off) v = std::abs(v);
+  if (off.empty()) return 0.0;
+  const auto at = off.begin() + static_cast<std::ptrdiff_t>(off.size() * 9 / 10);
+  std::nth_element(off.begin(), at, off.end());
+  return *at / 1.645;
+}
+
+}  // namespace
+
+void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    auto& recording = data.recordings[r];
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      auto& measured = recording.measured[o];
+      std::vector<std::size_t> rows;
+      std::vector<double> residual;
+      for (std::size_t i = 0; i < measured.size(); ++i)
+        if (std::isfinite(measured[i])) {
+          rows.push_back(i);
+          residual.push_back(measured[i] - simulated[r][o][i]);
+        }
+      if (residual.size() < 20) continue;
+      // Against the median of its neighbourhood, on the scale of all such differences.
+      auto off = off_median(residual, data.is_time_series ? 3 : 40);
+      auto lone = far_from(off, robust_sigma(off), data.is_time_series);
+      // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
+      // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
+      const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
+      const auto plant = data.model.plant;
+      const bool is_row_by_row = is_static(plant), is_swept = is_row_by_row && data.is_time_series;
+      if ((are_too_many() && (plant == physics::Plant::equations || plant == physics::Plant::axis)) ||
+          (!lone && is_swept)) {
+        off = off_lines(residual);
+        lone = far_from(off, robust_sigma(off), true);
+        if (are_too_many() && !is_row_by_row) continue;
+      }
+      if (!lone) continue;
+      if (is_swept) forget_continued(*lone, residual, off);
+      if (are_too_many() && is_row_by_row) lone = far_from(off, wider_scale(off), data.is_time_series);
+      if (lone && is_row_by_row) keep_effects(*lone, off, recorded_at(data, r, rows));
+      if (!lone) continue;
+      for (const std::size_t i : *lone) measured[rows[i]] = nothing;
+      data.count.outliers += lone->size();
+    }
+  }
+}
+
+void drop_outliers_anew(Case& data, const Case& as_read, const std::vector<physics::Outputs>& simulated) {
+  // Of equations a slip is seen once the numbers are near, not while their error is louder; what was dropped stays so.
+  if (data.model.plant == physics::Plant::equations) drop_outliers(data, simulated);
+  if (!is_static(data.model.plant)) return;
+  data.count.outliers = as_read.count.outliers;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    data.recordings[r].measured = as_read.recordings[r].measured;
+  drop_outliers(data, simulated);
+}
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,118 @@
+#include "core/diagnosis/estimate/weighing.hpp"
+#include "core/diagnosis/dataset/in_parallel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace invar::diagnosis {
+
+using physics::Model;
+
+std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
+  Remembered::Simulations recordings;
+  for (const auto& recording : data.recordings) recordings.push_back(recording.simulation);
+  if (auto known = data.remembered->find(model, recordings)) return std::move(*known);
+  auto all = simulate_once(data, model);
+  data.remembered->keep(model, recordings, all);
+  return all;
+}
+
+std::vector<physics::Outputs> simulate_once(const Case& data, const Model& model) {
+  if (data.stopped && data.stopped()) throw Stopped{};
+  std::vector<physics::Outputs> all(data.recordings.size());
+  for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
+  return all;
+}
+
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
+  Weighing weighing;
+  weighing.left_of_inputs = data.left_of_inputs;
+  weighing.present.resize(data.recordings.size());
+  for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+    std::vector<std::vector<double>> series;
+    std::size_t used = 0;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const auto& measured = data.recordings[r].measured[o];
+      std::vector<double> one(measured.size());
+      std::vector<bool> present(measured.size());
+      for (std::size_t i = 0; i < one.size(); ++i) {
+        one[i] = measured[i] - simulated[r][o][i];
+        present[i] = std::isfinite(one[i]);
+        used += present[i] ? 1U : 0U;
+      }
+      series.push_back(std::move(one));
+      weighing.present[r].push_back(std::move(present));
+      weighing.rows += static_cast<Eigen::Index>(measured.size());
+    }
+    const std::size_t most = coloured && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
+    auto filter = fit_whitening(series, most);
+    // Hardly any values: nothing but the user's word says how good they are.
+    if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o]};
+    weighing.filters.push_back(filter);
+  }
+  // In a loop the command repeats the noise of the reading.
+  weighing.temper = data.model.controller && data.outputs.size() > 1 ? 0.5 : 1.0;
+  return weighing;
+}
+
+Eigen::Index rows_of(const Case& data) {
+  Eigen::Index rows = 0;
+  for (const auto& recording : data.recordings)
+    rows += static_cast<Eigen::Index>(recording.inputs.rows() * data.outputs.size());
+  return rows;
+}
+
+Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated) {
+  Eigen::VectorXd out(rows_of(data));
+  Eigen::Index at = 0;
+  for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
+    for (std::size_t o = 0; o < data.outputs.size(); ++o)
+      for (std::size_t i = 0; i < data.recordings[rec].inputs.rows(); ++i)
+        out(at++) = data.recordings[rec].measured[o][i] - simulated[rec][o][i];
+  return out;
+}
+
+namespace {
+
+void whiten_all(const Case& data, const Weighing& weighing, const double* in, double* out) {
+  std::vector<double> r;
+  for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      const std::size_t rows = data.recordings[rec].inputs.rows();
+      r.assign(in, in + rows);
+      // What is present but not finite ran away.
+      for (std::size_t i = 0; i < rows; ++i)
+        if (!std::isfinite(r[i])) r[i] = 1e3 * weighing.filters[o].sigma;
+      whiten(weighing.filters[o], r, weighing.present[rec][o], out);
+      in += rows;
+      out += rows;
+    }
+}
+
+}  // namespace
+
+Eigen::VectorXd filtered(const Case& data, const Weighing& weighing, const Eigen::VectorXd& differences) {
+  Eigen::VectorXd out(differences.size());
+  whiten_all(data, weighing, differences.data(), out.data());
+  return out.cwiseMax(-1e6).cwiseMin(1e6);
+}
+
+Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
+                         const std::vector<physics::Outputs>& simulated) {
+  return filtered(data, weighing, differences(data, simulated));
+}
+
+Eigen::VectorXd residual(const Case& data, const Weighing& weighing, const Model& model) {
+  return residual(data, weighing, simulate(data, model));
+}
+
+Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd out(columns.rows(), columns.cols());
+  in_parallel(static_cast<std::size_t>(columns.cols()), [&](std::size_t j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    whiten_all(data, weighing, columns.col(k).data(), out.col(k).data());
+  });
+  return out;
+}
+
+}  // namespace invar::diagnosis

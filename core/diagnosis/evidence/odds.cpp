@@ -1,0 +1,127 @@
+#include "core/diagnosis/evidence/odds.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/diagnosis/evidence/form.hpp"
+#include "core/diagnosis/evidence/other_cause.hpp"
+#include "core/diagnosis/evidence/shape.hpp"
+
+namespace invar::diagnosis {
+
+using physics::Plant;
+using physics::Term;
+
+bool comes_late(const Term& term) {
+  const auto name = term.info->name;
+  return name == "lag" || name == "delay" || name == "amplifier_lag" || name == "transport_delay" ||
+         name == "measurement_delay" || name == "sensor_lag";
+}
+
+namespace {
+
+bool is_alternative(const Finding& finding, auto is) {
+  return std::any_of(finding.alternatives.begin(), finding.alternatives.end(),
+                     [&](const Alternative& a) { return is(a.term); });
+}
+
+/// One recording shows a sine in the motor's current and one at the carriage alike.
+double odds_of_other_site(const Finding& finding) {
+  const auto& term = finding.term;
+  const bool is_current = term.info->name == "additive_disturbance";
+  if (!is_current && (term.info->name != "periodic_disturbance" || term.info->plant != Plant::axis))
+    return 0.0;
+  if (is_current && term.values[term.info->index_of("squareness")] > 0.5) return 0.0;
+  if (is_alternative(finding, [](const Term& a) {
+        return a.info->name == "additive_disturbance" || a.info->name == "periodic_disturbance";
+      }))
+    return 0.0;
+  const double price = price_of_current(term.values[term.info->index_of("frequency")]);
+  return std::exp(0.5 * (is_current ? price : -price));
+}
+
+/// Ends a value as it stands: on the way to a state as in it.
+bool is_bound(const Term& term) {
+  const auto name = term.info->name;
+  return name == "upper_limit" || name == "lower_limit" || name == "dead_zone";
+}
+
+/// A lag and a delay of one time T differ by (s T)^2 / 2 and more: how plainly would the recording show that?
+double odds_of_other_lateness(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
+  if (!comes_late(finding.term) || is_alternative(finding, comes_late)) return 0.0;
+  // The second difference of the effect over a half of the time to either side is (s T)^2 / 4 for a delay, / 2 for a lag.
+  const bool is_delay = finding.term.info->index_of("time_constant") == physics::most_parameters;
+  return std::exp(-lead_over_shift(data, best, (is_delay ? 2.0 : 1.0) * second_times(data, best, place)));
+}
+
+/// A spring before sliding that is stiff enough is no more than friction that slides at once.
+double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
+  const auto& info = *finding.term.info;
+  if (info.name != "presliding_friction" ||
+      is_alternative(finding, [](const Term& a) { return a.info->name == "coulomb_friction"; }))
+    return 0.0;
+  constexpr double stiffer = 10.0;
+  auto limit = best.model;
+  auto& stiffness = limit.terms[place].values[info.index_of("stiffness")];
+  stiffness = std::min(stiffer * stiffness, info.parameters[info.index_of("stiffness")].bounds.upper);
+  const auto plain = weigh(data, simulate(data, best.model), false);
+  auto stiff = fit(data, plain, limit, data.model, 0);
+  // Two numbers fewer.
+  std::erase_if(stiff.free, [&](const Freedom& f) {
+    return f.where == Freedom::Where::term && f.term == place && f.index > 0;
+  });
+  return std::exp(std::min(3.0, -lead(data, best, stiff)));
+}
+
+}  // namespace
+
+double odds_of_another_cause(double gain, double left, double shape, double share) {
+  constexpr double at_100 = 0.18, slope = 0.52, by_left = 28.0, by_shape = 0.5, form = 0.005, ideal = 5e-4;
+  return at_100 * std::pow(std::max(gain, 1.0) / 100.0, -slope) + by_left * (left + shape) +
+         by_shape * std::min(1.0, shape / form) + (share < 1.0 ? ideal / std::max(share, 1e-6) : 0.0);
+}
+
+double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
+  // Where the current is recorded behind what acts on it, a force does not stand in it.
+  return (data.model.records_applied ? 0.0 : odds_of_other_site(finding)) +
+         odds_of_other_lateness(data, best, place, finding) +
+         odds_of_sliding_at_once(data, best, place, finding);
+}
+
+bool is_another_cause(const Finding& finding, const Alternative& alternative) {
+  const auto &one = finding.term, &other = alternative.term;
+  return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
+}
+
+bool is_elsewhere(const Term& one, const Term& other) {
+  return one.info == other.info && one.info->plant == Plant::equations && one.on != other.on &&
+         (comes_late(one) || one.info->name == "hidden_state" || is_bound(one) ||
+          variable_of(one) == variable_of(other));
+}
+
+double rest_beside(const std::vector<double>& won, const std::vector<double>& excess) {
+  double all = 0.0, most = 0.0;
+  for (const double one : won) all += std::max(0.0, one);
+  for (std::size_t o = 0; o < won.size(); ++o)
+    if (won[o] > 0.1 * all) most = std::max(most, excess[o] / (excess[o] + won[o]));
+  return most;
+}
+
+void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
+  double sum = 1.0;
+  for (const auto& a : finding.alternatives)
+    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+  finding.other_cause = 0.0;
+  if (finding.term.curve.knots.empty()) {
+    finding.relatives = odds_of_relatives(data, d.best, place, finding);
+    finding.other_cause =
+        odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
+                              d.findings.size() > 1 ? finding.share_of_rest : 1.0);
+    constexpr double most = 3.0;  // a sigma that is too small alone takes no name away
+    finding.other_cause += std::clamp(d.parameter_excursion / far_astray - 1.0, 0.0, most);
+    sum += finding.relatives + finding.other_cause;
+  }
+  finding.probability = std::min(0.995, 1.0 / sum);
+}
+
+}  // namespace invar::diagnosis

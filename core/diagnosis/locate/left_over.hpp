@@ -1,0 +1,35 @@
+// Does what a model leaves over still follow what was recorded? Asked without any idea of the form.
+#pragma once
+
+#include "core/diagnosis/estimate/fit.hpp"
+
+namespace invar::diagnosis {
+
+/// By output, the share of the power of measured - simulated that a surface of second order over all inputs, their
+/// motion and their past, the named terms' own effects with numbers that change, or any course over one of the inputs
+/// explain beyond what they explain of the same series shifted against the recording: chance and the colour of the noise
+/// are in both. 0 where it is no more than chance.
+std::vector<double> followed_share(const Case& data, const Fit& fit);
+
+/// By output, the share of its power that is more than `times` the size of what cannot be told from the row before, where
+/// it is as large as that: noise that wanders for long is, and a model that misses the greater part. 0 where nothing is in
+/// proportion to what the output itself does. For plants that are simulated freely.
+std::vector<double> far_share(const Case& data, const Fit& fit, double times);
+
+/// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
+bool is_louder_in_motion(const Case& data, const Fit& fit);
+
+/// Is it more than twice the noise that the user gave, or a quarter more where he wrote the equations down himself, and
+/// related from row to row?
+bool is_above_noise(const Case& data, const Fit& fit);
+
+/// By output, how many times the power of the noise is left beyond it: beyond what the user gave and beyond what cannot be
+/// told from the row before. 0: no more than the colour of noise may do in a recording, he gave none, or a loop leads the noise
+/// of one reading to the others.
+std::vector<double> excess_over_noise(const Case& data, const Fit& fit);
+
+/// Noise that wanders does not know what was recorded: does `with` take most of what in the residual of `without` goes with
+/// that, beyond what a residual turned round against the recording would? Never in a loop, which moves with its own noise.
+bool goes_with_recording(const Case& data, const Fit& with, const Fit& without);
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,164 @@
+#include "core/diagnosis/search/one_name.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/diagnosis/candidates/kin.hpp"
+#include "core/diagnosis/dataset/in_parallel.hpp"
+#include "core/diagnosis/evidence/claim.hpp"
+#include "core/diagnosis/evidence/foretold.hpp"
+#include "core/diagnosis/evidence/other_cause.hpp"
+#include "core/diagnosis/evidence/wander.hpp"
+#include "core/diagnosis/locate/left_over.hpp"
+#include "core/diagnosis/segments/excerpt.hpp"
+
+namespace invar::diagnosis {
+
+Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit& base,
+                      const std::vector<physics::Model>& alone, const std::function<void()>& fitting) {
+  const auto& data = naming.data;
+  const auto& options = naming.options;
+  Shortlist list;
+  list.screened = screen(data, weighing, base, named_starts(data, weighing, base, options.without), 0);
+  std::vector<const Screened*> tried;
+  std::map<std::string, int> seen;
+  for (const auto& s : list.screened) {
+    if (s.impossible) {
+      if (s.merit > 3.0)
+        list.impossible.push_back({std::string{s.start.term.info->name}, why_impossible(s.start), s.merit});
+      continue;
+    }
+    // What first order cannot tell apart goes on together.
+    if (s.merit < -3.0 || (tried.size() >= 9 && s.merit < tried.back()->merit - 0.5)) break;
+    if (seen[label(s.start.term)]++ < 2) tried.push_back(&s);
+  }
+  fitting();
+  // A few steps each; those that lag far behind the leader are not driven further.
+  auto& fits = list.fits;
+  fits.resize(tried.size());
+  const auto some = excerpt(data, weighing, base, 40 * fits.size());
+  in_parallel(fits.size(), [&](std::size_t i) {
+    fits[i] =
+        some ? on_all(data, weighing, base, fit_with(some->data, some->weighing, some->base, *tried[i], 3))
+             : fit_with(data, weighing, base, *tried[i], 3);
+  });
+  const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
+  const auto go_on = [&](Fit& f) {
+    if (!options.stopped || !options.stopped()) f = fit(data, weighing, f.model, data.model, 8, &f);
+  };
+  if (const auto best = std::min_element(fits.begin(), fits.end(), by_evidence); best != fits.end()) {
+    go_on(*best);
+    const double gained = std::max(1.0, best->evidence - base.evidence);
+    std::vector<Fit*> near;
+    for (auto& f : fits)
+      if (&f != &*best && f.evidence > best->evidence - std::max(15.0, 0.5 * gained)) near.push_back(&f);
+    in_parallel(near.size(), [&](std::size_t i) { go_on(*near[i]); });
+  }
+  if (data.model.plant == physics::Plant::equations && !fits.empty()) {
+    const auto first = std::min_element(fits.begin(), fits.end(), by_evidence);
+    const std::size_t place = first->model.terms.size() - 1;
+    for (auto& other : fits_of_other_laws(data, weighing, *first, place, options.without))
+      fits.push_back(std::move(other));
+  }
+  for (const auto& model : alone) fits.push_back(fit(data, weighing, model, data.model, 8));
+  if (options.refuses)
+    std::erase_if(fits, [&](const Fit& f) { return !stands(data, f, f.model.terms.size() - 1); });
+  std::sort(fits.begin(), fits.end(), by_evidence);
+  return list;
+}
+
+namespace {
+
+/// A name followed to its end, held against the model without it.
+struct Followed {
+  std::optional<OneName> name;  // nothing: it does not show
+  double rank = -1e300;
+};
+
+/// So many margins of evidence a name has that plainly foretells: enough for a further claim.
+constexpr double foretold_margins = 3.5;
+
+/// A wave was looked for at many frequencies.
+bool is_sought(const physics::Term& term) { return term.info->index_of("phase") < physics::most_parameters; }
+
+Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool has_rivals) {
+  const auto& [data, noise, options, is_first, margin] = naming;
+  // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
+  Weighing plain = weigh(data, simulate(data, start.model), false);
+  auto settled = fit(data, plain, start.model, data.model, 6, &start);
+  for (int again = 0; again < 3; ++again) {  // the nearer the fit, the finer its scale
+    plain = weigh(data, simulate(data, settled.model), false);
+    auto nearer = fit(data, plain, settled.model, data.model, 5, &settled);
+    const bool arrived = least_ratio(data, nearer, settled) > 0.97;
+    settled = std::move(nearer);
+    if (arrived) break;
+  }
+  Weighing own = weigh(data, simulate(data, settled.model));
+  auto with = fit(data, own, settled.model, data.model, 6, &settled);
+  // Weights that follow the colour of what is still missing may lead away.
+  if (least_ratio(data, settled, with) < 0.9) with = fit(data, own, settled.model, data.model, 0, &settled);
+  auto without = fit(data, own, base.model, data.model, 4, &base);
+  double evidence = advantage(data, own, with, without);
+  // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
+  // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
+  if (options.refuses && !noise.is_fed_back() && data.is_time_series && data.windows.count == 0 &&
+      least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
+    own = plain;
+    with = fit(data, own, settled.model, data.model, 6, &settled);
+    without = fit(data, own, base.model, data.model, 4, &base);
+    evidence = advantage(data, own, with, without);
+  }
+  double gain = std::min(evidence, noise.is_fed_back() ? noise.beyond(with.model, without.model, own)
+                                                       : advantage_over_wander(data, own, with, without));
+  const double counted = lead(data, with, without);
+  if (const double least = std::min(evidence, counted);
+      options.refuses && gain < 2.0 * margin && least > 2.0 * margin &&
+      (is_white(evidence, counted) || goes_with_recording(data, with, without)))
+    gain = least;
+  // Filters of a residual that still holds effects take a name for noise; who foretells what no fit saw is none.
+  // A wave was looked for at many frequencies, and goes with anything that is slow.
+  if (options.refuses && gain < margin && !noise.is_fed_back() && counted > 0.0 &&
+      !is_sought(with.model.terms.back()) && foretold(data, with, without).is_plain())
+    gain = std::max(gain, foretold_margins * margin);
+  // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
+  // not, where the noise is loud at other frequencies, if it pays when counted in independent rows; nor in a loop, where
+  // 200 machines that lacked nothing came nowhere near the margin.
+  const double ratio = !options.refuses ? 1.0 : is_first ? 0.995 : 0.95;
+  const double beyond = is_sought(with.model.terms.back()) ? 2.0 : 1.1;
+  const bool pays = is_first ? counted > claim_margin || (noise.is_fed_back() && gain > beyond * margin)
+                             : gain > margins_of_a_further(data, evidence, counted) * margin;
+  const bool shows = pays || least_ratio(data, with, without) < ratio;
+  if (!shows || (options.refuses && !stands(data, with, with.model.terms.size() - 1))) return {};
+  // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.
+  const double rank =
+      gain >= margin && has_rivals && noise.is_fed_back()
+          ? evidence + noise.gain(with.model, without.model, own) - (without.data_cost - with.data_cost)
+          : gain;
+  return {OneName{0, own, std::move(with), std::move(without), gain}, rank};
+}
+
+}  // namespace
+
+std::optional<OneName> leader(const Naming& naming, const Fit& base, const std::vector<Fit>& fits) {
+  std::vector<std::size_t> leaders;
+  std::set<std::string> tried;
+  for (std::size_t i = 0; i < fits.size() && tried.size() < 3; ++i) {
+    if (fits[i].evidence < base.evidence + 2.0) break;
+    if (!tried.insert(label(fits[i].model.terms.back())).second) continue;
+    if (fits[i].evidence < fits[0].evidence - 0.3 * (fits[0].evidence - base.evidence)) break;
+    leaders.push_back(i);
+  }
+  std::vector<Followed> followed(leaders.size());
+  in_parallel(leaders.size(), [&](std::size_t k) {
+    followed[k] = follow(naming, base, fits[leaders[k]], leaders.size() > 1);
+    if (followed[k].name) followed[k].name->place = leaders[k];
+    if (!std::isfinite(followed[k].rank)) followed[k] = {};
+  });
+  const auto best = std::max_element(followed.begin(), followed.end(),
+                                     [](const Followed& a, const Followed& b) { return a.rank < b.rank; });
+  return best == followed.end() ? std::nullopt : std::move(best->name);
+}
+
+}  // namespace invar::diagnosis

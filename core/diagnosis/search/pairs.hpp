@@ -1,0 +1,33 @@
+// Pairs: two effects that each do nothing alone may explain a recording together.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/diagnosis/evidence/screen.hpp"
+
+namespace invar::diagnosis {
+
+struct JointClaim {
+  Fit fit;  // the base and two terms, under filters of its own residual
+  Weighing weighing;
+  std::vector<std::vector<physics::Term>> rivals;  // of each: terms that did nearly as well in its place
+};
+
+struct Pairs {
+  /// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size
+  /// of what is left both say so.
+  std::optional<JointClaim> claim;
+  /// Of pairs that one of the two explains alone, that one: a search one by one, which goes by first order from numbers that
+  /// what is missing led astray, need not come upon it.
+  std::vector<physics::Model> alone;
+};
+
+/// `rival`: what one by one came to, which a pair must clearly better.
+Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
+                 const Fit* rival = nullptr);
+
+}  // namespace invar::diagnosis

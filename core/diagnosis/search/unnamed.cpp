@@ -1,0 +1,225 @@
+#include "core/diagnosis/search/unnamed.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/evidence/claim.hpp"
+#include "core/diagnosis/evidence/other_cause.hpp"
+#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/evidence/wander.hpp"
+#include "core/diagnosis/locate/left_over.hpp"
+#include "core/physics/library.hpp"
+
+namespace invar::diagnosis {
+
+namespace {
+
+using physics::Model;
+
+/// A dent or a step is narrow: the knots are gathered where the curve is not flat.
+void sharpen(const Case& data, Curved& found) {
+  auto& curved = found.fit;
+  auto& weighing = found.weighing;
+  const auto& curve = curved.model.terms.back().curve;
+  if (curve.period > 0.0 || curve.memory != physics::Curve::Memory::none) return;  // it has its width
+  const double level = median(curve.values);
+  double top = 0.0;
+  for (double v : curve.values) top = std::max(top, std::abs(v - level));
+  std::size_t first = curve.knots.size(), last = 0;
+  for (std::size_t k = 0; k < curve.knots.size(); ++k)
+    if (std::abs(curve.values[k] - level) > 0.3 * top) first = std::min(first, k), last = k;
+  if (first > last || (last - first + 3) * 2 > curve.knots.size()) return;
+  const double spacing = curve.knots[1] - curve.knots[0];
+  const double low = std::max(curve.knots.front(), curve.knots[first] - 1.2 * spacing),
+               high = std::min(curve.knots.back(), curve.knots[last] + 1.2 * spacing);
+  Model model = curved.model;
+  auto& fine = model.terms.back().curve;
+  fine.knots.clear(), fine.values.clear();
+  constexpr int count = 18;
+  for (int k = 0; k < count; ++k) {
+    fine.knots.push_back(low + (high - low) * k / (count - 1));
+    const bool is_force = model.terms.back().with.empty();  // friction and damping are everywhere
+    fine.values.push_back(curve(fine.knots.back()) - (is_force ? level : 0.0));
+  }
+  auto rough = fit(data, weighing, model, data.model, 4);
+  const Weighing own = weigh(data, simulate(data, rough.model));
+  auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
+  if (least_ratio(data, rough, sharp) < 0.97) sharp = fit(data, own, rough.model, data.model, 0, &rough);
+  const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
+  if (sharp.evidence < blunt.evidence || least_ratio(data, curved, sharp) < 0.97) return;
+  found.gain += sharp.evidence - blunt.evidence;
+  curved = std::move(sharp);
+  weighing = own;
+}
+
+/// A motor that fades is nearly a load that grows: of the two, what explains more.
+Fit load_or_motor(const Case& data, const Weighing& weighing, Fit load) {
+  const auto& found = load.model.terms.back();
+  if (found.info->plant != physics::Plant::axis || found.with != "acceleration") return load;
+  auto model = load.model;
+  auto& motor = model.terms.back();
+  motor.info = physics::unmodelled(physics::Plant::axis, "actuator");
+  motor.with.clear();
+  for (double& value : motor.curve.values) value /= -model.value("mass", 1.0);
+  auto faded = fit(data, weighing, model, data.model, 5);
+  return faded.evidence > load.evidence ? faded : load;
+}
+
+/// Does every output lie within the noise that the user gave?
+bool is_within_noise(const Case& data, const Fit& fit) {
+  const auto simulated = simulate(data, fit.model);
+  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  for (std::size_t o = 0; o < left.size(); ++o)
+    if (!(left[o].rms() <= data.given_noise[o])) return false;
+  return true;
+}
+
+/// Are the names three waves or more of one kind at one place? Those are the series of a curve.
+bool is_series(const Model& model, std::size_t given) {
+  constexpr std::ptrdiff_t waves = 3;
+  const auto begin = model.terms.begin() + static_cast<std::ptrdiff_t>(given);
+  return std::any_of(begin, model.terms.end(), [&](const physics::Term& one) {
+    return one.info->index_of("phase") < physics::most_parameters &&
+           std::count_if(begin, model.terms.end(), [&](const physics::Term& other) {
+             return other.info == one.info && other.on == one.on;
+           }) >= waves;
+  });
+}
+
+/// Would an engineer see it in the residual, or does it pay when counted in independent rows?
+bool shows(const Case& data, const Fit& with, const Fit& without) {
+  const double ratio = least_ratio(data, with, without);
+  return ratio < 0.7 || (ratio < 0.9 && lead(data, with, without) > 2.0 * claim_margin);
+}
+
+}  // namespace
+
+namespace {
+
+/// A screened curve fitted beside the base; nothing where it does not pay.
+std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighing& plain,
+                                const Fit& under_plain, const Screened& s) {
+  const double margin = claim_margin_of(plain);
+  const Fit near = with_columns(data, under_plain, s);
+  if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) return std::nullopt;
+  auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, 2, &near));
+  const Weighing own = weigh(data, simulate(data, rough.model));
+  auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+  // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
+  if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
+  const auto without = fit(data, own, base.model, data.model, 4, &base);
+  const double evidence = curved.evidence - without.evidence;
+  double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
+  const auto& term = s.start.term;
+  // Noise that wanders has a course over time too, but none in proportion to what the machine does.
+  const bool may_wander = term.with.empty() && (term.curve.over == "time" || term.curve.over == "t");
+  if (const double counted = lead(data, rough, under_plain);
+      gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
+    if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
+  }
+  // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
+  // takes any is what such noise does.
+  if (may_wander) {
+    if (is_within_noise(data, under_plain)) return std::nullopt;
+    const double left = least_ratio(data, rough, under_plain);
+    if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin))
+      return std::nullopt;
+  }
+  return Curved{std::move(curved), own, gain};
+}
+
+}  // namespace
+
+Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
+  Curved best;
+  for (const auto& s : looked.courses) {
+    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    auto one = curved_by(data, base, looked.plain, looked.fit, s);
+    // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
+    if (one && one->gain > claim_margin && (best.gain < claim_margin || lead(data, one->fit, best.fit) > 0.0))
+      best = std::move(*one);
+  }
+  // What remembers is a filter of many numbers: it takes a little of nearly any dynamics that are not quite the machine's,
+  // and drifts as an instrument does. It must leave far less than without it, and than a curve that remembers nothing.
+  constexpr double far_less = 0.8, plainly_less = 0.9;
+  for (const auto& s : looked.memories) {
+    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    auto one = curved_by(data, base, looked.plain, looked.fit, s);
+    if (!one || !(one->gain > claim_margin) || least_ratio(data, one->fit, looked.fit) > plainly_less)
+      continue;
+    if (best.gain < claim_margin || least_ratio(data, one->fit, best.fit) < far_less) best = std::move(*one);
+  }
+  if (best.gain > claim_margin) sharpen(data, best);
+  return best;
+}
+
+bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve) {
+  const double all = squares_in_noise(data, d.retuned, d.best),
+               by_names = all - squares_in_noise(data, d.best, d.best),
+               by_curve = all - squares_in_noise(data, curve, d.best);
+  return by_names < (1.0 - of_form) * by_curve;
+}
+
+void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
+  const std::size_t given = data.model.terms.size();
+  if (beside_best.courses.empty() && beside_best.memories.empty()) return;
+  const bool named = d.best.model.terms.size() > given;
+  const double margin = 2.0 * claim_margin_of(d.weighing);
+  auto beside = best_curve(data, d.best, beside_best);
+  // What a curve in place of the names explains beyond them it would explain beside them too.
+  const bool leaves_more = std::any_of(beside_best.courses.begin(), beside_best.courses.end(),
+                                       [&](const Screened& s) { return s.gain > margin; });
+  if (named && leaves_more) {
+    auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
+    if (instead.gain > margin) {
+      const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
+      if (instead.fit.evidence > named_there.evidence + margin &&
+          (is_series(d.best.model, given) ||
+           instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) &&
+          leaves_less(data, instead.fit, d.best)) {
+        for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
+          d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
+                   1.0);
+        d.best = std::move(instead.fit);
+        d.weighing = std::move(instead.weighing);
+        d.findings.clear();
+        d.is_unnamed = true;
+      }
+    }
+  }
+  // A rest counts where an engineer would see it.
+  if (!d.is_unnamed && beside.gain > margin &&
+      least_ratio(data, beside.fit, d.best) < (named ? seen_beside : seen_alone)) {
+    d.best = std::move(beside.fit);
+    d.weighing = std::move(beside.weighing);
+    (named ? d.has_rest : d.is_unnamed) = true;
+  }
+  // What goes with two things at once is a course of neither.
+  if (!named && !d.is_unnamed && data.model.plant == physics::Plant::equations)
+    if (auto product = best_curve(data, d.best, products_beside(data, d.best));
+        product.gain > margin && shows(data, product.fit, d.best)) {
+      d.best = std::move(product.fit);
+      d.weighing = std::move(product.weighing);
+      d.is_unnamed = true;
+    }
+  if (!d.is_unnamed && !d.has_rest) return;
+  const auto find_last = [&d] { d.findings.emplace_back().term = d.best.model.terms.back(); };
+  find_last();
+  // What moves a drop moves it in two directions, and an instrument may stand beside another.
+  for (std::size_t more = 1; more < data.outputs.size() && !d.best.model.terms.back().on.empty(); ++more) {
+    auto next = best_curve(data, d.best, courses_beside(data, d.best, &d.best));
+    if (next.gain < margin || least_ratio(data, next.fit, d.best) > (named ? seen_beside : seen_alone)) break;
+    const auto& terms = next.fit.model.terms;
+    if (std::any_of(
+            terms.begin() + static_cast<std::ptrdiff_t>(given), terms.end() - 1,
+            [&](const auto& term) { return !term.curve.knots.empty() && term.on == terms.back().on; }))
+      break;
+    d.best = std::move(next.fit);
+    d.weighing = std::move(next.weighing);
+    find_last();
+  }
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+}
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,28 @@
+// Physics without a name: a curve over one variable, beside the named terms or instead of them.
+#pragma once
+
+#include "core/diagnosis/evidence/other_cause.hpp"
+
+namespace invar::diagnosis {
+
+/// An effect without a name must leave less than this share of the residual's RMS, alone or beside names: an engineer sees it.
+inline constexpr double seen_alone = 0.985, seen_beside = 0.9;
+
+struct Curved {
+  Fit fit;
+  Weighing weighing;
+  double gain = -1e300;  // over what it was added to, under its own filters
+};
+
+/// The curve that explains most beside `base`, of what was looked at.
+Curved best_curve(const Case& data, const Fit& base, const Beside& looked);
+
+/// Adds a curve as a finding where one is plainly needed. One that explains far more than the named terms takes their
+/// place. `beside_best` is that of the best model.
+void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best);
+
+/// Does a curve take far more than the names do of what the retuned model leaves, in units of the noise? A name that takes most
+/// of it is right, and the rest is its form or the small effects beside it.
+bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve);
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,14 @@
+// The verdict: what was found, tried on held-out stretches, weighed and put into one word.
+#pragma once
+
+#include "core/diagnosis/evidence/diagnosis.hpp"
+
+namespace invar::diagnosis {
+
+/// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them. What a
+/// model gains is asked of the readings that it was fitted to, what it leaves is told of those `recorded`.
+void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses = true);
+/// Probabilities, shares, sigmas and the verdict.
+void conclude(const Case& data, Diagnosis& d);
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,13 @@
+// Steps of the integration of own equations, as fine as the readings ask for.
+#pragma once
+
+#include "core/diagnosis/dataset/case.hpp"
+
+namespace invar::diagnosis {
+
+/// Halves the steps until those of half their length change no output of the model `at` by more than a tenth of its noise
+/// (RMS; by output, or what the user gives if that is less), or twice: what a coarse step leaves over looks like physics.
+/// False: they are fine enough as they are.
+bool step_finely(Case& data, const physics::Model& at, const std::vector<double>& noise);
+
+}  // namespace invar::diagnosis

@@ -1,0 +1,38 @@
+// Windows: a model that integrates, or runs away, is compared from states set anew, never by one drifting run.
+#pragma once
+
+#include <optional>
+
+#include "core/diagnosis/estimate/fit.hpp"
+
+namespace invar::diagnosis {
+
+/// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
+/// on a state goes on to grow to the end of the recording. An axis without controller always does. Each window begins at
+/// states of its own, parameters "<state>.start<k>" that every fit estimates beside the others, under a prior as wide as the state itself goes. A closed
+/// loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
+/// (anew.hpp).
+void cut_into_windows(Case& data);
+/// The same where `near` lies nearer to the machine than what the user believes: does that forget?
+void cut_into_windows(Case& data, const physics::Model& near);
+
+/// The model with the numbers that fit it to short windows, whose states are known from what was measured: where one run from
+/// the first row goes another way than the machine (over the top, into another basin), no small step leads back. For a model
+/// in the user's own equations that is not cut into windows; nothing for others and for short recordings.
+std::optional<physics::Model> begun_in_windows(const Case& data);
+
+/// Are there longer windows in which the model stays near (`Case::Windows::few`)? Short ones keep a wrong model near the
+/// machine, but begin anew before anything slow shows.
+bool has_longer_windows(const Case& data);
+
+/// The states at the beginning of the windows that bring the model nearest, all its other numbers as they stand.
+void estimate_starts(Case& data);
+
+/// The model with its states as its outputs.
+physics::Model showing_states(const physics::Model& model);
+
+/// "judged over 12 windows of 5 s, each from states of its own, because the model integrates", and what begins anew behind
+/// gaps; empty where there is nothing of it.
+std::string how_windowed(const Case& data);
+
+}  // namespace invar::diagnosis
