@@ -52,6 +52,7 @@ CIRCLES = [
     {"core/physics/simulation", "core/physics/simulate_plants"},
     {"core/metrology/thermal_identification", "core/metrology/thermal_regression"},
     {"core/metrology/displacement_line", "core/metrology/line_fit"},
+    {"core/metrology/droplet_trajectory", "core/metrology/droplet_fit"},
     {"core/modbus/map", "core/modbus/codec"},
     {"components/vision/outline", "components/vision/outline_curve"},
     {"core/dds/rtps_message", "core/dds/rtps_parameters", "core/dds/sequence_guard"},
