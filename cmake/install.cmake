@@ -2,8 +2,10 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# What a component needs: the API, the types. Tools and devices stay inside.
-set(INVAR_PACKAGE invar_base invar_config invar_component invar_idl)
+# What a component needs: the API, the types; and for programs the diagnosis with what it stands on. Tools and devices stay
+# inside.
+set(INVAR_PACKAGE invar_base invar_config invar_component invar_idl
+  invar_diagnosis invar_model invar_physics invar_recording invar_idl_texts invar_numerics)
 install(TARGETS ${INVAR_PACKAGE} EXPORT invar
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
   FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/invar)

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A component outside the tree: installed package, its own CMakeLists, loaded and run in a cell; its output is what a
+# A component and a program outside the tree: installed package, its own CMakeLists, loaded and run in a cell; its output is what a
 # first-order low-pass makes of its recorded input.
 # plugin.sh BUILD_DIR SOURCE_DIR
 set -euo pipefail
@@ -15,6 +15,11 @@ done
 grep -q invar_stage_AxisCommand_desc "$folder/foreign/stage.h"
 cmake -S "$source/examples/low_pass" -B "$folder/build" -G Ninja -DCMAKE_PREFIX_PATH="$folder/installed" >/dev/null
 ninja -C "$folder/build" >/dev/null
+# A program outside the tree: the diagnosis of examples/diagnose prints what its README says.
+cmake -S "$source/examples/diagnose" -B "$folder/diagnose" -G Ninja -DCMAKE_PREFIX_PATH="$folder/installed" >/dev/null
+ninja -C "$folder/diagnose" >/dev/null
+"$folder/diagnose/diagnose" "$source"/examples/diagnose/{model.yaml,recording.csv} | tee "$folder/diagnosed"
+sed -n '/^It prints/,/^The level/s/^    //p' "$source/examples/diagnose/README.md" | diff - "$folder/diagnosed"
 mkdir "$folder/cell"; cd "$folder/cell"
 cp "$source"/examples/low_pass/*.yaml "$source/deployment/profiles.yaml" "$folder/build/liblow_pass.so" .
 source "$source/tests/support/claims.sh"

@@ -1,6 +1,4 @@
-// `invar diagnose`: what physics does the model leave out? Writes report.json, report.html and patched.yaml.
-#include "core/diagnosis/dataset/load.hpp"
-
+// `invar diagnose`: which physics does the model leave out? Writes report.json, report.html and patched.yaml.
 #include <malloc.h>
 #include <unistd.h>
 
@@ -14,9 +12,8 @@
 #include <sstream>
 
 #include "core/diagnosis/checks/clock.hpp"
-#include "core/diagnosis/dataset/case.hpp"
-#include "core/diagnosis/evidence/claim.hpp"
-#include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/dataset/load.hpp"
+#include "core/diagnosis/report/model_files.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/other_run.hpp"
 #include "core/diagnosis/search/search.hpp"
@@ -153,35 +150,10 @@ int run(const Options& options) {
   const auto page = diagnosis::page_text(data, diagnosis, options.model.string());
   patience.reset();
   diagnosis::ReportFolder folder{options.out};
-  const auto of_one = diagnosis::of_one_recording(diagnosis);
-  for (const bool is_retuned : {true, false}) {
-    auto changed = is_retuned ? diagnosis.retuned.model : diagnosis::best_without(data, diagnosis, of_one);
-    changed.parameters.resize(model.parameters.size());  // without the states at the beginning of windows
-    for (std::size_t i = 0; i < changed.parameters.size(); ++i)  // the fit looks through the encoder's steps
-      if (changed.parameters[i].name == "resolution") changed.parameters[i] = model.parameters[i];
-    if (model.plant == physics::Plant::error_map)
-      if (const auto range = diagnosis::covered(data, "temperature")) changed.baseline.temperature = range;
-    for (std::size_t i = 0; !is_retuned && i < diagnosis.findings.size(); ++i) {
-      const auto& sigmas = diagnosis.findings[i].sigmas;
-      const std::size_t place = model.terms.size() + i;
-      const auto at = std::lower_bound(of_one.begin(), of_one.end(), place);
-      if (at != of_one.end() && *at == place) continue;
-      auto& term = changed.terms[place - static_cast<std::size_t>(at - of_one.begin())];
-      for (std::size_t k = 0; k < sigmas.size(); ++k)
-        if (sigmas[k] > 0.0 && std::isfinite(sigmas[k])) term.sigmas[k] = sigmas[k];  // 0: was not fitted
-    }
-    std::string made_of =
-        "# " + options.model.filename().string() +
-        (is_retuned ? ", its own parameters refitted, no physics added\n"
-                    : " after `invar diagnose`. " + diagnosis::verdict_sentence(data, diagnosis) + "\n");
-    for (const auto& run : diagnosis.other_runs)
-      if (const auto worse = diagnosis::worse_on(diagnosis, run); !worse.empty())
-        made_of += "# " + worse + "\n";
-    for (std::size_t k = 0; !is_retuned && k < of_one.size(); ++k)
-      made_of += "# Without the curve over " + diagnosis.best.model.terms[of_one[k]].curve.over +
-                 ", with which it is worse elsewhere.\n";
-    folder.put(is_retuned ? "retuned.yaml" : "patched.yaml", made_of + model::patched(yaml, changed));
-  }
+  const auto files =
+      diagnosis::model_files(yaml, model, options.model.filename().string(), data, diagnosis);
+  folder.put("retuned.yaml", files.retuned);
+  folder.put("patched.yaml", files.patched);
   folder.put("report.html", page);
   folder.put("report.json", json + "\n");
   folder.finish();
