@@ -319,6 +319,61 @@ class Camera(Calibrations):
         return odd
 
 
+class Geometric(Calibrations):
+    LINES = (("X", (0, 0), (200, 0)), ("Y", (0, 0), (0, 200)), ("Y far", (200, 0), (200, 200)), ("D", (0, 0), (200, 200)),
+             ("A", (0, 200), (200, 0)), ("H", (0, 0), (200, 100)))
+
+    def rows(self, lines, spoil=()):
+        """Two passes each way; a scale error of 20 ppm along x, noise 0.2 um, one reading in `spoil` 20 um off."""
+        draw, rows = random.Random(9), []
+        for name, (x0, y0), (x1, y1) in lines:
+            length = math.hypot(x1 - x0, y1 - y0)
+            for cycle in (1, 2):
+                for way, order in ((1, range(21)), (-1, range(20, -1, -1))):
+                    for i in order:
+                        x, y = x0 + (x1 - x0) * i / 20, y0 + (y1 - y0) * i / 20
+                        along = math.hypot(x - x0, y - y0) + 2e-5 * (x - x0) * (x1 - x0) / length + draw.gauss(0, 2e-4)
+                        rows.append([name, x, y, f"{along:.6f}", cycle, way])
+        for row in spoil:
+            rows[row][3] = f"{float(rows[row][3]) + 0.02:.6f}"
+        self.write("lines.csv", "line,x [mm],y [mm],displacement [mm],cycle,direction", rows)
+        (self.here / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+
+    def test_outliers_are_counted_and_the_error_over_all_is_said(self):
+        self.rows(self.LINES, spoil=(30, 100, 250))
+        said = self.call("calibrate", "geometric", "--machine", "machine.yaml", "--lines", "lines.csv", "--out", "out")
+        self.assertIn("504 readings, 501 used (left out: 3 outliers)", said)
+        rows = self.report()["rows"]
+        self.assertAlmostEqual(rows["rms_used"], 0.2e-6, delta=0.04e-6)
+        self.assertAlmostEqual(rows["rms_all"], 20e-6 * math.sqrt(3 / 504), delta=0.2e-6)
+        self.assertIn("What was left out, and what it costs", self.page())
+
+    def test_an_export_has_no_zeros_for_what_no_line_told(self):
+        self.rows(self.LINES[:1])
+        self.call("calibrate", "geometric", "--machine", "machine.yaml", "--lines", "lines.csv", "--out", "out")
+        said = self.call("calibrate", "controller", "--model", "out/compensation.yaml", "--out", "controller")
+        self.assertIn("linuxcnc-y.comp is not written: no line told the positioning of y", said)
+        self.assertFalse((self.here / "controller/linuxcnc-y.comp").exists())
+        self.assertIn("EC0Y was not measured", (self.here / "controller/skew.txt").read_text())
+        self.assertNotIn("EYY \n", (self.here / "controller/volcomp-isg.csv").read_text())
+
+
+class Components(Calibrations):
+    def test_readings_left_out_are_shown_with_their_cost(self):
+        draw = random.Random(2)
+        rows = [["EYX", x, f"{2e-3 * math.sin(x / 40) + draw.gauss(0, 1e-4):.6f}"] for x in range(0, 201, 5)]
+        rows[17][2] = "0.05"
+        self.write("c.csv", "component,position [mm],translation [mm]", rows)
+        (self.here / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+        said = self.call("calibrate", "components", "--machine", "machine.yaml", "--readings", "c.csv", "--out", "out")
+        self.assertIn("over all", said)
+        one, = self.report()["components"]
+        self.assertEqual(one["rejected"], 1)
+        self.assertGreater(one["rms_all"], 5e-6)
+        self.assertLess(one["rms_used"], 0.2e-6)
+        self.assertIn("What was left out, and what it costs", self.page())
+
+
 class History(Calibrations):
     def thermal(self, name, warm, draw):
         rows = [[60 * k, x, f"{22 + 9 * k / 59:.3f}",

@@ -1,4 +1,5 @@
 // `invar calibrate camera`: the scale of a camera from a picture of circles of known radius.
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -13,6 +14,7 @@
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -24,12 +26,35 @@ struct Results {
   const vision::Pixels& image;
 };
 
+/// Every circle of the ruler is used, or the picture is refused; whether their radii are met to their noise is tested.
+report::LeftOut rows_of(const Results& r) {
+  report::LeftOut rows;
+  rows.row = "circle";
+  rows.unit = "px";
+  rows.given = rows.used = r.fit.circles.size();
+  std::vector<double> residual;
+  double squares = 0.0;
+  for (const vision::RulerCircle& circle : r.fit.circles) {
+    residual.push_back(circle.residual);
+    if (circle.sigma > 0.0) squares += std::pow(circle.residual / circle.sigma, 2);
+  }
+  if (residual.empty()) return rows;
+  rows.rms_used = rows.rms_all = report::rms_of(residual);
+  const double times = std::sqrt(squares / static_cast<double>(residual.size()));
+  constexpr double plainly = 3.0;
+  if (times > plainly)
+    rows.unexplained.push_back("The radii are met to " + report::number(times, 2) +
+                               " times their noise: the ruler, or the camera, is not as modelled.");
+  return rows;
+}
+
 nlohmann::json report_json(const Results& r) {
   const vision::CameraModel& camera = r.fit.camera;
   nlohmann::json out;
   out["scale"] = {{"value", camera.scale}, {"unit", "m/px"}, {"sigma", camera.scale_sigma}};
   out["residual_px"] = r.fit.residual;
   out["calibrated_at"] = calibrated_at();
+  out["rows"] = report::json_of(rows_of(r));
   out["unidentified"] = nlohmann::json::array();
   const double corner = camera.center.squaredNorm();
   if (r.fit.distortion_identified) {
@@ -89,6 +114,7 @@ report::Page make_page(const Results& r) {
     residual.x.push_back(c.radius * 1e3);
     residual.y.push_back(1000.0 * c.residual);
   }
+  report::show(page, rows_of(r));
   page.table({"radius [mm]", "x [px]", "y [px]", "radius [px]", "residual [1/1000 px]", "sigma [1/1000 px]"},
              rows);
   std::vector<vision::AnnotatedOutline> outlines;
@@ -127,6 +153,7 @@ void calibrate_by_ruler(const CameraOptions& options) {
     std::cout << "radial distortion not identified\n";
   if (fit->offset_identified)
     std::cout << "outlines lie " << report::number(fit->offset, 3) << " px outside their circles\n";
+  for (const auto& what : rows_of(results).unexplained) std::cout << "not explained: " << what << '\n';
   if (fit->aspect_identified) std::cout << "aspect " << report::number(camera.aspect, 7) << '\n';
   std::cout << written(options.out, "camera.yaml") << '\n';
 }

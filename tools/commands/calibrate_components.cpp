@@ -94,6 +94,7 @@ nlohmann::json report_of(const ComponentsResult& result) {
   report["readings"] = result.rows;
   report["field_rms_m"] = result.field_rms;
   report["field_sigma_m"] = result.field_sigma;
+  report["rows"] = report::json_of(rows_of(result));
   report["unidentified"] = result.unidentified;
   report["notes"] = result.notes;
   report["components"] = nlohmann::json::array();
@@ -107,6 +108,8 @@ nlohmann::json report_of(const ComponentsResult& result) {
                                     {"depends_on", depends},
                                     {"readings", fit.kept.size()},
                                     {"rejected", fit.rejected},
+                                    {"rms_used", rms_of_readings(fit, false)},
+                                    {"rms_all", rms_of_readings(fit, true)},
                                     {"left_out_rms", fit.left_out},
                                     {"left_out_rms_position_alone", fit.over_position},
                                     {"sigma", fit.component.sigma}});
@@ -142,7 +145,8 @@ void calibrate(const Options& options) {
     const char* unit = is_rotation(c) ? "rad" : "m";
     std::cout << metrology::iso_name(c) << ": " << fit.kept.size() << " readings, " << fit.rejected
               << " rejected; by " << result.depends_on(c) << "; readings left out met to "
-              << si(fit.left_out, unit) << '\n';
+              << si(fit.left_out, unit) << "; error " << si(rms_of_readings(fit, false), unit)
+              << " RMS over those used, " << si(rms_of_readings(fit, true), unit) << " over all\n";
   }
   std::cout << "error over the travels " << si(result.field_rms, "m") << " RMS, known to "
             << si(result.field_sigma, "m") << '\n';

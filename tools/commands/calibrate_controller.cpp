@@ -3,6 +3,8 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
+#include <set>
+#include <sstream>
 #include <string>
 
 #include "core/base/new_file.hpp"
@@ -29,19 +31,37 @@ void write(const std::filesystem::path& file, const std::string& text) {
   std::cout << file.string() << '\n';
 }
 
+/// Components that the lines left open, by the model's file.
+std::set<std::string> unidentified_of(const std::filesystem::path& file) {
+  const auto yaml = config::Yaml::load(file);
+  std::set<std::string> names;
+  if (!yaml.root().has("identification") || !yaml.root()["identification"].has("unidentified")) return names;
+  std::istringstream words{yaml.root()["identification"]["unidentified"].as_text()};
+  for (std::string name; words >> name;) names.insert(name);
+  return names;
+}
+
 void export_model(const Options& options) {
   const auto model = compensation::load_geometric(options.model);
   std::error_code failed;
   std::filesystem::create_directories(options.out, failed);
   if (failed)
     throw InputError{options.out.string(), "cannot be made", "name a folder that may be written to"};
-  write(options.out / "volcomp-isg.csv", isg_volumetric_csv(model, options.nodes));
-  for (int axis = 0; axis < 3; ++axis)
-    if (model.chain.has(axis))
-      write(options.out / ("linuxcnc-" +
-                           std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]) + ".comp"),
-            linuxcnc_compensation(model, axis));
-  write(options.out / "skew.txt", skew_numbers(model));
+  const auto unidentified = unidentified_of(options.model);
+  bool any = false;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!model.chain.has(axis)) continue;
+    const std::string letter(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
+    if (positioning_is_known(model, axis, unidentified)) {
+      write(options.out / ("linuxcnc-" + letter + ".comp"), linuxcnc_compensation(model, axis));
+      any = true;
+    } else {
+      std::cout << "linuxcnc-" << letter << ".comp is not written: no line told the positioning of " << letter
+                << '\n';
+    }
+  }
+  if (any) write(options.out / "volcomp-isg.csv", isg_volumetric_csv(model, options.nodes, unidentified));
+  write(options.out / "skew.txt", skew_numbers(model, unidentified));
 }
 
 }  // namespace
@@ -53,7 +73,7 @@ void add_calibrate_controller(CLI::App& group) {
       "Example: invar calibrate controller --model result/compensation.yaml --out controller\n"
       "Writes a grid for ISG and TwinCAT CNC (ISG_CSV), one COMP_FILE an axis for LinuxCNC (COMP_FILE_TYPE = "
       "0), and the\n"
-      "squareness as numbers for skew parameters.");
+      "squareness as numbers for skew parameters. What no line told is left out, never zero.");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "compensation.yaml of kind geometric")->required();
   command->add_option("--out", options->out, "folder to write to")->required();

@@ -71,6 +71,36 @@ report::Plot residual_plot(const ComponentsResult& result) {
 
 }  // namespace
 
+double rms_of_readings(const metrology::ComponentFit& fit, bool all) {
+  std::vector<double> rest;
+  for (std::size_t i = 0; i < fit.rest.size(); ++i)
+    if (all || fit.kept[i]) rest.push_back(fit.rest[i]);
+  return report::rms_of(rest);
+}
+
+report::LeftOut rows_of(const ComponentsResult& result) {
+  report::LeftOut left_out;
+  left_out.given = result.rows;
+  left_out.header = {"component", "position", "reading", "from the model"};
+  std::size_t rejected = 0;
+  for (int c = 0; c < component_count; ++c) {
+    if (!result.fits[index(c)]) continue;
+    const auto& fit = *result.fits[index(c)];
+    const auto& readings = *result.readings[index(c)];
+    rejected += fit.rejected;
+    for (std::size_t i = 0; i < fit.rest.size(); ++i)
+      if (!fit.kept[i])
+        left_out.rows.push_back(
+            {std::string{metrology::iso_name(c)}, si(readings.position[static_cast<Eigen::Index>(i)], "m", 4),
+             si(readings.value[static_cast<Eigen::Index>(i)], unit_of(c)), si(fit.rest[i], unit_of(c))});
+  }
+  left_out.used = left_out.given - rejected;
+  left_out.reasons = {{rejected, "more than five robust deviations off"}};
+  left_out.unexplained.emplace_back(
+      "The errors over those used and over all stand with each component below.");
+  return left_out;
+}
+
 std::string ComponentsResult::depends_on(int component) const {
   std::string text;
   for (const std::size_t state : fits[index(component)]->component.states)
@@ -89,6 +119,7 @@ report::Page components_page(const ComponentsResult& result) {
   for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
   if (!missing.empty()) page.callout("Not measured, taken as zero: " + missing, "warn");
   for (const auto& note : result.notes) page.paragraph(note);
+  report::show(page, rows_of(result));
   page.heading("Components");
   std::vector<std::vector<std::string>> rows;
   std::vector<report::Plot> plots;
@@ -99,10 +130,12 @@ report::Page components_page(const ComponentsResult& result) {
                     std::to_string(fit.kept.size()) +
                         (fit.rejected > 0 ? ", " + std::to_string(fit.rejected) + " rejected" : ""),
                     si(fit.over_position, unit_of(c)), si(fit.left_out, unit_of(c)),
-                    si(fit.component.sigma, unit_of(c))});
+                    si(fit.component.sigma, unit_of(c)), si(rms_of_readings(fit, false), unit_of(c)),
+                    si(rms_of_readings(fit, true), unit_of(c))});
     plots.push_back(component_plot(result, c));
   }
-  page.table({"ISO 230-1", "seed", "depends on", "readings", "left out, position alone", "left out", "sigma"},
+  page.table({"ISO 230-1", "seed", "depends on", "readings", "left out, position alone", "left out", "sigma",
+              "error over those used (RMS)", "over all (RMS)"},
              rows);
   for (int pair = 0; pair < metrology::squareness_count; ++pair)
     if (result.model.squareness_sigma[index(pair)] > 0.0)

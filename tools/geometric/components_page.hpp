@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/metrology/component_identification.hpp"
+#include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -27,6 +28,11 @@ struct ComponentsResult {
   /// "temperature, heating_rate" or "position alone".
   [[nodiscard]] std::string depends_on(int component) const;
 };
+
+/// Reading minus fit, RMS over the readings used or over all of them.
+double rms_of_readings(const metrology::ComponentFit& fit, bool all);
+/// Errors stand with each component: they are lengths of one and angles of another.
+report::LeftOut rows_of(const ComponentsResult& result);
 
 report::Page components_page(const ComponentsResult& result);
 

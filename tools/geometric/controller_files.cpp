@@ -28,7 +28,15 @@ Eigen::Vector3d home_of(const metrology::GeometricModel& model) {
 
 }  // namespace
 
-std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count) {
+bool positioning_is_known(const metrology::GeometricModel& model, int axis,
+                          const std::set<std::string>& unidentified) {
+  const int component = metrology::translation(axis, axis);
+  return model.chain.has(axis) && model.coefficients[index(component)].size() > 0 &&
+         !unidentified.contains(std::string{metrology::iso_name(component)});
+}
+
+std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count,
+                               const std::set<std::string>& unidentified) {
   std::ostringstream out;
   out << std::setprecision(12);
   out << "// Volumetric error by Invar: actual minus commanded position, mm; axes as measured (ISO 841).\n"
@@ -36,10 +44,15 @@ std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count
       << 1e3 * model.tool.z() << " mm. Compensation list: file_format ISG_CSV, interpolation GRID.\n";
   if (model.reference_temperature)
     out << "// Holds at a machine temperature of " << *model.reference_temperature << " degC.\n";
+  if (!unidentified.empty()) {
+    out << "// Not measured, hence not in here:";
+    for (const auto& name : unidentified) out << ' ' << name;
+    out << '\n';
+  }
   for (int k = 0; k < 3; ++k)
     if (model.chain.has(k)) out << upper(k) << ' ';
   for (int k = 0; k < 3; ++k)
-    if (model.chain.has(k)) out << 'E' << upper(k) << upper(k) << ' ';
+    if (positioning_is_known(model, k, unidentified)) out << 'E' << upper(k) << upper(k) << ' ';
   out << '\n';
   const auto nodes = [&](int axis) { return model.chain.has(axis) ? count : 1; };
   const auto at = [&](int axis, int i) {
@@ -54,7 +67,7 @@ std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count
         for (int k = 0; k < 3; ++k)
           if (model.chain.has(k)) out << 1e3 * position[k] << ' ';
         for (int k = 0; k < 3; ++k)
-          if (model.chain.has(k)) out << 1e3 * error[k] << ' ';
+          if (positioning_is_known(model, k, unidentified)) out << 1e3 * error[k] << ' ';
         out << '\n';
       }
   return out.str();
@@ -78,7 +91,7 @@ std::string linuxcnc_compensation(const metrology::GeometricModel& model, int ax
   return out.str();
 }
 
-std::string skew_numbers(const metrology::GeometricModel& model) {
+std::string skew_numbers(const metrology::GeometricModel& model, const std::set<std::string>& unidentified) {
   std::ostringstream out;
   out << "# Squareness by Invar. angle: between the positive axes; ISO: rotation of the second axis; sigma "
          "of both.\n"
@@ -87,6 +100,12 @@ std::string skew_numbers(const metrology::GeometricModel& model) {
     for (int b = a + 1; b < 3; ++b) {
       if (!model.chain.has(a) || !model.chain.has(b)) continue;
       const int pair = metrology::squareness_of(a, b);
+      const double sigma = model.squareness_sigma[index(pair)];
+      const std::string name{metrology::squareness_iso_name(pair)};
+      if (!(sigma > 0.0) || !std::isfinite(sigma) || unidentified.contains(name)) {
+        out << "# " << upper(a) << upper(b) << ' ' << name << " was not measured\n";
+        continue;
+      }
       const double cosine = model.squareness[index(pair)];
       out << upper(a) << upper(b) << ' ' << metrology::squareness_iso_name(pair) << std::fixed
           << std::setprecision(3) << ' ' << -std::asin(cosine) * 206264.806 << ' '

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "tools/geometric/geometric_plots.hpp"
+#include "tools/geometric/lines_used.hpp"
 
 namespace invar::tools {
 
@@ -178,13 +179,14 @@ report::Page report_page(const GeometricResult& result) {
   report::Page page{"Geometric calibration", result.lines_file.filename().string() + " on " +
                                                  result.machine_file.filename().string() + ", method " +
                                                  result.method};
+  const report::LeftOut left_out = lines_used(result);
   page.callout(
       "Error of displacement on the lines: " + report::si(result.before_rms, "m") + " before, " +
           report::si(result.after_rms, "m") + " after" +
           (result.unseen_rms > 0.0 ? ", " + report::si(result.unseen_rms, "m") + " on lines not fitted"
                                    : "") +
           " (RMS)",
-      "good");
+      left_out.unexplained.empty() ? "good" : "warn");
   page.paragraph(std::to_string(found.lines.size()) + " lines, " + std::to_string(result.input.rows) +
                  " readings; noise of one reading " + report::si(found.noise, "m") +
                  ", what no smooth model explains " + report::si(found.misfit, "m") + ".");
@@ -196,6 +198,7 @@ report::Page report_page(const GeometricResult& result) {
     page.callout("Line " + name + " holds the very readings of another line: it was left out.", "warn");
   if (result.input.far_off > 0)
     page.callout(std::to_string(result.input.far_off) + " readings far off were left out.", "warn");
+  report::show(page, left_out);
   page.heading("Machine");
   write_machine(page, result);
   page.heading("What the lines tell and what they leave open");

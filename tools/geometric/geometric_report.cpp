@@ -5,6 +5,8 @@
 #include <limits>
 #include <ostream>
 
+#include "tools/geometric/lines_used.hpp"
+
 namespace invar::tools {
 
 namespace {
@@ -228,6 +230,7 @@ nlohmann::json report_json(const GeometricResult& result) {
       json["temperature"]["expansion"][one.axis] = {
           {"value", one.value}, {"sigma", one.sigma}, {"known", one.known}, {"unit", "1/K"}};
   }
+  json["rows"] = report::json_of(lines_used(result));
   json["unidentified"] = nlohmann::json::array();
   for (const auto& one : result.knowledge.unidentified) {
     // One component alone is its bare name; a combination names all its members.
@@ -284,6 +287,9 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   if (result.unseen_rms > 0.0) out << ", " << micro(result.unseen_rms) << " um on lines not fitted";
   out << " (RMS)\nexpected over the volume: " << micro(result.knowledge.volumetric_rms)
       << " um (RMS of the vector)\n";
+  const report::LeftOut left_out = lines_used(result);
+  out << line_of(left_out) << '\n';
+  for (const auto& what : left_out.unexplained) out << "not explained: " << what << '\n';
   if (const std::string words = temperature_words(result); !words.empty()) out << words << '\n';
   for (const auto& name : result.input.repeated)
     out << "left out: line " << name << ", the very readings of another line\n";
@@ -304,6 +310,10 @@ void describe_identification(const GeometricResult& result, compensation::ModelT
   text.text("method", result.method);
   text.number("noise", result.found.noise);
   text.number("misfit", result.found.misfit);
+  std::string open;  // components that the lines leave open by themselves
+  for (const auto& one : result.knowledge.unidentified)
+    if (one.components.size() == 1) open += (open.empty() ? "" : " ") + one.components.front();
+  if (!open.empty()) text.text("unidentified", open);
   text.numbers("prior_amplitude", result.found.prior.amplitude.data(), 3);
   text.numbers("prior_length", result.found.prior.length.data(), 3);
   text.numbers("prior_stretch", result.found.prior.stretch.data(), 3);

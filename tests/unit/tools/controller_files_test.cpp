@@ -86,5 +86,20 @@ TEST(ControllerFiles, SkewIsTheAngleBetweenTheAxes) {
   EXPECT_NEAR(urad, -1000.0, 1e-2);
 }
 
+TEST(ControllerFiles, HaveNoZeroForWhatNoLineTold) {
+  const auto model = some_model();
+  const std::set<std::string> open{"EYY", "EC0Y"};
+  const std::string skew = skew_numbers(model, open);
+  EXPECT_NE(skew.find("# XY EC0Y was not measured"), std::string::npos) << skew;
+  EXPECT_EQ(skew.find("\nXY EC0Y"), std::string::npos);
+  const std::string table = isg_volumetric_csv(model, 5, open);
+  EXPECT_NE(table.find("Not measured, hence not in here: EC0Y EYY"), std::string::npos);
+  EXPECT_EQ(table.find("EYY \n"), std::string::npos) << table.substr(0, 400);
+  const Eigen::Vector3d at{0.1, 0.1, 0.0};
+  EXPECT_NEAR(IsgTable{table}.error(at).x(), model.error(at, model.tool).x(), 1e-6);
+  EXPECT_FALSE(positioning_is_known(model, 1, open));
+  EXPECT_TRUE(positioning_is_known(model, 0, open));
+}
+
 }  // namespace
 }  // namespace invar::tools
