@@ -175,7 +175,9 @@ report::Page make_page(const std::vector<Rival>& rivals, const Rival& best,
   page.callout("Held-out views: " + number(nominal.held_out, 4) + " px with an ideal pinhole, " +
                    number(best.held_out, 4) + " px with " + metrology::name(best.fit.lens) +
                    " (chosen by it)",
-               sorted.bad.empty() ? "good" : "warn");
+               !sorted.bad.empty()            ? "warn"
+               : left_out.unexplained.empty() ? "good"
+                                              : "plain");
   for (const auto& what : bad_views_of(sorted, options)) page.callout("Left out: " + what, "warn");
   report::show(page, left_out);
   std::vector<std::vector<std::string>> rows;

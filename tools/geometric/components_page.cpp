@@ -113,8 +113,8 @@ report::Page components_page(const ComponentsResult& result) {
                                                              std::to_string(result.rows) + " readings, " +
                                                              result.machine_file.filename().string()};
   page.callout("Error over the travels " + si(result.field_rms, "m") +
-                   " RMS; what is known of it is good to " + si(result.field_sigma, "m") + " (1 sigma)",
-               "good");
+                   " RMS; what was measured of it is good to " + si(result.field_sigma, "m") + " (1 sigma)",
+               result.unidentified.empty() ? "good" : "plain");
   std::string missing;
   for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
   if (!missing.empty()) page.callout("Not measured, taken as zero: " + missing, "warn");
