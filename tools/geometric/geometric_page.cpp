@@ -179,7 +179,7 @@ report::Page report_page(const GeometricResult& result) {
   report::Page page{"Geometric calibration", result.lines_file.filename().string() + " on " +
                                                  result.machine_file.filename().string() + ", method " +
                                                  result.method};
-  const report::LeftOut left_out = lines_used(result);
+  const report::LeftOut left_out = lines_used(result.found, result.input);
   page.callout(
       "Error of displacement on the lines: " + report::si(result.before_rms, "m") + " before, " +
           report::si(result.after_rms, "m") + " after" +

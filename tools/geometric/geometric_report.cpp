@@ -230,7 +230,7 @@ nlohmann::json report_json(const GeometricResult& result) {
       json["temperature"]["expansion"][one.axis] = {
           {"value", one.value}, {"sigma", one.sigma}, {"known", one.known}, {"unit", "1/K"}};
   }
-  json["rows"] = report::json_of(lines_used(result));
+  json["rows"] = report::json_of(lines_used(result.found, result.input));
   json["unidentified"] = nlohmann::json::array();
   for (const auto& one : result.knowledge.unidentified) {
     // One component alone is its bare name; a combination names all its members.
@@ -287,7 +287,7 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   if (result.unseen_rms > 0.0) out << ", " << micro(result.unseen_rms) << " um on lines not fitted";
   out << " (RMS)\nexpected over the volume: " << micro(result.knowledge.volumetric_rms)
       << " um (RMS of the vector)\n";
-  const report::LeftOut left_out = lines_used(result);
+  const report::LeftOut left_out = lines_used(result.found, result.input);
   out << line_of(left_out) << '\n';
   for (const auto& what : left_out.unexplained) out << "not explained: " << what << '\n';
   if (const std::string words = temperature_words(result); !words.empty()) out << words << '\n';

@@ -86,27 +86,26 @@ void add_line(const metrology::Identification& found, std::size_t l, const std::
 
 }  // namespace
 
-report::LeftOut lines_used(const GeometricResult& result) {
-  const auto& found = result.found;
+report::LeftOut lines_used(const metrology::Identification& found, const LinesFile& input) {
   report::LeftOut left_out;
   left_out.header = {"line", "reading of it", "along the beam", "from the model"};
   Sums sums;
   std::size_t condensed = 0;
   for (std::size_t l = 0; l < found.lines.size(); ++l) {
-    const auto source = std::find_if(result.input.lines.begin(), result.input.lines.end(),
+    const auto source = std::find_if(input.lines.begin(), input.lines.end(),
                                      [&](const auto& one) { return one.name == found.lines[l].name; });
-    if (source == result.input.lines.end()) continue;
+    if (source == input.lines.end()) continue;
     condensed += source->readings.size();
     add_line(found, l, source->readings, sums, left_out.rows);
   }
   const auto count = [](int value) { return static_cast<std::size_t>(std::max(value, 0)); };
-  left_out.given = count(result.input.rows);
+  left_out.given = count(input.rows);
   const std::size_t elsewhere =
       left_out.given -
-      std::min(left_out.given, condensed + count(result.input.without_value) + count(result.input.far_off));
+      std::min(left_out.given, condensed + count(input.without_value) + count(input.far_off));
   left_out.used = condensed - sums.outliers - sums.in_bad_points;
-  left_out.reasons = {{count(result.input.without_value), "without a value"},
-                      {count(result.input.far_off), "a hundredth of the line off, not in the error over all"},
+  left_out.reasons = {{count(input.without_value), "without a value"},
+                      {count(input.far_off), "a hundredth of the line off, not in the error over all"},
                       {sums.outliers, "outliers"},
                       {sums.in_bad_points, "at points that do not fit their neighbours"},
                       {elsewhere, "of lines that were left out, or between the intervals"}};
