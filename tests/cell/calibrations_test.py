@@ -374,6 +374,20 @@ class Components(Calibrations):
         self.assertIn("What was left out, and what it costs", self.page())
 
 
+    def test_a_prediction_says_what_is_not_in_it(self):
+        draw = random.Random(3)
+        self.write("c.csv", "component,position [mm],translation [mm]",
+                   [["EXX", x, f"{1e-5 * x + draw.gauss(0, 1e-4):.6f}"] for x in range(0, 201, 10)])
+        (self.here / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+        self.call("calibrate", "components", "--machine", "machine.yaml", "--readings", "c.csv", "--out", "out")
+        self.write("points.csv", "x [m],y [m]", [[0.1, 0.1]])
+        done = subprocess.run([INVAR, "predict", "--model", "out/compensation.yaml", "--inputs", "points.csv",
+                               "--output", "p.csv"], cwd=self.here, capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("taken as zero and not in sigma: EYX", done.stderr)
+        self.assertNotIn("EXX", done.stderr)
+
+
 class History(Calibrations):
     def thermal(self, name, warm, draw):
         rows = [[60 * k, x, f"{22 + 9 * k / 59:.3f}",

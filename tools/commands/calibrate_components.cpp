@@ -31,27 +31,39 @@ struct Options {
   std::filesystem::path out;
 };
 
-/// What is missing, and what the whole field amounts to.
-void evaluate(ComponentsResult& result) {
-  const auto& model = result.model;
-  for (int c = 0; c < component_count; ++c) {
-    if (!model.chain.has(metrology::axis_of(c))) continue;
-    const std::string name{metrology::iso_name(c)};
-    if (!result.fits[index(c)]) {
-      result.unidentified.push_back(name);
-      continue;
-    }
-    const Range travel = model.travel[index(metrology::axis_of(c))];
-    const Range known = result.fits[index(c)]->component.network.range[0];
-    if (known.width() < 0.9 * travel.width())
-      result.notes.push_back(name + " was measured from " + si(known.lower, "m") + " to " +
-                             si(known.upper, "m") + " only: its end values are held beyond");
-  }
+/// ISO names of what no reading told: components of the machine's axes, and squareness.
+std::vector<std::string> not_measured(const metrology::ComponentNetworks& model) {
+  std::vector<std::string> names;
+  for (int c = 0; c < component_count; ++c)
+    if (model.chain.has(metrology::axis_of(c)) && !model.components[index(c)])
+      names.emplace_back(metrology::iso_name(c));
   for (int a = 0; a < 3; ++a)
     for (int b = a + 1; b < 3; ++b)
       if (model.chain.has(a) && model.chain.has(b) &&
           model.squareness_sigma[index(metrology::squareness_of(a, b))] <= 0.0)
-        result.unidentified.emplace_back(metrology::squareness_iso_name(metrology::squareness_of(a, b)));
+        names.emplace_back(metrology::squareness_iso_name(metrology::squareness_of(a, b)));
+  return names;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+/// What is missing, and what the whole field amounts to.
+void evaluate(ComponentsResult& result) {
+  const auto& model = result.model;
+  result.unidentified = not_measured(model);
+  for (int c = 0; c < component_count; ++c) {
+    if (!model.chain.has(metrology::axis_of(c)) || !result.fits[index(c)]) continue;
+    const Range travel = model.travel[index(metrology::axis_of(c))];
+    const Range known = result.fits[index(c)]->component.network.range[0];
+    if (known.width() < 0.9 * travel.width())
+      result.notes.push_back(std::string{metrology::iso_name(c)} + " was measured from " +
+                             si(known.lower, "m") + " to " + si(known.upper, "m") +
+                             " only: its end values are held beyond");
+  }
   std::vector<double> usual;
   for (const auto& state : model.states) usual.push_back(state.usual());
   const auto grid = metrology::volume_grid(model.chain, model.travel, 9);
@@ -151,9 +163,8 @@ void calibrate(const Options& options) {
   std::cout << "error over the travels " << si(result.field_rms, "m") << " RMS, known to "
             << si(result.field_sigma, "m") << '\n';
   for (const auto& note : result.notes) std::cout << "note: " << note << '\n';
-  std::string missing;
-  for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
-  if (!missing.empty()) std::cout << "not measured, taken as zero: " << missing << '\n';
+  if (!result.unidentified.empty())
+    std::cout << "not measured, taken as zero: " << joined(result.unidentified) << '\n';
   std::cout << written(options.out, "compensation.yaml") << '\n';
 }
 
@@ -184,6 +195,8 @@ recording::Table predict_components(const config::Yaml& file, const recording::T
   compensation::check_seal(file);
   const auto model = compensation::read_components(file.root());
   file.finish();
+  if (const auto missing = not_measured(model); !missing.empty())
+    std::cerr << "warning: not measured, taken as zero and not in sigma: " << joined(missing) << '\n';
   const FieldPoints points = read_points(inputs, model.tool);
   std::vector<std::vector<double>> columns;
   for (const auto& state : model.states) columns.push_back(inputs.in(state.name, unit_of_state(state.name)));
