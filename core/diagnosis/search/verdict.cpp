@@ -7,6 +7,7 @@
 #include "core/diagnosis/dataset/in_parallel.hpp"
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/estimate/block_sigma.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/locate/left_over.hpp"
@@ -298,6 +299,7 @@ void conclude(const Case& data, Diagnosis& d) {
                           ? excess_over_noise(data, d.best)
                           : std::vector<double>(data.outputs.size(), 0.0);
   d.parameter_excursion = excursion_of(d.best);
+  if (!d.is_partial) d.best.sigma = sigma_over_blocks(data, d.weighing, d.best);
   std::vector<double> rests;
   const std::size_t given = data.model.terms.size();
   const auto beyond_best = [&](const physics::Model& model) {
