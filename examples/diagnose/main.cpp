@@ -2,7 +2,7 @@
 #include <core/base/fault.hpp>
 #include <core/diagnosis/dataset/load.hpp>
 #include <core/diagnosis/report/report.hpp>
-#include <core/diagnosis/search/search.hpp>
+#include <core/diagnosis/search/diagnose.hpp>
 #include <core/model/model_file.hpp>
 
 #include <iostream>
@@ -11,7 +11,7 @@ int main(int count, char** arguments) try {
   namespace diagnosis = invar::diagnosis;
   if (count != 3) throw invar::InputError{"call", "takes two files", "diagnose MODEL.yaml RECORDING.csv"};
   auto data = diagnosis::load_case(invar::model::load(arguments[1]), {arguments[2]});
-  const auto found = diagnosis::search(data, [](double, const std::string&) {});
+  const auto found = diagnosis::diagnose(data, [](double, const std::string&) {});
   std::cout.precision(2);
   std::cout << diagnosis::name_of(found.verdict) << '\n';
   for (const auto& finding : found.findings)

@@ -13,7 +13,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/crowd.hpp"
@@ -69,7 +69,7 @@ Row run(const std::string& plant, const std::string& effect, double size, unsign
   if (row.machine.missing.size() > 1) row.beside = to_be_won_beside(row.machine, seed, trouble);
   const std::clock_t begin = std::clock();  // of all threads: what it costs, however busy the host
   auto data = case_of(row.machine);
-  const auto d = diagnosis::search(
+  const auto d = diagnosis::diagnose(
       data, [](double, const std::string&) {}, options);
   row.marks = mark(row.machine, data, d, row.win, row.beside);
   row.marks.seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;

@@ -11,7 +11,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/record_file.hpp"
 #include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/marks.hpp"
@@ -272,7 +272,7 @@ Answer stepwise(const Machine& machine, const Case& data, diagnosis::Weighing we
 Answer ours(const Machine& machine, Case data, bool refuses) {
   diagnosis::Options options;
   options.refuses = refuses;
-  const auto d = diagnosis::search(
+  const auto d = diagnosis::diagnose(
       data, [](double, const std::string&) {}, options);
   return of_model(machine, data, d.best.model);
 }

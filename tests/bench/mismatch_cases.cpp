@@ -12,7 +12,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/model_file.hpp"
 #include "tests/support/mismatch/claims.hpp"
 
@@ -57,7 +57,7 @@ struct Study {
     auto data = diagnosis::load_case(model, files);
     diagnosis::Options options;
     options.without = without;
-    const auto d = diagnosis::search(
+    const auto d = diagnosis::diagnose(
         data, [](double, const std::string&) {}, options);
     seconds.push_back(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
     std::string missing, found;

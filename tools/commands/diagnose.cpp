@@ -16,7 +16,7 @@
 #include "core/diagnosis/report/model_files.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/other_run.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
@@ -138,7 +138,7 @@ int run(const Options& options) {
   diagnosis::ReportFolder{options.out};
   auto patience =
       std::make_unique<Patience>("invar: stopped before there was anything to say; no report was written");
-  auto diagnosis = diagnosis::search(data, progress, how);
+  auto diagnosis = diagnosis::diagnose(data, progress, how);
   line.clear();
   if (diagnosis.is_partial && !interrupted()) diagnosis.budget = options.budget;
   diagnosis::check_runs(data, diagnosis.best.model, 0.0, options.model);

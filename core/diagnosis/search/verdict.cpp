@@ -6,8 +6,8 @@
 
 #include "core/diagnosis/dataset/in_parallel.hpp"
 #include "core/diagnosis/dataset/starts.hpp"
-#include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/estimate/block_sigma.hpp"
+#include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/locate/left_over.hpp"

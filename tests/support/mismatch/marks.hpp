@@ -3,7 +3,7 @@
 
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/machine.hpp"
 

@@ -16,7 +16,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
@@ -251,7 +251,7 @@ TEST(AddedToCommand, ThePatchedFileSaysWhereTheCurrentIsRecorded) {
 
 Diagnosis diagnosed(const Loop& loop) {
   auto data = case_of(loop);
-  auto d = search(data, [](double, const std::string&) {});
+  auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_TRUE(data.model.records_applied);
   EXPECT_EQ(d.findings.size(), 1U) << summary(data, d);
   if (!d.findings.empty()) {

@@ -10,7 +10,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -69,7 +69,7 @@ physics::Model model_of_store(double slow, const char* initial = "{value: 0, uni
 }
 
 Diagnosis diagnosed(Case& data) {
-  return search(data, [](double, const std::string&) {});
+  return diagnose(data, [](double, const std::string&) {});
 }
 
 /// What a machine that remembers for long was fed while nobody looked: the level changed at row 400, recorded are 380 and 430.

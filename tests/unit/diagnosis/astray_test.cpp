@@ -10,7 +10,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/diagnosis/search/unsure.hpp"
 #include "core/physics/library.hpp"
 #include "core/recording/table.hpp"
@@ -82,7 +82,7 @@ Case car_over_a_road(unsigned seed, double lag) {
 TEST(Astray, ALateRoadIsFoundThoughTheRetunedCarHasNoSpringLeft) {
   for (const auto& [seed, lag] : {std::pair{3U, 0.1}, {5U, 0.08}}) {
     auto data = car_over_a_road(seed, lag);
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     ASSERT_EQ(d.findings.size(), 1U) << seed << summary(data, d);
     EXPECT_EQ(d.findings[0].term.info->name, "lag") << seed;
     EXPECT_EQ(d.findings[0].term.on, "r") << seed;
@@ -134,7 +134,7 @@ Case late_pendulum(unsigned seed, double lag, double dry) {
 TEST(Astray, ALateTorqueBesideFrictionIsFoundFromWhatIsBelieved) {
   for (const auto& [lag, dry] : {std::pair{0.8, 0.17}, {0.4, 0.4}}) {
     auto data = late_pendulum(1, lag, dry);
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
     ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
     for (const auto& finding : d.findings) {

@@ -16,7 +16,7 @@
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/diagnosis/search/verdict.hpp"
 #include "core/physics/library.hpp"
 #include "core/recording/table.hpp"
@@ -136,7 +136,7 @@ Case recorded(const Axis& axis, double rest, unsigned seed) {
 }
 
 Diagnosis searched(Case data) {
-  return search(data, [](double, const std::string&) {});
+  return diagnose(data, [](double, const std::string&) {});
 }
 
 TEST(AxisLoop, ASlowWaveThatTheLoopHoldsAgainstIsFound) {
@@ -198,7 +198,7 @@ TEST(AxisLoop, WhatHuntsWhereItRestsIsFrictionAlone) {
     axis.friction = 1.0;
     axis.noise = noise;
     auto data = recorded(axis, 1.5, seed);
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_GT(data.count.left_to_chance, 500U);
     ASSERT_EQ(d.findings.size(), 1U) << "noise " << noise;
     EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction");

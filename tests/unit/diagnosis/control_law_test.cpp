@@ -10,7 +10,7 @@
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -111,7 +111,7 @@ TEST(ControlLaw, TellsHowMuchOfTheMismatchIsTheLaws) {
 
 TEST(ControlLaw, ADriveThatSmoothsItsReferenceDoesNotHideARipple) {
   auto data = case_of(loop({.smoothing = 3e-4, .ripple = 2.0}, 1e-7, 0.0, 0.0, 4));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_TRUE(d.off_law);
   EXPECT_TRUE(d.off_law->is_beside()) << d.off_law->off << " A, " << d.off_law->share;
   ASSERT_FALSE(d.findings.empty()) << summary(data, d);
@@ -122,7 +122,7 @@ TEST(ControlLaw, ADriveThatSmoothsItsReferenceDoesNotHideARipple) {
 
 TEST(ControlLaw, NothingBehindALoopOfAnotherLawIsNamed) {
   auto data = case_of(loop({.kp = 8800.0}, 1e-7, 0.0, 0.0, 4));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   EXPECT_TRUE(d.findings.empty());
   ASSERT_TRUE(d.suspect);

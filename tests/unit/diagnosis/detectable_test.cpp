@@ -34,7 +34,7 @@ TEST(Detectable, TwiceTheSmallestEffectIsSeenAndAThirdMostlyNot) {
        {std::pair{"error_map", 11U}, {"droplet", 11U}, {"thermal", 11U}, {"sensor", 11U}}) {
     const auto machine = make(plant, "none", 1.0, seed);
     auto null = case_of(machine);
-    const auto d = diagnosis::search(null, silent);
+    const auto d = diagnosis::diagnose(null, silent);
     if (d.verdict != diagnosis::Verdict::no_mismatch) continue;
     for (const auto& entry : d.detectable) {
       physics::Term term;
@@ -47,7 +47,7 @@ TEST(Detectable, TwiceTheSmallestEffectIsSeenAndAThirdMostlyNot) {
       for (const double times : {2.0, 0.3}) {
         term.values[term.info->index_of(entry.parameter)] = times * entry.value;
         auto data = with_effect(machine, d, term);
-        const auto found = diagnosis::search(data, silent);
+        const auto found = diagnosis::diagnose(data, silent);
         const bool seen = found.verdict != diagnosis::Verdict::no_mismatch;
         (times > 1.0 ? seen_twice : seen_third) += seen ? 1 : 0;
         std::string names;

@@ -13,7 +13,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulation.hpp"
@@ -133,7 +133,7 @@ class Equations : public ::testing::Test {
     table.write(folder / "recording.csv");
     data = load_case(model, {folder / "recording.csv"});
     std::cout << "seed " << seed << '\n';
-    return search(data, [](double, const std::string&) {});
+    return diagnosis::diagnose(data, [](double, const std::string&) {});
   }
 
   static void expect(const Diagnosis& d, const char* name, const char* on, double value, double tolerance) {
@@ -282,7 +282,7 @@ TEST_F(Equations, NamesWhatAnInputDoesToAMassThatNobodyMeasures) {
   table.add("room", "", out[0]);
   table.write(folder / "recording.csv");
   data = load_case(model, {folder / "recording.csv"});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
   expect(d, "coupling", "Tw", 1.7e-7, 1e-8);
 }
 

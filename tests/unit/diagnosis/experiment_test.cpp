@@ -13,7 +13,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
@@ -76,7 +76,7 @@ struct Answer {
 
 Answer diagnosis_of(const physics::Model& model, const recording::Table& table) {
   Answer answer{make_case(model, {table}), {}};
-  answer.d = search(answer.data, [](double, const std::string&) {});
+  answer.d = diagnose(answer.data, [](double, const std::string&) {});
   return answer;
 }
 

@@ -10,7 +10,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -18,7 +18,7 @@ namespace invar::diagnosis {
 namespace {
 
 Diagnosis diagnosed(Case& data) {
-  return search(data, [](double, const std::string&) {});
+  return diagnose(data, [](double, const std::string&) {});
 }
 
 bool is_curve(const Finding& f, const std::string& site, const std::string& over, const std::string& with) {

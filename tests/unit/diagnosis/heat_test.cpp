@@ -8,7 +8,7 @@
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -67,7 +67,7 @@ TEST(Heat, AStoreBehindAWeakContactIsAStore) {
     at.store += at.step * flow / 3000.0;
     return -flow;
   });
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "hidden_node");
   EXPECT_NEAR(d.findings[0].term.values[0], 0.16, 0.02);
@@ -78,7 +78,7 @@ TEST(Heat, AirThatIsDrivenCarriesHeatAwayWithAPowerOfTheSpeed) {
   auto data = heated(2000.0, 10.0, 300.0, 0.02, [](const Moment& at) {
     return -1.5 * std::pow(at.speed, 0.7) * (at.temperature - 22.0);
   });
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.verdict, Verdict::explained);
   EXPECT_EQ(d.findings[0].stand_in, nullptr);
@@ -94,7 +94,7 @@ TEST(Heat, WhatMeltsIsStoredAtItsTemperature) {
     const bool melts = at.temperature > 34.0 && at.temperature < 36.0;
     return melts ? (1.0 / (1.0 + 0.2) - 1.0) * (at.power - 10.0 * (at.temperature - 22.0)) : 0.0;
   });
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 1U);
   const auto& term = d.findings[0].term;
@@ -134,7 +134,7 @@ TEST(Heat, ANumberThatTheMachineDidNotFeelIsASlipOfTheRecord) {
   auto data = as_believed([](recording::Table& table) { table.columns[1].values[400] = 99999.0; });
   EXPECT_EQ(data.count.lone_inputs, 1U);
   EXPECT_TRUE(std::isnan(data.recordings[0].inputs.signals.at("pad")[400]));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_TRUE(d.findings.empty()) << summary(data, d);
   EXPECT_EQ(d.verdict, Verdict::no_mismatch);
 }
@@ -148,7 +148,7 @@ TEST(Heat, ABlowOfOneRowThatTheMachineFeltIsNone) {
           500.0 / 8.0 * -std::expm1(-0.02) * std::exp(-0.02 * static_cast<double>(i - 101));
   });
   EXPECT_EQ(data.count.lone_inputs, 0U);
-  EXPECT_TRUE(search(data, [](double, const std::string&) {}).findings.empty());
+  EXPECT_TRUE(diagnose(data, [](double, const std::string&) {}).findings.empty());
 }
 
 TEST(Heat, AStartOffTheAirIsSeenThoughOneReadingSlips) {
@@ -156,7 +156,7 @@ TEST(Heat, AStartOffTheAirIsSeenThoughOneReadingSlips) {
     auto data = as_believed([](recording::Table& table) { table.columns[2].values[2] += 0.5; }, start);
     const auto& given = data.recordings[0].inputs.signals.at("body");
     EXPECT_NEAR(given[0], start, 0.03);
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_EQ(d.verdict, Verdict::no_mismatch) << start << summary(data, d);
   }
 }
@@ -170,7 +170,7 @@ TEST(Heat, AHeaterThatOneStepAloneDrivesTooFarSaturates) {
   });
   EXPECT_GT(top, most);
   EXPECT_LT(top, 1.02 * most);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "heater_saturation");
   EXPECT_NEAR(d.findings[0].term.values[0], most, 0.02);

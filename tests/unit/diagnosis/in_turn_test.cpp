@@ -9,7 +9,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
@@ -25,7 +25,7 @@ struct Answer {
 
 Answer diagnosed(const Machine& machine, const diagnosis::Options& options = {}) {
   Answer answer{case_of(machine), {}};
-  answer.d = diagnosis::search(
+  answer.d = diagnosis::diagnose(
       answer.data, [](double, const std::string&) {}, options);
   return answer;
 }

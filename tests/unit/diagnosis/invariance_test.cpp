@@ -5,7 +5,7 @@
 #include "core/diagnosis/dataset/shorten.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/marks.hpp"
@@ -15,7 +15,7 @@ namespace {
 
 diagnosis::Diagnosis diagnosed(const Machine& machine, const diagnosis::Options& options = {}) {
   auto data = case_of(machine);
-  return diagnosis::search(
+  return diagnosis::diagnose(
       data, [](double, const std::string&) {}, options);
 }
 
@@ -386,7 +386,7 @@ TEST(WrongReadings, AreLeftOutBesideAWrongParameter) {
   trouble.faults = true;
   for (const unsigned seed : {1U, 2U, 3U, 4U, 5U, 6U}) {
     auto data = case_of(make("equations", "parameter", 1.0, seed, trouble));
-    const auto d = diagnosis::search(data, [](double, const std::string&) {});
+    const auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
     EXPECT_EQ(d.verdict, diagnosis::Verdict::parameters_only)
         << seed << ": " << diagnosis::name_of(d.verdict);
     EXPECT_LT(d.unexplained, 1.2) << seed;

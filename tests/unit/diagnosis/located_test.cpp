@@ -7,7 +7,7 @@
 
 #include "core/diagnosis/candidates/place.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
 namespace invar::test::mismatch {
@@ -27,7 +27,7 @@ TEST_P(Located, InALoopActuatorPlantAndSensorAreToldApart) {
     trouble.rows = 6000;
     const auto machine = make("axis", effect, 1.0, 351, trouble);
     auto data = case_of(machine);
-    const auto d = diagnosis::search(data, [](double, const std::string&) {});
+    const auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
     ASSERT_FALSE(d.findings.empty()) << diagnosis::summary(data, d);
     for (const auto& finding : d.findings) {
       // What comes late by less than a millisecond may be late in the motor or in the encoder: then both must be said.

@@ -9,7 +9,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -61,7 +61,7 @@ Columns recorded(std::size_t early) {
 }
 
 Diagnosis diagnosed(Case& data) {
-  return search(data, [](double, const std::string&) {});
+  return diagnose(data, [](double, const std::string&) {});
 }
 
 TEST(Misrecorded, AColumnThatComesEarlyIsSaidAndMoved) {

@@ -12,7 +12,7 @@
 #include "core/diagnosis/estimate/weighing.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report_page.hpp"
@@ -73,7 +73,7 @@ TEST(InstrumentNoise, IsNoLessThanTheStepInWhichAConverterCounts) {
 TEST(Verdict, WhatWandersFarAboveTheNoiseIsNeverNothing) {
   for (const unsigned seed : {5U, 6U, 7U}) {
     auto data = make_case(encoder(), {readings(12.0 * white, seed)});
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     SCOPED_TRACE(summary(data, d));
     EXPECT_GT(most_over_noise(d), times_noise);
     EXPECT_NE(d.verdict, Verdict::no_mismatch);
@@ -86,7 +86,7 @@ TEST(Verdict, WhatWandersFarAboveTheNoiseIsNeverNothing) {
 
 TEST(Verdict, WhiteNoiseAloneIsNoMismatch) {
   auto data = make_case(encoder(), {readings(0.0)});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
   EXPECT_LT(most_over_noise(d), 1.2);
 }
@@ -118,7 +118,7 @@ TEST(Verdict, AFewRowsWithFalseStampsCarryNoFit) {
       "parameters: {gain: {value: 1.0, unit: 1, sigma: 0.02}}\n");
   for (const bool hurries : {false, true}) {
     auto data = make_case(model, {hurried(hurries)});
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     SCOPED_TRACE(summary(data, d));
     EXPECT_EQ(d.verdict, Verdict::no_mismatch);
     EXPECT_NEAR(d.retuned.model.value("gain"), 1.0, 0.01);

@@ -9,7 +9,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/dataset/outliers.hpp"
 #include "core/diagnosis/estimate/weighing.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -86,7 +86,7 @@ const std::set<std::size_t> slips{42, 111, 238, 371, 502};
 
 TEST(Outliers, AreSeenOnceTheNumbersThatHideThemAreRight) {
   auto data = printed([](double height, double) { return 0.02 * height; }, slips, 32);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::parameters_only);
   EXPECT_EQ(data.count.outliers, slips.size());
   EXPECT_EQ(dropped(data), slips);
@@ -117,14 +117,14 @@ TEST(Outliers, OfAModelThatRemembersAreSeenOnceItsNumbersAreNear) {
   auto far = data;
   drop_outliers(far, simulate(far, far.model));
   EXPECT_FALSE(dropped(far).contains(180));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::parameters_only);
   EXPECT_EQ(dropped(data), std::set<std::size_t>{180});
 }
 
 TEST(Outliers, AreNotTheFewDropsOnWhichAnEffectActs) {
   auto data = printed([](double, double velocity) { return 4e-4 * velocity; }, slips, 33);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "valve_delay");
   EXPECT_NEAR(d.findings[0].term.values[0], 4e-4, 2e-5);

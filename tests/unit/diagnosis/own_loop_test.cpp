@@ -9,7 +9,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/locate/what_looks_at_what.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/record_file.hpp"
 #include "core/physics/library.hpp"
 #include "core/physics/simulation.hpp"
@@ -86,13 +86,13 @@ TEST(OwnLoop, WhatOnlyTheControllerLooksAtIsNoStateOfTheMachine) {
 
 TEST(OwnLoop, TheNoiseThatGoesRoundInItIsNoPhysics) {
   auto data = cart(0.0, 0.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::no_mismatch);
 }
 
 TEST(OwnLoop, AForceIsExplainedThoughTheNoiseGoesRound) {
   auto data = cart(0.08, 0.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::explained);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
@@ -101,7 +101,7 @@ TEST(OwnLoop, AForceIsExplainedThoughTheNoiseGoesRound) {
 
 TEST(OwnLoop, ANoisyReadingMakesTheOtherOutputsLouderAndNoNameWorse) {
   auto data = cart(0.08, 0.0, true);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
   EXPECT_GT(d.findings[0].probability, 0.8);
@@ -150,7 +150,7 @@ Case ball(double friction, double down) {
 
 TEST(OwnLoop, ASteadyPushBesideFrictionIsFoundToo) {
   auto data = ball(0.0021, 0.0018);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   // The controller feeds the noise of its readings back: the ball wanders by more than twice that noise, which nothing explains.
   EXPECT_EQ(d.verdict, Verdict::partly_explained) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 2U);
@@ -185,7 +185,7 @@ TEST(OwnLoop, WhatTheControllerDecidesNeedNotBeListedAmongTheInputs) {
 
 TEST(OwnLoop, WhatTheControllerDecidesMayArriveLate) {
   auto data = cart(0.0, 0.12);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "lag");
   EXPECT_EQ(d.findings[0].term.on, "u");

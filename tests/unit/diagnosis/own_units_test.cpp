@@ -8,7 +8,7 @@
 #include "core/base/fault.hpp"
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/fault_of.hpp"
 #include "tests/support/model_of.hpp"
@@ -49,7 +49,7 @@ recording::Table recorded(double leaves) {
 TEST(OwnUnits, AnInputThatTheEquationsCountInItsOwnUnitIsNoPhysics) {
   auto data = make_case(reactor("feed"), {recorded(0.0)});
   try {
-    (void)search(data, [](double, const std::string&) {});
+    (void)diagnose(data, [](double, const std::string&) {});
     FAIL() << "in SI the feed is a millionth of what the equations count";
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("feed.csv: column `feed`: is in `mL/s`"));
@@ -59,7 +59,7 @@ TEST(OwnUnits, AnInputThatTheEquationsCountInItsOwnUnitIsNoPhysics) {
 
 TEST(OwnUnits, AreTakenAsTheModelSays) {
   auto data = make_case(reactor("{column: feed, unit: mL/s}"), {recorded(0.0)});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.findings.size(), 0U) << summary(data, d);
   auto in_litres = make_case(reactor("{column: feed, unit: L/s}"), {recorded(0.0)});
   EXPECT_NEAR(in_litres.recordings[0].inputs.signals.at("q")[0], 1e-3, 1e-12);
@@ -67,13 +67,13 @@ TEST(OwnUnits, AreTakenAsTheModelSays) {
 
 TEST(OwnUnits, LeaveRoomForPhysics) {
   auto data = make_case(reactor("{column: feed, unit: mL/s}"), {recorded(0.05)});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "quadratic");
   auto table = recorded(0.05);  // a feed that is in SI by its header, of a machine that counts in SI
   for (double& q : table.columns[1].values) q *= 1e6;
   auto in_si = make_case(reactor("feed"), {table});
-  const auto same = search(in_si, [](double, const std::string&) {});
+  const auto same = diagnose(in_si, [](double, const std::string&) {});
   ASSERT_EQ(same.findings.size(), 1U) << summary(in_si, same);
   EXPECT_EQ(same.findings[0].term.info->name, "quadratic");
 }

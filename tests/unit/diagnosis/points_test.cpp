@@ -14,7 +14,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 #include "tools/diagnose/report_page.hpp"
@@ -54,7 +54,7 @@ Case calibrated(double play, bool back, unsigned seed, double middle = 0.0) {
 
 TEST(ErrorMaps, PlayIsFoundThoughNobodyRecordedTheDirection) {
   auto data = calibrated(8e-7, true, 11);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "backlash");
   EXPECT_NEAR(d.findings[0].term.values[0], 8e-7, 1e-7);
@@ -64,7 +64,7 @@ TEST(ErrorMaps, PlayIsFoundThoughNobodyRecordedTheDirection) {
 
 TEST(ErrorMaps, PlayBesideABaselineThatWasTakenFromOneSideLeavesNothingElse) {
   auto data = calibrated(8e-7, true, 13, -4e-7);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "backlash");
   EXPECT_NEAR(d.findings[0].term.values[0], 8e-7, 1e-7);
@@ -73,7 +73,7 @@ TEST(ErrorMaps, PlayBesideABaselineThatWasTakenFromOneSideLeavesNothingElse) {
 
 TEST(ErrorMaps, AConstantIsNoPlayWhereAllPointsWereApproachedFromOneSide) {
   auto data = calibrated(8e-7, false, 12);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   for (const auto& finding : d.findings) EXPECT_NE(finding.term.info->name, "backlash");
 }
 
@@ -89,7 +89,7 @@ TEST(ErrorMaps, ABendBesideOneOffsetIsNoTilt) {
   table.add("e", "m", error);
   table.add("beside", "m", std::vector<double>(at.size(), 0.044));
   auto data = make_case(straight_axis(", offset: beside"), {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_FALSE(d.findings.empty());
   EXPECT_EQ(d.findings[0].term.info->name, "sag");
   EXPECT_NEAR(std::abs(d.findings[0].term.values[0]), 8e-6, 1e-6);  // a parabola, not a sine
@@ -122,7 +122,7 @@ Case watched(Error error, unsigned seed) {
 
 TEST(ErrorMaps, AScaleThatSlipsOnceIsDrawnAsAJump) {
   auto data = watched([](double t, double) { return t > 70000.0 ? 5e-7 : 0.0; }, 14);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   const auto& curve = d.best.model.terms.back().curve;
@@ -132,7 +132,7 @@ TEST(ErrorMaps, AScaleThatSlipsOnceIsDrawnAsAJump) {
 
 TEST(ErrorMaps, AnErrorThatGoesWithTheTemperatureAndNotWithThePlaceIsLocatedThere) {
   auto data = watched([](double, double warmth) { return 4e-7 * warmth; }, 15);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "temperature");
@@ -142,7 +142,7 @@ TEST(ErrorMaps, AnErrorThatGoesWithTheTemperatureAndNotWithThePlaceIsLocatedTher
 TEST(ErrorMaps, AHumOverManyPointsIsDrawnAsAWaveInTime) {
   constexpr double period = 23000.0;
   auto data = watched([](double t, double) { return 4e-7 * std::sin(2.0 * M_PI * t / period + 0.4); }, 24);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   const auto& curve = d.best.model.terms.back().curve;
@@ -183,7 +183,7 @@ TEST(ErrorMaps, AScaleThatFollowsByLessThanAMinuteIsNoOtherExpansion) {
   auto data = swept(
       ", temperature: T", ", expansion: {value: 1.7e-5, unit: 1/K, sigma: 3.5e-7}",
       [](double x, double, double scale, double) { return 1.7e-5 * scale * x; }, 17);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "heating_rate_lag");
   EXPECT_NEAR(d.findings[0].term.values[0], 45.0, 7.0);
@@ -197,7 +197,7 @@ TEST(ErrorMaps, ACarriageMaySwingToEitherSideAlongTheWay) {
         return offset * 2e-5 * std::sin(2.0 * M_PI * x / travel);
       },
       18);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "abbe_offset");
 }
@@ -225,7 +225,7 @@ TEST(Instruments, SpikesThatFallTogetherByChanceHideNoBias) {
   table.add("x", "m", position);
   table.add("v", "m/s", velocity);
   auto data = make_case(tachometer(), {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "bias");
   EXPECT_NEAR(d.findings[0].term.values[0], 4e-5, 5e-6);
@@ -252,7 +252,7 @@ TEST(Instruments, ABiasBesideADroopAreTwoNames) {
           "parameters: {resolution: {value: 1e-6, unit: m, sigma: 0}, gain: {value: 1, sigma: "
           "0.005}}\nterms: []\n"),
       {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "bias");
   EXPECT_EQ(d.findings[1].term.info->name, "gain_droop");
@@ -290,7 +290,7 @@ TEST(Instruments, ALongWaveIsFoundThoughMostRowsStandAtTheEnds) {
     shown.push_back(x + 4e-8 * std::sin(2.0 * M_PI * x / 0.0037 + 1.0) + reading(random));
   }
   auto data = scale_beside(time, position, shown, 1e-9);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "periodic_error");
   EXPECT_NEAR(d.findings[0].term.values[1], 0.0037, 1e-4);
@@ -332,7 +332,7 @@ TEST(Instruments, AWaveAlongTheWayIsFoundThoughTheCarriageMostlyRests) {
         return place(t) + 2.5e-8 * std::sin(2.0 * M_PI * place(t) / 0.0031 + 1.0);
       },
       22);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
   EXPECT_EQ(d.verdict, Verdict::explained);
 }
@@ -349,7 +349,7 @@ TEST(Instruments, WhatTheirOwnStepsMakeOfASteadyMotionIsNoWave) {
         1e-11 * std::round(1e11 * step * std::round((place(time.back() - 3e-7) + shaken(random)) / step)));
   }
   auto data = scale_beside(time, position, shows, step);
-  EXPECT_FALSE(names_of(search(data, [](double, const std::string&) {})).contains("periodic_error"));
+  EXPECT_FALSE(names_of(diagnose(data, [](double, const std::string&) {})).contains("periodic_error"));
 }
 
 TEST(Instruments, AWaveIsNotTakenForABeatOfTheStepsWithTheDigitsTheyAreWrittenIn) {
@@ -363,7 +363,7 @@ TEST(Instruments, AWaveIsNotTakenForABeatOfTheStepsWithTheDigitsTheyAreWrittenIn
         return 1e-9 * std::round(1e9 * step * std::round(shows / step));
       },
       27, step);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(names_of(d), std::set<std::string>{"periodic_error"});
 }
 
@@ -376,7 +376,7 @@ TEST(Instruments, WhatIsLateThroughPlayIsFoundAsBoth) {
         return shown = std::clamp(shown, late - 5e-8, late + 5e-8);
       },
       23);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(names_of(d), (std::set<std::string>{"hysteresis", "latency"}));
   for (const auto& finding : d.findings) {
     EXPECT_NEAR(finding.term.values[0], finding.term.info->name == "latency" ? 3e-5 : 1e-7,
@@ -400,7 +400,7 @@ TEST(Instruments, LatenessAtOneSpeedIsNotToldFromPlay) {
   }
   shown[0] = std::nan("");  // where the play stood at first nobody knows
   auto data = scale_beside(time, position, shown, 1e-9);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::ambiguous);
   EXPECT_THAT(names_of(d),
               ::testing::AnyOf(std::set<std::string>{"latency"}, std::set<std::string>{"hysteresis"}));
@@ -441,7 +441,7 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
   table.add("x", "m", position);
   table.add("v", "m/s", velocity);
   auto data = make_case(tachometer(), {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.best.model.terms.back().curve.over, "velocity");
@@ -463,7 +463,7 @@ TEST(Instruments, ATachometerThatRipplesWithItsSpeedIsDrawnAlongTheWay) {
   table.add("x", "m", position);
   table.add("v", "m/s", velocity);
   auto data = make_case(tachometer(), {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   const auto& term = d.best.model.terms.back();
@@ -496,7 +496,7 @@ TEST(Drops, WhatMovesThemInTwoDirectionsIsDrawnInBoth) {
                      "{value: 0, unit: m, sigma: 2e-5}, slope_x: {value: 0, sigma: 0.002}, slope_y: {value: "
                      "0, sigma: 0.002}, speed: {value: 3, unit: m/s, sigma: 0.2}}\nterms: []\n"),
       {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 2U);
   for (const auto& finding : d.findings) {

@@ -11,7 +11,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -54,7 +54,7 @@ Diagnosis diagnosis_of(const recording::Table& table, std::size_t& quiet_rows) {
                                "parameters: {k: {value: 1.02, unit: 1, sigma: 0.03}, "
                                "T: {value: 0.021, unit: s, sigma: 0.002}}\n"),
                 {table});
-  auto d = search(data, [](double, const std::string&) {});
+  auto d = diagnose(data, [](double, const std::string&) {});
   quiet_rows = data.quiet_rows;
   return d;
 }

@@ -8,7 +8,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/search/other_run.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/model_file.hpp"
 #include "core/recording/table.hpp"
 
@@ -51,7 +51,7 @@ Result diagnose(const std::filesystem::path& folder, std::size_t rows = 0) {
     if (rows > 0 && column.values.size() > rows) column.values.resize(rows);
   auto data = make_case(model, {table});
   Result result;
-  result.diagnosis = search(data, [](double, const std::string&) {});
+  result.diagnosis = diagnose(data, [](double, const std::string&) {});
   result.test = read_other_run(model, {csv(folder, "test_inputs"), csv(folder, "test_outputs"),
                                        folder.parent_path().filename() == "ball-drops"});
   compare(data, result.diagnosis, result.test);

@@ -9,7 +9,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "tests/support/mismatch/marks.hpp"
 #include "tools/diagnose/report_page.hpp"
 
@@ -155,7 +155,7 @@ TEST(Report, HoldsTheContractForEveryVerdict) {
                                             {"error_map", "unknown:dent", 1011U}}) {
     SCOPED_TRACE(std::string{plant} + " " + effect);
     auto data = case_of(make(plant, effect, 1.0, seed));
-    auto d = diagnosis::search(data, [](double, const std::string&) {});
+    auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
     look(data, d, plant);
     if (d.verdict != Verdict::explained) continue;
     // The same with a rest, and with a rival that comes as near: of another name, and of its own elsewhere.
@@ -178,7 +178,7 @@ TEST(Report, OfASearchThatWasStoppedSaysFirstThatNothingCanBeSaid) {
     auto data = case_of(make("thermal", effect, 1.0, 3));
     diagnosis::Options stop;
     stop.stopped = [] { return true; };
-    const auto d = diagnosis::search(
+    const auto d = diagnosis::diagnose(
         data, [](double, const std::string&) {}, stop);
     EXPECT_TRUE(d.is_partial);
     EXPECT_TRUE(d.findings.empty());
@@ -193,7 +193,7 @@ TEST(Report, OfASearchThatWasStoppedSaysFirstThatNothingCanBeSaid) {
 // What is named explains little where the model's own numbers had to leave what is known, or much remains.
 TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
   auto data = case_of(make("thermal", "sensor_lag", 1.0, 3));
-  auto d = diagnosis::search(data, [](double, const std::string&) {});
+  auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
   ASSERT_FALSE(d.findings.empty());
   EXPECT_EQ(diagnosis::beside_the_verdict(data, d), "");
   EXPECT_EQ(diagnosis::page_text(data, d, "model.yaml").find("Mind: "), std::string::npos);
@@ -232,7 +232,7 @@ TEST(Report, SaysBesideTheVerdictWhatItWouldHide) {
 TEST(Report, SaysInWhichRegionAnEffectShows) {
   const auto machine = make("axis", "slow_drift", 1.0, 6001);
   auto data = case_of(machine);
-  const auto d = diagnosis::search(data, [](double, const std::string&) {});
+  const auto d = diagnosis::diagnose(data, [](double, const std::string&) {});
   const auto report = json::parse(diagnosis::report_json(data, d));
   SCOPED_TRACE(report.at("location").dump(1));
   ASSERT_EQ(report.at("findings")[0].at("term"), "slow_drift");

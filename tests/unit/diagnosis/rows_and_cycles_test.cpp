@@ -9,7 +9,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -62,7 +62,7 @@ recording::Table every_other_cycle(bool held) {
 }
 
 Diagnosis diagnosed(Case& data) {
-  return search(data, [](double, const std::string&) {});
+  return diagnose(data, [](double, const std::string&) {});
 }
 
 TEST(RowsAndCycles, AReferenceIsHeldFromRowToRow) {

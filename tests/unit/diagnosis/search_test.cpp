@@ -1,5 +1,5 @@
 // The diagnosis on machines made here: the right name where physics is missing, none where nothing is.
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -54,7 +54,7 @@ class DiagnosisTest : public ::testing::Test {
     table.add(temperature, "degC", out[0]);
     table.write(folder / "recording.csv");
     data = load_case(model, {folder / "recording.csv"});
-    return search(data, [](double, const std::string&) {});
+    return diagnose(data, [](double, const std::string&) {});
   }
 
   static physics::Term term(const char* name, double value) {

@@ -11,7 +11,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/simulation.hpp"
 #include "core/recording/table.hpp"
@@ -52,7 +52,7 @@ Case moved(const physics::Model& model, double friction, double ripple, double t
 TEST(StaticEquations, FrictionOverASpeedIsNamedAtTheTorqueWhicheverWayItCounts) {
   for (const double toward : {1.0, -1.0}) {
     auto data = moved(model_of(joint), 0.35, 0.0, toward);
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
     const auto& term = d.findings[0].term;
     EXPECT_EQ(term.info->name, "dry_friction");
@@ -67,13 +67,13 @@ TEST(StaticEquations, FrictionOverASpeedIsNamedAtTheTorqueWhicheverWayItCounts) 
 
 TEST(StaticEquations, WhatIsWholeIsNoMismatch) {
   auto data = moved(model_of(joint), 0.0, 0.0, 1.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
 }
 
 TEST(StaticEquations, ARippleOverTheAngleIsFoundToGoWithIt) {
   auto data = moved(model_of(joint), 0.0, 0.4, 1.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_FALSE(d.findings.empty()) << summary(data, d);
   const auto& term = d.findings[0].term;
   EXPECT_EQ(term.info->name, "periodic") << summary(data, d);

@@ -12,7 +12,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/library.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -99,7 +99,7 @@ TEST(SteadySpeed, ATwinIsNoneOfAMotionThatTurns) {
 
 TEST(SteadySpeed, ARippleIsNeverCalledADisturbanceWithoutTheRipple) {
   auto data = steady(0.05);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_FALSE(d.findings.empty()) << summary(data, d);
   const auto& finding = d.findings.front();
   if (finding.term.info->name == "force_ripple") return;

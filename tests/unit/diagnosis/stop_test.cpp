@@ -8,7 +8,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/options.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
 namespace invar::test::mismatch {
@@ -33,7 +33,7 @@ Run run(const Machine& machine, long patience) {
   std::atomic<long> asked{0};
   diagnosis::Options options;
   options.stopped = [&] { return asked++ >= patience && patience >= 0; };
-  r.diagnosis = diagnosis::search(
+  r.diagnosis = diagnosis::diagnose(
       r.data, [&](double share, const std::string&) { r.shares.push_back(share); }, options);
   r.asked = asked;
   return r;

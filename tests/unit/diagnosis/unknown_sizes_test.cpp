@@ -9,7 +9,7 @@
 
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/load.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -45,7 +45,7 @@ Case tank(double gain, double leak, const std::string& numbers) {
 TEST(UnknownSizes, AGainOfWhichNothingIsKnownIsFoundWhateverItsSize) {
   for (const double gain : {3e-7, 0.5, 4e6}) {
     auto data = tank(gain, 0.0, "b: {value: 0}}\n");
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_TRUE(d.findings.empty()) << gain;
     EXPECT_NEAR(d.best.model.value("b"), gain, 0.01 * gain);
     EXPECT_NEAR(d.best.model.value("a"), 0.4, 0.004) << gain;
@@ -55,7 +55,7 @@ TEST(UnknownSizes, AGainOfWhichNothingIsKnownIsFoundWhateverItsSize) {
 TEST(UnknownSizes, ALawThatStandsInTheModelWithoutItsNumberIsFound) {
   auto data =
       tank(4e5, 9e4, "b: {value: 400000, sigma: 10}}\nterms: [{term: constant, on: x, value: {value: 0}}]\n");
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_TRUE(d.findings.empty());
   EXPECT_NEAR(d.best.model.terms[0].values[0], -9e4, 1e3);
 }

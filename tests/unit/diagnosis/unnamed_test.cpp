@@ -15,7 +15,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/locate/left_over.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -66,7 +66,7 @@ TEST(WithoutAName, AnElasticShaftIsNeitherNoiseNorADelay) {
   testing::TemporaryFolder folder;
   elastic_motor(3).write(folder / "recording.csv");
   auto data = load_case(rigid_motor(), {folder / "recording.csv"});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_TRUE(d.verdict == Verdict::unknown_physics || d.verdict == Verdict::partly_explained)
       << name_of(d.verdict);
   EXPECT_GT(d.unexplained, 2.0);
@@ -118,7 +118,7 @@ TEST(WithoutAName, ANumberThatChangesOnTheWayIsACourseInProportionToItsState) {
   auto data = make_case(
       rigid_motor(),
       {motor(6, [](double u, double w, double t) { return 12.0 * u - (t < 5.0 ? 3.0 : 2.7) * w; })});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.curve.over, "t");
@@ -131,7 +131,7 @@ TEST(WithoutAName, TheSameNumbersFromBeginningToEndAreNoSuchCourse) {
   for (const unsigned seed : {7U, 8U, 9U}) {
     auto data = make_case(rigid_motor(),
                           {motor(seed, [](double u, double w, double) { return 12.0 * u - 3.0 * w; })});
-    EXPECT_TRUE(search(data, [](double, const std::string&) {}).findings.empty()) << seed;
+    EXPECT_TRUE(diagnose(data, [](double, const std::string&) {}).findings.empty()) << seed;
   }
 }
 
@@ -196,7 +196,7 @@ Case drifting(double drift) {
 
 TEST(Unnamed, AnInstrumentThatDriftsIsNoPhysicsOfTheMachine) {
   auto data = drifting(0.002);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
   const auto& term = d.findings[0].term;

@@ -11,7 +11,7 @@
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/diagnosis/estimate/weighing.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -65,7 +65,7 @@ Case under_a_magnet(double strength, double steady) {
 TEST(Valley, ASteadyForceIsFoundBesideANumberThatNearlyDoesTheSame) {
   constexpr double steady = -0.2;
   auto data = under_a_magnet(0.000442, steady);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");
   EXPECT_EQ(d.findings[0].term.on, "v");

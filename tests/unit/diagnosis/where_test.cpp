@@ -12,7 +12,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/report/region.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/physics/library.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -90,7 +90,7 @@ TEST(Where, ASteadyRateThatMayActAtTwoStatesIsExplainedAndBothAreSaid) {
                      "outputs: {y: {column: y, expression: b}}\nnoise: {y: 0.002}\n"
                      "parameters: {k: {value: 1, sigma: 0.02}}\n"),
       {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "constant");

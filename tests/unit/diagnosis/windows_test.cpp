@@ -13,7 +13,7 @@
 #include "core/diagnosis/dataset/outliers.hpp"
 #include "core/diagnosis/estimate/weighing.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/search.hpp"
+#include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
 
@@ -64,7 +64,7 @@ const char* const mass =
 
 TEST(Windows, ADriftOfWhatIntegratesIsNoOtherParameter) {
   auto data = pushed_mass(0.0, 0.01, 1500).with(model_of(mass));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, 5U);
   EXPECT_TRUE(d.findings.empty()) << d.findings[0].term.info->name;
   // No farther off than what was believed, 3.1: that stays where other numbers do no better on windows that no fit saw.
@@ -74,7 +74,7 @@ TEST(Windows, ADriftOfWhatIntegratesIsNoOtherParameter) {
 
 TEST(Windows, TheAirsDragIsNamedWhereTheFreeRunDrifts) {
   auto data = pushed_mass(0.3, 0.0, 1500).with(model_of(mass));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "quadratic");
   EXPECT_EQ(d.findings[0].term.on, "v");
@@ -117,7 +117,7 @@ const char* const let_go =
 TEST(Windows, APendulumIsJudgedFromWhereItWasLetGoAndNotFromWhereItHangs) {
   auto data = make_case(model_of(let_go), swings({3.1, -2.9}, 3500));
   EXPECT_LE(rows_of(data), 6000);  // of 7000: what swings once a second is known from fewer
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, data.recordings.size());
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "linear");
@@ -147,7 +147,7 @@ TEST(Windows, ASlowLeakOfWhatAddsUpIsNamed) {
                       "outputs: {v: {column: y, expression: '3.2 + 0.9*soc - R*i'}}\nnoise: {v: 0.002}\n"
                       "parameters: {Q: {value: 71000, unit: A s, sigma: 3000}, R: {value: 0.01, unit: ohm, "
                       "sigma: 0.001}}\n"));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "linear") << summary(data, d);
   EXPECT_NEAR(d.findings[0].term.values[0], -leak, 0.3e-6);
@@ -171,7 +171,7 @@ TEST(Windows, WhatRunsAwayIsFollowedOverShortOnes) {
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: drive}\n"
       "states: {x: {derivative: 'a*x + u', initial: {value: 0, unit: m, sigma: 0.01}}}\n"
       "outputs: {way: {column: y, expression: x}}\nparameters: {a: {value: 1.9, unit: 1/s, sigma: 0.1}}\n"));
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, 5U);
   EXPECT_TRUE(d.findings.empty()) << d.findings[0].term.info->name;
   EXPECT_NEAR(d.retuned.model.value("a"), 2.0, 0.02);
@@ -232,7 +232,7 @@ Case led_axis(double friction, int lost = 0, const std::map<int, double>& slips 
 
 TEST(Windows, AnAxisWithoutControllerIsJudgedOverThem) {
   auto data = led_axis(3.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_GT(data.windows.count, 20U);
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "coulomb_friction") << summary(data, d);
@@ -242,7 +242,7 @@ TEST(Windows, AnAxisWithoutControllerIsJudgedOverThem) {
 
 TEST(Windows, AnAxisThatTheModelKnowsLacksNothing) {
   auto data = led_axis(0.0);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
 }
@@ -260,7 +260,7 @@ TEST(Windows, SlipsAreSeenWhereAWrongModelRunsAwaySmoothly) {
 
 TEST(Windows, WhatTheCurrentDidInAGapIsNotKnown) {
   auto data = led_axis(0.0, 2110);
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(data.windows.anew, 1U);
   EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
   EXPECT_LT(d.heldout[0].after, 1.3e-6);
@@ -294,7 +294,7 @@ TEST(Windows, AnAxisThatASpringHoldsHasNone) {
                "terms: [{term: position_stiffness, stiffness: {value: 900, unit: N/m, sigma: 9}, center: "
                "{value: 0, unit: m, sigma: 0}}]\n"),
       {table});
-  const auto d = search(data, [](double, const std::string&) {});
+  const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(data.windows.count, 0U);
   ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
   EXPECT_EQ(d.findings[0].term.info->name, "quadratic_drag");
@@ -333,7 +333,7 @@ TEST(Windows, WhatWentAnotherWayIsFoundFromShortOnes) {
                 "  g: {value: 20, unit: 1/s2, sigma: 0.6}\n"
                 "  c: {value: 0.9, unit: 1/s, sigma: 0.1}\n"
                 "  b: {value: 9.2, unit: 1/(kg m2), sigma: 0.3}\n"));
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_EQ(d.verdict, Verdict::parameters_only) << seed << summary(data, d);
     EXPECT_NEAR(d.best.model.value("b"), 11.0, 0.05) << seed;
   }
@@ -350,7 +350,7 @@ TEST(Windows, ANameThatOnlyLeadsOutOfAValleyIsNone) {
         "  g: {value: 25, unit: 1/s2, sigma: 0.75}\n"
         "  c: {value: 0.8, unit: 1/s, sigma: 0.13}\n"
         "  b: {value: 7, unit: 1/(kg m2), sigma: 0.35}\n"));
-    const auto d = search(data, [](double, const std::string&) {});
+    const auto d = diagnose(data, [](double, const std::string&) {});
     EXPECT_EQ(d.verdict, Verdict::parameters_only) << seed << summary(data, d);
     EXPECT_NEAR(d.best.model.value("g"), 20.0, 0.1) << seed;
   }
