@@ -15,8 +15,9 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/report/model_files.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/other_run.hpp"
+#include "core/diagnosis/search/assumed.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
+#include "core/diagnosis/search/other_run.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/library.hpp"
 #include "tools/command.hpp"
@@ -37,6 +38,7 @@ struct Options {
   std::vector<std::filesystem::path> recordings;
   std::filesystem::path out = "diagnosis";
   std::vector<std::filesystem::path> checks, check_outputs;
+  std::vector<std::string> assumed;
   bool fits_check_start = false;
   bool json = false;
   unsigned seed = 1;
@@ -128,6 +130,9 @@ int run(const Options& options) {
     checks.push_back(diagnosis::read_other_run(
         model, {options.checks[i], options.check_outputs.empty() ? "" : options.check_outputs[i],
                 options.fits_check_start}));
+  std::vector<diagnosis::Wanted> wanted;
+  for (const auto& text : options.assumed) wanted.push_back(diagnosis::wanted_of(text));
+  if (!wanted.empty()) diagnosis::check_wanted(data, wanted, "--assume");
   // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
   diagnosis::Options how;
   how.stopped = [&] {
@@ -142,6 +147,7 @@ int run(const Options& options) {
   line.clear();
   if (diagnosis.is_partial && !interrupted()) diagnosis.budget = options.budget;
   diagnosis::check_runs(data, diagnosis.best.model, 0.0, options.model);
+  if (!diagnosis.is_partial) diagnosis.assumed = diagnosis::fit_assumed(data, diagnosis, wanted);
   for (auto& run : checks) {
     diagnosis::compare(data, diagnosis, run);
     diagnosis.other_runs.push_back(std::move(run));
@@ -150,8 +156,7 @@ int run(const Options& options) {
   const auto page = diagnosis::page_text(data, diagnosis, options.model.string());
   patience.reset();
   diagnosis::ReportFolder folder{options.out};
-  const auto files =
-      diagnosis::model_files(yaml, model, options.model.filename().string(), data, diagnosis);
+  const auto files = diagnosis::model_files(yaml, model, options.model.filename().string(), data, diagnosis);
   folder.put("retuned.yaml", files.retuned);
   folder.put("patched.yaml", files.patched);
   folder.put("report.html", page);
@@ -217,6 +222,12 @@ void add_diagnose(CLI::App& program) {
                       "the outputs of each --check, where they lie in a file of their own");
   command->add_flag("--check-fits-start", options->fits_check_start,
                     "the first row of --check is a guess: each model starts where it comes nearest");
+  command
+      ->add_option(
+          "--assume", options->assumed,
+          "TERM or TERM:PLACE of the library, fitted beside the model's own numbers whatever is found; its "
+          "figures stand beside the finding's; may be repeated")
+      ->take_all();
   command->add_flag("--json", options->json, "print report.json instead of the summary");
   command
       ->add_option(

@@ -381,6 +381,24 @@ void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
       number(claim_margin_of(d.weighing)) + " and a gain on held-out data.");
 }
 
+/// Terms that the user named, beside what was found.
+void add_assumed(report::Page& page, const Case& data, const Diagnosis& d) {
+  if (d.assumed.empty()) return;
+  page.heading("Terms that you named (--assume)");
+  Names rows;
+  for (const auto& [finding, heldout] : d.assumed) {
+    std::string errors;
+    for (const auto& row : heldout)
+      if (!is_bare(row))
+        errors += (errors.empty() ? "" : "; ") + row.signal + " " + error_of(row.retuned, row) + " to " +
+                  error_of(row.after, row);
+    rows.push_back({readable(finding.term.info->name), place_of(data, finding.term),
+                    sizes_of(data, d, finding), errors});
+  }
+  page.table({"term", "where", "size", "error held out, retuned to with it"}, rows);
+  page.paragraph("Each stands alone on top of your retuned model, whether the recording asks for it or not.");
+}
+
 }  // namespace
 
 std::string page_text(const Case& data, const Diagnosis& d, const std::string& subject) {
@@ -448,6 +466,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
         "what was "
         "believed could pass for. Twice as much is seen.");
   }
+  add_assumed(page, data, d);
   page.heading("What remains, and what to do next");
   std::string with;
   for (const auto& one : d.unexplained_over) with += (with.empty() ? ", and goes with " : ", ") + one;

@@ -78,6 +78,12 @@ struct OtherRun {
   bool is_worse_with_them = false;  // patched.yaml would be, with the terms that are left out here
 };
 
+/// A term that the user named, fitted whatever the search made of it.
+struct Assumed {
+  Finding finding;  // term and sigmas alone
+  std::vector<FitRow> heldout;
+};
+
 enum class Verdict { no_mismatch, parameters_only, explained, partly_explained, ambiguous, unknown_physics };
 
 struct Diagnosis {
@@ -91,6 +97,7 @@ struct Diagnosis {
   std::vector<Detectable> detectable;
   std::vector<FitRow> heldout, train;
   std::vector<OtherRun> other_runs;
+  std::vector<Assumed> assumed;
   double unexplained = 1.0;  // residual over noise of the best model
   std::vector<std::string> unexplained_over;
   std::optional<Suspect> suspect;      // of unknown physics that has no curve either

@@ -57,7 +57,12 @@ std::string summary(const Case& data, const Diagnosis& d) {
   rows.clear();
   add_fit(rows, "error held out", d.heldout);
   for (const auto& run : d.other_runs) add_fit(rows, "in " + run.name, run.fit);
+  for (const auto& assumed : d.assumed)
+    add_fit(rows, readable(assumed.finding.term.info->name) + " assumed", assumed.heldout);
   out += aligned(rows);
+  for (const auto& [finding, heldout] : d.assumed)
+    out += "  assumed: " + readable(finding.term.info->name) + ", " + place_of(data, finding.term) + ": " +
+           sizes_of(data, d, finding) + "\n";
   std::string considered;
   for (std::size_t i = 0; i < d.rejected.size() && i < 5; ++i)
     considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;

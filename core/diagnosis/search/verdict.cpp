@@ -284,6 +284,21 @@ void keep_to_noise(const Case& data, Diagnosis& d) {
 
 }  // namespace
 
+void give_sigmas(const Case& data, Diagnosis& d) {
+  if (!d.is_partial) d.best.sigma = sigma_over_blocks(data, d.weighing, d.best);
+  for (std::size_t i = 0; i < d.findings.size(); ++i) {
+    auto& finding = d.findings[i];
+    const std::size_t place = data.model.terms.size() + i;
+    finding.term = d.best.model.terms[place];
+    finding.sigmas.assign(finding.term.info->parameter_count(), 0.0);
+    for (std::size_t k = 0; k < d.best.free.size(); ++k) {
+      const auto& f = d.best.free[k];
+      if (f.where == Freedom::Where::term && f.term == place)
+        finding.sigmas[f.index] = d.best.sigma(static_cast<Eigen::Index>(k));
+    }
+  }
+}
+
 void conclude(const Case& data, Diagnosis& d) {
   auto followed = followed_share(data, d.best);
   // Beside a name that is right little is left; without one, noise may wander far.
@@ -299,7 +314,7 @@ void conclude(const Case& data, Diagnosis& d) {
                           ? excess_over_noise(data, d.best)
                           : std::vector<double>(data.outputs.size(), 0.0);
   d.parameter_excursion = excursion_of(d.best);
-  if (!d.is_partial) d.best.sigma = sigma_over_blocks(data, d.weighing, d.best);
+  give_sigmas(data, d);
   std::vector<double> rests;
   const std::size_t given = data.model.terms.size();
   const auto beyond_best = [&](const physics::Model& model) {
@@ -310,13 +325,6 @@ void conclude(const Case& data, Diagnosis& d) {
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
     const std::size_t place = given + i;
-    finding.term = d.best.model.terms[place];
-    finding.sigmas.assign(finding.term.info->parameter_count(), 0.0);
-    for (std::size_t k = 0; k < d.best.free.size(); ++k) {
-      const auto& f = d.best.free[k];
-      if (f.where == Freedom::Where::term && f.term == place)
-        finding.sigmas[f.index] = d.best.sigma(static_cast<Eigen::Index>(k));
-    }
     // What is lost without it.
     const auto without = physics::without_term(d.best.model, place);
     const double lost = beyond_best(without);
