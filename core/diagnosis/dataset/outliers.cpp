@@ -35,10 +35,44 @@ std::vector<double> off_lines(const std::vector<double>& values) {
   return off;
 }
 
-/// Which are alone far from zero; nothing where most are zero.
+/// By row, what one count of the converter is about its reading; 0 where readings are not in counts. Each converter has a
+/// finest step, of which all readings are multiples. One that is bent afterwards (a thermistor's) has steps that change
+/// along its range: there the steps between the values nearest to a reading count, where most values were read again.
+std::vector<double> counts_of(const std::vector<double>& values) {
+  constexpr double of_rounding = 1e-9;  // of the range: two roundings of one number
+  std::vector<double> levels = values;
+  std::sort(levels.begin(), levels.end());
+  const double same = of_rounding * (levels.back() - levels.front());
+  levels.erase(std::unique(levels.begin(), levels.end(), [&](double a, double b) { return b - a <= same; }),
+               levels.end());
+  if (levels.size() < 3) return std::vector<double>(values.size(), 0.0);
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < levels.size(); ++k) steps.push_back(levels[k] - levels[k - 1]);
+  const double finest = *std::min_element(steps.begin(), steps.end());
+  constexpr double of_a_step = 1e-3;  // how near a whole number of steps is
+  const bool even = std::all_of(steps.begin(), steps.end(), [&](double step) {
+    return std::abs(step / finest - std::round(step / finest)) < of_a_step * std::max(1.0, step / finest);
+  });
+  if (even || 2 * levels.size() > values.size())
+    return std::vector<double>(values.size(), even ? finest : 0.0);
+  constexpr std::size_t reach = 5;  // steps to each side: a slip far from all others does not make its own
+  std::vector<double> counts;
+  for (const double value : values) {
+    const auto at = static_cast<std::size_t>(std::lower_bound(levels.begin(), levels.end(), value - same) -
+                                             levels.begin());
+    const std::size_t a = at < reach ? 0 : at - reach, b = std::min(steps.size(), at + reach);
+    counts.push_back(median(
+        {steps.begin() + static_cast<std::ptrdiff_t>(a), steps.begin() + static_cast<std::ptrdiff_t>(b)}));
+  }
+  return counts;
+}
+
+/// Which are alone far from zero; nothing where most are zero. A step of two counts, and half of one for the rounding of what
+/// it is compared with, is how a converter reads: `counts` by row.
 std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off, double scale,
-                                                 bool is_time_series) {
+                                                 bool is_time_series, const std::vector<double>& counts) {
   if (!(scale > 0.0)) return std::nullopt;
+  constexpr double read_alike = 2.5;  // counts
   const double limit = (is_time_series ? 6.0 : 5.0) * scale;
   // A neighbour that is off to the same side, and not by next to nothing against it, makes it a narrow effect and no
   // lone value.
@@ -46,14 +80,16 @@ std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off,
     return is_time_series && j < off.size() &&
            off[j] * std::copysign(1.0, off[i]) > std::max(0.5 * limit, 0.2 * std::abs(off[i]));
   };
+  const auto is_far = [&](std::size_t i) {
+    return std::abs(off[i]) > std::max(limit, read_alike * counts[i]);
+  };
   std::vector<std::size_t> lone;
   for (std::size_t i = 0; i < off.size(); ++i)
-    if (std::abs(off[i]) > limit && !beside(i, i - 1) && !beside(i, i + 1)) lone.push_back(i);
+    if (is_far(i) && !beside(i, i - 1) && !beside(i, i + 1)) lone.push_back(i);
   // Where many are alone, some fall beside another by chance; no more of them than that.
   std::vector<std::size_t> pairs;
   for (std::size_t i = 1; i + 2 < off.size(); ++i)
-    if (std::abs(off[i]) > limit && std::abs(off[i + 1]) > limit && beside(i, i + 1) && !beside(i, i - 1) &&
-        !beside(i + 1, i + 2))
+    if (is_far(i) && is_far(i + 1) && beside(i, i + 1) && !beside(i, i - 1) && !beside(i + 1, i + 2))
       pairs.push_back(i);
   const auto alone = static_cast<double>(lone.size());
   const double expected = 0.5 * alone * alone / static_cast<double>(off.size());
@@ -148,6 +184,27 @@ double wider_scale(std::vector<double> off) {
   return *at / 1.645;
 }
 
+/// The first or the last value, where the step to its neighbour is far longer than any other of the series: a row of another
+/// run. At an end there is no neighbour on the other side to say so.
+std::vector<std::size_t> ends_apart(const std::vector<double>& values) {
+  constexpr double far = 5.0;  // times the longest other step
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < values.size(); ++i) steps.push_back(std::abs(values[i] - values[i - 1]));
+  const double longest = *std::max_element(steps.begin() + 1, steps.end() - 1);
+  std::vector<std::size_t> ends;
+  if (steps.front() > far * longest) ends.push_back(0);
+  if (steps.back() > far * longest) ends.push_back(values.size() - 1);
+  return ends;
+}
+
+void drop(Case& data, std::vector<double>& measured, const std::vector<std::size_t>& rows,
+          const std::vector<std::size_t>& places) {
+  for (const std::size_t i : places) {
+    data.count.outliers += std::isfinite(measured[rows[i]]) ? 1U : 0U;
+    measured[rows[i]] = nothing;
+  }
+}
+
 }  // namespace
 
 void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
@@ -156,34 +213,36 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
     for (std::size_t o = 0; o < data.outputs.size(); ++o) {
       auto& measured = recording.measured[o];
       std::vector<std::size_t> rows;
-      std::vector<double> residual;
+      std::vector<double> residual, read;
       for (std::size_t i = 0; i < measured.size(); ++i)
         if (std::isfinite(measured[i])) {
           rows.push_back(i);
           residual.push_back(measured[i] - simulated[r][o][i]);
+          read.push_back(measured[i]);
         }
       if (residual.size() < 20) continue;
+      const auto plant = data.model.plant;
+      const bool is_row_by_row = is_static(plant), is_swept = is_row_by_row && data.is_time_series;
+      if (!is_row_by_row) drop(data, measured, rows, ends_apart(residual));
+      const auto counts = counts_of(read);
       // Against the median of its neighbourhood, on the scale of all such differences.
       auto off = off_median(residual, data.is_time_series ? 3 : 40);
-      auto lone = far_from(off, robust_sigma(off), data.is_time_series);
+      auto lone = far_from(off, robust_sigma(off), data.is_time_series, counts);
       // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
       // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
-      const auto plant = data.model.plant;
-      const bool is_row_by_row = is_static(plant), is_swept = is_row_by_row && data.is_time_series;
-      if ((are_too_many() && (plant == physics::Plant::equations || plant == physics::Plant::axis)) ||
-          (!lone && is_swept)) {
+      if ((are_too_many() && !is_row_by_row) || (!lone && is_swept)) {
         off = off_lines(residual);
-        lone = far_from(off, robust_sigma(off), true);
+        lone = far_from(off, robust_sigma(off), true, counts);
         if (are_too_many() && !is_row_by_row) continue;
       }
       if (!lone) continue;
       if (is_swept) forget_continued(*lone, residual, off);
-      if (are_too_many() && is_row_by_row) lone = far_from(off, wider_scale(off), data.is_time_series);
+      if (are_too_many() && is_row_by_row)
+        lone = far_from(off, wider_scale(off), data.is_time_series, counts);
       if (lone && is_row_by_row) keep_effects(*lone, off, recorded_at(data, r, rows));
       if (!lone) continue;
-      for (const std::size_t i : *lone) measured[rows[i]] = nothing;
-      data.count.outliers += lone->size();
+      drop(data, measured, rows, *lone);
     }
   }
 }

@@ -9,6 +9,7 @@
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/dataset/outliers.hpp"
 #include "core/diagnosis/estimate/weighing.hpp"
+#include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -120,6 +121,84 @@ TEST(Outliers, OfAModelThatRemembersAreSeenOnceItsNumbersAreNear) {
   const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::parameters_only);
   EXPECT_EQ(dropped(data), std::set<std::size_t>{180});
+}
+
+/// A vessel that leaks, read by a converter: `read` makes counts of what is there.
+template <class Read>
+Case leaking(Read read, const std::set<std::size_t>& slipped, double slip) {
+  recording::Table table;
+  std::vector<double> time, pressure;
+  for (std::size_t k = 0; k < 1400; ++k) {
+    time.push_back(0.02 * static_cast<double>(k));
+    pressure.push_back(read(7.5 * std::exp(-0.17 * time.back()), k) + (slipped.contains(k) ? slip : 0.0));
+  }
+  table.add("t", "s", time);
+  table.add("p", "bar", pressure);
+  return make_case(
+      test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\n"
+                     "states: {p: {derivative: '-k*p', initial: {value: 7.5, unit: bar, sigma: 0.05}}}\n"
+                     "outputs: {pressure: {column: p, expression: p}}\n"
+                     "parameters: {k: {value: 0.16, unit: 1/s, sigma: 0.05}}\n"),
+      {table});
+}
+
+TEST(Outliers, AreNotStepsOfOneOrTwoCounts) {
+  std::mt19937 random{35};
+  std::uniform_int_distribution<int> flicker{-1, 1};
+  const std::set<std::size_t> rare{200, 640, 1100};
+  const auto even = [&](double count) {
+    return [&, count](double value, std::size_t k) {
+      return count * (std::round(value / count) + (k % 9 == 0 ? flicker(random) : 0));
+    };
+  };
+  // The steps of a thermistor's converter grow along its range.
+  const auto bent = [&](double value, std::size_t k) {
+    return std::pow((std::round(std::sqrt(value) / 0.004) + (k % 9 == 0 ? flicker(random) : 0)) * 0.004, 2);
+  };
+  auto plain = leaking(even(0.001), {}, 0.0), slipped = leaking(even(0.001), rare, 0.02),
+       coarse = leaking(even(0.05), rare, 0.6), curved = leaking(bent, rare, 0.4);
+  for (auto* data : {&plain, &slipped, &coarse, &curved}) drop_outliers(*data, simulate(*data, data->model));
+  EXPECT_THAT(dropped(plain), testing::IsEmpty());
+  EXPECT_EQ(dropped(slipped), rare);
+  EXPECT_EQ(dropped(coarse), rare);
+  EXPECT_EQ(dropped(curved), rare);
+}
+
+TEST(Outliers, OfATwentiethOfAllRowsAreSaid) {
+  auto data = leaking([](double value, std::size_t) { return value; }, {}, 0.0);
+  Diagnosis d;
+  d.best.model = data.model;
+  data.count.outliers = 69;  // of 1400
+  EXPECT_THAT(beside_the_verdict(data, d), testing::Not(testing::HasSubstr("outliers")));
+  data.count.outliers = 70;
+  EXPECT_THAT(beside_the_verdict(data, d),
+              testing::HasSubstr("70 of 1400 readings are left out as outliers"));
+}
+
+TEST(Outliers, TheLastRowMayBeOfAnotherRun) {
+  // A heated body in steps of its converter: most readings are the median of their neighbours.
+  recording::Table table;
+  std::vector<double> time, power, read;
+  double temperature = 20.0;
+  for (std::size_t k = 0; k < 600; ++k) {
+    time.push_back(static_cast<double>(k));
+    power.push_back(0.5);
+    read.push_back(0.25 * std::round(temperature / 0.25));
+    temperature += 0.5 / 12.0 - (temperature - 20.0) / 1200.0;
+  }
+  read.back() = 20.0;
+  table.add("t", "s", time);
+  table.add("heater", "", power);
+  table.add("T", "degC", read);
+  table.add("room", "degC", std::vector<double>(600, 20.0));
+  auto data = make_case(
+      test::model_of(
+          "invar_model: 1\nplant: thermal\ncolumns: {time: t}\n"
+          "nodes: {body: {column: T, capacity: {value: 12, unit: J/K}, loss: {value: 0.01, unit: W/K}}}\n"
+          "heaters: {pad: {node: body, column: heater, gain: {value: 1, unit: W/W}}}\nambient: room\n"),
+      {table});
+  drop_outliers(data, simulate(data, data.model));
+  EXPECT_EQ(dropped(data), std::set<std::size_t>{599});
 }
 
 TEST(Outliers, AreNotTheFewDropsOnWhichAnEffectActs) {
