@@ -23,7 +23,7 @@ namespace invar::compensation {
 
 /// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, grown to the slide's
 /// temperature where its calibration found an expansion (or error motions measured one by one, which may depend on
-/// temperatures), and for each axis a model over position and temperature of what the geometric one leaves.
+/// temperatures), with half the reversal of each axis to the side that it last moved from, and for each axis a model over position and temperature of what the geometric one leaves.
 ///
 /// A model is staged (loaded, checked and compiled by a thread of its own, never by the loop), activated and rolled back by
 /// command. What a change would make the correction jump is eased in at `rate_limit`. Changes made in a transaction are
@@ -135,6 +135,7 @@ class Compensation final : public Component {
   [[nodiscard]] double kelvin_in_doubt(Instant at, unsigned zones) const noexcept;
   [[nodiscard]] Eigen::Vector3d geometric_sigma(Instant at) const noexcept;
   [[nodiscard]] double thermal_sigma(const LiveModel& model, double x, Instant at) const noexcept;
+  void follow_motion(const Eigen::Vector3d& velocity) noexcept;
   void correct(const Tick& tick) noexcept;
   void publish(const Tick& tick, const Layers& layers, const Eigen::Vector3d& before) noexcept;
 
@@ -155,6 +156,8 @@ class Compensation final : public Component {
   ModelStatus reply_;
 
   Eigen::Vector3d setpoint_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d moving_ =
+      Eigen::Vector3d::Zero();  // sense of each axis' last motion: +1, -1, 0 before the first
   Eigen::Vector3d applied_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d easing_ = Eigen::Vector3d::Zero();  // what a change still has to go, on top of the layers
   bool blind_ = true;                                 // no setpoints: the last correction holds

@@ -142,7 +142,8 @@ void Compensation::follow_temperature(const Tick& tick) noexcept {
 
 Compensation::Layers Compensation::corrections(const Eigen::Vector3d& at) const noexcept {
   Layers layers;
-  if (active_.geometric != nullptr) layers.geometric = -active_.geometric->error(at);
+  if (active_.geometric != nullptr)
+    layers.geometric = -active_.geometric->error(at) - active_.geometric->reversal(at, moving_);
   if (expands() && has_temperature())
     layers.geometric -= active_.geometric->expanding.expansion_at(at, expanded_to_);
   for (std::size_t i = 0; i < axes_.size(); ++i)
@@ -197,14 +198,25 @@ double Compensation::thermal_sigma(const LiveModel& model, double x, Instant at)
   return std::hypot(model.thermal->sigma(x), model.slope_temperature * doubt);
 }
 
+/// An axis that turns loses its motion at once; the correction follows at `rate_limit`.
+void Compensation::follow_motion(const Eigen::Vector3d& velocity) noexcept {
+  Eigen::Vector3d moving = moving_;
+  for (int k = 0; k < 3; ++k)
+    if (velocity[k] != 0.0) moving[k] = velocity[k] > 0.0 ? 1.0 : -1.0;
+  if (moving == moving_) return;
+  ease([&] { moving_ = moving; });
+}
+
 void Compensation::correct(const Tick& tick) noexcept {
   bool stale = false;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < axes_.size(); ++i) {
     const auto* state = axes_[i]->state.latest();
     stale =
         stale || state == nullptr || axes_[i]->state.age(tick.now) > Duration::seconds(20.0 * tick.period);
     if (state == nullptr) continue;
     setpoint_[static_cast<Eigen::Index>(i)] = state->setpoint_position();
+    velocity[static_cast<Eigen::Index>(i)] = state->setpoint_velocity();
     // Whoever corrected before, this or another process: go on from where the axis stands.
     if (blind_) applied_[static_cast<Eigen::Index>(i)] = state->correction();
   }
@@ -215,6 +227,7 @@ void Compensation::correct(const Tick& tick) noexcept {
     blind_ = true;
     clamped_ = false;
   } else {
+    follow_motion(velocity);
     layers = wanted(setpoint_);
     if (blind_) easing_ = applied_ - layers.sum();
     blind_ = false;

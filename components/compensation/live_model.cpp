@@ -276,7 +276,10 @@ void load_live_model(const std::filesystem::path& file, const ModelLimits& limit
     live.refusal = refusal_of_machine(model.chain, model.travel, limits);
     if (live.refusal.empty())
       live.refusal = refusal_of_field(
-          model.chain, model.travel, [&](const Eigen::Vector3d& p) { return live.geometric->error(p); },
+          model.chain, model.travel,
+          [&](const Eigen::Vector3d& p) -> Eigen::Vector3d {
+            return live.geometric->error(p) + model.reversal_at(p, Eigen::Vector3d::Ones());
+          },
           [&](const Eigen::Vector3d& p) { return live.geometric->sigma(p); }, limits);
   } else if (kind == "components") {
     read_components_into(live, yaml, limits);

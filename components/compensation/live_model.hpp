@@ -43,7 +43,7 @@ struct LiveModel {
   std::string text;  // the file, byte for byte
 
   std::optional<metrology::VolumetricTable> geometric;
-  metrology::GeometricModel expanding;  // what `geometric` was compiled from, for its growth by temperature
+  metrology::GeometricModel expanding;  // what `geometric` was compiled from, for its growth and its reversal
   bool expands = false;
 
   std::optional<metrology::ComponentTables> components;  // in the place of `geometric`
@@ -54,6 +54,12 @@ struct LiveModel {
   /// [m], of a volumetric model, without its expansion. Real-time, as the others.
   [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position) const noexcept {
     return components ? components->error(position) : geometric->error(position);
+  }
+  /// What the sense of each axis' last motion adds to it: `moving` +1, -1, or 0 for the mean.
+  [[nodiscard]] Eigen::Vector3d reversal(const Eigen::Vector3d& position,
+                                         const Eigen::Vector3d& moving) const noexcept {
+    return components ? components->model().reversal_at(position, moving)
+                      : expanding.reversal_at(position, moving);
   }
   [[nodiscard]] Eigen::Vector3d sigma(const Eigen::Vector3d& position) const noexcept {
     return components ? components->sigma(position) : geometric->sigma(position);

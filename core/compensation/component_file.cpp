@@ -29,6 +29,7 @@ void write_components(ModelText& text, const ComponentNetworks& model) {
   write_chain(text, model.chain, model.travel, model.tool);
   text.text("outside", "end values are held");
   write_squareness(text, model.squareness, model.squareness_sigma);
+  write_reversal(text, model.reversal);
   if (!model.states.empty()) {
     text.comment("What components depend on beside the position, from 0 on: degC, a heating rate in K/s.");
     text.open_list("states");
@@ -57,6 +58,7 @@ ComponentNetworks read_components(const config::Node& root) {
   for (const char* key : {"identified_from", "outside"}) root[key].accept_all();
   read_chain(root, model.chain, model.travel, model.tool);
   read_squareness(root, model.squareness, model.squareness_sigma);
+  if (root["reversal"].exists()) read_reversal(root, model.chain, model.travel, model.reversal);
   for (const auto& node : root["states"].children()) {
     metrology::MachineState state{node.text("name"), {}};
     const auto ends = exactly(node.required("range"), 2, "1");

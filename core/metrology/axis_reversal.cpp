@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "core/numerics/gaussian_prior.hpp"
 
@@ -180,6 +181,74 @@ double ReversalCurve::mean() const noexcept {
   for (int i = 0; i < places; ++i)
     sum += value(spline.interval().lower + (i + 0.5) / places * spline.interval().width());
   return sum / places;
+}
+
+Eigen::Vector3d reversal_at(const std::array<ReversalCurve, 3>& reversal, const Eigen::Vector3d& position,
+                            const Eigen::Vector3d& moving) noexcept {
+  Eigen::Vector3d result;
+  for (int k = 0; k < 3; ++k) result[k] = 0.5 * moving[k] * reversal[index(k)].value(position[k]);
+  return result;
+}
+
+Eigen::Vector3d reversal_sigma_at(const std::array<ReversalCurve, 3>& reversal,
+                                  const Eigen::Vector3d& position, const Eigen::Vector3d& moving) noexcept {
+  Eigen::Vector3d result = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k)
+    if (moving[k] != 0.0) result[k] = 0.5 * std::abs(moving[k]) * reversal[index(k)].sigma_at(position[k]);
+  return result;
+}
+
+ReversalCurve reversal_of_readings(const Eigen::VectorXd& position, const Eigen::VectorXd& value,
+                                   const std::vector<int>& direction, Range travel) {
+  constexpr double cell = 1e-7;  // m, readings nearer than this are of one place
+  struct Place {
+    double at = 0.0;
+    std::array<double, 2> sum{}, square{}, count{};
+  };
+  std::map<long, Place> places;
+  for (Eigen::Index i = 0; i < position.size(); ++i) {
+    Place& one = places[std::lround(position[i] / cell)];
+    const std::size_t way = direction[static_cast<std::size_t>(i)] > 0 ? 0 : 1;
+    one.at = position[i];
+    one.sum[way] += value[i];
+    one.square[way] += value[i] * value[i];
+    one.count[way] += 1.0;
+  }
+  double scatter = 0.0;
+  double degrees = 0.0;
+  std::vector<Place> both;
+  for (const auto& [key, one] : places) {
+    for (std::size_t way = 0; way < 2; ++way) {
+      if (one.count[way] < 2.0) continue;
+      scatter += one.square[way] - one.sum[way] * one.sum[way] / one.count[way];
+      degrees += one.count[way] - 1.0;
+    }
+    if (one.count[0] > 0.0 && one.count[1] > 0.0) both.push_back(one);
+  }
+  if (both.empty()) return {};
+  // Without repeats the differences of neighbouring places say how far they scatter.
+  const auto lost = [](const Place& one) { return one.sum[0] / one.count[0] - one.sum[1] / one.count[1]; };
+  if (degrees < 1.0)
+    for (std::size_t i = 1; i < both.size(); ++i) {
+      scatter += 0.25 * std::pow(lost(both[i]) - lost(both[i - 1]), 2);
+      degrees += 1.0;
+    }
+  const double variance = std::max(scatter / std::max(degrees, 1.0), 1e-20);
+  CondensedLine line;
+  line.beam.start = {travel.lower, 0.0, 0.0};
+  line.beam.direction = {1.0, 0.0, 0.0};
+  line.beam.length = travel.width();
+  const auto count = static_cast<Eigen::Index>(both.size());
+  line.reversal.places.resize(count);
+  line.reversal.information = Eigen::MatrixXd::Zero(count, count);
+  line.reversal.weighted.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Place& one = both[static_cast<std::size_t>(i)];
+    line.reversal.places[i] = one.at - travel.lower;
+    line.reversal.information(i, i) = 1.0 / (variance * (1.0 / one.count[0] + 1.0 / one.count[1]));
+    line.reversal.weighted[i] = line.reversal.information(i, i) * lost(one);
+  }
+  return axis_reversals({line}, {{0, 1, 2}, 1}, {travel, travel, travel})[0];
 }
 
 ReversalCurve constant_reversal(Range travel, double value, double sigma) {

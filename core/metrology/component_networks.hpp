@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/range.hpp"
+#include "core/metrology/axis_reversal.hpp"
 #include "core/metrology/volumetric.hpp"
 #include "core/numerics/rbf_network.hpp"
 
@@ -54,6 +55,7 @@ struct ComponentNetworks {
   Squareness squareness_sigma{};
   std::vector<MachineState> states;
   std::array<std::optional<ComponentNetwork>, component_count> components;  // none: zero
+  std::array<ReversalCurve, 3> reversal;  // of positioning, half to either side; empty where one way was read
 
   [[nodiscard]] ErrorMotions motions(const Eigen::Vector3d& position, std::span<const double> state) const;
   /// Actual minus commanded position [m] of a tool at a state of the machine, to first order with exact axis directions;
@@ -64,6 +66,15 @@ struct ComponentNetworks {
   /// Real-time.
   [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position, const Eigen::Vector3d& tool_offset,
                                          std::span<const double> state) const noexcept;
+  /// What the sense of the last motion adds to `error` [m], and its standard deviation: as in `GeometricModel`. Real-time.
+  [[nodiscard]] Eigen::Vector3d reversal_at(const Eigen::Vector3d& position,
+                                            const Eigen::Vector3d& moving) const noexcept {
+    return metrology::reversal_at(reversal, position, moving);
+  }
+  [[nodiscard]] Eigen::Vector3d reversal_sigma_at(const Eigen::Vector3d& position,
+                                                  const Eigen::Vector3d& moving) const noexcept {
+    return metrology::reversal_sigma_at(reversal, position, moving);
+  }
   /// Whether every state lies within the calibration. Real-time.
   [[nodiscard]] bool knows(std::span<const double> state) const noexcept;
 };

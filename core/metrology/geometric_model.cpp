@@ -88,19 +88,12 @@ Eigen::Vector3d GeometricModel::sigma_at(const Eigen::Vector3d& position,
 
 Eigen::Vector3d GeometricModel::reversal_at(const Eigen::Vector3d& position,
                                             const Eigen::Vector3d& moving) const noexcept {
-  Eigen::Vector3d result = Eigen::Vector3d::Zero();
-  for (int k = 0; k < 3; ++k)
-    if (chain.has(k)) result[k] = 0.5 * moving[k] * reversal[index(k)].value(position[k]);
-  return result;
+  return metrology::reversal_at(reversal, position, moving);
 }
 
 Eigen::Vector3d GeometricModel::reversal_sigma_at(const Eigen::Vector3d& position,
                                                   const Eigen::Vector3d& moving) const noexcept {
-  Eigen::Vector3d result = Eigen::Vector3d::Zero();
-  for (int k = 0; k < 3; ++k)
-    if (chain.has(k) && moving[k] != 0.0)
-      result[k] = 0.5 * std::abs(moving[k]) * reversal[index(k)].sigma_at(position[k]);
-  return result;
+  return metrology::reversal_sigma_at(reversal, position, moving);
 }
 
 Eigen::Vector3d GeometricModel::expansion_at(const Eigen::Vector3d& position,

@@ -114,8 +114,8 @@ struct Wanted {
 
 class Reader {
  public:
-  Reader(const std::filesystem::path& file, Wanted wanted)
-      : file_{file}, wanted_{std::move(wanted)}, lines_{file} {
+  Reader(const std::filesystem::path& file, Wanted wanted, std::vector<std::string> known = {})
+      : file_{file}, wanted_{std::move(wanted)}, known_{std::move(known)}, lines_{file} {
     table_.file = file;
   }
 
@@ -160,6 +160,12 @@ class Reader {
   }
 
   /// The header, and as many lines behind it as tell the form; empty where there is none.
+  /// Is it the header behind a preamble?
+  [[nodiscard]] bool names_known(std::string_view line) const {
+    return std::any_of(known_.begin(), known_.end(),
+                       [&](const std::string& name) { return line.find(name) != std::string_view::npos; });
+  }
+
   std::vector<NumberedLine> first_lines() {
     constexpr std::size_t enough = 40, bytes = 1U << 20U;
     std::vector<NumberedLine> first;
@@ -175,6 +181,10 @@ class Reader {
       }
       size += line.size();
       first.push_back(std::move(one));
+      if (names_known(first.back().text) && !behind_) {
+        behind_ = true;
+        first.erase(first.begin(), first.end() - 1);
+      }
     }
     return first;
   }
@@ -296,6 +306,8 @@ class Reader {
   };
   std::filesystem::path file_;
   Wanted wanted_;
+  std::vector<std::string> known_;  // names of columns that a header behind a preamble has
+  bool behind_ = false;
   TextLines lines_;
   Table table_;
   TableForm form_;
@@ -311,6 +323,12 @@ class Reader {
 
 Table Table::read(const std::filesystem::path& file, const std::vector<std::string>& text_columns) {
   return Reader{file, {text_columns, std::nullopt}}.run();
+}
+
+Table Table::read_behind_preamble(const std::filesystem::path& file,
+                                  const std::vector<std::string>& text_columns,
+                                  const std::vector<std::string>& known) {
+  return Reader{file, {text_columns, std::nullopt}, known}.run();
 }
 
 Table Table::read_columns(const std::filesystem::path& file, const std::vector<std::string>& wanted) {

@@ -31,6 +31,10 @@ class Table {
   /// no rows, a row has another number of cells, a name stands twice, or a cell
   /// of a number column is no number. Columns named in `text_columns` may hold texts; any other may not.
   static Table read(const std::filesystem::path& file, const std::vector<std::string>& text_columns = {});
+  /// The same where lines of any kind may stand in front of the header: it is the first line that names one of `known`.
+  static Table read_behind_preamble(const std::filesystem::path& file,
+                                    const std::vector<std::string>& text_columns,
+                                    const std::vector<std::string>& known);
   /// The same of these columns alone, as far as they are there; the others may hold anything.
   static Table read_columns(const std::filesystem::path& file, const std::vector<std::string>& wanted);
 

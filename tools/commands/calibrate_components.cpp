@@ -31,6 +31,20 @@ struct Options {
   std::filesystem::path out;
 };
 
+/// Readings as the mean of both directions would be: half the reversal is taken from each, where it was read.
+metrology::ComponentReadings without_reversal(ComponentsResult& result, int component) {
+  metrology::ComponentReadings readings = *result.readings[index(component)];
+  if (readings.direction.empty() || !metrology::is_positioning(component)) return readings;
+  const int axis = metrology::axis_of(component);
+  metrology::ReversalCurve& curve = result.model.reversal[index(axis)];
+  curve = metrology::reversal_of_readings(readings.position, readings.value, readings.direction,
+                                          result.model.travel[index(axis)]);
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i)
+    readings.value[i] -=
+        0.5 * readings.direction[static_cast<std::size_t>(i)] * curve.value(readings.position[i]);
+  return readings;
+}
+
 /// ISO names of what no reading told: components of the machine's axes, and squareness.
 std::vector<std::string> not_measured(const metrology::ComponentNetworks& model) {
   std::vector<std::string> names;
@@ -115,6 +129,10 @@ nlohmann::json report_of(const ComponentsResult& result) {
     const auto& fit = *result.fits[index(c)];
     nlohmann::json depends = nlohmann::json::array();
     for (const std::size_t state : fit.component.states) depends.push_back(result.model.states[state].name);
+    if (const auto& curve = result.model.reversal[index(metrology::axis_of(c))];
+        metrology::is_positioning(c) && !curve.empty())
+      report["reversal"][std::string(1, metrology::axis_letters[index(metrology::axis_of(c))])] = {
+          {"mean", curve.mean()}, {"unit", "m"}};
     report["components"].push_back({{"name", metrology::iso_name(c)},
                                     {"unit", is_rotation(c) ? "rad" : "m"},
                                     {"depends_on", depends},
@@ -142,7 +160,7 @@ void calibrate(const Options& options) {
     const Progress progress{"fitting the error motions"};
     for (int c = 0; c < component_count; ++c) {
       if (!result.readings[index(c)]) continue;
-      result.fits[index(c)] = metrology::identify_component(*result.readings[index(c)]);
+      result.fits[index(c)] = metrology::identify_component(without_reversal(result, c));
     }
     drop_unused_states(result);
   }
@@ -160,6 +178,10 @@ void calibrate(const Options& options) {
               << si(fit.left_out, unit) << "; error " << si(rms_of_readings(fit, false), unit)
               << " RMS over those used, " << si(rms_of_readings(fit, true), unit) << " over all\n";
   }
+  for (int k = 0; k < 3; ++k)
+    if (const auto& curve = result.model.reversal[index(k)]; !curve.empty())
+      std::cout << "reversal of " << metrology::axis_letters[index(k)] << ": " << si(curve.mean(), "m")
+                << " in the mean over the travel\n";
   std::cout << "error over the travels " << si(result.field_rms, "m") << " RMS, known to "
             << si(result.field_sigma, "m") << '\n';
   for (const auto& note : result.notes) std::cout << "note: " << note << '\n';
@@ -177,7 +199,8 @@ void add_calibrate_components(CLI::App& group) {
       "Example: invar calibrate components --machine machine.yaml --readings components.csv --out result\n"
       "Rows: component (EXX .. ECZ, or EC0Y, EB0Z, EA0Z without a position), position [m] of its axis, "
       "translation [m]\n"
-      "or rotation [rad], and what it may depend on: temperature [degC], heating_rate [K/s], "
+      "or rotation [rad]; optional direction (1, -1), which tells the reversal; and what it may depend on: "
+      "temperature [degC], heating_rate [K/s], "
       "temperature_<zone> [degC].\n"
       "From displacement lines alone: invar calibrate geometric.");
   auto options = std::make_shared<Options>();
@@ -208,9 +231,14 @@ recording::Table predict_components(const config::Yaml& file, const recording::T
     const bool known = points.positions[i].allFinite() && points.tools[i].allFinite() &&
                        std::all_of(state.begin(), state.end(), [](double s) { return std::isfinite(s); });
     outside += known && !model.knows(state) ? 1U : 0U;
-    values.push_back(known ? FieldValue{model.error(points.positions[i], points.tools[i], state),
-                                        model.sigma_at(points.positions[i], points.tools[i], state)}
-                           : unknown_value());
+    const Eigen::Vector3d& moving = points.moving[i];
+    values.push_back(
+        known ? FieldValue{model.error(points.positions[i], points.tools[i], state) +
+                               model.reversal_at(points.positions[i], moving),
+                           (model.sigma_at(points.positions[i], points.tools[i], state).cwiseAbs2() +
+                            model.reversal_sigma_at(points.positions[i], moving).cwiseAbs2())
+                               .cwiseSqrt()}
+              : unknown_value());
   }
   if (outside > 0)
     std::cerr << "warning: " << outside << " of " << values.size()

@@ -1,4 +1,5 @@
 // `invar calibrate controller`: a geometric model in the forms that machine controllers read.
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -60,7 +61,16 @@ void export_model(const Options& options) {
                 << '\n';
     }
   }
-  if (any) write(options.out / "volcomp-isg.csv", isg_volumetric_csv(model, options.nodes, unidentified));
+  if (any) {
+    write(options.out / "volcomp-isg.csv", isg_volumetric_csv(model, options.nodes, unidentified));
+    if (std::any_of(model.reversal.begin(), model.reversal.end(),
+                    [](const auto& curve) { return !curve.empty(); })) {
+      write(options.out / "volcomp-isg-forward.csv",
+            isg_volumetric_csv(model, options.nodes, unidentified, 1));
+      write(options.out / "volcomp-isg-backward.csv",
+            isg_volumetric_csv(model, options.nodes, unidentified, -1));
+    }
+  }
   write(options.out / "skew.txt", skew_numbers(model, unidentified));
 }
 
@@ -71,9 +81,11 @@ void add_calibrate_controller(CLI::App& group) {
                                        "Write a geometric model in the forms that machine controllers read");
   command->footer(
       "Example: invar calibrate controller --model result/compensation.yaml --out controller\n"
-      "Writes a grid for ISG and TwinCAT CNC (ISG_CSV), one COMP_FILE an axis for LinuxCNC (COMP_FILE_TYPE = "
-      "0), and the\n"
-      "squareness as numbers for skew parameters. What no line told is left out, never zero.");
+      "Writes a grid for ISG and TwinCAT CNC (ISG_CSV): the mean of both directions and, where a reversal "
+      "was\n"
+      "measured, one for all axes moving forward and one for backward; one COMP_FILE an axis for LinuxCNC\n"
+      "(COMP_FILE_TYPE = 0) with both directions; and the squareness as numbers for skew parameters. What no line told is left out,\n"
+      "never zero.");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "compensation.yaml of kind geometric")->required();
   command->add_option("--out", options->out, "folder to write to")->required();

@@ -16,6 +16,7 @@
 #include "tools/geometric/field_points.hpp"
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/geometric/rotary.hpp"
 #include "tools/live/terminal.hpp"
 #include "tools/positive.hpp"
 
@@ -30,14 +31,21 @@ struct Options {
   std::string method = "full";
   double interval = 0.0;
   bool study = false;
+  std::vector<std::string> tolerances;
+  double device = 0.0;
+  double environment = -1.0;
 };
 
 void calibrate(const Options& options) {
+  if (const std::string axis = rotary_axis(options.machine); !axis.empty())
+    return test_rotary({options.machine, options.lines, options.out, axis, options.tolerances, options.device,
+                        std::max(options.environment, 0.0)});
   GeometricResult result;
+  result.tolerances = read_tolerances(options.tolerances, false);
   result.machine_file = options.machine;
   result.lines_file = options.lines;
   result.method = options.method;
-  result.machine = machine::load_machine(options.machine);
+  result.machine = machine::load_machine(options.machine, 1);
   result.input = read_lines(options.lines, result.machine, options.interval);
   metrology::IdentificationOptions how;
   how.method = options.method == "full" ? metrology::IdentificationMethod::full
@@ -51,6 +59,7 @@ void calibrate(const Options& options) {
   result.found = metrology::identify(result.machine, result.input.lines, how);
   if (watched) steer(std::cerr, clear_line);
   evaluate(result);
+  test_positioning(result, options.device, options.environment);
   if (options.study) study_intervals(result);
 
   compensation::ModelText text{"geometric", {options.machine, options.lines}};
@@ -77,12 +86,19 @@ void add_calibrate_geometric(CLI::App& group) {
       "temperature [degC], tool_x [m] ... [mm], [um], ... are converted. `invar calibrate plan` proposes "
       "which to "
       "measure.\n"
+      "Instead of displacement: deviation [um] (reading minus nominal), or Renishaw's .rtl or .pos. Lines "
+      "read at\n"
+      "each target more than once also get the figures of ISO 230-2 (A, R, E, M, B); diagonals those of ISO "
+      "230-6.\n"
       "machine.yaml, the chain in the order of motion from the workpiece:\n"
       "  invar_machine: 1\n"
       "  chain: [y, x, z]\n"
       "  travel: {x: [0, 0.2], y: [0, 0.2], z: [-0.1, 0]}   # m; two axes for an XY table\n"
       "  tool: {x: 0, y: 0, z: -0.05}                       # m, from the last axis to the reflector; "
-      "optional");
+      "optional\n"
+      "One axis: chain: [x]. A rotary one, chain: [c] (or a, b): columns c [deg] and deviation [arcsec]; its "
+      "report\n"
+      "has the figures and no compensation.yaml.");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--lines", options->lines, "readings of displacement lines, .csv or .csv.gz")
@@ -96,6 +112,19 @@ void add_calibrate_geometric(CLI::App& group) {
       ->capture_default_str();
   command->add_option("--interval", options->interval, "use only readings at this interval along a line [m]")
       ->check(positive());
+  command->add_option("--tolerance", options->tolerances,
+                      "a figure of ISO 230-2 and its limit, \"A=10 um\": the report says pass or fail");
+  command
+      ->add_option(
+          "--device", options->device,
+          "standard uncertainty of the instrument's scale, its alignment and the axis' temperature [of 1]")
+      ->check(CLI::Range(0.0, 1e-2));
+  command
+      ->add_option(
+          "--environment", options->environment,
+          "standard uncertainty of what the surroundings move a reading by [m, rad]; without it the drift "
+          "at one point gives it")
+      ->check(CLI::Range(0.0, 1e-2));
   command->add_flag("--interval-study", options->study, "also report the accuracy at coarser data intervals");
   command->callback([options] { calibrate(*options); });
 }
@@ -121,7 +150,10 @@ recording::Table predict_geometric(const config::Yaml& model_file, const recordi
       values.push_back(unknown_value());
       continue;
     }
-    FieldValue value{model.error(position, tool), model.sigma_at(position, tool)};
+    FieldValue value{model.error(position, tool) + model.reversal_at(position, points.moving[i]),
+                     (model.sigma_at(position, tool).cwiseAbs2() +
+                      model.reversal_sigma_at(position, points.moving[i]).cwiseAbs2())
+                         .cwiseSqrt()};
     if (warmed) {
       value.error += model.expansion_at(position, (*temperature)[i]);
       const Eigen::Vector3d more = model.expansion_sigma_at(position, (*temperature)[i]);

@@ -31,6 +31,7 @@ bool is_state(const std::string& name) {
 
 struct Rows {
   std::vector<double> position, value;
+  std::vector<int> direction;
   std::vector<std::vector<double>> state;
 };
 
@@ -44,6 +45,7 @@ class Reader {
     if (!table_.has("translation") && !table_.has("rotation")) (void)table_.in("translation", "m");
     translation_ = table_.optionally_in("translation", "m");
     rotation_ = table_.optionally_in("rotation", "rad");
+    direction_ = table_.optionally_in("direction", "1");
     for (const auto& column : table_.columns) {
       if (!is_state(column.name)) continue;
       names_.push_back(column.name);
@@ -115,6 +117,11 @@ class Reader {
     Rows& rows = rows_[index(*found)];
     rows.position.push_back(position_[row]);
     rows.value.push_back(value(row, is_rotation(*found)));
+    if (direction_) {
+      if (!std::isfinite((*direction_)[row]) || (*direction_)[row] == 0.0)
+        refuse("direction", row, "is neither +1 nor -1", "give every reading the sense of its motion");
+      rows.direction.push_back((*direction_)[row] > 0.0 ? 1 : -1);
+    }
     rows.state.emplace_back();
     for (const auto& state : states_) rows.state.back().push_back(state[row]);
   }
@@ -138,6 +145,7 @@ class Reader {
     ComponentReadings readings;
     readings.position = vector_of(rows.position);
     readings.value = vector_of(rows.value);
+    readings.direction = rows.direction;
     readings.state.resize(static_cast<Eigen::Index>(states_.size()), readings.position.size());
     for (std::size_t i = 0; i < rows.state.size(); ++i)
       readings.state.col(static_cast<Eigen::Index>(i)) = vector_of(rows.state[i]);
@@ -161,7 +169,7 @@ class Reader {
   recording::Table table_;
   const metrology::Machine& machine_;
   std::vector<double> position_;
-  std::optional<std::vector<double>> translation_, rotation_;
+  std::optional<std::vector<double>> translation_, rotation_, direction_;
   std::vector<std::string> names_;
   std::vector<std::vector<double>> states_;
   std::vector<Range> ranges_;

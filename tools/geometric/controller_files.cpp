@@ -36,12 +36,14 @@ bool positioning_is_known(const metrology::GeometricModel& model, int axis,
 }
 
 std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count,
-                               const std::set<std::string>& unidentified) {
+                               const std::set<std::string>& unidentified, int moving) {
   std::ostringstream out;
   out << std::setprecision(12);
   out << "// Volumetric error by Invar: actual minus commanded position, mm; axes as measured (ISO 841).\n"
       << "// Tool offset of the calibration: " << 1e3 * model.tool.x() << ' ' << 1e3 * model.tool.y() << ' '
       << 1e3 * model.tool.z() << " mm. Compensation list: file_format ISG_CSV, interpolation GRID.\n";
+  out << (moving == 0 ? "// Mean of both directions.\n"
+                      : (moving > 0 ? "// Axes moving forward.\n" : "// Axes moving backward.\n"));
   if (model.reference_temperature)
     out << "// Holds at a machine temperature of " << *model.reference_temperature << " degC.\n";
   if (!unidentified.empty()) {
@@ -63,7 +65,8 @@ std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count
     for (int j = 0; j < nodes(1); ++j)
       for (int i = 0; i < nodes(0); ++i) {
         const Eigen::Vector3d position{at(0, i), at(1, j), at(2, l)};
-        const Eigen::Vector3d error = model.error(position, model.tool);
+        const Eigen::Vector3d error = model.error(position, model.tool) +
+                                      model.reversal_at(position, Eigen::Vector3d::Constant(moving));
         for (int k = 0; k < 3; ++k)
           if (model.chain.has(k)) out << 1e3 * position[k] << ' ';
         for (int k = 0; k < 3; ++k)
@@ -77,7 +80,7 @@ std::string linuxcnc_compensation(const metrology::GeometricModel& model, int ax
   std::ostringstream out;
   out << std::fixed << std::setprecision(6);
   const Range range = model.travel[index(axis)];
-  const int points = std::min(most_points, 4 * model.splines[index(axis)].intervals() + 1);
+  const int points = most_points;
   for (int i = 0; i < points; ++i) {
     Eigen::Vector3d position = home_of(model);
     position[axis] = range.lower + range.width() * i / (points - 1);

@@ -13,9 +13,10 @@ namespace invar::tools {
 
 /// ISG kernel and TwinCAT CNC (TF5280), file_format ISG_CSV: one record a node of a grid over the travels, `X Y Z EXX EYY
 /// EZZ` in mm, the error at the calibration's tool (actual minus commanded). `count` nodes an axis. `unidentified`: ISO names
-/// that the lines left open; an error along an axis of which no line told the positioning has no column.
+/// that the lines left open; an error along an axis of which no line told the positioning has no column. The format knows no
+/// direction: `moving` +1 or -1 writes the grid of all axes moving forward or backward, 0 the mean of both.
 std::string isg_volumetric_csv(const metrology::GeometricModel& model, int count,
-                               const std::set<std::string>& unidentified = {});
+                               const std::set<std::string>& unidentified = {}, int moving = 0);
 
 /// Whether the lines told the positioning of an axis: EXX of x.
 bool positioning_is_known(const metrology::GeometricModel& model, int axis,

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "core/base/fault.hpp"
 #include "core/metrology/components.hpp"
 
 namespace invar::tools {
@@ -23,6 +24,21 @@ FieldPoints read_points(const recording::Table& inputs, const Eigen::Vector3d& t
     };
     any = fill(letter, points.positions) || any;
     (void)fill("tool_" + letter, points.tools);
+  }
+  points.moving.assign(inputs.rows(), Eigen::Vector3d::Zero());
+  for (int k = 0; k < 3; ++k) {
+    const std::string own =
+        "direction_" + std::string(1, metrology::axis_letters[static_cast<std::size_t>(k)]);
+    const std::string name = inputs.has(own) ? own : "direction";
+    const auto values = inputs.optionally_in(name, "1");
+    for (std::size_t i = 0; values && i < values->size(); ++i) {
+      const double value = (*values)[i];
+      if (std::isnan(value)) continue;  // not told
+      if (value != 1.0 && value != 0.0 && value != -1.0)
+        throw InputError{inputs.file.string() + ": column `" + name + "`, row " + std::to_string(i + 1),
+                         "is no direction", "write 1, -1, or 0 for the mean of both"};
+      points.moving[i][k] = value;
+    }
   }
   if (!any) (void)inputs.in("x", "m");  // says what is missing
   return points;

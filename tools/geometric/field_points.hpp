@@ -11,6 +11,9 @@ namespace invar::tools {
 struct FieldPoints {
   std::vector<Eigen::Vector3d> positions;  // m; an axis without a column is at 0
   std::vector<Eigen::Vector3d> tools;      // m; `tool` where there is no column tool_x, tool_y, tool_z
+  /// Sense of each axis' last motion, +1 or -1, by the column `direction` of all, or direction_x, _y, _z; 0 without: the
+  /// error is then the mean of both.
+  std::vector<Eigen::Vector3d> moving;
 };
 FieldPoints read_points(const recording::Table& inputs, const Eigen::Vector3d& tool);
 

@@ -192,8 +192,13 @@ report::Page report_page(const GeometricResult& result) {
                  ", what no smooth model explains " + report::si(found.misfit, "m") + ".");
   if (const std::string words = temperature_words(result); !words.empty())
     page.paragraph("Temperature" + words.substr(std::string{"temperature"}.size()) + ".");
-  for (const auto& name : result.input.without_length)
-    page.callout("Line " + name + " has no length and was left out.", "warn");
+  if (const std::string words = wave_words(found); !words.empty())
+    page.paragraph("Periodic error, as of a screw: " + words +
+                   ". Each is in the curve of its axis' positioning.");
+  for (const auto& one : result.drifts)
+    page.paragraph("Drift at one point, line " + one.line + ": range " + report::si(one.range, "m") +
+                   ", end minus start " + report::si(one.end, "m") + ", in " + std::to_string(one.readings) +
+                   " readings (ISO 230-3).");
   for (const auto& name : result.input.repeated)
     page.callout("Line " + name + " holds the very readings of another line: it was left out.", "warn");
   if (result.input.far_off > 0)
@@ -207,10 +212,20 @@ report::Page report_page(const GeometricResult& result) {
   write_lines(page, result);
   page.heading("Components");
   write_components(page, result);
-  page.heading("Field");
-  page.plots(field_plots(found.model),
-             "At the middle of the axis that is not shown. The rigid motion of the plane, which "
-             "displacements cannot see, is taken out.");
+  std::vector<Plot> reversals;
+  for (int k = 0; k < 3; ++k)
+    if (!found.model.reversal[index(k)].empty()) reversals.push_back(reversal_plot(found.model, k));
+  if (!reversals.empty())
+    page.plots(std::move(reversals),
+               "Where an axis stands after moving forward, less where after moving backward, with the "
+               "two-sigma band. "
+               "Half of it lies to either side of the curves above.");
+  write_positioning(page, result.tests, result.tolerances);
+  if (found.model.chain.axes > 1)
+    page.plots(
+        field_plots(found.model),
+        "Error field at the middle of the axis that is not shown. The rigid motion of the plane, which "
+        "displacements cannot see, is taken out.");
   page.heading("Residuals");
   page.plot(residual_histogram(result));
   if (!result.intervals.empty()) {

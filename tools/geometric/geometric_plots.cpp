@@ -248,6 +248,19 @@ void draw_variance_left(report::Page& page, const metrology::Identifiability& kn
   page.bars("Share of the variance expected beforehand that the lines leave, standard deviation", bars);
 }
 
+Plot reversal_plot(const GeometricModel& model, int axis) {
+  const auto& curve = model.reversal[index(axis)];
+  Plot plot;
+  plot.title = "Reversal of " + letter(axis);
+  plot.x_label = letter(axis) + " [mm]";
+  plot.y_label = "forward minus backward [um]";
+  const Range range = curve.spline.interval();
+  report::add_curve(plot, {1e3 * range.lower, 1e3 * range.upper}, "", "#1f5fa8", [&](double mm) {
+    return report::CurvePoint{1e6 * curve.value(1e-3 * mm), 1e6 * curve.sigma_at(1e-3 * mm)};
+  });
+  return plot;
+}
+
 std::vector<Plot> field_plots(const GeometricModel& model) {
   std::vector<Plot> plots;
   for (int a = 0; a < 3; ++a)

@@ -18,6 +18,8 @@ void draw_variance_left(report::Page& page, const metrology::Identifiability& kn
 report::Plot component_plot(const GeometricResult& result, int component);
 /// Measured, fitted and predicted deviation along one line.
 report::Plot line_plot(const GeometricResult& result, std::size_t line);
+/// Lost motion of an axis over its position, with its two-sigma band.
+report::Plot reversal_plot(const metrology::GeometricModel& model, int axis);
 /// The error vectors over every plane of two axes, at the middle of the third, less the plane's rigid motion.
 std::vector<report::Plot> field_plots(const metrology::GeometricModel& model);
 /// What is left of the points, beside a normal distribution.

@@ -101,8 +101,35 @@ void evaluate(GeometricResult& result) {
   // What repeats but no smooth model explains stays, whatever is measured more.
   const double stays = std::sqrt(static_cast<double>(found.basis.chain.axes)) * found.misfit;
   result.knowledge.volumetric_rms = std::hypot(result.knowledge.volumetric_rms, stays);
-  result.next = metrology::next_lines(result.machine, found, 3);
+  if (found.basis.chain.axes > 1) result.next = metrology::next_lines(result.machine, found, 3);
   for (auto& next : result.next) next.volumetric_rms = std::hypot(next.volumetric_rms, stays);
+}
+
+void test_positioning(GeometricResult& result, double device, double environment) {
+  double drift = 0.0;
+  for (const auto& line : result.input.at_one_point) {
+    if (line.readings.size() < 2) continue;
+    const auto [low, high] =
+        std::minmax_element(line.readings.begin(), line.readings.end(),
+                            [](const auto& a, const auto& b) { return a.displacement < b.displacement; });
+    result.drifts.push_back({line.name, static_cast<int>(line.readings.size()),
+                             high->displacement - low->displacement,
+                             line.readings.back().displacement - line.readings.front().displacement});
+    drift = std::max(drift, result.drifts.back().range);
+  }
+  const metrology::Iso230Conditions conditions{
+      device, environment >= 0.0 ? environment : drift / (2.0 * std::sqrt(3.0))};
+  for (const auto& line : result.input.lines)
+    if (auto test = test_of(line, conditions)) result.tests.push_back(std::move(*test));
+}
+
+std::string wave_words(const Identification& found) {
+  std::string words;
+  for (const auto& wave : found.basis.waves)
+    words += (words.empty() ? "" : ", ") +
+             std::string(1, metrology::axis_letters[static_cast<std::size_t>(wave.axis)]) + " every " +
+             report::si(wave.period(), "m", 4) + " by " + report::si(std::hypot(wave.cosine, wave.sine), "m");
+  return words;
 }
 
 const IntervalFigures* interval_to_choose(const GeometricResult& result) {
@@ -218,6 +245,34 @@ nlohmann::json report_json(const GeometricResult& result) {
   json["readings"] = result.input.rows;
   json["noise"] = {{"value", found.noise}, {"unit", "m"}};
   json["misfit"] = {{"value", found.misfit}, {"unit", "m"}};
+  for (const auto& wave : found.basis.waves)
+    json["waves"].push_back(
+        {{"axis", std::string(1, metrology::axis_letters[static_cast<std::size_t>(wave.axis)])},
+         {"period", wave.period()},
+         {"amplitude", std::hypot(wave.cosine, wave.sine)},
+         {"unit", "m"}});
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& curve = found.model.reversal[k];
+    if (curve.empty()) continue;
+    auto& one = json["reversal"][std::string(1, metrology::axis_letters[k])];
+    one = {{"mean", curve.mean()}, {"unit", "m"}};
+    for (int i = 0; i <= curve.spline.intervals(); ++i) {
+      const double at = curve.spline.interval().lower + i * curve.spline.spacing();
+      one["position"].push_back(at);
+      one["value"].push_back(curve.value(at));
+      one["sigma"].push_back(curve.sigma_at(at));
+    }
+  }
+  json["positioning"] = positioning_json(result.tests, result.tolerances);
+  for (const auto& one : result.drifts)
+    json["drift_at_one_point"].push_back({{"line", one.line},
+                                          {"readings", one.readings},
+                                          {"range", one.range},
+                                          {"end_minus_start", one.end},
+                                          {"unit", "m"}});
+  json["left_out"] = {{"without_value", result.input.without_value},
+                      {"far_off", result.input.far_off},
+                      {"lines_repeated", result.input.repeated.size()}};
   json["lines_rms"] = {{"before", result.before_rms}, {"after", result.after_rms}, {"unit", "m"}};
   if (result.method == "full" && found.lines.size() > 1) json["lines_rms"]["unseen"] = result.unseen_rms;
   json["volumetric_rms_predicted"] = result.knowledge.volumetric_rms;
@@ -291,6 +346,25 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
   out << line_of(left_out) << '\n';
   for (const auto& what : left_out.unexplained) out << "not explained: " << what << '\n';
   if (const std::string words = temperature_words(result); !words.empty()) out << words << '\n';
+  if (const std::string words = wave_words(found); !words.empty()) out << "periodic error: " << words << '\n';
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& curve = found.model.reversal[k];
+    if (curve.empty()) continue;
+    double lowest = std::numeric_limits<double>::infinity();
+    double highest = -lowest;
+    const Range range = curve.spline.interval();
+    for (int i = 0; i <= 100; ++i) {
+      const double value = curve.value(range.lower + range.width() * i / 100.0);
+      lowest = std::min(lowest, value);
+      highest = std::max(highest, value);
+    }
+    out << "reversal of " << metrology::axis_letters[k] << ": " << micro(curve.mean())
+        << " um in the mean over the travel, " << micro(lowest) << " to " << micro(highest) << " um\n";
+  }
+  print_positioning(result.tests, result.tolerances, out);
+  for (const auto& one : result.drifts)
+    out << "drift at one point, line " << one.line << ": range " << micro(one.range) << " um in "
+        << one.readings << " readings\n";
   for (const auto& name : result.input.repeated)
     out << "left out: line " << name << ", the very readings of another line\n";
   for (const auto& one : result.knowledge.unidentified) out << "not identified: " << one.words() << '\n';

@@ -12,6 +12,7 @@
 #include "core/metrology/identifiability.hpp"
 #include "core/metrology/line_plan.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/geometric/positioning.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -33,6 +34,14 @@ struct IntervalFigures {
       0.0;  // m^2, of the error's size along the first of the longest lines, as in the seed's Table 2.3
 };
 
+/// A line that was read at one point only: how far the surroundings move a reading there (ISO 230-3).
+struct DriftAtOnePoint {
+  std::string line;
+  int readings = 0;
+  double range = 0.0;  // m, largest less smallest
+  double end = 0.0;    // m, last less first
+};
+
 struct GeometricResult {
   std::filesystem::path machine_file, lines_file;
   std::string method;
@@ -43,6 +52,9 @@ struct GeometricResult {
   std::vector<metrology::NextLine> next;   // that would help most
   std::vector<IntervalFigures> intervals;  // filled by study_intervals
   std::vector<LineFigures> figures;        // by line
+  std::vector<PositioningTest> tests;      // by ISO 230-2 and -6
+  std::vector<Tolerance> tolerances;
+  std::vector<DriftAtOnePoint> drifts;
   std::vector<Eigen::VectorXd> rest;  // by line and point: measured minus model, m; NaN for points left out
   std::vector<Eigen::VectorXd>
       unseen;  // the same predicted from the other lines alone; empty where impossible
@@ -54,6 +66,13 @@ std::string micro(double value, int digits = 3);
 
 /// Fills the figures from `found`: each line also predicted from the others alone.
 void evaluate(GeometricResult& result);
+
+/// Figures of ISO 230-2 and -6, drift at one point. `device` of 1 and `environment` [m] are standard uncertainties; where
+/// the latter is not given (negative), the drift at one point gives it: a range is 2 sqrt(3) of one.
+void test_positioning(GeometricResult& result, double device, double environment);
+
+/// "x every 12.7 mm by 1.4 um" of each periodic error found; empty without one.
+std::string wave_words(const metrology::Identification& found);
 
 /// Accuracy against data interval (every second, fourth, eighth point of the lines), at the prior found.
 void study_intervals(GeometricResult& result);

@@ -6,6 +6,7 @@
 
 #include "core/base/fault.hpp"
 #include "core/recording/table.hpp"
+#include "tools/geometric/rtl_file.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -59,6 +60,28 @@ bool same_readings(const DisplacementLine& a, const DisplacementLine& b) {
   });
 }
 
+/// Displacements from deviations.
+void add_nominal(DisplacementLine& line) {
+  const auto beam = metrology::beam_of(line);
+  for (Reading& reading : line.readings)
+    reading.displacement +=
+        beam.direction.dot(reading.position + reading.tool - beam.start - beam.start_tool);
+}
+
+/// The sense of the motion that led to each reading; of one at the place of the last, that which follows.
+void infer_directions(DisplacementLine& line) {
+  const auto beam = metrology::beam_of(line);
+  auto& readings = line.readings;
+  const auto way = [&](std::size_t i) { return beam.direction.dot(readings[i].position - beam.start); };
+  constexpr double tolerance = 1e-7;  // m
+  int after = 1;
+  for (std::size_t i = readings.size(); i-- > 0;) {
+    const double step = i > 0 ? way(i) - way(i - 1) : 0.0;
+    if (std::abs(step) > tolerance) after = step > 0.0 ? 1 : -1;
+    readings[i].direction = after;
+  }
+}
+
 /// Keeps the points that lie on multiples of `interval` from the start.
 void thin(DisplacementLine& line, double interval) {
   const Eigen::Vector3d start = line.readings.front().position;
@@ -71,12 +94,15 @@ void thin(DisplacementLine& line, double interval) {
 }  // namespace
 
 LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine& machine, double interval) {
-  const auto table = recording::Table::read(file, {"line"});
+  if (is_rtl(file)) return read_rtl(file, machine);
+  const auto table = recording::Table::read_behind_preamble(file, {"line"}, {"displacement", "deviation"});
   LinesFile result;
   result.rows = static_cast<int>(table.rows());
   const recording::Column* names = table.find("line");
   if (names == nullptr) (void)table.in("line", "1");  // says what is missing
-  const auto displacement = table.in("displacement", "m");
+  const bool deviates = !table.has("displacement") && table.has("deviation");
+  const std::string measured = deviates ? "deviation" : "displacement";
+  const auto displacement = table.in(measured, "m");
   const auto positions = read_positions(table, machine);
   const auto direction = table.optionally_in("direction", "1");
   const auto temperature = table.optionally_in("temperature", "degC");
@@ -101,7 +127,7 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
   for (std::size_t i = 0; i < table.rows(); ++i) {
     const std::string& name = names->texts[i];
     if (std::isinf(displacement[i]) || std::abs(displacement[i]) > 1000.0)
-      refuse(table, "displacement", i, report::number(displacement[i], 6) + " m is out of range",
+      refuse(table, measured, i, report::number(displacement[i], 6) + " m is out of range",
              "check the value and its unit");
     if (std::isnan(displacement[i])) {
       ++result.without_value;
@@ -119,7 +145,8 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
     result.lines[found->second].readings.push_back(reading);
   }
   if (first_value == table.rows())
-    throw InputError{file.string() + ": column `displacement`", "holds no number at all", "add the readings"};
+    throw InputError{file.string() + ": column `" + measured + "`", "holds no number at all",
+                     "add the readings"};
 
   for (std::size_t i = 1; i < result.lines.size();) {
     const auto line = result.lines.begin() + static_cast<std::ptrdiff_t>(i);
@@ -134,11 +161,16 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
       ++i;
     }
   }
+  result.tells_direction = direction.has_value();
+  for (DisplacementLine& line : result.lines) {
+    if (deviates) add_nominal(line);
+    if (!direction) infer_directions(line);
+  }
   for (DisplacementLine& line : result.lines) {
     if (interval > 0.0) thin(line, interval);
     const auto beam = metrology::beam_of(line);
     if (beam.length == 0.0) {
-      result.without_length.push_back(line.name);
+      result.at_one_point.push_back(line);
       continue;
     }
     // A reading one hundredth of the line off is no error of a machine: a count lost, or another unit.
@@ -159,7 +191,7 @@ LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine
     result.far_off += static_cast<int>(dropped);
     if (dropped * 5 > before)
       throw InputError{
-          file.string() + ": column `displacement`, line " + line.name,
+          file.string() + ": column `" + measured + "`, line " + line.name,
           std::to_string(dropped) + " of " + std::to_string(before) +
               " readings differ from the commanded distance by more than a hundredth",
           "check the unit, the sign (the whole way along the beam, 0 at its start, not the error alone) "

@@ -96,6 +96,7 @@ struct LiveCell : Component {
   Compensation::Parameters parameters;
   std::unique_ptr<Compensation> compensation;
   double x = 0.1;
+  double velocity = 0.0;  // m/s, of x
   double temperature = 28.0;
   bool thermometer_lives = true;
   std::uint64_t cycle = 0;
@@ -139,8 +140,10 @@ struct LiveCell : Component {
       return input.latest() != nullptr ? input.latest()->correction() : 0.0;
     };
     sample.setpoint_position(x);
+    sample.setpoint_velocity(velocity);
     sample.correction(held(correction));
     state_x.write(sample);
+    sample.setpoint_velocity(0.0);
     sample.setpoint_position(0.05);
     sample.correction(held(correction_y));
     state_y.write(sample);

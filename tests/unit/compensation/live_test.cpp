@@ -52,6 +52,36 @@ TEST(LiveCompensation, PutsAModelToUseWithoutAJumpAndGoesBackWithoutOne) {
   EXPECT_NEAR(cell.run_for(1.0).correction(), 0.0, 1e-15);
 }
 
+// Lost motion over position: half of it to the side that the axis came from, and no step when it turns.
+TEST(LiveCompensation, TakesHalfTheReversalToTheSideThatTheAxisCameFrom) {
+  LiveCell cell;
+  cell.bring_up();
+  metrology::GeometricModel model = geometry(0.0, 0.0);
+  model.reversal[0] = metrology::constant_reversal({0.0, 0.2}, 0.0, 1e-7);
+  const auto& spline = model.reversal[0].spline;
+  for (int i = 0; i < spline.size(); ++i)
+    model.reversal[0].coefficients[i] = 4e-6 + 2e-5 * spline.place(i);  // 4 um at 0, 8 um at 0.2 m
+  ASSERT_EQ(cell.use(write(cell.folder, "a.yaml", model)).state(), MODEL_ACTIVE);
+  EXPECT_NEAR(cell.run_for(0.5).correction(), 0.0, 1e-12);  // it has not moved yet
+  cell.velocity = 0.01;
+  EXPECT_NEAR(cell.run_for(0.5).correction(), -3e-6, 1e-9);
+  cell.velocity = 0.0;
+  EXPECT_NEAR(cell.run_for(0.5).correction(), -3e-6, 1e-9);  // standing, it stays where it came from
+  cell.velocity = -0.01;
+  double last = cell.correction.latest()->correction();
+  double largest_step = 0.0;
+  for (int i = 0; i < 500; ++i) {
+    const double now = cell.cycle_once().correction();
+    largest_step = std::max(largest_step, std::abs(now - last));
+    last = now;
+  }
+  EXPECT_NEAR(last, 3e-6, 1e-9);
+  EXPECT_LE(largest_step, 1.0001e-7);  // rate_limit times period
+  cell.x = 0.2;
+  EXPECT_NEAR(cell.run_for(0.5).correction(), 4e-6, 1e-9);
+  EXPECT_EQ(cell.correction_y.latest()->correction(), 0.0);
+}
+
 TEST(LiveCompensation, RefusesWhatMustNotMoveTheMachineAndTheLastGoodModelHolds) {
   LiveCell cell;
   cell.bring_up();

@@ -49,6 +49,17 @@ TEST(ControllerFiles, TheIsgGridReadsBackAsTheSameField) {
   EXPECT_LT((table.error(node) - model.error(node, model.tool)).norm(), 1e-12);
 }
 
+TEST(ControllerFiles, TheIsgGridsOfBothDirectionsDifferByTheReversal) {
+  const auto model = some_model();
+  const IsgTable forward{isg_volumetric_csv(model, 11, {}, 1)};
+  const IsgTable backward{isg_volumetric_csv(model, 11, {}, -1)};
+  const Eigen::Vector3d node{0.1, 0.075, 0.05};
+  for (int k = 0; k < 3; ++k)
+    EXPECT_NEAR((forward.error(node) - backward.error(node))[k],
+                model.reversal[static_cast<std::size_t>(k)].value(node[k]), 1e-12);
+  EXPECT_GT(model.reversal[0].value(0.1), 1e-6);
+}
+
 TEST(ControllerFiles, TheLinuxCncFileHoldsBothDirectionsInAtMost256Points) {
   const auto model = some_model();
   const std::string text = linuxcnc_compensation(model, 0);

@@ -1,0 +1,266 @@
+#include "tools/geometric/positioning.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <ostream>
+
+#include "core/base/fault.hpp"
+#include "core/base/unit.hpp"
+
+namespace invar::tools {
+
+namespace {
+
+using metrology::iso230_figures;
+using metrology::iso230_names;
+using metrology::Iso230Figure;
+using metrology::TargetFigures;
+using metrology::TargetReadings;
+using report::number;
+
+constexpr std::size_t most_targets = 500;  // a capture on the fly is no test of targets
+constexpr double arcsec = 4.84813681109536e-6;
+
+std::string title_of(const PositioningTest& test) {
+  if (test.axis.empty()) return "Diagonal " + test.line + " (ISO 230-6)";
+  return "Axis " + test.axis + (test.line.empty() ? "" : ", line " + test.line) + " (ISO 230-2)";
+}
+
+const char* small_unit(const PositioningTest& test) { return test.rotary ? "arcsec" : "um"; }
+const char* place_unit(const PositioningTest& test) { return test.rotary ? "deg" : "mm"; }
+double small(const PositioningTest& test, double value) { return value / (test.rotary ? arcsec : 1e-6); }
+double place(const PositioningTest& test, double value) {
+  return value * (test.rotary ? 180.0 / 3.14159265358979323846 : 1e3);
+}
+std::string shown(const PositioningTest& test, double value, int digits = 4) {
+  return std::isnan(value) ? "-" : number(small(test, value), digits);
+}
+
+std::string words(const PositioningTest& test, const Tolerance& tolerance) {
+  const auto figure = static_cast<std::size_t>(tolerance.figure);
+  const std::string value = std::string{iso230_names[figure]} + " = " +
+                            shown(test, test.figures.values[figure]) + " +- " +
+                            shown(test, test.figures.uncertainty[figure], 2) + " " + small_unit(test);
+  const std::string limit = shown(test, tolerance.limit) + " " + small_unit(test);
+  switch (verdict_of(test, tolerance)) {
+    case Verdict::within:
+      return value + ": pass, within " + limit;
+    case Verdict::beyond:
+      return value + ": fail, beyond " + limit;
+    default:
+      return value + ": neither pass nor fail is shown, the limit is " + limit;
+  }
+}
+
+report::Plot plot_of(const PositioningTest& test) {
+  report::Plot plot;
+  plot.title = title_of(test);
+  plot.x_label = std::string{"target ["} + place_unit(test) + "]";
+  plot.y_label = std::string{"deviation ["} + small_unit(test) + "]";
+  const auto curve = [&](const std::string& label, const std::string& colour, auto mean, auto s) {
+    report::Series band{"", report::Series::Style::band, {}, {}, {}, {}, colour};
+    report::Series line{label, report::Series::Style::line, {}, {}, {}, {}, colour};
+    for (const TargetFigures& one : test.figures.targets) {
+      if (std::isnan(mean(one))) continue;
+      line.x.push_back(place(test, one.position));
+      line.y.push_back(small(test, mean(one)));
+      if (std::isnan(s(one))) continue;
+      band.x.push_back(place(test, one.position));
+      band.y.push_back(small(test, mean(one) - 2.0 * s(one)));
+      band.u.push_back(small(test, mean(one) + 2.0 * s(one)));
+    }
+    if (!band.x.empty()) plot.series.push_back(std::move(band));
+    if (!line.x.empty()) plot.series.push_back(std::move(line));
+  };
+  const auto none = [](const TargetFigures&) { return std::nan(""); };
+  curve(
+      "forward", "#1f5fa8", [](const TargetFigures& t) { return t.mean_forward; },
+      [](const TargetFigures& t) { return t.s_forward; });
+  curve(
+      "backward", "#c0552d", [](const TargetFigures& t) { return t.mean_backward; },
+      [](const TargetFigures& t) { return t.s_backward; });
+  curve(
+      "mean", "#2e8b57", [](const TargetFigures& t) { return t.mean; }, none);
+  return plot;
+}
+
+void write_test(report::Page& page, const PositioningTest& test) {
+  page.plot(plot_of(test), "Means of each direction with two standard deviations to either side.");
+  std::vector<std::vector<std::string>> rows;
+  for (const TargetFigures& one : test.figures.targets)
+    rows.push_back({number(place(test, one.position), 7), shown(test, one.mean_forward),
+                    shown(test, one.mean_backward), shown(test, one.mean), shown(test, one.reversal),
+                    shown(test, one.s_forward), shown(test, one.s_backward),
+                    shown(test, one.repeatability_forward), shown(test, one.repeatability_backward),
+                    shown(test, one.repeatability)});
+  page.table({std::string{"target ["} + place_unit(test) + "]", "mean forward", "mean backward", "mean both",
+              "reversal B", "s forward", "s backward", "R forward", "R backward", "R both"},
+             rows);
+  rows.clear();
+  for (std::size_t f = 0; f < iso230_figures; ++f)
+    if (!std::isnan(test.figures.values[f]))
+      rows.push_back({std::string{iso230_names[f]}, shown(test, test.figures.values[f]),
+                      shown(test, test.figures.uncertainty[f], 2)});
+  page.table({"figure", std::string{"value ["} + small_unit(test) + "]", "expanded uncertainty, k = 2"},
+             rows);
+}
+
+/// The axis [0..2] that a beam runs along, or -1.
+int axis_along(const Eigen::Vector3d& direction) {
+  for (int k = 0; k < 3; ++k)
+    if (std::abs(direction[k]) > 0.999999) return k;
+  return -1;
+}
+
+}  // namespace
+
+std::vector<Tolerance> read_tolerances(const std::vector<std::string>& texts, bool rotary) {
+  std::vector<Tolerance> result;
+  for (const std::string& text : texts) {
+    const auto equal = text.find('=');
+    const std::string name = text.substr(0, equal);
+    const auto found = std::find(iso230_names.begin(), iso230_names.end(), name);
+    const std::string where = "--tolerance " + text;
+    if (equal == std::string::npos || found == iso230_names.end())
+      throw InputError{where, "names no figure of ISO 230-2",
+                       "write A, E, M, B, R, or one of a direction as R_forward: \"A=10 um\""};
+    const std::string rest = text.substr(equal + 1);
+    double value = 0.0;
+    const auto [end, flaw] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
+    std::string unit{end, static_cast<std::size_t>(rest.data() + rest.size() - end)};
+    unit.erase(0, unit.find_first_not_of(' '));
+    const char* si = rotary ? "rad" : "m";
+    const auto carried = conversion(unit.empty() ? si : unit, si);
+    if (flaw != std::errc{} || !carried || !(value > 0.0))
+      throw InputError{where, "is no limit",
+                       std::string{"write a number above 0 with a unit of "} +
+                           (rotary ? "an angle: \"A=8 arcsec\"" : "a length: \"A=10 um\"")};
+    result.push_back({static_cast<Iso230Figure>(found - iso230_names.begin()), (*carried)(value)});
+  }
+  return result;
+}
+
+std::optional<PositioningTest> test_of(const std::string& axis, std::vector<TargetReadings> targets,
+                                       const metrology::Iso230Conditions& conditions) {
+  if (targets.size() < 2 || targets.size() > most_targets) return std::nullopt;
+  std::size_t least = SIZE_MAX;
+  for (const TargetReadings& one : targets)
+    least = std::min(least, std::max(one.forward.size(), one.backward.size()));
+  if (least < 2) return std::nullopt;
+  PositioningTest test;
+  test.axis = axis;
+  test.cycles = static_cast<int>(least);
+  test.figures = metrology::iso230(targets, conditions);
+  return test;
+}
+
+std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
+                                       const metrology::Iso230Conditions& conditions) {
+  constexpr double cell = 1e-7;  // m, commanded positions nearer than this are one target
+  const auto beam = metrology::beam_of(line);
+  if (beam.length == 0.0) return std::nullopt;
+  const int axis = axis_along(beam.direction);
+  // A beam that points backward along its axis turns position, deviation and sense of motion.
+  const double sign = axis >= 0 && beam.direction[axis] < 0.0 ? -1.0 : 1.0;
+  std::map<long, TargetReadings> targets;
+  for (const metrology::Reading& reading : line.readings) {
+    const double way = beam.direction.dot(reading.position + reading.tool - beam.start - beam.start_tool);
+    const double at = axis >= 0 ? reading.position[axis] : way;
+    TargetReadings& one = targets[std::lround(at / cell)];
+    one.position = at;
+    (sign * reading.direction > 0.0 ? one.forward : one.backward)
+        .push_back(sign * (reading.displacement - way));
+  }
+  std::vector<TargetReadings> all;
+  for (auto& [key, one] : targets) all.push_back(std::move(one));
+  auto test = test_of(axis >= 0 ? std::string(1, "XYZ"[axis]) : "", std::move(all), conditions);
+  if (test) test->line = line.name;
+  return test;
+}
+
+Verdict verdict_of(const PositioningTest& test, const Tolerance& tolerance) {
+  const auto figure = static_cast<std::size_t>(tolerance.figure);
+  const double value = std::abs(test.figures.values[figure]);
+  const double doubt = test.figures.uncertainty[figure];
+  if (value + doubt <= tolerance.limit) return Verdict::within;
+  return value - doubt > tolerance.limit ? Verdict::beyond
+                                         : Verdict::open;  // a figure that is not there is open
+}
+
+nlohmann::json positioning_json(const std::vector<PositioningTest>& tests,
+                                const std::vector<Tolerance>& tolerances) {
+  nlohmann::json list = nlohmann::json::array();
+  const auto value = [](double v) { return std::isnan(v) ? nlohmann::json{} : nlohmann::json(v); };
+  for (const PositioningTest& test : tests) {
+    nlohmann::json one{{"standard", test.axis.empty() ? "ISO 230-6" : "ISO 230-2"},
+                       {"line", test.line},
+                       {"axis", test.axis},
+                       {"cycles", test.cycles},
+                       {"unit", test.rotary ? "rad" : "m"}};
+    for (std::size_t f = 0; f < iso230_figures; ++f) {
+      one[std::string{iso230_names[f]}] = value(test.figures.values[f]);
+      one["expanded_uncertainty"][std::string{iso230_names[f]}] = value(test.figures.uncertainty[f]);
+    }
+    for (const TargetFigures& t : test.figures.targets)
+      one["targets"].push_back({{"position", t.position},
+                                {"mean_forward", value(t.mean_forward)},
+                                {"mean_backward", value(t.mean_backward)},
+                                {"mean", value(t.mean)},
+                                {"B", value(t.reversal)},
+                                {"s_forward", value(t.s_forward)},
+                                {"s_backward", value(t.s_backward)},
+                                {"R_forward", value(t.repeatability_forward)},
+                                {"R_backward", value(t.repeatability_backward)},
+                                {"R", value(t.repeatability)}});
+    for (const Tolerance& tolerance : tolerances) {
+      const Verdict verdict = verdict_of(test, tolerance);
+      one["tolerances"].push_back(
+          {{"figure", iso230_names[static_cast<std::size_t>(tolerance.figure)]},
+           {"limit", tolerance.limit},
+           {"verdict",
+            verdict == Verdict::within ? "pass" : (verdict == Verdict::beyond ? "fail" : "open")}});
+    }
+    list.push_back(std::move(one));
+  }
+  return list;
+}
+
+void write_positioning(report::Page& page, const std::vector<PositioningTest>& tests,
+                       const std::vector<Tolerance>& tolerances) {
+  if (tests.empty()) return;
+  page.heading("Accuracy and repeatability of positioning");
+  page.paragraph(
+      "By ISO 230-2 and, along diagonals, ISO 230-6. All readings count, outliers too; positions and "
+      "deviations as "
+      "read, before any compensation. The expanded uncertainty (k = 2) holds the chance of these readings, "
+      "the "
+      "instrument's scale and the surroundings as given. Pass and fail by ISO 14253-1.");
+  for (const PositioningTest& test : tests) {
+    for (const Tolerance& tolerance : tolerances) {
+      const Verdict verdict = verdict_of(test, tolerance);
+      page.callout(title_of(test) + ": " + words(test, tolerance),
+                   verdict == Verdict::within ? "good" : (verdict == Verdict::beyond ? "bad" : "warn"));
+    }
+    write_test(page, test);
+  }
+}
+
+void print_positioning(const std::vector<PositioningTest>& tests, const std::vector<Tolerance>& tolerances,
+                       std::ostream& out) {
+  for (const PositioningTest& test : tests) {
+    if (test.axis.empty() && tolerances.empty()) continue;
+    out << title_of(test) << ":";
+    for (const Iso230Figure figure :
+         {Iso230Figure::A, Iso230Figure::R, Iso230Figure::E, Iso230Figure::M, Iso230Figure::B}) {
+      const auto f = static_cast<std::size_t>(figure);
+      if (!std::isnan(test.figures.values[f]))
+        out << ' ' << iso230_names[f] << ' ' << shown(test, test.figures.values[f]);
+    }
+    out << ' ' << small_unit(test) << '\n';
+    for (const Tolerance& tolerance : tolerances) out << "  " << words(test, tolerance) << '\n';
+  }
+}
+
+}  // namespace invar::tools
