@@ -14,7 +14,7 @@ struct ComponentReadings {
   Eigen::VectorXd position;  // N [m], of the moving axis
   Eigen::MatrixXd state;     // states of the machine x N
   Eigen::VectorXd value;     // N, m or rad
-  std::vector<int> direction;  // N, +1 or -1, of the motion; empty where not told
+  std::vector<int> direction = {};  // N, +1 or -1, of the motion; empty where not told
 };
 
 /// A component's network and how it was chosen.

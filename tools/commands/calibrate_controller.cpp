@@ -84,7 +84,8 @@ void add_calibrate_controller(CLI::App& group) {
       "Writes a grid for ISG and TwinCAT CNC (ISG_CSV): the mean of both directions and, where a reversal "
       "was\n"
       "measured, one for all axes moving forward and one for backward; one COMP_FILE an axis for LinuxCNC\n"
-      "(COMP_FILE_TYPE = 0) with both directions; and the squareness as numbers for skew parameters. What no line told is left out,\n"
+      "(COMP_FILE_TYPE = 0) with both directions; and the squareness as numbers for skew parameters. What no "
+      "line told is left out,\n"
       "never zero.");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "compensation.yaml of kind geometric")->required();

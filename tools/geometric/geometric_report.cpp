@@ -270,9 +270,6 @@ nlohmann::json report_json(const GeometricResult& result) {
                                           {"range", one.range},
                                           {"end_minus_start", one.end},
                                           {"unit", "m"}});
-  json["left_out"] = {{"without_value", result.input.without_value},
-                      {"far_off", result.input.far_off},
-                      {"lines_repeated", result.input.repeated.size()}};
   json["lines_rms"] = {{"before", result.before_rms}, {"after", result.after_rms}, {"unit", "m"}};
   if (result.method == "full" && found.lines.size() > 1) json["lines_rms"]["unseen"] = result.unseen_rms;
   json["volumetric_rms_predicted"] = result.knowledge.volumetric_rms;

@@ -1,6 +1,7 @@
 #include "tools/geometric/lines_file.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <map>
 
@@ -89,6 +90,52 @@ void thin(DisplacementLine& line, double interval) {
     const double steps = (reading.position - start).norm() / interval;
     return std::abs(steps - std::round(steps)) > 1e-3;
   });
+}
+
+/// "x" of "X".
+std::string letter_of(std::string axis) {
+  if (!axis.empty()) axis[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(axis[0])));
+  return axis;
+}
+
+/// The runs of a Renishaw file as one displacement line along the axis that it names, or the only one of the machine.
+LinesFile read_rtl(const std::filesystem::path& file, const metrology::Machine& machine) {
+  const RtlFile rtl = load_rtl(file);
+  if (rtl.rotary)
+    throw InputError{file.string(), "is of a rotary axis", "name a machine whose chain is that axis, as [c]"};
+  const auto axis = rtl.axis.empty() && machine.chain.axes == 1 ? std::optional<int>{machine.chain.order[0]}
+                                                                : metrology::axis_named(letter_of(rtl.axis));
+  if (!axis || !machine.chain.has(*axis))
+    throw InputError{file.string(),
+                     rtl.axis.empty() ? "does not say which axis was measured"
+                                      : "is of axis " + rtl.axis + ", which the machine lacks",
+                     "write the line `Axis: X` below USER-TEXT::, or name the machine of that axis"};
+  LinesFile result;
+  result.rows = static_cast<int>(rtl.readings.size());
+  result.tells_direction = true;
+  metrology::DisplacementLine line{rtl.axis.empty() ? std::string(1, "XYZ"[*axis]) : rtl.axis, {}};
+  const Range travel = machine.travel[static_cast<std::size_t>(*axis)];
+  const double start = rtl.targets[rtl.readings.front().target];
+  const auto [lowest, highest] = std::minmax_element(rtl.targets.begin(), rtl.targets.end());
+  if (*lowest < travel.lower - travel.width() || *highest > travel.upper + travel.width())
+    throw InputError{file.string(), "its targets are far outside the travel of the machine",
+                     "check the travel in the machine file"};
+  // The farthest target gives the beam's sense; readings are counted along it.
+  const double sign = std::abs(*highest - start) >= std::abs(*lowest - start) ? 1.0 : -1.0;
+  for (const RtlReading& one : rtl.readings) {
+    metrology::Reading reading;
+    for (int k = 0; k < 3; ++k)
+      if (const Range r = machine.travel[static_cast<std::size_t>(k)];
+          machine.chain.has(k) && !r.contains(0.0))
+        reading.position[k] = r.lower;
+    reading.position[*axis] = rtl.targets[one.target];
+    reading.tool = machine.tool;
+    reading.displacement = sign * (rtl.targets[one.target] - start + one.deviation);
+    reading.direction = sign > 0.0 ? one.direction : -one.direction;
+    line.readings.push_back(reading);
+  }
+  result.lines.push_back(std::move(line));
+  return result;
 }
 
 }  // namespace

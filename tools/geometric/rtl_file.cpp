@@ -135,45 +135,6 @@ bool is_rtl(const std::filesystem::path& file) {
 
 RtlFile load_rtl(const std::filesystem::path& file) { return Reader{file}.run(); }
 
-LinesFile read_rtl(const std::filesystem::path& file, const metrology::Machine& machine) {
-  const RtlFile rtl = load_rtl(file);
-  if (rtl.rotary)
-    throw InputError{file.string(), "is of a rotary axis", "name a machine whose chain is that axis, as [c]"};
-  const auto axis = rtl.axis.empty() && machine.chain.axes == 1 ? std::optional<int>{machine.chain.order[0]}
-                                                                : metrology::axis_named(lower(rtl.axis));
-  if (!axis || !machine.chain.has(*axis))
-    throw InputError{file.string(),
-                     rtl.axis.empty() ? "does not say which axis was measured"
-                                      : "is of axis " + rtl.axis + ", which the machine lacks",
-                     "write the line `Axis: X` below USER-TEXT::, or name the machine of that axis"};
-  LinesFile result;
-  result.rows = static_cast<int>(rtl.readings.size());
-  result.tells_direction = true;
-  metrology::DisplacementLine line{rtl.axis.empty() ? std::string(1, "XYZ"[*axis]) : rtl.axis, {}};
-  const Range travel = machine.travel[static_cast<std::size_t>(*axis)];
-  const double start = rtl.targets[rtl.readings.front().target];
-  const auto [lowest, highest] = std::minmax_element(rtl.targets.begin(), rtl.targets.end());
-  if (*lowest < travel.lower - travel.width() || *highest > travel.upper + travel.width())
-    throw InputError{file.string(), "its targets are far outside the travel of the machine",
-                     "check the travel in the machine file"};
-  // The farthest target gives the beam's sense; readings are counted along it.
-  const double sign = std::abs(*highest - start) >= std::abs(*lowest - start) ? 1.0 : -1.0;
-  for (const RtlReading& one : rtl.readings) {
-    metrology::Reading reading;
-    for (int k = 0; k < 3; ++k)
-      if (const Range r = machine.travel[static_cast<std::size_t>(k)];
-          machine.chain.has(k) && !r.contains(0.0))
-        reading.position[k] = r.lower;
-    reading.position[*axis] = rtl.targets[one.target];
-    reading.tool = machine.tool;
-    reading.displacement = sign * (rtl.targets[one.target] - start + one.deviation);
-    reading.direction = sign > 0.0 ? one.direction : -one.direction;
-    line.readings.push_back(reading);
-  }
-  result.lines.push_back(std::move(line));
-  return result;
-}
-
 std::vector<metrology::TargetReadings> targets_of(const RtlFile& rtl) {
   std::vector<metrology::TargetReadings> targets;
   for (const double position : rtl.targets) targets.push_back({position, {}, {}});

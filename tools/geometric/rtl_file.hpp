@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/metrology/iso230.hpp"
-#include "tools/geometric/lines_file.hpp"
 
 namespace invar::tools {
 
@@ -31,10 +30,7 @@ struct RtlFile {
 /// Targets in mm or deg, deviations in um or arcsec, as the file type says. Throws InputError with line and mend.
 RtlFile load_rtl(const std::filesystem::path& file);
 
-/// The runs as one displacement line along the axis that the file names, or the only one of the machine.
-LinesFile read_rtl(const std::filesystem::path& file, const metrology::Machine& machine);
-
-/// The same for the figures of ISO 230-2.
+/// For the figures of ISO 230-2.
 std::vector<metrology::TargetReadings> targets_of(const RtlFile& rtl);
 
 }  // namespace invar::tools
