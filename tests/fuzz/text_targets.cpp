@@ -183,6 +183,12 @@ const std::string lines =
     "[1]\nX1,0,0,0,20,1\nX1,100,0,100.001,20,1\n"
     "X1,200,0,200.003,20.5,-1\n\"Y 1\",0,0,0,21,1\n\"Y 1\",0,100,99.998,21,1\n\"Y 1\",0,200,199.999,21,1\n";
 
+const std::string renishaw =
+    "HEADER::\r\nFile Type: linear\r\n\r\nTARGET DATA::\r\nTargets :\r\n0 50,5\r\n100\r\nFlags: "
+    "1\r\n\r\nUSER-TEXT::\r\n"
+    "Axis: X\r\n\r\nDEVIATIONS::\r\nRun Target Data:\r\n 1 1 0.1\r\n 1 2 1.1\r\n 1 3 2\r\n 2 3 2.2\r\n 2 2 "
+    "1\r\n 2 1 -0,1\r\n";
+
 void read_table(const fs::path& file) {
   const auto model = model::read(config::Yaml::parse(axis_model, file.string()));
   for (const auto& table : model::read_recording(file, model)) {
@@ -273,6 +279,12 @@ std::vector<Target> text_targets() {
                  ".csv",
                  texts({lines}),
                  {"tool_x [mm]", "\xC2\xB5m"},
+                 [table = machine::load_machine(source / "deployment/machines/xy-table.yaml")](
+                     const Bytes&, const fs::path& file) { (void)tools::read_lines(file, table); }});
+  all.push_back({"rtl",
+                 ".rtl",
+                 texts({renishaw}),
+                 {"HEADER::", "TARGET DATA::", "DEVIATIONS::", "Filetype: angular", " 1 1 "},
                  [table = machine::load_machine(source / "deployment/machines/xy-table.yaml")](
                      const Bytes&, const fs::path& file) { (void)tools::read_lines(file, table); }});
   // --- formulas and units

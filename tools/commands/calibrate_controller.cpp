@@ -13,10 +13,13 @@
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/geometric/controller_files.hpp"
+#include "tools/report/page.hpp"
 
 namespace invar::tools {
 
 namespace {
+
+constexpr double worth_saying = 3e-8;  // m
 
 struct Options {
   std::filesystem::path model;
@@ -55,6 +58,9 @@ void export_model(const Options& options) {
     const std::string letter(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
     if (positioning_is_known(model, axis, unidentified)) {
       write(options.out / ("linuxcnc-" + letter + ".comp"), linuxcnc_compensation(model, axis));
+      if (const double off = linuxcnc_difference(model, axis); off > worth_saying)
+        std::cout << "  its 256 points are " << report::si(off, "m")
+                  << " off the model between them at most\n";
       any = true;
     } else {
       std::cout << "linuxcnc-" << letter << ".comp is not written: no line told the positioning of " << letter

@@ -94,6 +94,24 @@ std::string linuxcnc_compensation(const metrology::GeometricModel& model, int ax
   return out.str();
 }
 
+double linuxcnc_difference(const metrology::GeometricModel& model, int axis) {
+  const Range range = model.travel[index(axis)];
+  const double step = range.width() / (most_points - 1);
+  const auto told = [&](double at, double way) {
+    Eigen::Vector3d position = home_of(model);
+    position[axis] = at;
+    return model.error(position, model.tool)[axis] + 0.5 * way * model.reversal[index(axis)].value(at);
+  };
+  double largest = 0.0;
+  for (int i = 0; i + 1 < most_points; ++i) {
+    const double at = range.lower + i * step;
+    for (const double way : {1.0, -1.0})
+      largest = std::max(largest,
+                         std::abs(told(at + 0.5 * step, way) - 0.5 * (told(at, way) + told(at + step, way))));
+  }
+  return largest;
+}
+
 std::string skew_numbers(const metrology::GeometricModel& model, const std::set<std::string>& unidentified) {
   std::ostringstream out;
   out << "# Squareness by Invar. angle: between the positive axes; ISO: rotation of the second axis; sigma "

@@ -26,6 +26,9 @@ bool positioning_is_known(const metrology::GeometricModel& model, int axis,
 /// along `axis` with the others at the origin of the travels.
 std::string linuxcnc_compensation(const metrology::GeometricModel& model, int axis);
 
+/// How far that table, straight between its points, may be from the model [m]: a screw's wave bends between them.
+double linuxcnc_difference(const metrology::GeometricModel& model, int axis);
+
 /// Squareness as plain numbers: angle between the axes, its standard deviation, and mm per m. A pair that no line told is a
 /// comment, not a zero.
 std::string skew_numbers(const metrology::GeometricModel& model,

@@ -31,7 +31,7 @@ errors:
   EXX: {polynomial: [0, 5e-5], harmonics: [{amplitude: 2e-6, period: 0.1, phase: 0.5}]}
   ECX: {table: {position: [0, 0.1, 0.2], value: [0, 4e-6, 8e-6]}}
   EC0Y: {value: 100, unit: arcsec}
-  reversal: {x: 2e-6}
+  reversal: {x: 2e-6, y: {polynomial: [1e-6, 2e-5]}}
 )",
                                         "m.yaml");
   const auto machine = read_machine(yaml.root());
@@ -47,6 +47,7 @@ errors:
   const auto directions = metrology::axis_directions(machine.chain, errors.squareness);
   const auto e = metrology::simulated_error(machine, directions, {0.03, 0.0, 0.0}, {0, 0, 0}, {1, 0, 0});
   EXPECT_NEAR(e.x(), errors.functions[0](0.03) + 1e-6 - 0.03 * (1 - directions(0, 0)), 1e-12);
+  EXPECT_NEAR(errors.reversal[1](0.1), 3e-6, 1e-18);  // over position
 }
 
 TEST(MachineFile, HeatStretchesAndBowsTheScaleAndStretchesTheBase) {

@@ -80,6 +80,19 @@ TEST(ControllerFiles, TheLinuxCncFileHoldsBothDirectionsInAtMost256Points) {
   }
 }
 
+TEST(ControllerFiles, AWaveFinerThanTheTableIsSaid) {
+  auto model = some_model();
+  EXPECT_LT(linuxcnc_difference(model, 0), 3e-8);
+  const auto positioning = static_cast<std::size_t>(metrology::translation(0, 0));
+  model.splines[0] = {model.travel[0], 400};
+  model.coefficients[positioning].resize(model.splines[0].size());
+  for (int i = 0; i < model.splines[0].size(); ++i)
+    model.coefficients[positioning][i] =
+        1e-6 * std::sin(2.0 * 3.14159265358979 * model.splines[0].place(i) / 0.004);
+  // h^2/8 times the curvature: (0.2/255)^2 / 8 * 1e-6 (2 pi / 0.004)^2 = 190 nm
+  EXPECT_NEAR(linuxcnc_difference(model, 0), 190e-9, 30e-9);
+}
+
 TEST(ControllerFiles, SkewIsTheAngleBetweenTheAxes) {
   auto model = some_model();
   model.squareness = {1e-3, 0.0, 0.0};
