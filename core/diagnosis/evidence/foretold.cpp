@@ -12,13 +12,42 @@ namespace {
 
 constexpr std::size_t quarters = 4;
 
-/// The rows of a quarter alone, or all others.
-Weighing rows_of_quarter(Weighing weighing, std::size_t quarter, bool inside) {
-  for (auto& recording : weighing.present)
-    for (auto& rows : recording)
+/// Rows that a quarter keeps from a fit. Where states begin anew within a recording: the later half of every fourth stretch
+/// that has states of its own, since these must be known from rows of the stretch itself.
+std::vector<bool> kept_back(const physics::Record& inputs, std::size_t quarter) {
+  const std::size_t rows = inputs.rows();
+  std::vector<bool> kept(rows, false);
+  if (inputs.restarts.empty()) {
+    for (std::size_t i = 0; i < rows; ++i) kept[i] = i * quarters / rows == quarter;
+    return kept;
+  }
+  std::size_t begin = 0;
+  for (std::size_t stretch = 0; stretch <= inputs.restarts.size(); ++stretch) {
+    const std::size_t end = stretch < inputs.restarts.size() ? inputs.restarts[stretch] : rows;
+    if (stretch % quarters == quarter)
+      for (std::size_t i = begin + (end - begin) / 2; i < end; ++i) kept[i] = true;
+    begin = end;
+  }
+  return kept;
+}
+
+/// The weighing of the rows that a quarter keeps back, or of all others.
+Weighing rows_of_quarter(const Case& data, Weighing weighing, std::size_t quarter, bool inside) {
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto kept = kept_back(data.recordings[r].inputs, quarter);
+    for (auto& rows : weighing.present[r])
       for (std::size_t i = 0; i < rows.size(); ++i)
-        if ((i * quarters / rows.size() == quarter) != inside) rows[i] = false;
+        if (kept[i] != inside) rows[i] = false;
+  }
   return weighing;
+}
+
+/// Are there stretches with states of their own, but too few to keep some of them back?
+bool has_few_stretches(const Case& data) {
+  std::size_t stretches = 0;
+  for (const auto& recording : data.recordings)
+    if (!recording.inputs.restarts.empty()) stretches += recording.inputs.restarts.size() + 1;
+  return stretches > 0 && stretches < 2 * quarters;
 }
 
 }  // namespace
@@ -29,7 +58,7 @@ bool Foretold::is_plain() const {
 }
 
 Foretold foretold(const Case& data, const Fit& with, const Fit& without) {
-  if (data.windows.count > 0 || data.windows.anew > 0) return {};
+  if (has_few_stretches(data)) return {};
   const auto near = simulate(data, with.model);
   const auto plain = weigh(data, near, false);
   std::vector<double> noise;
@@ -40,9 +69,9 @@ Foretold foretold(const Case& data, const Fit& with, const Fit& without) {
     const auto& whole = k % 2 == 0 ? with : without;
     constexpr int steps = 4;
     const auto fitted =
-        fit(data, rows_of_quarter(plain, quarter, false), whole.model, data.model, steps, &whole);
+        fit(data, rows_of_quarter(data, plain, quarter, false), whole.model, data.model, steps, &whole);
     const auto squares =
-        squares_left(data, simulate(data, fitted.model), rows_of_quarter(plain, quarter, true));
+        squares_left(data, simulate(data, fitted.model), rows_of_quarter(data, plain, quarter, true));
     for (std::size_t o = 0; o < squares.size(); ++o)
       if (noise[o] > 0.0) left[quarter][k % 2] += squares[o].sum / (noise[o] * noise[o]);
   });

@@ -14,8 +14,8 @@ struct Foretold {
   [[nodiscard]] bool is_plain() const;
 };
 
-/// Each quarter of each recording in turn is kept from both fits, which are begun from where they stand. Nothing (no quarter)
-/// where states are begun anew within a recording: the rows that would say how are those that were kept back.
+/// Each quarter of each recording in turn is kept from both fits, which are begun from where they stand. Where states begin anew
+/// within recordings the quarters are later halves of stretches. Nothing (no quarter) where there are too few of those.
 Foretold foretold(const Case& data, const Fit& with, const Fit& without);
 
 }  // namespace invar::diagnosis
