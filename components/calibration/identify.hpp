@@ -12,7 +12,7 @@
 
 namespace invar::calibration {
 
-/// The columns of lines.csv (calibration.md).
+/// The columns of lines.csv (docs/reference/calibration-files.md#linescsv).
 [[nodiscard]] metrology::LineReadings readings_of(const recording::Table& lines);
 
 struct IdentifiedGeometry {

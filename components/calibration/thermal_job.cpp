@@ -47,7 +47,8 @@ void write_models_tried(const metrology::ThermalFit& fit, const std::filesystem:
 
 }  // namespace
 
-/// Columns of thermal.csv (calibration.md); with the model that was in use for those of a comparison.
+/// Columns of thermal.csv (docs/reference/calibration-files.md#thermalcsv); with the model that was in use for those of
+/// a comparison.
 recording::Table Calibration::heat_table(bool with_models) const {
   recording::Table table;
   if (with_models) table.add_texts("model", {});

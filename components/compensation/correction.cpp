@@ -154,7 +154,8 @@ Compensation::Layers Compensation::corrections(const Eigen::Vector3d& at) const 
   return layers;
 }
 
-/// The second step of the fixed point: the error where the machine is really sent (metrology.md section 5).
+/// The second step of the fixed point: the error where the machine is really sent
+/// (docs/explanation/geometric.md#correction-in-the-controller).
 Compensation::Layers Compensation::wanted(const Eigen::Vector3d& setpoint) const noexcept {
   return corrections(setpoint + corrections(setpoint).sum());
 }

@@ -28,7 +28,7 @@ namespace invar::world {
 class SimulatedStage final : public Component {
  public:
   struct Axis {
-    std::filesystem::path model;    // a model.yaml of plant axis (mismatch.md): the truth, terms included
+    std::filesystem::path model;    // docs/reference/model-file.md#plant-axis: the truth, terms included
     double mass = 3.2;              // used where no model is named
     double motor_constant = 12.0;   //
     double viscous_damping = 25.0;  //

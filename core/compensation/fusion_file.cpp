@@ -116,7 +116,7 @@ void write_fusion(ModelText& text, const FusionFile& model) {
     }
     text.close();
   }
-  text.comment("the seed's method: weights over speed and noise level")
+  text.comment("weights over speed and noise level, by the method of the thesis")
       .open("weights")
       .number("intercept", model.weights.intercept)
       .numbers("delays", model.weights.delays);

@@ -44,9 +44,9 @@ struct ComponentNetwork {
   [[nodiscard]] double sigma_at(double position, std::span<const double> of_machine) const noexcept;
 };
 
-/// The seed's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more), for components
-/// that were measured themselves, by an angular interferometer, a level or a straightedge, at several states of the machine.
-/// From displacement lines take `identify`. Offline; `ComponentTables` is for the loop.
+/// The thesis's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more), for
+/// components that were measured themselves, by an angular interferometer, a level or a straightedge, at several states
+/// of the machine. From displacement lines take `identify`. Offline; `ComponentTables` is for the loop.
 struct ComponentNetworks {
   Chain chain;
   std::array<Range, 3> travel{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m

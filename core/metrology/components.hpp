@@ -1,4 +1,4 @@
-// Names of the 21 geometric errors of a three-axis machine: ISO 230-1 symbols beside those of the seed
+// Names of the 21 geometric errors of a three-axis machine: ISO 230-1 symbols beside those of the thesis
 // method.
 #pragma once
 
@@ -31,7 +31,7 @@ constexpr bool is_straightness(int component) {
 
 /// "EXX" ... "ECZ": ISO 230-1, E + direction + moving axis.
 std::string_view iso_name(int component);
-/// The seed's symbol in plain text: "delta_y(x)" for EYX, "eps_z(x)" for ECX.
+/// The thesis's symbol in plain text: "delta_y(x)" for EYX, "eps_z(x)" for ECX.
 std::string seed_name(int component);
 std::optional<int> component_named(std::string_view iso);
 
@@ -40,10 +40,10 @@ constexpr int squareness_of(int a, int b) { return a + b - 1; }
 /// "EC0Y", "EB0Z", "EA0Z". ISO gives the rotation of the second axis of the pair: positive EC0Y turns +Y
 /// about +Z.
 std::string_view squareness_iso_name(int pair);
-/// "cos(a_xy)": the seed's symbol, the cosine of the angle between the positive axes.
+/// "cos(a_xy)": the thesis's symbol, the cosine of the angle between the positive axes.
 std::string_view squareness_seed_name(int pair);
-/// Carries the cosine of the angle between two positive axes to ISO's angle [rad] and back (metrology.md
-/// section 1): cos a_xy = -sin EC0Y, cos a_xz = +sin EB0Z, cos a_yz = -sin EA0Z.
+/// Carries the cosine of the angle between two positive axes to ISO's angle [rad] and back
+/// (docs/explanation/geometric.md#squareness): cos a_xy = -sin EC0Y, cos a_xz = +sin EB0Z, cos a_yz = -sin EA0Z.
 double squareness_angle_from_cosine(int pair, double cosine);
 double squareness_cosine_from_angle(int pair, double angle);
 

@@ -23,8 +23,8 @@ struct Droplets {
 ///
 /// The field is what grows over the targets: a frame that is turned or scaled against another.
 /// Linear in placement and slope (a, b) = tan(tilt) (cos azimuth, sin azimuth), in which everything is done,
-/// since the azimuth is undefined at zero tilt. The seed's theta is the elevation: tilt = 90 deg - theta
-/// (erratum E23). Golden numbers: tilt 0.304 deg, azimuth 0.9739 deg, placement (2.0, 118.2) um land at
+/// since the azimuth is undefined at zero tilt. The thesis's theta is the elevation: tilt = 90 deg - theta
+/// (docs/references.md#e23). Golden numbers: tilt 0.304 deg, azimuth 0.9739 deg, placement (2.0, 118.2) um land at
 /// (12.610, 118.380) um from 2 mm and (108.102, 120.004) um from 20 mm.
 struct DropletTrajectory {
   Eigen::Vector2d placement = Eigen::Vector2d::Zero();  // [m]

@@ -23,7 +23,7 @@ namespace invar::metrology {
 /// A second estimate runs without the readings that stand still. As these become improbable by that estimate, the fused
 /// position goes over to it, and sigma holds the distance of both. An encoder that stood still while the others moved
 /// comes back only after it has counted again: the true position may pass the stuck one.
-/// Source: metrology.md section 10 (interval observer and its Kalman version).
+/// Source: docs/explanation/fusion.md#interval-observer; Blom and Bar-Shalom 1988.
 class FusionObserver final : public FusionEstimator {
  public:
   explicit FusionObserver(const FusionModel& model);

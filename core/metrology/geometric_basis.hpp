@@ -22,9 +22,10 @@ struct AxisWave {
 };
 inline constexpr int wave_unknowns = 3;
 
-/// Cubic B-splines of every error motion that can show, in the canonical gauge (metrology.md 3.1): each motion is zero
-/// at the origin of its axis, straightness has no end-point slope as well, and three squareness constants hold
-/// what is left. Displacements cannot see rigid motions of the frame; this gauge is one choice among them.
+/// Cubic B-splines of every error motion that can show, in the canonical gauge (docs/explanation/geometric.md#gauge):
+/// each motion is zero at the origin of its axis, straightness has no end-point slope as well, and three squareness
+/// constants hold what is left. Displacements cannot see rigid motions of the frame; this gauge is one choice among
+/// them.
 struct GeometricBasis {
   struct Block {
     int component = 0;

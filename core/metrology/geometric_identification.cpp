@@ -130,7 +130,7 @@ bool weaken_outlying_points(Identification& work, const Eigen::VectorXd& unknown
 /// exp(2 (log strength - its estimate)), component by component. And the unknowns themselves move with the strengths.
 void widen_by_strengths(Identification& work) {
   constexpr double other_form =
-      0.15;  // of a log strength: real curves are no draws of this prior (metrology.md section 4)
+      0.15;  // of a log strength: real curves are no draws of this prior (docs/explanation/geometric.md#estimator)
   const StrengthMatrix& strengths = work.strengths;
   const Eigen::MatrixXd& h = work.posterior.covariance;
   Eigen::MatrixXd product = h;  // H^-1 Q^(1/2), Q block diagonal, each block by its own growth

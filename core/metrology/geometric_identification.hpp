@@ -1,4 +1,4 @@
-// Identification: from displacement lines to a geometric model, by all lines at once or as the seed does it.
+// Identification: from displacement lines to a geometric model, by all lines at once, or step by step as in the thesis.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +14,8 @@
 namespace invar::metrology {
 
 enum class IdentificationMethod {
-  full,          // all lines at once, prior by evidence, posterior covariance (metrology.md section 4)
-  displacement,  // the seed's steps with its errata: positioning, angles, then diagonals (metrology.md 3.2 to 3.4)
+  full,  // all lines at once, prior by evidence, posterior covariance (docs/explanation/geometric.md#estimator)
+  displacement,  // the thesis's steps, corrected (docs/explanation/geometric.md#two-axes)
 };
 
 struct IdentificationOptions {

@@ -14,7 +14,7 @@ enum class MotionKind { positioning = 0, straightness = 1, angle = 2 };
 MotionKind kind_of(int component);
 
 /// Strengths of the prior, by kind. A roughness penalty is no substitute: it leaves what the lines do not see with
-/// a huge prior (metrology.md section 4).
+/// a huge prior (docs/explanation/geometric.md#estimator).
 struct GeometricPrior {
   std::array<double, 3> amplitude{2e-6, 2e-6, 8e-6};  // m, m, rad: sd of the waviness
   std::array<double, 3> length{0.07, 0.07, 0.07};     // m, over which it changes (Matern 5/2)

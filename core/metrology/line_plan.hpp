@@ -17,9 +17,9 @@ struct PlannedLine {
   Eigen::Vector3d tool = Eigen::Vector3d::Zero();  // m, offset of the reflector
 };
 
-/// The recipe of metrology.md 3.5 for a chain a, b, c (full rank for every order): 14 lines, 17 with the anti-diagonals, 20
-/// with the steep diagonals; for an XY table 5, 6 and 7 (the seed's four with y = x/2, + anti-diagonal, + y = 2x).
-/// `level` is 0, 1 or 2.
+/// The recipe of docs/explanation/geometric.md#line-recipe for a chain a, b, c (full rank for every order): 14 lines,
+/// 17 with the anti-diagonals, 20 with the steep diagonals; for an XY table 5, 6 and 7 (the thesis's four with y = x/2,
+/// + anti-diagonal, + y = 2x). `level` is 0, 1 or 2.
 std::vector<PlannedLine> recipe_lines(const Machine& machine, int level);
 
 /// Lines worth considering beside the recipe's: parallels along every edge, both body diagonals and their like.

@@ -61,7 +61,7 @@ struct ThermalFit {
 };
 
 /// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
-/// Matern prior whose sizes and lengths are set by the evidence (metrology.md sections 4 and 9). Terms of further
+/// Matern prior whose sizes and lengths are set by the evidence (docs/explanation/thermal.md#model). Terms of further
 /// zones' temperatures, a lagged temperature, the heating rate and hysteresis are tried in turn and kept where the log
 /// evidence rises by more than three and passes that were not fitted are met no worse. Outliers (4.5 standard deviations) are rejected,
 /// stretches of them are not. At least four readings at two

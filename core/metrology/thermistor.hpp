@@ -1,4 +1,4 @@
-// The equation of an NTC thermistor, and its calibration: the B law of the seed, (3.3) with erratum E18, or Steinhart-Hart.
+// The equation of an NTC thermistor, and its calibration: the B law of thesis (3.3), corrected, or Steinhart-Hart.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,9 +7,9 @@ namespace invar::metrology {
 
 /// 1/T = 1/T_B + (x - x_B) / B + C (x^3 - x_B^3 - 3 x_B^2 (x - x_B)), T in kelvin, x = ln(R / 1 ohm), B = (a / 100) T_B^2.
 /// With C = 0 this is R = R_B exp(B (1/T - 1/T_B)); otherwise the equation of Steinhart and Hart (1968) with the coefficient C
-/// of that name. The relative change at T_B is -a percent per kelvin, so `a` is entered POSITIVE for an NTC (erratum E18).
-/// Against a Steinhart-Hart NTC anchored at 25 degC the B law errs by 0.01 K at 20 and 30 degC, 0.09 K at 40, 0.8 K at 70.
-/// 1 kOhm, a = 4.4: 924.294 ohm at 26.8 degC.
+/// of that name. The relative change at T_B is -a percent per kelvin, so `a` is entered POSITIVE for an NTC
+/// (docs/references.md#e18). Against a Steinhart-Hart NTC anchored at 25 degC the B law errs by 0.01 K at 20 and 30
+/// degC, 0.09 K at 40, 0.8 K at 70. 1 kOhm, a = 4.4: 924.294 ohm at 26.8 degC.
 struct Thermistor {
   double resistance_at_base = 1000.0;  // R_B [ohm]
   double base_temperature = 25.0;      // T_B [degC]

@@ -42,7 +42,7 @@ using ErrorMotions = std::array<ErrorMotion, 3>;  // by axis letter, not by plac
 Eigen::Matrix3d axis_directions(const Chain& chain, const Squareness& squareness) noexcept;
 
 /// Actual minus nominal position [m] of the tool in the workpiece frame by the product of transforms
-///   P = t1 + R1 t2 + R1 R2 t3 + R1 R2 R3 p,  t_v = q_v d_v + delta_v,  R_v = exp([eps_v]x)   (seed 2.8).
+///   P = t1 + R1 t2 + R1 R2 t3 + R1 R2 R3 p,  t_v = q_v d_v + delta_v,  R_v = exp([eps_v]x)   (thesis 2.8).
 /// `position` holds the axes' commands [m], `tool` the offset p [m]. Real-time: no allocation, about 0.3 us.
 Eigen::Vector3d exact_error(const Chain& chain, const Eigen::Matrix3d& directions,
                             const Eigen::Vector3d& position, const ErrorMotions& motions,
@@ -50,9 +50,10 @@ Eigen::Vector3d exact_error(const Chain& chain, const Eigen::Matrix3d& direction
 
 /// The same to first order in the error motions, axis directions exact:
 ///   e = sum_v [ delta_v + q_v (d_v - u_v) + eps_v x r_v ],  r_v = p + sum over axes w after v of q_w d_w.
-/// Worked number (tested): chain y,x,z at (100,150,50) mm with the errors of metrology.md section 13 gives
-/// (0.88, 0.26, 2.35) um; equal to seed (2.10). Against `exact_error` it drops under 1 nm for errors of a few
-/// um and some 10 urad in a 200 mm cube. Real-time: no allocation.
+/// Worked number (tested): chain y,x,z at (100,150,50) mm with the errors of
+/// docs/explanation/geometric.md#golden-numbers gives (0.88, 0.26, 2.35) um; equal to thesis (2.10). Against
+/// `exact_error` it drops under 1 nm for errors of a few um and some 10 urad in a 200 mm cube. Real-time: no
+/// allocation.
 Eigen::Vector3d linear_error(const Chain& chain, const Eigen::Matrix3d& directions,
                              const Eigen::Vector3d& position, const ErrorMotions& motions,
                              const Eigen::Vector3d& tool) noexcept;

@@ -184,7 +184,8 @@ WeightModel identify_weights(const std::vector<FusionRun>& runs, const WeightOpt
   model.intercept = intercepts.empty() ? 0.0 : numerics::median(intercepts);
   for (Eigen::Index i = 1; i < sensors; ++i) {
     if (count >= 5) {
-      // Lengths that matter: 0.2 m/s and 570 % of noise (metrology.md section 10); of a further attribute half its range.
+      // Lengths that matter: 0.2 m/s and 570 % of noise (docs/explanation/fusion.md#weights-over-speed-and-noise); of a
+      // further attribute half its range.
       numerics::KernelOptions kernel;
       kernel.input_scale = {0.2, 5.7};
       if (selectors.rows() > 2)

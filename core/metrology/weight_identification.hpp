@@ -1,4 +1,5 @@
-// Identification of the seed's weights from runs: least squares in each cell of the selectors, then a network over them.
+// Identification of the thesis's weights from runs: least squares in each cell of the selectors, then a network over
+// them.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// The seed's fusion: weights of the sensors' positions, learned by least squares over speed, noise level and more.
+// The thesis's fusion: weights of the sensors' positions, learned by least squares over speed, noise level and more.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@ namespace invar::metrology {
 
 /// Weights that sum to one with an intercept, from positions of N sensors (rows: samples) and the reference:
 /// the constraint is built in, since the columns are nearly equal and K = (S'S)^-1 S'x is set by the error
-/// covariance alone (errata E20). Batch, by QR.
+/// covariance alone (docs/references.md#e20). Batch, by QR.
 struct WeightFit {
   Eigen::VectorXd weights;  // N
   double intercept = 0.0;   // [m]
@@ -38,8 +38,9 @@ using Powers = std::array<unsigned char, most_sensors>;
 std::vector<Powers> monomials(int variables, int degree);
 double monomial(const Powers& powers, const std::array<double, most_sensors>& variables) noexcept;
 
-/// Nonlinear fusion (erratum E29): x = m + sum of c_k times the monomials of the weighted mean m and the difference of each
-/// other sensor from the first, up to `degree`, centred and scaled. Held at the border of what was fitted.
+/// Nonlinear fusion (docs/references.md#e29): x = m + sum of c_k times the monomials of the weighted mean m and the
+/// difference of each other sensor from the first, up to `degree`, centred and scaled. Held at the border of what was
+/// fitted.
 struct FusionPolynomial {
   int degree = 1;                 // 1: none
   double centre = 0.0;            // of m [m]

@@ -1,4 +1,4 @@
-// The seed's training by gradient descent, kept to reproduce its figures; use fit_ridge for anything else.
+// Gradient descent as in the thesis, kept to reproduce its figures; use fit_ridge for anything else.
 #pragma once
 
 #include <Eigen/Core>
@@ -24,9 +24,9 @@ struct DescentResult {
   bool diverged = false;   // not finite, or a centre more than ten ranges away
 };
 
-/// Seed (2.11)-(2.14) with errata E3 to E6: error E = target - output, one pass over all samples an epoch,
-/// w += eta_w E phi(r), mu += eta_mu E w phi(r) (x - mu) / s^2; as many centres as samples, starting on them.
-/// The input is scaled to [0, 1] over its range, the output by `output_scale` (the seed's um: 1e-6 m).
+/// Thesis (2.11)-(2.14), corrected (docs/references.md#e4): error E = target - output, one pass over all samples an
+/// epoch, w += eta_w E phi(r), mu += eta_mu E w phi(r) (x - mu) / s^2; as many centres as samples, starting on them.
+/// The input is scaled to [0, 1] over its range, the output by `output_scale` (um in the thesis: 1e-6 m).
 ///
 /// It only works as early stopping: the centre update carries w / s^2 = 400 w, and centres run away.
 DescentResult train_by_descent(const Eigen::Ref<const Eigen::MatrixXd>& x,

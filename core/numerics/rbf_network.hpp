@@ -14,7 +14,7 @@ namespace invar::numerics {
 ///
 /// The scales travel with the weights, because a width of 0.05 means 0.05 mm, 10 mm or 50 mm depending on the
 /// unit of the input. Outside its range an input is held at the end value: a bare Gaussian would decay to the
-/// constant there, and a slope would run away. Source: seed (2.11), chapter 2.3.
+/// constant there, and a slope would run away. Source: thesis (2.11), chapter 2.3.
 struct RbfNetwork {
   std::vector<Range> range;      // D, in input units: where the network was trained
   Eigen::VectorXd input_offset;  // D, input units

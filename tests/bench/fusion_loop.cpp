@@ -1,5 +1,5 @@
 // A position loop closed on the fused position: sinusoids of 100 mm, tracking error by the truth, for the encoder alone, for
-// the seed's weights and for the observer, each with the loop bandwidth that suits it best. Prints a table; no test.
+// the thesis's weights and for the observer, each with the loop bandwidth that suits it best. Prints a table; no test.
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -24,7 +24,7 @@ using namespace invar;
 constexpr double amplitude = 0.1, resolution = 2e-3, latency = 3e-3, droop = 0.1, dt = 1e-3;
 constexpr double mass = 3.2, motor = 12.0, damping = 18.0;
 
-/// The seed's training: 200 mm at constant speed, noise in parts of the largest reading.
+/// The thesis's training: 200 mm at constant speed, noise in parts of the largest reading.
 std::vector<metrology::FusionRun> training() {
   std::mt19937 random{1};
   std::uniform_real_distribution<double> uniform{-1.0, 1.0};
@@ -153,11 +153,11 @@ void write_model(const metrology::FusionFit& fit, const std::string& method,
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Tracking error of a position loop: encoder alone, the seed's weights, the observer"};
+  CLI::App app{"Tracking error of a position loop: encoder alone, the thesis's weights, the observer"};
   bool alone = false;
   std::filesystem::path axis = "deployment/machines/axis-rippled.yaml";
   app.add_option("--axis", axis, "model.yaml that is the truth of the axis")->capture_default_str();
-  app.add_flag("--pid-alone", alone, "no feedforward, as the seed has it");
+  app.add_flag("--pid-alone", alone, "no feedforward, as the thesis has it");
   CLI11_PARSE(app, argc, argv);
   const auto folder =
       std::filesystem::temp_directory_path() / ("invar-fusion-loop-" + std::to_string(getpid()));
@@ -175,7 +175,7 @@ int main(int argc, char** argv) {
   write_model(fit, "weights", folder / "weights.yaml");
   write_model(fit, "observer", folder / "observer.yaml");
   std::printf(
-      "| noise | period s | encoder alone mm | the seed's weights mm | observer mm | encoder over observer "
+      "| noise | period s | encoder alone mm | the thesis's weights mm | observer mm | encoder over observer "
       "|\n"
       "| --- | --- | --- | --- | --- | --- |\n");
   for (const double noise : {0.05, 0.1, 0.2, 0.3, 0.4, 0.5})

@@ -1,4 +1,5 @@
-// Monte Carlo of the identification on random machines (metrology.md section 6): error left in the volume by line set.
+// Monte Carlo of the identification on random machines (docs/explanation/geometric.md#simulated-machines): error left
+// in the volume by line set.
 //
 //     build/bin/bench_geometric_monte_carlo [machines] [rows that contain this text] [whole]
 //
@@ -158,13 +159,13 @@ int main(int argc, char** argv) {
                        IdentificationMethod method, int points = 41) {
     if (name.find(only) != std::string::npos) row(name, chain, ends, method, machines, points);
   };
-  run("XY seed, errata applied, 4", xy, xy4, seed);
+  run("XY thesis, errata applied, 4", xy, xy4, seed);
   run("XY full, same 4 lines", xy, xy4, full);
   run("XY full, 5 (+ anti-diagonal)", xy, xy4 + std::vector<Ends>{anti}, full);
   run("XY full, 5 (+ y = x/2)", xy, xy4 + std::vector<Ends>{half}, full);
   run("XY full, 6 (+ both)", xy, xy4 + std::vector<Ends>{anti, half}, full);
   run("XY full, 7 (+ y = 2x)", xy, xy4 + std::vector<Ends>{anti, half, steep}, full);
-  run("XYZ seed, errata applied, 15", xyz, seed15, seed);
+  run("XYZ thesis, errata applied, 15", xyz, seed15, seed);
   run("XYZ full, same 15 lines", xyz, seed15, full);
   run("XYZ full, 9 parallels + 6 face (15)", xyz, parallels_and_faces(), full);
   run("XYZ full, 22 (edges, face, body)", xyz, edges_faces_bodies(), full);

@@ -69,7 +69,7 @@ void table_of_components(benchmark::State& state) {
 }
 BENCHMARK(table_of_components);
 
-/// The same field as 18 Gaussian sums of 41 centres, evaluated as printed in the seed method.
+/// The same field as 18 Gaussian sums of 41 centres, evaluated as printed in the thesis.
 void gaussian_sums(benchmark::State& state) {
   const auto& model = setup().model;
   std::vector<double> weights(18 * 41, 1e-7);

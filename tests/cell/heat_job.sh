@@ -21,7 +21,7 @@ figures() {
 for file in verify_fixed.csv verify_varying.csv; do
   room=$(figures $file "room temperature"); heat=$(figures $file "position and temperature")
   echo "$file: room $room, heat $heat"
-  # The seed's band for a table compensated at a fixed and at a varying temperature: +-2 um.
+  # The thesis's band for a table compensated at a fixed and at a varying temperature: +-2 um.
   echo "$room $heat" | awk '{ exit !($1 > 1 && $4 < $1 / 4 && $5 > -2 && $6 < 2) }' ||
     { echo "the model over position and temperature did not do its work"; exit 1; }
 done

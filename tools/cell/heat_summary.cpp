@@ -141,7 +141,7 @@ void summarise_heat(const std::filesystem::path& folder, report::Page& page, std
   page.plots(plots,
              "Read by the laser with the one and the other model in the loop, at points between those "
              "fitted; in the form of "
-             "figures 3.9 and 3.10 of the seed.");
+             "figures 3.9 and 3.10 of the thesis.");
 }
 
 }  // namespace invar::tools

@@ -59,7 +59,7 @@ struct Prints {
 
 struct Errors {
   double rms = 0.0, largest = 0.0,
-         relative_rms = 0.0;  // m; relative: to the first droplet, as the seed's table
+         relative_rms = 0.0;  // m; relative: to the first droplet, as table 5.3 of the thesis
   std::size_t count = 0;
 };
 

@@ -107,7 +107,7 @@ void add_calibrate_geometric(CLI::App& group) {
       ->required();
   command
       ->add_option("--method", options->method,
-                   "full: all lines at once; displacement: step by step as the seed method, corrected")
+                   "full: all lines at once; displacement: step by step as in the thesis, corrected")
       ->check(CLI::IsMember({"full", "displacement"}))
       ->capture_default_str();
   command->add_option("--interval", options->interval, "use only readings at this interval along a line [m]")

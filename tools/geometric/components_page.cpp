@@ -134,8 +134,8 @@ report::Page components_page(const ComponentsResult& result) {
                     si(rms_of_readings(fit, true), unit_of(c))});
     plots.push_back(component_plot(result, c));
   }
-  page.table({"ISO 230-1", "seed", "depends on", "readings", "left out, position alone", "left out", "sigma",
-              "error over those used (RMS)", "over all (RMS)"},
+  page.table({"ISO 230-1", "thesis", "depends on", "readings", "left out, position alone", "left out",
+              "sigma", "error over those used (RMS)", "over all (RMS)"},
              rows);
   for (int pair = 0; pair < metrology::squareness_count; ++pair)
     if (result.model.squareness_sigma[index(pair)] > 0.0)

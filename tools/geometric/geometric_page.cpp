@@ -92,7 +92,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
                     std::string{metrology::squareness_seed_name(pair)}, micro(angle, 5),
                     number(angle / arcsec, 5), micro(2.0 * model.squareness_sigma[index(pair)])});
   }
-  page.table({"squareness", "seed's symbol", "ISO [urad]", "[arcsec]", "2 sigma [urad]"}, rows);
+  page.table({"squareness", "thesis's symbol", "ISO [urad]", "[arcsec]", "2 sigma [urad]"}, rows);
   rows.clear();
   std::vector<Plot> plots;
   for (int c = 0; c < metrology::component_count; ++c) {
@@ -111,7 +111,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
     rows.push_back({std::string{metrology::iso_name(c)}, metrology::seed_name(c), micro(lowest),
                     micro(highest), micro(2.0 * sigma), metrology::is_rotation(c) ? "urad" : "um"});
   }
-  page.table({"component", "seed's symbol", "lowest", "highest", "2 sigma at most", "unit"}, rows);
+  page.table({"component", "thesis's symbol", "lowest", "highest", "2 sigma at most", "unit"}, rows);
   page.plots(std::move(plots),
              "Each error motion with its two-sigma band; points: the fit plus what is left of each reading, "
              "over the "

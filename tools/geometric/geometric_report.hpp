@@ -31,7 +31,7 @@ struct IntervalFigures {
   double points_rms = 0.0;    // m, over all points, those left out included
   double expected_rms = 0.0;  // m, over the volume
   double integral =
-      0.0;  // m^2, of the error's size along the first of the longest lines, as in the seed's Table 2.3
+      0.0;  // m^2, of the error's size along the first of the longest lines, as in table 2.3 of the thesis
 };
 
 /// A line that was read at one point only: how far the surroundings move a reading there (ISO 230-3).

@@ -23,9 +23,9 @@ struct LinesFile {
   std::optional<Range> temperature;   // degC, of all readings; nothing without the column
 };
 
-/// Reads the columns of calibration.md, or `deviation` (reading minus nominal) in the place of `displacement`; lines of any
-/// kind may stand before the header. A file that begins as Renishaw's .rtl or .pos is read as such.
-/// `interval` [m] above 0 keeps only points at its multiples from the line's start
+/// Reads the columns of docs/reference/calibration-files.md#linescsv, or `deviation` (reading minus nominal) in the
+/// place of `displacement`; lines of any kind may stand before the header. A file that begins as Renishaw's .rtl or
+/// .pos is read as such. `interval` [m] above 0 keeps only points at its multiples from the line's start
 /// (accuracy against data interval). Throws InputError with the first fault that makes the file unusable.
 LinesFile read_lines(const std::filesystem::path& file, const metrology::Machine& machine,
                      double interval = 0.0);

@@ -92,7 +92,8 @@ void write_instructions(report::Page& page, const MeasuringPlan& plan) {
   const auto shortest = *std::min_element(
       best.lines.begin(), best.lines.end(),
       [](const PlannedLine& a, const PlannedLine& b) { return length_of(a) < length_of(b); });
-  // A beam that runs s sideways over the length L reads s^2 / (2 L) too little (metrology.md section 3).
+  // A beam that runs s sideways over the length L reads s^2 / (2 L) too little
+  // (docs/explanation/geometric.md#reading-of-a-displacement-line).
   const double bearable = 0.1 * best.expected_rms();
   page.paragraph(
       "Positions are commanded ones in the machine's frame, without compensation. The reflector stands at " +

@@ -68,7 +68,7 @@ report::Plot levels_plot(const ThermalReadings& readings, const ThermalFit& fit)
   return plot;
 }
 
-/// Figures 3.9 and 3.10 of the seed: what is left with the model of the coldest readings (room temperature),
+/// Figures 3.9 and 3.10 of the thesis: what is left with the model of the coldest readings (room temperature),
 /// and with the whole one; along x at mid temperature, and in the order of measurement.
 std::vector<report::Plot> residual_plots(const ThermalReadings& readings, const ThermalFit& fit) {
   report::Plot fixed;
@@ -172,7 +172,7 @@ report::Page thermal_page(const std::filesystem::path& file, const ThermalReadin
   page.plots({levels_plot(readings, fit), surface_plot(fit)},
              "Bands are two standard deviations of the curve.");
   page.heading("Residual");
-  page.plots(residual_plots(readings, fit), "In the form of figures 3.9 and 3.10 of the seed.");
+  page.plots(residual_plots(readings, fit), "In the form of figures 3.9 and 3.10 of the thesis.");
   report::Plot growth;
   growth.title = "Standard deviation over temperature";
   growth.x_label = "temperature [degC]";

@@ -33,7 +33,7 @@ TEST(Dispenser, AnswersWithTargetsAsTheyAreWhereNoModelIsInUse) {
   EXPECT_NE(bench.ask("grid", 0.0).refusal().size(), 0U);
 }
 
-/// compensation.yaml of the seed's head with a delay of 0.3 ms and 2 m/s.
+/// compensation.yaml of the thesis's head with a delay of 0.3 ms and 2 m/s.
 fs::path write_model(const invar::testing::TemporaryFolder& folder, double placement_y = 118.2e-6,
                      double slope_sigma = 1e-4, const Eigen::Matrix2d& field = Eigen::Matrix2d::Zero()) {
   metrology::DropletTrajectory path;
@@ -63,7 +63,7 @@ TEST(Dispenser, MovesItsTargetsByTheModelInUseAndBack) {
   const TriggerPattern pattern = bench.ask("grid", 20e-3);
   EXPECT_NE(pattern.model_checksum(), 0U);
   for (const TriggerPoint& point : pattern.points()) {
-    // The golden numbers of the seed's head at 20 mm, and 0.3 ms + 20 mm / 2 m/s.
+    // The golden numbers of the thesis's head at 20 mm, and 0.3 ms + 20 mm / 2 m/s.
     EXPECT_NEAR(point.target()[0] - point.position()[0], 108.102e-6, 1e-9);
     EXPECT_NEAR(point.target()[1] - point.position()[1], 120.004e-6, 1e-9);
     EXPECT_EQ(point.lead_ns(), 10'300'000);

@@ -9,7 +9,7 @@ import unittest
 FOLDER = pathlib.Path(sys.argv.pop(1))
 SIZES = {"boolean": 1, "octet": 1, "int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "int64": 8,
          "uint64": 8, "float": 4, "double": 8}
-UNITS = {"1", "s", "m", "m/s", "m/s2", "m/s3", "A", "degC", "K/s", "W", "Hz", "Pa"}  # one spelling each, as in style.md
+UNITS = {"1", "s", "m", "m/s", "m/s2", "m/s3", "A", "degC", "K/s", "W", "Hz", "Pa"}  # one spelling each (docs/explanation/architecture.md#units)
 LOOP = {"stage", "sensing"}  # files whose types the loop writes: fixed size
 LOOP_TYPES = {"AxisCorrection"}
 

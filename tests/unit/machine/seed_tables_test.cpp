@@ -1,5 +1,5 @@
-// Simulated tables in the shape of those of the seed: what they read before, and what is left when their error is identified
-// from lines and corrected. Prints the figures of tests/bench/README.md.
+// Simulated tables in the shape of those of the thesis: what they read before, and what is left when their error is
+// identified from lines and corrected. Prints the figures of tests/bench/README.md.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -80,7 +80,8 @@ TEST(SeedTables, AerotechLikeIsRightToTwoMicrometresOnLinesThatWereNotFitted) {
   const Machine table{"aerotech-like"};
   const auto seed = table.identified(four, displacement);
   const auto ours = table.identified(six, full);
-  std::printf("largest error along a line [um]: before, the seed's 4 lines step by step, 6 lines at once\n");
+  std::printf(
+      "largest error along a line [um]: before, the thesis's 4 lines step by step, 6 lines at once\n");
   for (const Path& path : {along_x, along_y, diagonal, parallel, steep}) {
     const double before = table.largest(path, nullptr);
     const double after = table.largest(path, &ours);
@@ -97,7 +98,8 @@ TEST(SeedTables, WinnerMotorLikeIsRightToAFewMicrometresWhereTheSeedLeftATenthOf
   const Machine table{"winnermotor-like"};
   const auto seed = table.identified(four, displacement);
   const auto ours = table.identified(six, full);
-  std::printf("largest error along a line [um]: before, the seed's 4 lines step by step, 6 lines at once\n");
+  std::printf(
+      "largest error along a line [um]: before, the thesis's 4 lines step by step, 6 lines at once\n");
   const auto row = [&](const Path& path, double range, double printed) {
     const double before = table.largest(path, nullptr, range);
     const double after = table.largest(path, &ours, range);

@@ -229,7 +229,7 @@ TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
   for (int m = 0; m < 4; ++m) {
     const Machine machine = random_machine(xy, {0.2, 0.2, 0.0}, random);
     auto plan = recipe_lines(machine, 1);
-    plan.erase(plan.begin() + 4, plan.end());  // the seed's four
+    plan.erase(plan.begin() + 4, plan.end());  // the thesis's four
     const auto lines = measured(machine, plan, 41, random);
     IdentificationOptions options;
     before += left_over(machine, nullptr).rms;

@@ -69,7 +69,7 @@ inline std::vector<double> random_curve(double travel, double rms, const CurveFa
   return values;
 }
 
-/// The machine of metrology.md section 6.
+/// The machine of docs/explanation/geometric.md#simulated-machines.
 inline Machine random_machine(const Chain& chain, const std::array<double, 3>& travel,
                               std::mt19937_64& random, const MachineSpread& spread = {}) {
   std::normal_distribution<double> normal;

@@ -15,7 +15,7 @@ namespace {
 constexpr double um = 1e-6;
 constexpr double urad = 1e-6;
 
-/// The machine of metrology.md section 13.
+/// The machine of docs/explanation/geometric.md#golden-numbers.
 ErrorMotions golden_motions() {
   ErrorMotions m;
   m[0].translation = Eigen::Vector3d{1, -2, .5} * um;
@@ -87,7 +87,7 @@ TEST(Volumetric, KeepsTheExactDirectionOfALargeSquareness) {
 }
 
 TEST(Volumetric, ShowsTheNullVectorOfTheFourLines) {
-  // EXY = 2 um sin(2 pi y/L), EYX = -2 um sin(2 pi x/L): no line of the seed's four sees it.
+  // EXY = 2 um sin(2 pi y/L), EYX = -2 um sin(2 pi x/L): no line of the thesis's four sees it.
   const Chain chain{{1, 0, 2}, 2};
   const double travel = 0.2;
   const auto field = [&](double x, double y) {

@@ -1,4 +1,4 @@
-// The seed's weights: batch and recursive, over selectors, of higher order; its tables 4.1 and 4.2.
+// The thesis's weights: batch and recursive, over selectors, of higher order; its tables 4.1 and 4.2.
 #include "core/metrology/weighted_fusion.hpp"
 
 #include <gmock/gmock.h>
@@ -212,7 +212,7 @@ TEST(NonlinearFusion, HoldsAllMonomialsUpToItsOrder) {
   EXPECT_THAT(values, ::testing::UnorderedElementsAre(1.0, 3.0, 5.0, 9.0, 15.0, 25.0));
 }
 
-/// The seed's table as selectors (speed [m/s], noise fraction) and weights; empty where the data are absent.
+/// The thesis's table as selectors (speed [m/s], noise fraction) and weights; empty where the data are absent.
 bool read_table(const std::string& name, Eigen::MatrixXd& selectors, Eigen::VectorXd& weights) {
   const char* shared = std::getenv("INVAR_SHARED");
   const std::filesystem::path folder =
