@@ -7,6 +7,7 @@
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/estimate/common_factor.hpp"
 #include "core/diagnosis/estimate/own_rows.hpp"
+#include "core/diagnosis/estimate/priors.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
@@ -15,52 +16,6 @@ namespace invar::diagnosis {
 
 using physics::Model;
 using physics::Role;
-
-namespace {
-
-// What users believe has a heavy tail (Student's t, 3 degrees of freedom): one parameter that is far off is likelier
-// than several that are each a little off.
-constexpr double tail = 3.0;
-double prior_cost(const Freedom& f, double value) {
-  const double z = (value - f.center) / f.sigma;
-  return f.where == Freedom::Where::curve ? 0.5 * z * z : 0.5 * (tail + 1.0) * std::log1p(z * z / tail);
-}
-/// The weight of a Gaussian prior that has the same slope here.
-double prior_weight(const Freedom& f, double value) {
-  const double z = (value - f.center) / f.sigma;
-  return (f.where == Freedom::Where::curve ? 1.0 : (tail + 1.0) / (tail + z * z)) / (f.sigma * f.sigma);
-}
-
-/// A knot that no row visits lies between its neighbours: how far two of them may part, against the prior of one alone.
-constexpr double beside = 0.1;
-/// Calls f(k) for every two neighbours k and k + 1 of a curve.
-template <class F>
-void for_neighbours(const std::vector<Freedom>& free, F f) {
-  for (std::size_t k = 0; k + 1 < free.size(); ++k)
-    if (free[k].where == Freedom::Where::curve && free[k + 1].where == Freedom::Where::curve &&
-        free[k].term == free[k + 1].term)
-      f(k);
-}
-
-double neighbour_weight(const Freedom& f) { return 1.0 / std::pow(beside * f.sigma, 2); }
-
-}  // namespace
-
-Eigen::VectorXd slope_of_priors(const Fit& fit) {
-  Eigen::VectorXd slope = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.free.size()));
-  for (Eigen::Index k = 0; k < slope.size(); ++k) {
-    const auto& f = fit.free[static_cast<std::size_t>(k)];
-    const double value = get(fit.model, f);
-    if (f.sigma > 0.0) slope(k) = (value - f.center) * prior_weight(f, value);
-  }
-  for_neighbours(fit.free, [&](std::size_t at) {
-    const auto k = static_cast<Eigen::Index>(at);
-    const double pull =
-        neighbour_weight(fit.free[at]) * (get(fit.model, fit.free[at + 1]) - get(fit.model, fit.free[at]));
-    slope(k) -= pull, slope(k + 1) += pull;
-  });
-  return slope;
-}
 
 namespace {
 
@@ -162,171 +117,268 @@ void keep_reached(const Case& data, const Model& model, std::vector<Freedom>& fr
   }
 }
 
+/// The free numbers of `start` and their priors, with the numbers put within their bounds.
+Fit begin_at(const Case& data, const Model& start, const Model& believed) {
+  Fit at;
+  at.model = start;
+  at.free = freedoms(start, believed);
+  if (data.model.plant == physics::Plant::thermal) keep_reached(data, start, at.free);
+  for (const auto& f : at.free)  // first order does not know that friction takes energy
+    if (f.where == Freedom::Where::curve) set(at.model, f, f.bounds.clamp(get(at.model, f)));
+  return at;
+}
+
+/// A point that a step leads to.
+struct Trial {
+  Model model;
+  Eigen::VectorXd taken, scale;   // the step within the bounds, and the typical change of each number
+  Eigen::VectorXd raw, residual;  // measured - simulated as it stands, and whitened
+  double data_cost = 0.0, cost = 0.0;
+};
+
+/// Derivatives of measured - simulated by each free number, as they stand and whitened.
+class Jacobian {
+ public:
+  Jacobian(const Case& data, const Weighing& weighing, const Fit& at, Eigen::MatrixXd columns)
+      : data_{data}, weighing_{weighing}, of_window_(at.free.size()) {
+    for (std::size_t k = 0; k < of_window_.size(); ++k)
+      of_window_[k] =
+          at.free[k].where == Freedom::Where::parameter && is_start(at.model.parameters[at.free[k].index]);
+    put(std::move(columns));
+  }
+
+  void find_anew(const Fit& at) { put(sensitivities(data_, at.model, at.free)); }
+  [[nodiscard]] Eigen::MatrixXd take_columns() { return std::move(columns_); }
+
+  /// The tempered J^T J.
+  [[nodiscard]] Eigen::MatrixXd normal() const {
+    constexpr Eigen::Index many = 40;
+    const double temper = weighing_.temper;
+    if (white_rows_.any()) return temper * white_rows_.normal(white_);  // windows: most of the rows are zero
+    if (white_.cols() <= many) return temper * (white_.transpose() * white_);
+    Eigen::MatrixXd half = Eigen::MatrixXd::Zero(white_.cols(), white_.cols());
+    half.selfadjointView<Eigen::Lower>().rankUpdate(white_.transpose(), temper);
+    return Eigen::MatrixXd{half.selfadjointView<Eigen::Lower>()};
+  }
+  /// The tempered J^T r.
+  [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd& residual) const {
+    return weighing_.temper * (white_rows_.any() ? white_rows_.times(white_, residual)
+                                                 : Eigen::VectorXd{white_.transpose() * residual});
+  }
+
+  void divide(Eigen::Index column, double factor) {
+    white_.col(column) /= factor, columns_.col(column) /= factor;
+  }
+
+  /// Broyden's rule: afterwards the derivatives give the change that was seen from the point with these residuals.
+  void update(const Trial& trial, const Eigen::VectorXd& raw, const Eigen::VectorXd& residual) {
+    const auto &taken = trial.taken, &scale = trial.scale;
+    const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
+    const double length = taken.dot(by_scale);
+    if (!(length > 0.0)) return;
+    const Eigen::VectorXd error = trial.residual - residual - white_ * taken;
+    Eigen::VectorXd change = trial.raw - raw - columns_ * taken;
+    change = change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
+    if (white_rows_.any()) {
+      white_rows_.update(white_, error, taken, scale);
+      raw_rows_.update(columns_, change, taken, scale);
+    } else {
+      white_ += error * by_scale.transpose() / length;
+      columns_ += change * by_scale.transpose() / length;
+    }
+  }
+
+ private:
+  void put(Eigen::MatrixXd columns) {
+    columns_ = std::move(columns);
+    white_ = whitened(data_, weighing_, columns_);
+    white_rows_ = OwnRows{white_, of_window_}, raw_rows_ = OwnRows{columns_, of_window_};
+  }
+
+  const Case& data_;
+  const Weighing& weighing_;
+  std::vector<bool> of_window_;  // is the number a state at the beginning of a window?
+  Eigen::MatrixXd columns_, white_;
+  OwnRows white_rows_, raw_rows_;
+};
+
+/// Maximum a posteriori estimate by Levenberg-Marquardt, with Broyden's updates of the Jacobian between fresh ones.
+class Minimizer {
+ public:
+  Minimizer(const Case& data, const Weighing& weighing, Fit start, int iterations, const Fit* near)
+      : data_{data},
+        weighing_{weighing},
+        iterations_{iterations},
+        at_{std::move(start)},
+        jacobian_{data, weighing, at_, nearly(data, at_.model, at_.free, near)},
+        is_fresh_{near == nullptr},
+        is_verified_{is_fresh_} {
+    raw_ = differences(data_, simulate(data_, at_.model));
+    at_.residual = filtered(data_, weighing_, raw_);
+    at_.data_cost = 0.5 * weighing_.temper * at_.residual.squaredNorm();
+    at_.cost = at_.data_cost + cost_of_priors(at_.model, at_.free);
+    constexpr Eigen::Index cheap_values = 60000;
+    is_cheap_ = data.model.plant == physics::Plant::equations && count() * raw_.size() <= cheap_values;
+  }
+
+  Fit minimize() {
+    take_factor();
+    find_slopes();
+    for (int i = 0; i < iterations_ && count() > 0; ++i)
+      if (!step()) break;
+    at_.columns = jacobian_.take_columns();
+    find_covariance();
+    return std::move(at_);
+  }
+
+ private:
+  [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(at_.free.size()); }
+  /// So few steps only polish a fit that has been at its end before: the derivatives are not looked at again.
+  [[nodiscard]] bool only_polishes() const { return iterations_ < 4; }
+
+  /// False where no further step is worth its cost.
+  bool step() {
+    constexpr double as_good = 0.05;  // in cost: what a last step may lose and still be the end
+    constexpr int most_failures = 4;
+    const Eigen::VectorXd step = step_within(hessian_, gradient_, damping_, at_);
+    if (!step.allFinite()) return false;
+    Trial trial = try_out(step);
+    if (trial.cost < at_.cost) return go_to(std::move(trial));
+    if (trial.cost < at_.cost + as_good && (is_fresh_ || only_polishes())) return false;
+    if (!is_fresh_) {  // carried derivatives may be what misled the step
+      find_jacobian();
+      find_slopes();
+      return true;
+    }
+    damping_ *= 30.0;
+    return ++failures_ <= most_failures;
+  }
+
+  [[nodiscard]] Trial try_out(const Eigen::VectorXd& step) const {
+    constexpr double trusted = 20.0;  // scales: a shape is trusted to be linear only so far
+    Trial trial;
+    trial.model = at_.model;
+    trial.taken.resize(count()), trial.scale.resize(count());
+    for (Eigen::Index k = 0; k < count(); ++k) {
+      const auto& f = at_.free[static_cast<std::size_t>(k)];
+      double by = step(k);
+      if (f.where == Freedom::Where::term && f.sigma <= 0.0)
+        by = std::clamp(by, -trusted * f.scale, trusted * f.scale);
+      const double before = get(at_.model, f);
+      set(trial.model, f, f.bounds.clamp(before + by));
+      trial.taken(k) = get(trial.model, f) - before;
+      trial.scale(k) = f.scale;
+    }
+    trial.raw = differences(data_, simulate(data_, trial.model));
+    trial.residual = filtered(data_, weighing_, trial.raw);
+    trial.data_cost = 0.5 * weighing_.temper * trial.residual.squaredNorm();
+    trial.cost = trial.data_cost + cost_of_priors(trial.model, at_.free);
+    return trial;
+  }
+
+  /// False where the gain was so small that the fit has arrived.
+  bool go_to(Trial trial) {
+    constexpr double little = 0.2;  // in cost
+    if (!is_cheap_) jacobian_.update(trial, raw_, at_.residual);
+    const bool is_settled = at_.cost - trial.cost < little;
+    at_.model = std::move(trial.model);
+    at_.residual = std::move(trial.residual);
+    raw_ = std::move(trial.raw);
+    at_.cost = trial.cost;
+    at_.data_cost = trial.data_cost;
+    take_factor();
+    damping_ = std::max(1e-9, 0.1 * damping_);
+    if (is_settled && (is_verified_ || only_polishes())) return false;
+    if (is_settled || is_cheap_)  // carried derivatives cannot say that the fit has arrived
+      find_jacobian();
+    else
+      is_fresh_ = false;
+    find_slopes();
+    return true;
+  }
+
+  void find_jacobian() {
+    jacobian_.find_anew(at_);
+    is_fresh_ = is_verified_ = true;
+  }
+
+  void find_slopes() {
+    hessian_ = jacobian_.normal();
+    add_curvature_of_priors(at_.model, at_.free, hessian_);
+    gradient_ = jacobian_.times(at_.residual);
+    gradient_ += slope_of_priors(at_.model, at_.free);
+  }
+
+  /// Along the factor that the data leave open a damped step only creeps: it is taken at once.
+  void take_factor() {
+    const auto priors = [&](const Model& model) { return cost_of_priors(model, at_.free); };
+    const double factor = take_common_factor(at_.model, at_.free, priors);
+    if (factor == 1.0) return;
+    const auto goes = with_common_factor(at_.model, at_.free);
+    for (Eigen::Index k = 0; k < count(); ++k)
+      if (goes[static_cast<std::size_t>(k)]) jacobian_.divide(k, factor);
+    at_.cost = at_.data_cost + priors(at_.model);
+  }
+
+  /// From the curvature of the last slopes; numbers that the data do not move keep their prior.
+  void find_covariance() {
+    Eigen::MatrixXd regular = hessian_;
+    for (Eigen::Index k = 0; k < count(); ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;
+    at_.covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(count(), count()));
+    at_.sigma = at_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  }
+
+  const Case& data_;
+  const Weighing& weighing_;
+  const int iterations_;
+  Fit at_;
+  Eigen::VectorXd raw_;
+  Jacobian jacobian_;
+  bool is_fresh_;          // is the Jacobian that of this very point?
+  bool is_verified_;       // has a Jacobian of its own been found since the start?
+  bool is_cheap_ = false;  // to simulate: the Jacobian is found anew at each point
+  Eigen::MatrixXd hessian_;
+  Eigen::VectorXd gradient_;
+  double damping_ = 1e-3;
+  int failures_ = 0;
+};
+
+/// Half the logarithm of the observations a free number without prior (BIC); numbers with a prior cost nothing.
+double complexity_of(const Weighing& weighing, const Model& believed, const Fit& fit) {
+  double complexity = 0.0;
+  const double observations = std::max(10.0, weighing.temper * static_cast<double>(fit.residual.size()));
+  for (const auto& f : fit.free)
+    if (!(f.sigma > 0.0) || f.where == Freedom::Where::curve) complexity += 0.5 * std::log(observations);
+  // A pitch or a frequency was looked for in as many places as the recording resolves.
+  for (std::size_t t = believed.terms.size(); t < fit.model.terms.size(); ++t)
+    for (const char* scanned : {"pitch", "frequency", "period"})
+      if (fit.model.terms[t].info->index_of(scanned) < physics::most_parameters &&
+          fit.model.terms[t].info->index_of("phase") < physics::most_parameters)
+        complexity += 0.7 * std::log(observations);
+  return complexity;
+}
+
+/// How rare the terms are that the user did not write.
+double rarity_of_all(const Case& data, const Model& believed, const Model& model) {
+  double unlikely = 0.0;
+  for (std::size_t t = believed.terms.size(); t < model.terms.size(); ++t)
+    if (const auto& term = model.terms[t]; term.info->name == "additive_disturbance" &&
+                                           !believed.records_applied &&
+                                           term.values[term.info->index_of("squareness")] < 0.5)
+      unlikely += price_of_current(term.values[term.info->index_of("frequency")]);
+  for (std::size_t t = believed.terms.size(); t < model.terms.size(); ++t)
+    unlikely += rarity(data, model, model.terms[t]);
+  return unlikely;
+}
+
 }  // namespace
 
 Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
         const Fit* near) {
-  Fit best;
-  best.model = start;
-  best.free = freedoms(start, believed);
-  if (data.model.plant == physics::Plant::thermal) keep_reached(data, start, best.free);
-  for (const auto& f : best.free)  // first order does not know that friction takes energy
-    if (f.where == Freedom::Where::curve) set(best.model, f, f.bounds.clamp(get(best.model, f)));
-  const auto n = static_cast<Eigen::Index>(best.free.size());
-  const auto priors = [&](const Model& model) {
-    double sum = 0.0;
-    for (const auto& f : best.free)
-      if (f.sigma > 0.0) sum += prior_cost(f, get(model, f));
-    for_neighbours(best.free, [&](std::size_t k) {
-      const double apart = get(model, best.free[k + 1]) - get(model, best.free[k]);
-      sum += 0.5 * std::pow(apart / (beside * best.free[k].sigma), 2);
-    });
-    return sum;
-  };
-  Eigen::VectorXd raw = differences(data, simulate(data, best.model));
-  best.residual = filtered(data, weighing, raw);
-  best.data_cost = 0.5 * weighing.temper * best.residual.squaredNorm();
-  best.cost = best.data_cost + priors(best.model);
-  best.columns = nearly(data, best.model, best.free, near);
-  bool fresh = near == nullptr, verified = fresh;
-  // To simulate: always fresh sensitivities.
-  constexpr Eigen::Index cheap_values = 60000, many = 40;
-  const bool cheap = data.model.plant == physics::Plant::equations && n * raw.size() <= cheap_values;
-  Eigen::MatrixXd j = whitened(data, weighing, best.columns);
-  std::vector<bool> of_window(best.free.size());
-  for (std::size_t k = 0; k < of_window.size(); ++k)
-    of_window[k] = best.free[k].where == Freedom::Where::parameter &&
-                   is_start(best.model.parameters[best.free[k].index]);
-  OwnRows white_rows{j, of_window}, raw_rows{best.columns, of_window};
-  const auto find_anew = [&] {
-    best.columns = sensitivities(data, best.model, best.free);
-    j = whitened(data, weighing, best.columns);
-    white_rows = OwnRows{j, of_window}, raw_rows = OwnRows{best.columns, of_window};
-  };
-  Eigen::MatrixXd hessian;
-  Eigen::VectorXd gradient;
-  const auto derive = [&] {
-    if (white_rows.any()) {  // the products are most of what windows cost
-      hessian = weighing.temper * white_rows.normal(j);
-    } else if (n > many) {  // half of it
-      hessian.setZero(n, n);
-      hessian.selfadjointView<Eigen::Lower>().rankUpdate(j.transpose(), weighing.temper);
-      hessian = Eigen::MatrixXd{hessian.selfadjointView<Eigen::Lower>()};
-    } else {
-      hessian = weighing.temper * (j.transpose() * j);
-    }
-    gradient = weighing.temper * (white_rows.any() ? white_rows.times(j, best.residual)
-                                                   : Eigen::VectorXd{j.transpose() * best.residual});
-    gradient += slope_of_priors(best);
-    for (Eigen::Index k = 0; k < n; ++k)
-      if (const auto& f = best.free[static_cast<std::size_t>(k)]; f.sigma > 0.0)
-        hessian(k, k) += prior_weight(f, get(best.model, f));
-    for_neighbours(best.free, [&](std::size_t at) {
-      const auto k = static_cast<Eigen::Index>(at);
-      const double weight = neighbour_weight(best.free[at]);
-      hessian(k, k) += weight, hessian(k + 1, k + 1) += weight;
-      hessian(k, k + 1) -= weight, hessian(k + 1, k) -= weight;
-    });
-  };
-  // Along the factor that the data leave open a damped step only creeps: it is taken at once.
-  const auto take_factor = [&] {
-    const double factor = take_common_factor(best.model, best.free, priors);
-    if (factor == 1.0) return;
-    const auto goes = with_common_factor(best.model, best.free);
-    for (Eigen::Index k = 0; k < n; ++k)
-      if (goes[static_cast<std::size_t>(k)]) j.col(k) /= factor, best.columns.col(k) /= factor;
-    best.cost = best.data_cost + priors(best.model);
-  };
-  take_factor();
-  derive();
-  double damping = 1e-3;
-  int failures = 0;
-  for (int i = 0; i < iterations && n > 0; ++i) {
-    const Eigen::VectorXd step = step_within(hessian, gradient, damping, best);
-    if (!step.allFinite()) break;
-    Model tried = best.model;
-    Eigen::VectorXd taken(n), scale(n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-      const auto& f = best.free[static_cast<std::size_t>(k)];
-      double by = step(k);
-      // A shape is trusted to be linear only so far.
-      if (f.where == Freedom::Where::term && f.sigma <= 0.0)
-        by = std::clamp(by, -20.0 * f.scale, 20.0 * f.scale);
-      const double before = get(best.model, f);
-      set(tried, f, f.bounds.clamp(before + by));
-      taken(k) = get(tried, f) - before;
-      scale(k) = f.scale;
-    }
-    const Eigen::VectorXd raw_tried = differences(data, simulate(data, tried));
-    Eigen::VectorXd r = filtered(data, weighing, raw_tried);
-    const double data_cost = 0.5 * weighing.temper * r.squaredNorm();
-    const double cost = data_cost + priors(tried);
-    if (cost < best.cost) {
-      const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
-      if (const double length = taken.dot(by_scale); length > 0.0 && !cheap) {
-        // Broyden: the sensitivities now give the change that was seen.
-        const Eigen::VectorXd error = r - best.residual - j * taken;
-        Eigen::VectorXd change = raw_tried - raw - best.columns * taken;
-        change = change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
-        if (white_rows.any()) {
-          white_rows.update(j, error, taken, scale);
-          raw_rows.update(best.columns, change, taken, scale);
-        } else {
-          j += error * by_scale.transpose() / length;
-          best.columns += change * by_scale.transpose() / length;
-        }
-      }
-      const double gained = best.cost - cost;
-      best.model = std::move(tried);
-      best.residual = std::move(r);
-      raw = raw_tried;
-      best.cost = cost;
-      best.data_cost = data_cost;
-      take_factor();
-      damping = std::max(1e-9, 0.1 * damping);
-      const bool settled = gained < 0.2;
-      if (settled && (verified || iterations < 4)) break;
-      if (settled || cheap) {  // with sensitivities from elsewhere: only fresh ones can say so
-        find_anew();
-        verified = true;
-      }
-      fresh = settled || cheap;
-      derive();
-    } else if (cost < best.cost + 0.05 && (fresh || iterations < 4)) {
-      break;  // as good as it gets
-    } else if (!fresh) {
-      verified = true;
-      find_anew();
-      fresh = true;
-      derive();
-    } else {
-      damping *= 30.0;
-      if (++failures > 4) break;
-    }
-  }
-  // Numbers that the data do not move keep their prior and cost nothing.
-  double complexity = 0.0;
-  const double observations = std::max(10.0, weighing.temper * static_cast<double>(best.residual.size()));
-  for (const auto& f : best.free)
-    if (!(f.sigma > 0.0) || f.where == Freedom::Where::curve) complexity += 0.5 * std::log(observations);
-  // A pitch or a frequency was looked for in as many places as the recording resolves.
-  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    for (const char* scanned : {"pitch", "frequency", "period"})
-      if (best.model.terms[t].info->index_of(scanned) < physics::most_parameters &&
-          best.model.terms[t].info->index_of("phase") < physics::most_parameters)
-        complexity += 0.7 * std::log(observations);
-  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    if (const auto& term = best.model.terms[t]; term.info->name == "additive_disturbance" &&
-                                                !believed.records_applied &&
-                                                term.values[term.info->index_of("squareness")] < 0.5)
-      best.unlikely += price_of_current(term.values[term.info->index_of("frequency")]);
-  for (std::size_t t = believed.terms.size(); t < best.model.terms.size(); ++t)
-    best.unlikely += rarity(data, best.model, best.model.terms[t]);
-  best.evidence = -best.cost - complexity - best.unlikely;
-  Eigen::MatrixXd regular = hessian;
-  for (Eigen::Index k = 0; k < n; ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;
-  best.covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(n, n));
-  best.sigma = best.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  Minimizer minimizer{data, weighing, begin_at(data, start, believed), iterations, near};
+  Fit best = minimizer.minimize();
+  best.unlikely = rarity_of_all(data, believed, best.model);
+  best.evidence = -best.cost - complexity_of(weighing, believed, best) - best.unlikely;
   return best;
 }
 

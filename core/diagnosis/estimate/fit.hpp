@@ -22,9 +22,6 @@ struct Fit {
   Eigen::MatrixXd columns;   // sensitivities at or near the solution, not whitened
 };
 
-/// Of the cost of what the user believes, by each number that is free.
-Eigen::VectorXd slope_of_priors(const Fit& fit);
-
 /// What it costs (log) to call a sine in time a current and not a force: one recording shows both alike. Hum sits at the
 /// mains' frequencies, shaking anywhere.
 double price_of_current(double frequency);

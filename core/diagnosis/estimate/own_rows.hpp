@@ -11,6 +11,7 @@ namespace invar::diagnosis {
 /// Which columns of a matrix have few rows of their own, and which rows.
 class OwnRows {
  public:
+  OwnRows() = default;  // of no columns
   /// `may`: the columns that are looked at; all others count as full. Those full of rows all the same are so too.
   OwnRows(const Eigen::MatrixXd& columns, const std::vector<bool>& may);
   [[nodiscard]] bool any() const { return !own_.empty(); }

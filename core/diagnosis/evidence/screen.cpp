@@ -7,6 +7,7 @@
 
 #include "core/diagnosis/candidates/equation_candidates.hpp"
 #include "core/diagnosis/dataset/in_parallel.hpp"
+#include "core/diagnosis/estimate/priors.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
 #include "core/physics/counted_units.hpp"
@@ -44,7 +45,8 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   n.slope = Eigen::VectorXd::Zero(h.rows());
   // Elsewhere sensitivities are carried along from fit to fit and do not say so finely where the end is.
   if (data.model.plant != physics::Plant::equations) return n;
-  n.slope = weighing.temper * (n.columns.transpose() * base.residual) + slope_of_priors(base);
+  n.slope =
+      weighing.temper * (n.columns.transpose() * base.residual) + slope_of_priors(base.model, base.free);
   for (Eigen::Index k = 0; k < n.slope.size(); ++k) {  // what a bound holds has arrived
     const auto& f = base.free[static_cast<std::size_t>(k)];
     const double value = get(base.model, f);
