@@ -110,17 +110,14 @@ void check_filled(const physics::Model& model, const physics::Record& record,
                      "record what the model is to be compared with"};
 }
 
-/// One file among `files`: it has its share of the rows that a diagnosis runs through.
-void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
-  auto content = model::to_record(table, model, true);
+/// Notes the units of the columns, and the noise that the user gave, in SI.
+void take_units(Case& data, const physics::Model& model, const model::RecordFile& content) {
   if (data.recordings.empty())  // they are of the same model and units each time
     for (const auto& doubt : content.doubts) data.doubts.push_back("units: " + doubt);
-  data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
   if (model.plant == physics::Plant::sensor && !physics::is_rotary(data.model)) {
     const auto unit = parse_unit(content.units.at("true_position").unit);
     if (unit && unit->dimension == parse_unit("rad")->dimension) physics::count_in_angles(data.model);
   }
-  table.columns.clear();
   for (auto& signal : data.model.signals) {  // the user's own expressions are in the units of his columns
     const auto unit = content.units.find(signal.name);
     if (unit == content.units.end() || !signal.unit.empty()) continue;
@@ -131,24 +128,54 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
       data.taken_in_si.push_back(
           {signal.name, signal.column, unit->second.unit, unit->second.factor, unit->second.offset});
   }
-  data.count.rows += content.record.rows();
   for (const auto& name : data.outputs)
     if (const auto noise = model.noise.find(name); noise != model.noise.end() && noise->second > 0.0)
       data.given_noise[static_cast<std::size_t>(&name - data.outputs.data())] =
           noise->second * content.units.at(name).factor;
-  auto record = std::move(content.record);
-  drop_absurd(record);
-  check_filled(model, record, table.file);
+}
+
+/// Sorts the rows by time; points of a map and drops may stand in any order.
+void order_rows(Case& data, const physics::Model& model, const std::filesystem::path& file,
+                physics::Record& record) {
   const std::size_t before = data.count.out_of_order, rows = record.rows();
   put_in_order(record, data.count);
   if (model.plant == physics::Plant::error_map && record.find("direction") == nullptr)
     record.signals["direction"] =
         physics::directions_of_approach(physics::bridged(record.time, record.signals.at("position")));
-  // Points of a map and drops may stand in any order.
   const bool is_course = model.plant != physics::Plant::error_map && model.plant != physics::Plant::droplet;
   if (is_course && 2 * (data.count.out_of_order - before) > rows)
-    throw InputError{table.file.string() + ": column `" + model.signal("time")->column + "`",
+    throw InputError{file.string() + ": column `" + model.signal("time")->column + "`",
                      "goes back at most of its rows", "name the column of the time, and sort the rows by it"};
+}
+
+/// Parted at its pauses, and shortened to its share of the rows that a diagnosis runs through.
+void add_parts(Case& data, const physics::Model& model, const std::string& name, physics::Record record,
+               std::size_t files) {
+  const std::size_t ordered = record.rows();
+  std::size_t looked_at = 0;
+  auto parts = without_pauses(model, std::move(record));
+  data.count.gaps += parts.size() - 1;
+  for (auto& part : parts) {
+    const std::size_t share = std::max<std::size_t>(1, most_rows / files * part.record.rows() / ordered);
+    for (auto& stretch : shortened(model, std::move(part.record), share)) {
+      looked_at += stretch.record.rows();
+      add(data, model, name, std::move(stretch.record), std::max(part.forget, stretch.forget));
+    }
+  }
+  data.count.shortened += ordered - looked_at;
+}
+
+/// One file among `files`: it has its share of the rows that a diagnosis runs through.
+void add(Case& data, const physics::Model& model, recording::Table table, std::size_t files) {
+  auto content = model::to_record(table, model, true);
+  data.count.before_standstill += table.before, data.count.behind_rest += table.behind;
+  take_units(data, model, content);
+  table.columns.clear();
+  data.count.rows += content.record.rows();
+  auto record = std::move(content.record);
+  drop_absurd(record);
+  check_filled(model, record, table.file);
+  order_rows(data, model, table.file, record);
   even_out(model, record, table.file.filename().string(), data.doubts);
   leave_out_hiccups(model, record, table.file.filename().string(), data.doubts);
   leave_out_what_died(model, record, table.file.filename().string(), data.doubts);
@@ -158,19 +185,7 @@ void add(Case& data, const physics::Model& model, recording::Table table, std::s
     throw InputError{table.file.string(), "has fewer than 8 usable rows", "record for longer"};
   check_ticks(model, record.time, table.file);
   data.count.lone_inputs += drop_lone_inputs(model, record);
-  const std::size_t ordered = record.rows();
-  std::size_t looked_at = 0;
-  auto parts = without_pauses(model, std::move(record));
-  data.count.gaps += parts.size() - 1;
-  for (auto& part : parts) {
-    const std::size_t share = std::max<std::size_t>(1, most_rows / files * part.record.rows() / ordered);
-    for (auto& stretch : shortened(model, std::move(part.record), share)) {
-      looked_at += stretch.record.rows();
-      add(data, model, table.file.filename().string(), std::move(stretch.record),
-          std::max(part.forget, stretch.forget));
-    }
-  }
-  data.count.shortened += ordered - looked_at;
+  add_parts(data, model, table.file.filename().string(), std::move(record), files);
 }
 
 /// What was taken in SI is reported in it.

@@ -235,54 +235,68 @@ bool lasts(const Case& data, const physics::Model& model, std::size_t term) {
   return *std::max_element(gain.begin(), gain.end()) < 0.6 * all;
 }
 
+/// The amplitude of a wave block by block, of one output.
+struct Amplitudes {
+  std::vector<std::complex<double>> blocks;
+  double weights_squared = 0.0;      // of the windows
+  double squares = 0.0, rows = 0.0;  // of what the model leaves
+};
+
+/// `with`, `without`: what the model simulates with the wave and without it.
+Amplitudes amplitudes_of(const Case& data, const physics::Model& model, std::size_t term, std::size_t o,
+                         const std::vector<physics::Outputs>& with,
+                         const std::vector<physics::Outputs>& without) {
+  Amplitudes all;
+  auto& [blocks, weights_squared, squares, rows] = all;
+  const auto onset = model.terms[term].info->index_of("onset");
+  const double from = onset < physics::most_parameters ? model.terms[term].values[onset] : -1e300;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const auto& time = data.recordings[r].inputs.time;
+    const auto angles = angles_of(data, model, model.terms[term], r);
+    // The turns gone through until each row, to and fro. Blocks are alike in them, and so much does each row count: rest
+    // between two moves, however long, shows nothing of a wave along the way.
+    std::vector<double> gone(time.size(), 0.0);
+    for (std::size_t i = 1; i < time.size(); ++i)
+      gone[i] = gone[i - 1] + (time[i] > from ? std::abs(angles[i] - angles[i - 1]) : 0.0);
+    const double way = gone.back(), most = 5.0 * way / static_cast<double>(time.size());
+    const double count = std::min(16.0, std::floor(0.25 * way / std::numbers::pi));
+    for (double b = 0.0; b < count; b += 1.0) {
+      const double low = way * b / count, high = way * (b + 1.0) / count;
+      std::complex<double> sum;
+      std::array<double, 2> level{}, power{};  // of the two ends: a slow rest is no line
+      for (int pass = 0; pass < 2; ++pass)
+        for (auto i =
+                 static_cast<std::size_t>(std::lower_bound(gone.begin(), gone.end(), low) - gone.begin());
+             i < time.size() && gone[i] < high; ++i) {
+          const double e = data.recordings[r].measured[o][i] - without[r][o][i];
+          if (!std::isfinite(e) || (pass == 1 && !(power[0] > 0.0 && power[1] > 0.0))) continue;
+          const double s = (gone[i] - low) / (high - low),
+                       step = std::min(most, gone[std::min(i + 1, gone.size() - 1)] - gone[i]),
+                       window = step * (1.0 - std::cos(2.0 * std::numbers::pi * s));
+          const double weights[2] = {window * (1.0 - s), window * s};
+          if (pass == 0) {
+            for (std::size_t k = 0; k < 2; ++k) level[k] += weights[k] * e, power[k] += weights[k];
+          } else {
+            const double slow = (1.0 - s) * level[0] / power[0] + s * level[1] / power[1];
+            sum += window * (e - slow) * std::polar(1.0, -angles[i]);
+            weights_squared += window * window;
+            squares += std::pow(data.recordings[r].measured[o][i] - with[r][o][i], 2), rows += 1.0;
+          }
+        }
+      if (power[0] > 0.0 && power[1] > 0.0) blocks.push_back(sum);
+    }
+  }
+  return all;
+}
+
 /// Is what a sine explains a line, with one phase from beginning to end? A hum of the noise has a band, and what coarse
 /// steps make of a motion has another phase in every pass, however much evidence a sine in it gathers. Against the scatter
 /// of its amplitude from block to block (Fisher's F), strictly where that is more than rows without memory would make.
 bool is_line(const Case& data, const physics::Model& model, std::size_t term) {
-  const auto& info = *model.terms[term].info;
   if (angles_of(data, model, model.terms[term], 0).empty()) return true;
-  const auto onset = info.index_of("onset");
-  const double from = onset < physics::most_parameters ? model.terms[term].values[onset] : -1e300;
   const auto with = simulate(data, model), without = simulate(data, physics::without_term(model, term));
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    std::vector<std::complex<double>> blocks;
-    double weights_squared = 0.0, squares = 0.0, rows = 0.0;
-    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
-      const auto& time = data.recordings[r].inputs.time;
-      const auto angles = angles_of(data, model, model.terms[term], r);
-      // The turns gone through until each row, to and fro. Blocks are alike in them, and so much does each row count: rest
-      // between two moves, however long, shows nothing of a wave along the way.
-      std::vector<double> gone(time.size(), 0.0);
-      for (std::size_t i = 1; i < time.size(); ++i)
-        gone[i] = gone[i - 1] + (time[i] > from ? std::abs(angles[i] - angles[i - 1]) : 0.0);
-      const double way = gone.back(), most = 5.0 * way / static_cast<double>(time.size());
-      const double count = std::min(16.0, std::floor(0.25 * way / std::numbers::pi));
-      for (double b = 0.0; b < count; b += 1.0) {
-        const double low = way * b / count, high = way * (b + 1.0) / count;
-        std::complex<double> sum;
-        std::array<double, 2> level{}, power{};  // of the two ends: a slow rest is no line
-        for (int pass = 0; pass < 2; ++pass)
-          for (auto i =
-                   static_cast<std::size_t>(std::lower_bound(gone.begin(), gone.end(), low) - gone.begin());
-               i < time.size() && gone[i] < high; ++i) {
-            const double e = data.recordings[r].measured[o][i] - without[r][o][i];
-            if (!std::isfinite(e) || (pass == 1 && !(power[0] > 0.0 && power[1] > 0.0))) continue;
-            const double s = (gone[i] - low) / (high - low),
-                         step = std::min(most, gone[std::min(i + 1, gone.size() - 1)] - gone[i]),
-                         window = step * (1.0 - std::cos(2.0 * std::numbers::pi * s));
-            const double weights[2] = {window * (1.0 - s), window * s};
-            if (pass == 0) {
-              for (std::size_t k = 0; k < 2; ++k) level[k] += weights[k] * e, power[k] += weights[k];
-            } else {
-              const double slow = (1.0 - s) * level[0] / power[0] + s * level[1] / power[1];
-              sum += window * (e - slow) * std::polar(1.0, -angles[i]);
-              weights_squared += window * window;
-              squares += std::pow(data.recordings[r].measured[o][i] - with[r][o][i], 2), rows += 1.0;
-            }
-          }
-        if (power[0] > 0.0 && power[1] > 0.0) blocks.push_back(sum);
-      }
-    }
+    const auto [blocks, weights_squared, squares, rows] = amplitudes_of(data, model, term, o, with, without);
     const auto n = static_cast<double>(blocks.size());
     if (n < 6.0) return true;  // too few waves to tell
     std::complex<double> mean;

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include "core/diagnosis/candidates/equation_candidates.hpp"
 #include "core/diagnosis/dataset/in_parallel.hpp"
@@ -99,6 +101,34 @@ Eigen::MatrixXd shares_of(const Start& start, const Start& finer) {
   return shares;
 }
 
+/// By how much a value of the curve is moved for its slope.
+double step_of_curve(const Case& data, const Start& start) {
+  if (start.step > 0.0) return start.step;
+  if (data.model.plant == physics::Plant::sensor) return 1e-7;
+  const auto site = start.term.info->site;
+  if (site == "actuator" || site == "thermal" || site == "measurement") return 1e-3;
+  if (data.model.plant == physics::Plant::thermal) return 0.1;
+  return data.model.plant == physics::Plant::axis ? 0.05 : 1e-6;
+}
+
+/// The term of a start moved along one direction alone, and how far.
+std::pair<Term, double> moved(const Case& data, const Start& start, const Start::Direction& direction) {
+  Term term = start.term;
+  if (!term.curve.knots.empty()) {
+    const double by = step_of_curve(data, start);
+    term.curve.values[direction.knot] = by;
+    return {std::move(term), by};
+  }
+  if (direction.amplitude >= none) return {std::move(term), 1.0};
+  for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
+    if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude) term.values[i] = 0.0;
+    if (term.info->parameters[i].role == Role::phase && direction.quadrature)
+      term.values[i] += 0.5 * std::numbers::pi;
+  }
+  const double by = term.values[direction.amplitude];
+  return {std::move(term), by};
+}
+
 /// Of all directions of all starts: terms of one kind at one place run together. A curve of few knots is
 /// the sum of one of many that has them too.
 std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const Eigen::VectorXd& at,
@@ -118,27 +148,8 @@ std::vector<Eigen::MatrixXd> columns_of(const Case& data, const Fit& base, const
     const auto& start = starts[s];
     all[s].resize(at.size(), static_cast<Eigen::Index>(start.directions.size()));
     for (const auto& direction : start.directions) {
-      auto& model = models.emplace_back(base.model);
-      Term term = start.term;
-      double by = 1.0;
-      if (!term.curve.knots.empty()) {
-        by = data.model.plant == physics::Plant::axis ? 0.05 : 1e-6;
-        if (data.model.plant == physics::Plant::thermal) by = 0.1;
-        if (term.info->site == "actuator" || term.info->site == "thermal" || term.info->site == "measurement")
-          by = 1e-3;
-        if (data.model.plant == physics::Plant::sensor) by = 1e-7;
-        if (start.step > 0.0) by = start.step;
-        term.curve.values[direction.knot] = by;
-      } else if (direction.amplitude < none) {
-        for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
-          if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude)
-            term.values[i] = 0.0;
-          if (term.info->parameters[i].role == Role::phase && direction.quadrature)
-            term.values[i] += 0.5 * std::numbers::pi;
-        }
-        by = term.values[direction.amplitude];
-      }
-      model.terms.push_back(std::move(term));
+      auto [term, by] = moved(data, start, direction);
+      models.emplace_back(base.model).terms.push_back(std::move(term));
       places.push_back({s, &direction - start.directions.data(), by});
     }
   }
@@ -183,13 +194,54 @@ std::size_t directions_of(const std::vector<Start>& starts) {
   return sum;
 }
 
+/// Strength, gain and merit of one start, whose columns are there already.
+void weigh_start(const Case& data, const Weighing& weighing, const Fit& base, const Nuisance& n,
+                 Screened& s) {
+  const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
+  s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
+  const auto& info = *s.start.term.info;
+  if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
+      s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
+    // A term without a strength is there once, not eight times: the gain of one.
+    const double full = s.strength(0);
+    s.gain *= (2.0 * full - 1.0) / (full * full);
+    s.strength(0) = 1.0;
+  }
+  // An amplitude without a phase has one possible sign where its bounds say so.
+  bool periodic = false;
+  std::size_t shapes = 0;
+  for (std::size_t k = 0; k < info.parameter_count(); ++k) {
+    periodic = periodic || info.parameters[k].role == Role::phase;
+    shapes += info.parameters[k].role == Role::shape ? 1U : 0U;
+  }
+  if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
+    const auto& d = s.start.directions.front();
+    const double lower =
+        d.amplitude < none ? physics::bounds_of_parameter(base.model, s.start.term, d.amplitude).lower : 0.0;
+    s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
+  }
+  const double numbers = static_cast<double>(s.start.directions.size() + shapes);
+  // More than all there is of something is none of it: the gain of what may be.
+  if (s.start.term.curve.knots.empty() && s.start.directions.size() == 1 &&
+      s.start.directions[0].amplitude < none) {
+    const double upper =
+                     physics::bounds_of_parameter(base.model, s.start.term, s.start.directions[0].amplitude)
+                         .upper,
+                 full = s.strength(0);
+    if (full > upper) {
+      s.gain *= upper * (2.0 * full - upper) / (full * full);
+      s.strength(0) = upper;
+    }
+  }
+  s.merit = s.gain - 0.5 * numbers * std::log(observations);
+}
+
 /// On all rows.
 std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, const Fit& base,
                                     const std::vector<Start>& starts, std::size_t keep) {
   const auto n = nuisance(data, weighing, base);
   const Eigen::VectorXd at = differences(data, simulate(data, base.model));
   std::vector<Screened> all(starts.size());
-  const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
   // So many at a time: their columns are as long as the recording.
   const std::size_t most = data.model.plant == physics::Plant::equations ? 64 : 16;
   for (std::size_t begin = 0; begin < starts.size(); begin += most) {
@@ -202,43 +254,7 @@ std::vector<Screened> screen_on_all(const Case& data, const Weighing& weighing, 
       const std::size_t i = begin + of;
       auto& s = all[i];
       s.start = starts[i];
-      s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
-      const auto& info = *s.start.term.info;
-      if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
-          s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
-        // A term without a strength is there once, not eight times: the gain of one.
-        const double full = s.strength(0);
-        s.gain *= (2.0 * full - 1.0) / (full * full);
-        s.strength(0) = 1.0;
-      }
-      // An amplitude without a phase has one possible sign where its bounds say so.
-      bool periodic = false;
-      std::size_t shapes = 0;
-      for (std::size_t k = 0; k < info.parameter_count(); ++k) {
-        periodic = periodic || info.parameters[k].role == Role::phase;
-        shapes += info.parameters[k].role == Role::shape ? 1U : 0U;
-      }
-      if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
-        const auto& d = s.start.directions.front();
-        const double lower = d.amplitude < none
-                                 ? physics::bounds_of_parameter(base.model, s.start.term, d.amplitude).lower
-                                 : 0.0;
-        s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
-      }
-      const double numbers = static_cast<double>(s.start.directions.size() + shapes);
-      // More than all there is of something is none of it: the gain of what may be.
-      if (s.start.term.curve.knots.empty() && s.start.directions.size() == 1 &&
-          s.start.directions[0].amplitude < none) {
-        const double upper = physics::bounds_of_parameter(base.model, s.start.term,
-                                                          s.start.directions[0].amplitude)
-                                 .upper,
-                     full = s.strength(0);
-        if (full > upper) {
-          s.gain *= upper * (2.0 * full - upper) / (full * full);
-          s.strength(0) = upper;
-        }
-      }
-      s.merit = s.gain - 0.5 * numbers * std::log(observations);
+      weigh_start(data, weighing, base, n, s);
       if (keep == 0 || s.merit < 0.0) s.columns.resize(0, 0);
     });
   }
@@ -309,6 +325,95 @@ double price(const Start& start, double observations) {
   return 0.5 * static_cast<double>(numbers) * std::log(observations);
 }
 
+bool is_of_one_term(const Start& x, const Start& y) {
+  return x.term.info == y.term.info && x.term.on == y.term.on && x.term.with == y.term.with;
+}
+
+/// Of each term the two starts that gain most alone. In the user's equations, which have many places, what repeats is left
+/// to the search one by one: it shows alone, at its own place in the spectrum.
+std::vector<Start> best_alone(const Case& data, const Weighing& weighing, const Fit& base,
+                              const std::vector<Start>& starts, bool may_repeat) {
+  const auto single = screen(data, weighing, base, starts, 0);
+  std::vector<Start> chosen;
+  for (const auto& s : single) {
+    const auto same = std::count_if(chosen.begin(), chosen.end(),
+                                    [&](const Start& start) { return is_of_one_term(start, s.start); });
+    if (same < 2 && (may_repeat || s.start.directions.size() == 1)) chosen.push_back(s.start);
+  }
+  return chosen;
+}
+
+/// The normal equations of all directions of all starts, from which those of any two are taken.
+class PairScreen {
+ public:
+  PairScreen(const Case& data, const Weighing& weighing, const Fit& base, const std::vector<Start>& starts)
+      : base_{base},
+        starts_{starts},
+        nuisance_{nuisance(data, weighing, base)},
+        observations_{std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()))} {
+    const Eigen::VectorXd at = differences(data, simulate(data, base.model));
+    for (const auto& start : starts)
+      begins_.push_back(begins_.back() + static_cast<Eigen::Index>(start.directions.size()));
+    Eigen::MatrixXd columns(at.size(), begins_.back());
+    const auto found = columns_of(data, base, at, starts);
+    for (std::size_t i = 0; i < starts.size(); ++i)
+      columns.middleCols(begins_[i], begins_[i + 1] - begins_[i]) = found[i];
+    columns = whitened(data, weighing, columns);
+    shared_ = weighing.temper * (nuisance_.columns.transpose() * columns);
+    all_ = weighing.temper * (columns.transpose() * columns);
+    gram_ = all_ - shared_.transpose() * nuisance_.hessian.solve(shared_);
+    slope_ = slope_along(weighing, base, nuisance_, columns, shared_);
+  }
+
+  /// Nothing where the two together need what their bounds forbid.
+  [[nodiscard]] std::optional<ScreenedPair> pair(std::size_t i, std::size_t k) const {
+    std::vector<Eigen::Index> places;
+    for (auto c = begins_[i]; c < begins_[i + 1]; ++c) places.push_back(c);
+    const auto second = static_cast<Eigen::Index>(places.size());
+    for (auto c = begins_[k]; c < begins_[k + 1]; ++c) places.push_back(c);
+    Eigen::MatrixXd m = gram_(places, places);
+    for (Eigen::Index c = 0; c < m.rows(); ++c) {
+      const auto place = places[static_cast<std::size_t>(c)];
+      m(c, c) += 1e-6 * all_(place, place) + 1e-300;
+    }
+    const Eigen::VectorXd g = slope_(places);
+    const Eigen::VectorXd strength = -m.ldlt().solve(g);
+    if (!strength.allFinite() || is_impossible(base_.model, starts_[i], strength, 0) ||
+        is_impossible(base_.model, starts_[k], strength, second))
+      return std::nullopt;
+    ScreenedPair pair;
+    pair.merit = -0.5 * strength.dot(g) - price(starts_[i], observations_) - price(starts_[k], observations_);
+    pair.first.start = starts_[i], pair.second.start = starts_[k];
+    pair.first.strength = strength.head(second),
+    pair.second.strength = strength.tail(strength.size() - second);
+    pair.shift = -nuisance_.hessian.solve(shared_(Eigen::all, places) * strength);
+    return pair;
+  }
+
+ private:
+  const Fit& base_;
+  const std::vector<Start>& starts_;
+  Nuisance nuisance_;
+  double observations_;
+  std::vector<Eigen::Index> begins_{0};  // of the columns of each start
+  Eigen::MatrixXd shared_, all_, gram_;
+  Eigen::VectorXd slope_;
+};
+
+/// Of two names their best beginning alone, so that others have their turn; `pairs` come best first.
+std::vector<ScreenedPair> best_of_each_two(std::vector<ScreenedPair> pairs, std::size_t most) {
+  const auto is_same = [](const ScreenedPair& x, const ScreenedPair& y) {
+    return (is_of_one_term(x.first.start, y.first.start) && is_of_one_term(x.second.start, y.second.start)) ||
+           (is_of_one_term(x.first.start, y.second.start) && is_of_one_term(x.second.start, y.first.start));
+  };
+  std::vector<ScreenedPair> best;
+  for (auto& pair : pairs)
+    if (best.size() < most && std::none_of(best.begin(), best.end(),
+                                           [&](const ScreenedPair& other) { return is_same(pair, other); }))
+      best.push_back(std::move(pair));
+  return best;
+}
+
 }  // namespace
 
 std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighing, const Fit& base,
@@ -319,75 +424,17 @@ std::vector<ScreenedPair> screen_pairs(const Case& data, const Weighing& weighin
       pair.shift.setZero(static_cast<Eigen::Index>(base.free.size()));  // of the excerpt's
     return pairs;
   }
-  // Of each term the two starts that gain most alone. In the user's equations, which have many places, what repeats is left
-  // to the search one by one: it shows alone, at its own place in the spectrum.
   const bool may_repeat = data.model.plant != physics::Plant::equations;
-  const auto single = screen(data, weighing, base, starts, 0);
-  std::vector<Start> chosen;
-  for (const auto& s : single) {
-    const auto same = std::count_if(chosen.begin(), chosen.end(), [&](const Start& start) {
-      const auto &a = start.term, &b = s.start.term;
-      return a.info == b.info && a.on == b.on && a.with == b.with;
-    });
-    if (same < 2 && (may_repeat || s.start.directions.size() == 1)) chosen.push_back(s.start);
-  }
-  const auto n = nuisance(data, weighing, base);
-  const Eigen::VectorXd at = differences(data, simulate(data, base.model));
-  std::vector<Eigen::Index> begins{0};
-  for (const auto& start : chosen)
-    begins.push_back(begins.back() + static_cast<Eigen::Index>(start.directions.size()));
-  Eigen::MatrixXd columns(at.size(), begins.back());
-  const auto found = columns_of(data, base, at, chosen);
-  for (std::size_t i = 0; i < chosen.size(); ++i)
-    columns.middleCols(begins[i], begins[i + 1] - begins[i]) = found[i];
-  columns = whitened(data, weighing, columns);
-  const Eigen::MatrixXd b = weighing.temper * (n.columns.transpose() * columns);
-  const Eigen::MatrixXd all = weighing.temper * (columns.transpose() * columns);
-  const Eigen::MatrixXd gram = all - b.transpose() * n.hessian.solve(b);
-  const Eigen::VectorXd slope = slope_along(weighing, base, n, columns, b);
-  const double observations = std::max(10.0, weighing.temper * static_cast<double>(base.residual.size()));
+  const auto chosen = best_alone(data, weighing, base, starts, may_repeat);
+  const PairScreen screened{data, weighing, base, chosen};
   std::vector<ScreenedPair> pairs;
   for (std::size_t i = 0; i < chosen.size(); ++i)
     for (std::size_t k = i + 1; k < chosen.size(); ++k) {
-      const auto &one = chosen[i].term, &two = chosen[k].term;
-      if ((one.info == two.info && one.on == two.on && one.with == two.with) || same_law(one, two)) continue;
-      std::vector<Eigen::Index> places;
-      for (auto c = begins[i]; c < begins[i + 1]; ++c) places.push_back(c);
-      const auto second = static_cast<Eigen::Index>(places.size());
-      for (auto c = begins[k]; c < begins[k + 1]; ++c) places.push_back(c);
-      Eigen::MatrixXd m = gram(places, places);
-      for (Eigen::Index c = 0; c < m.rows(); ++c) {
-        const auto place = places[static_cast<std::size_t>(c)];
-        m(c, c) += 1e-6 * all(place, place) + 1e-300;
-      }
-      const Eigen::VectorXd g = slope(places);
-      const Eigen::VectorXd strength = -m.ldlt().solve(g);
-      if (!strength.allFinite() || is_impossible(base.model, chosen[i], strength, 0) ||
-          is_impossible(base.model, chosen[k], strength, second))
-        continue;
-      ScreenedPair pair;
-      pair.merit = -0.5 * strength.dot(g) - price(chosen[i], observations) - price(chosen[k], observations);
-      pair.first.start = chosen[i], pair.second.start = chosen[k];
-      pair.first.strength = strength.head(second),
-      pair.second.strength = strength.tail(strength.size() - second);
-      pair.shift = -n.hessian.solve(b(Eigen::all, places) * strength);
-      pairs.push_back(std::move(pair));
+      if (is_of_one_term(chosen[i], chosen[k]) || same_law(chosen[i].term, chosen[k].term)) continue;
+      if (auto pair = screened.pair(i, k)) pairs.push_back(std::move(*pair));
     }
   std::sort(pairs.begin(), pairs.end(), [](const auto& x, const auto& y) { return x.merit > y.merit; });
-  if (may_repeat) {  // of two names their best beginning: where few places are, others should have their turn
-    const auto same = [](const Start& x, const Start& y) {
-      return x.term.info == y.term.info && x.term.on == y.term.on && x.term.with == y.term.with;
-    };
-    std::vector<ScreenedPair> best;
-    for (auto& pair : pairs)
-      if (best.size() < most && std::none_of(best.begin(), best.end(), [&](const ScreenedPair& other) {
-            return (same(pair.first.start, other.first.start) &&
-                    same(pair.second.start, other.second.start)) ||
-                   (same(pair.first.start, other.second.start) && same(pair.second.start, other.first.start));
-          }))
-        best.push_back(std::move(pair));
-    return best;
-  }
+  if (may_repeat) return best_of_each_two(std::move(pairs), most);
   if (pairs.size() > most) pairs.resize(most);
   return pairs;
 }

@@ -215,28 +215,78 @@ std::string not_tried(const Diagnosis& d) {
   return text;
 }
 
-std::string verdict_sentence(const Case& data, const Diagnosis& d) {
-  if (d.is_partial) {
-    const std::string ended = why_ended(d) + " before all was tried";
-    if (d.findings.empty())
-      return "Not finished, nothing can be said. " + ended +
-             "; nothing was found until then, which does not say that nothing is missing.";
-    auto whole = d;
-    whole.is_partial = false;
-    const bool has_rival = std::any_of(d.findings.begin(), d.findings.end(), [](const Finding& f) {
-      return std::any_of(f.alternatives.begin(), f.alternatives.end(),
-                         [](const Alternative& a) { return a.explains_as_well(); });
-    });
-    if (whole.verdict == Verdict::ambiguous && !has_rival) whole.verdict = Verdict::explained;
-    return "Not finished. " + ended +
-           ", and rivals may not have been weighed; so far: " + verdict_sentence(data, whole);
-  }
+namespace {
+
+/// So far as it went: what was found until then.
+std::string sentence_of_part(const Case& data, const Diagnosis& d) {
+  const std::string ended = why_ended(d) + " before all was tried";
+  if (d.findings.empty())
+    return "Not finished, nothing can be said. " + ended +
+           "; nothing was found until then, which does not say that nothing is missing.";
+  auto whole = d;
+  whole.is_partial = false;
+  const bool has_rival = std::any_of(d.findings.begin(), d.findings.end(), [](const Finding& f) {
+    return std::any_of(f.alternatives.begin(), f.alternatives.end(),
+                       [](const Alternative& a) { return a.explains_as_well(); });
+  });
+  if (whole.verdict == Verdict::ambiguous && !has_rival) whole.verdict = Verdict::explained;
+  return "Not finished. " + ended +
+         ", and rivals may not have been weighed; so far: " + verdict_sentence(data, whole);
+}
+
+std::string names_of_findings(const Case& data, const Diagnosis& d) {
   std::string names;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
     names += (i == 0 ? "" : (i + 1 == d.findings.size() ? " and " : ", ")) + title_of(finding) + " (" +
              place_of(data, finding.term) + ")";
   }
+  return names;
+}
+
+std::string names_of_rivals(const Case& data, const Diagnosis& d) {
+  std::string also;
+  for (const auto& f : d.findings)
+    for (const auto& a : f.alternatives)
+      if (a.explains_as_well())
+        also +=
+            (also.empty() ? "" : ", ") + readable(a.term.info->name) + " (" + place_of(data, a.term) + ")";
+  return also;
+}
+
+std::string sentence_of_unknown(const Case& data, const Diagnosis& d) {
+  if (d.off_law && d.off_law->is_chief())
+    return "Unknown physics: the recorded current is not what the model's controller makes of the recorded "
+           "reference and position. What goes with the motion differs by " +
+           si(d.off_law->off, "A") + " RMS, and the current moves by " + si(d.off_law->all, "A") +
+           ". Nothing behind the loop is judged.";
+  if (d.findings.empty())
+    return "Unknown physics: what the model leaves over follows what was recorded and its past, and neither "
+           "a known term nor a curve describes it" +
+           (d.suspect && !d.suspect->place.empty() ? "; it looks most like the " + d.suspect->place
+                                                   : std::string{}) +
+           ".";
+  const auto& first = d.findings.front();
+  if (first.stand_in != nullptr) {
+    std::string places;
+    for (const auto& f : d.findings)
+      if (const auto place = place_of(data, f.term); places.find(place) == std::string::npos)
+        places += (places.empty() ? "" : " and the ") + place;
+    return "Unknown physics: something is missing, most likely at the " + places + ". Of the known terms " +
+           nearest_of(d, first) + ".";
+  }
+  return "Unknown physics: something is missing at the " + place_of(data, first.term) + " (" +
+         site_of(data, first.term) + ") that goes with " +
+         (first.term.curve.memory != physics::Curve::Memory::none ? "the history of " : "") +
+         first.term.curve.over + (is_multiplied(first.term) ? " and " + first.term.with : "") +
+         ", and no known term describes it.";
+}
+
+}  // namespace
+
+std::string verdict_sentence(const Case& data, const Diagnosis& d) {
+  if (d.is_partial) return sentence_of_part(data, d);
+  const std::string names = names_of_findings(data, d);
   switch (d.verdict) {
     case Verdict::no_mismatch:
       return "No mismatch: the model explains the recording to " +
@@ -247,43 +297,11 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
       return "Explained: the model leaves out " + names + elsewhere(data, d) + ".";
     case Verdict::partly_explained:
       return "Partly explained: the model leaves out " + names + elsewhere(data, d) + ", and something more.";
-    case Verdict::ambiguous: {
-      std::string also;
-      for (const auto& f : d.findings)
-        for (const auto& a : f.alternatives)
-          if (a.explains_as_well())
-            also += (also.empty() ? "" : ", ") + readable(a.term.info->name) + " (" + place_of(data, a.term) +
-                    ")";
-      return "Ambiguous: the recording shows " + names + ", but cannot tell it from " + also + ".";
-    }
+    case Verdict::ambiguous:
+      return "Ambiguous: the recording shows " + names + ", but cannot tell it from " +
+             names_of_rivals(data, d) + ".";
     case Verdict::unknown_physics:
-      if (d.off_law && d.off_law->is_chief())
-        return "Unknown physics: the recorded current is not what the model's controller makes of the "
-               "recorded "
-               "reference and position. What goes with the motion differs by " +
-               si(d.off_law->off, "A") + " RMS, and the current moves by " + si(d.off_law->all, "A") +
-               ". Nothing behind the loop is judged.";
-      if (d.findings.empty())
-        return "Unknown physics: what the model leaves over follows what was recorded and its past, and "
-               "neither a known "
-               "term nor a curve describes it" +
-               (d.suspect && !d.suspect->place.empty() ? "; it looks most like the " + d.suspect->place
-                                                       : std::string{}) +
-               ".";
-      if (d.findings.front().stand_in != nullptr) {
-        std::string places;
-        for (const auto& f : d.findings)
-          if (const auto place = place_of(data, f.term); places.find(place) == std::string::npos)
-            places += (places.empty() ? "" : " and the ") + place;
-        return "Unknown physics: something is missing, most likely at the " + places +
-               ". Of the known terms " + nearest_of(d, d.findings.front()) + ".";
-      }
-      return "Unknown physics: something is missing at the " + place_of(data, d.findings.front().term) +
-             " (" + site_of(data, d.findings.front().term) + ") that goes with " +
-             (d.findings.front().term.curve.memory != physics::Curve::Memory::none ? "the history of " : "") +
-             d.findings.front().term.curve.over +
-             (is_multiplied(d.findings.front().term) ? " and " + d.findings.front().term.with : "") +
-             ", and no known term describes it.";
+      return sentence_of_unknown(data, d);
   }
   return "";
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <string>
 
@@ -100,13 +101,9 @@ bool is_done_by_one(const Case& data, const std::vector<Settled>& all, const Set
   });
 }
 
-}  // namespace
-
-Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
-                 const Fit* rival) {
-  Pairs found;
-  const Weighing plain = weigh(data, simulate(data, base.model), false);
-  const Fit under = fit(data, plain, base.model, data.model, 4, &base);
+/// The pairs that gain most to first order, fitted, and the best of them followed to their end; best first.
+std::vector<Settled> settled_pairs(const Case& data, const Weighing& plain, const Fit& under,
+                                   const std::set<std::string, std::less<>>& without) {
   // A model of the user's own equations offers many terms of one kind, and is quick to simulate.
   const bool own = data.model.plant == physics::Plant::equations;
   const auto pairs =
@@ -118,62 +115,92 @@ Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, 
                     : begin(data, plain, under, pairs[i]);
   });
   std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
-  // What swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
+  // A motion that swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
   const bool quick = own && data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
   std::vector<Settled> settled(std::min<std::size_t>(3, rough.size()));
   in_parallel(settled.size(),
               [&](std::size_t i) { settled[i] = settle(data, std::move(rough[i]), quick ? 12 : 3); });
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
-  const std::size_t given = data.model.terms.size();
-  const auto keep = [&](const physics::Model& single) {
-    if (std::none_of(found.alone.begin(), found.alone.end(), [&](const physics::Model& model) {
-          return label(model.terms.back()) == label(single.terms.back());
-        }))
-      found.alone.push_back(single);
-  };
-  for (auto& best : settled) {
+  return settled;
+}
+
+/// Keeps a model with one term, once of each label.
+void keep(Pairs& found, const physics::Model& single) {
+  if (std::none_of(found.alone.begin(), found.alone.end(), [&](const physics::Model& model) {
+        return label(model.terms.back()) == label(single.terms.back());
+      }))
+    found.alone.push_back(single);
+}
+
+/// Are both terms needed, from place `first` on? An engineer must see what the other adds; a term that does without it is
+/// kept alone.
+bool needs_both(const Case& data, const Settled& best, std::size_t first, Pairs& found) {
+  const bool one = stands(data, best.fit, first), two = stands(data, best.fit, first + 1);
+  if (one != two) keep(found, physics::without_term(best.fit.model, one ? first + 1 : first));
+  if (!one || !two) return false;
+  bool needed = true;
+  for (const std::size_t dropped : {first, first + 1}) {
+    const auto alone = physics::without_term(best.fit.model, dropped);
+    const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
+    const bool adds = least_ratio(data, best.fit, single.fit) < 0.8;
+    if (!adds) keep(found, single.fit.model);
+    needed = needed && adds;
+  }
+  return needed;
+}
+
+/// For each term of the pair, the terms that another pair has in its place beside the same other one.
+std::vector<std::vector<physics::Term>> rivals_of(const Settled& best, const std::vector<Settled>& settled,
+                                                  std::size_t first) {
+  std::vector<std::vector<physics::Term>> rivals(2);
+  for (const auto& other : settled) {
+    if (&other == &best) continue;
+    for (std::size_t i = 0; i < 2; ++i)
+      for (std::size_t k = 0; k < 2; ++k) {
+        const auto &kept = best.fit.model.terms[first + 1 - i], &same = other.fit.model.terms[first + 1 - k];
+        const auto &mine = best.fit.model.terms[first + i], &instead = other.fit.model.terms[first + k];
+        if (label(kept) == label(same) && label(mine) != label(instead)) rivals[i].push_back(instead);
+      }
+  }
+  return rivals;
+}
+
+/// The pair under weights of its own; nothing where it does not lead the base by what two claims need.
+std::optional<JointClaim> claimed(const Case& data, const Fit& base, const Settled& best) {
+  JointClaim claim;
+  claim.weighing = weigh(data, simulate(data, best.fit.model));
+  claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
+  if (least_ratio(data, best.fit, claim.fit) < 0.9)
+    claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 0, &best.fit);
+  const auto neither = fit(data, claim.weighing, base.model, data.model, 6, &base);
+  if (claim.fit.evidence - neither.evidence < 2.0 * claim_margin_of(claim.weighing)) return std::nullopt;
+  return claim;
+}
+
+}  // namespace
+
+Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
+                 const Fit* rival) {
+  Pairs found;
+  const bool own = data.model.plant == physics::Plant::equations;
+  const Weighing plain = weigh(data, simulate(data, base.model), false);
+  const Fit under = fit(data, plain, base.model, data.model, 4, &base);
+  const auto settled = settled_pairs(data, plain, under, without);
+  for (const auto& best : settled) {
     const std::size_t first = best.fit.model.terms.size() - 2;
     if (rival != nullptr && lead(data, best.fit, *rival) < claim_margin) continue;
-    if (first < given) continue;
-    const bool one = stands(data, best.fit, first), two = stands(data, best.fit, first + 1);
-    if (one != two) keep(physics::without_term(best.fit.model, one ? first + 1 : first));
-    if (!one || !two) continue;
-    // Neither alone: an engineer must see what the other adds.
-    bool needed = true;
-    for (const std::size_t dropped : {first, first + 1}) {
-      const auto alone = physics::without_term(best.fit.model, dropped);
-      const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
-      const bool adds = least_ratio(data, best.fit, single.fit) < 0.8;
-      if (!adds) keep(single.fit.model);
-      needed = needed && adds;
-    }
-    if (!needed) continue;
+    if (first < data.model.terms.size() || !needs_both(data, best, first, found)) continue;
     // Two of the late outputs of a machine are one late input.
     if (rival == nullptr && is_done_by_one(data, singles(data, plain, under, without), best)) return found;
     if (own && rival == nullptr && drifts_alone(data, plain, under, best)) return found;
-    JointClaim claim;
-    claim.weighing = weigh(data, simulate(data, best.fit.model));
-    claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
-    if (least_ratio(data, best.fit, claim.fit) < 0.9)
-      claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 0, &best.fit);
-    const auto neither = fit(data, claim.weighing, base.model, data.model, 6, &base);
-    if (claim.fit.evidence - neither.evidence < 2.0 * claim_margin_of(claim.weighing)) continue;
-    claim.rivals.resize(2);
-    for (const auto& other : settled) {
-      if (&other == &best) continue;
-      for (std::size_t i = 0; i < 2; ++i)
-        for (std::size_t k = 0; k < 2; ++k) {
-          const auto &kept = best.fit.model.terms[first + 1 - i],
-                     &same = other.fit.model.terms[first + 1 - k];
-          const auto &mine = best.fit.model.terms[first + i], &instead = other.fit.model.terms[first + k];
-          if (label(kept) == label(same) && label(mine) != label(instead)) claim.rivals[i].push_back(instead);
-        }
-    }
+    auto claim = claimed(data, base, best);
+    if (!claim) continue;
+    claim->rivals = rivals_of(best, settled, first);
     found.claim = std::move(claim);
     return found;
   }
   if (!found.alone.empty() && rival == nullptr)  // others have their turn from the same numbers
-    for (const auto& one : singles(data, plain, under, without)) keep(one.fit.model);
+    for (const auto& one : singles(data, plain, under, without)) keep(found, one.fit.model);
   return found;
 }
 
