@@ -397,9 +397,9 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
 void read_memory(const Node& node, const Model& model, Term& term) {
   const auto kind = node.text("memory");
   using Memory = physics::Curve::Memory;
-  term.curve.memory = kind == "stop"         ? Memory::stop
-                      : kind == "relaxation" ? Memory::relaxation
-                                             : Memory::none;
+  term.curve.memory = Memory::none;
+  for (const auto memory : {Memory::stop, Memory::relaxation})
+    if (kind == physics::name_of(memory)) term.curve.memory = memory;
   if (term.curve.memory == Memory::none)
     node["memory"].fault("`" + kind + "` is no memory of a curve", "write `stop` or `relaxation`");
   const bool is_place = model.plant == Plant::axis
@@ -543,7 +543,7 @@ YAML::Node term_yaml(const Term& term, const Model& model) {
     node["values"].SetStyle(YAML::EmitterStyle::Flow);
     if (term.curve.period > 0.0) node["period"] = term.curve.period;
     if (term.curve.memory != physics::Curve::Memory::none)
-      node["memory"] = term.curve.memory == physics::Curve::Memory::stop ? "stop" : "relaxation";
+      node["memory"] = std::string{physics::name_of(term.curve.memory)};
     return node;
   }
   for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {

@@ -5,10 +5,24 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 
 #include "core/physics/curve.hpp"
 
 namespace invar::physics {
+
+/// Its word in a model file and in a report; empty for a curve without memory.
+constexpr std::string_view name_of(Curve::Memory memory) {
+  switch (memory) {
+    case Curve::Memory::stop:
+      return "stop";
+    case Curve::Memory::relaxation:
+      return "relaxation";
+    case Curve::Memory::none:
+      break;
+  }
+  return "";
+}
 
 /// The state of a curve with memory: one number a knot. Its value is a sum over the knots.
 ///   stop        weight z / r: an element that bends with the variable by at most r, its knot, then slips. Prandtl's and

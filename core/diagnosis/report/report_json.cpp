@@ -9,6 +9,7 @@
 #include "core/diagnosis/report/region.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/physics/curve_memory.hpp"
 
 namespace invar::diagnosis {
 
@@ -111,8 +112,7 @@ void add_location(json& location, const Case& data, const Diagnosis& d, std::siz
 json curve_json(const physics::Curve& curve) {
   json one = {{"over", curve.over}, {"knots", curve.knots}, {"values", curve.values}};
   if (curve.period > 0.0) one["period"] = curve.period;
-  if (curve.memory != physics::Curve::Memory::none)
-    one["memory"] = curve.memory == physics::Curve::Memory::stop ? "stop" : "relaxation";
+  if (curve.memory != physics::Curve::Memory::none) one["memory"] = physics::name_of(curve.memory);
   return one;
 }
 
