@@ -95,7 +95,7 @@ TEST_F(ImageFile, ACameraIsReadAsItWasWritten) {
 TEST_F(ImageFile, ACameraWithoutScaleIsRefused) {
   for (const auto& [text, fault] :
        {std::pair{"scael: 1e-5\n", "scale"}, std::pair{"scale: {value: 1.0e-5, unit: kg}\n", "kg"},
-        std::pair{"model: pinhole\n", "has no scale"}}) {
+        std::pair{"model: pinhole\n", "pinhole: missing"}}) {
     try {
       (void)read_camera(write("camera.yaml", text));
       ADD_FAILURE() << "accepted: " << text;
