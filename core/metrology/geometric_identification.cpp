@@ -35,16 +35,7 @@ int intervals_of(const std::vector<CondensedLine>& lines, int axis, Range range,
                  const IdentificationOptions& options) {
   double finest = range.width() / 8.0;
   for (const auto& line : lines) {
-    std::vector<double> places;
-    for (const auto& point : line.points) places.push_back(point[axis]);
-    std::sort(places.begin(), places.end());
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < places.size(); ++i)
-      if (places[i] - places[i - 1] > 1e-7) steps.push_back(places[i] - places[i - 1]);
-    if (steps.size() < 3) continue;
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                     steps.end());
-    finest = std::min(finest, steps[steps.size() / 2]);
+    if (const auto step = usual_step(line, axis)) finest = std::min(finest, *step);
   }
   return std::clamp(static_cast<int>(std::lround(range.width() / finest)), options.least_intervals,
                     std::max(options.least_intervals, options.most_intervals));

@@ -5,10 +5,21 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 namespace invar::metrology {
+
+std::optional<double> usual_step(const CondensedLine& line, int axis) {
+  std::vector<double> places;
+  for (const auto& point : line.points) places.push_back(point[axis]);
+  std::sort(places.begin(), places.end());
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < places.size(); ++i)
+    if (places[i] - places[i - 1] > 1e-7) steps.push_back(places[i] - places[i - 1]);
+  if (steps.size() < 3) return std::nullopt;
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  return steps[steps.size() / 2];
+}
 
 namespace {
 
@@ -54,16 +65,7 @@ double finest_step(const std::vector<CondensedLine>& lines, int axis, double wid
   double finest = width;
   for (const auto& line : lines) {
     if (std::abs(line.beam.direction[axis]) < 1e-6) continue;
-    std::vector<double> places;
-    for (const auto& point : line.points) places.push_back(point[axis]);
-    std::sort(places.begin(), places.end());
-    std::vector<double> steps;
-    for (std::size_t i = 1; i < places.size(); ++i)
-      if (places[i] - places[i - 1] > 1e-7) steps.push_back(places[i] - places[i - 1]);
-    if (steps.size() < 3) continue;
-    std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2),
-                     steps.end());
-    finest = std::min(finest, steps[steps.size() / 2]);
+    if (const auto step = usual_step(line, axis)) finest = std::min(finest, *step);
   }
   return finest;
 }

@@ -1,6 +1,7 @@
 // Waves of a screw, a rack or a scale: periodic errors of positioning whose period nobody told.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "core/metrology/displacement_line.hpp"
@@ -8,6 +9,9 @@
 #include "core/metrology/geometric_model.hpp"
 
 namespace invar::metrology {
+
+/// [m, rad] The median step of a line's points along an axis; nothing where fewer than three are apart.
+std::optional<double> usual_step(const CondensedLine& line, int axis);
 
 /// Waves that the lines show beyond what the smooth curves of `basis` explain, strongest first: found one by one over the
 /// wave number by their evidence, each with what the others left. `basis` may hold waves already; they are not found again.
