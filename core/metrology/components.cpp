@@ -20,7 +20,7 @@ std::string_view iso_name(int component) {
   return iso[static_cast<std::size_t>(component)];
 }
 
-std::string seed_name(int component) {
+std::string thesis_symbol(int component) {
   INVAR_EXPECTS(component >= 0 && component < component_count, component);
   std::string name = is_rotation(component) ? "eps_" : "delta_";
   name += axis_letters[static_cast<std::size_t>(direction_of(component))];
@@ -38,7 +38,7 @@ std::string_view squareness_iso_name(int pair) {
   return names.at(static_cast<std::size_t>(pair));
 }
 
-std::string_view squareness_seed_name(int pair) {
+std::string_view squareness_thesis_symbol(int pair) {
   static constexpr std::array<std::string_view, squareness_count> names{"cos(a_xy)", "cos(a_xz)",
                                                                         "cos(a_yz)"};
   return names.at(static_cast<std::size_t>(pair));

@@ -32,7 +32,7 @@ constexpr bool is_straightness(int component) {
 /// "EXX" ... "ECZ": ISO 230-1, E + direction + moving axis.
 std::string_view iso_name(int component);
 /// The thesis's symbol in plain text: "delta_y(x)" for EYX, "eps_z(x)" for ECX.
-std::string seed_name(int component);
+std::string thesis_symbol(int component);
 std::optional<int> component_named(std::string_view iso);
 
 /// The unordered pair of axes of a squareness: 0 is xy, 1 is xz, 2 is yz.
@@ -41,7 +41,7 @@ constexpr int squareness_of(int a, int b) { return a + b - 1; }
 /// about +Z.
 std::string_view squareness_iso_name(int pair);
 /// "cos(a_xy)": the thesis's symbol, the cosine of the angle between the positive axes.
-std::string_view squareness_seed_name(int pair);
+std::string_view squareness_thesis_symbol(int pair);
 /// Carries the cosine of the angle between two positive axes to ISO's angle [rad] and back
 /// (docs/explanation/geometric.md#squareness): cos a_xy = -sin EC0Y, cos a_xz = +sin EB0Z, cos a_yz = -sin EA0Z.
 double squareness_angle_from_cosine(int pair, double cosine);

@@ -13,7 +13,7 @@ namespace invar::metrology {
 
 /// The order of the axes from the workpiece to the tool; which side of the bed an axis is on does not matter.
 struct Chain {
-  std::array<int, 3> order{1, 0, 2};  // seed: y, x, z
+  std::array<int, 3> order{1, 0, 2};  // thesis: y, x, z
   int axes = 3;                       // 2 for an XY table: the third entry is then not used
 
   [[nodiscard]] bool has(int axis) const noexcept { return place(axis) < axes; }

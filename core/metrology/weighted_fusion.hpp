@@ -24,7 +24,7 @@ struct WeightFit {
 WeightFit fit_weights(const Eigen::Ref<const Eigen::MatrixXd>& sensors,
                       const Eigen::Ref<const Eigen::VectorXd>& reference);
 
-/// Noise of the first velocity sensor as a function of speed (seed, 6.2: two models in series); logarithm of the
+/// Noise of the first velocity sensor as a function of speed (thesis, 6.2: two models in series); logarithm of the
 /// deviation [m/s], monotone and straight between the knots. No knots: noise does not follow speed.
 struct NoiseBySpeed {
   std::vector<double> speed;  // ascending [m/s]

@@ -6,6 +6,7 @@ Each test makes its own file, of a machine whose truth it knows.
 """
 import json
 import math
+import os
 import pathlib
 import random
 import subprocess
@@ -96,6 +97,28 @@ class Thermal(Calibrations):
             self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
             row, = self.predicted("x [mm],temperature [degC]", [[60, 30]])
             self.assertLess(abs(row["error"] - 6e-6), 0.5e-6)
+
+
+    def test_a_report_is_written_where_gnuplot_fails_or_is_absent(self):
+        self.write("t.csv", "x [mm],temperature [degC],error [um]",
+                   [[x, t, f"{0.01 * x * (t - 20):.5f}"] for _ in range(3) for t in (20, 30) for x in (0, 20, 40, 60)])
+        fake = self.here / "bin" / "gnuplot"
+        fake.parent.mkdir()
+        for lines, words in (("echo cannot open terminal >&2; exit 1", "gnuplot says: cannot open terminal"),
+                             ("kill -9 $$", "gnuplot failed without a word"), (None, "gnuplot is not there")):
+            fake.unlink(missing_ok=True)
+            if lines is not None:
+                fake.write_text("#!/bin/sh\n" + lines + "\n")
+                fake.chmod(0o755)
+            path = str(fake.parent) + (os.pathsep + os.environ["PATH"] if lines is not None else "")
+            done = subprocess.run([INVAR, "calibrate", "thermal", "--recording", "t.csv", "--out", "out"], cwd=self.here,
+                                  capture_output=True, text=True, timeout=120, env={**os.environ, "PATH": path})
+            self.assertEqual(done.returncode, 0, done.stderr)
+            page = self.page()
+            self.assertIn("is not drawn: " + words, page)
+            self.assertNotIn("<svg", page)
+            self.assertEqual(self.report()["readings"], 24)
+            (self.here / "out" / "report.html").unlink()
 
 
 class Dispenser(Calibrations):
@@ -469,6 +492,36 @@ class History(Calibrations):
         self.assertAlmostEqual(names["EXX"]["moved"], 3e-6, delta=0.5e-6)  # 15 ppm of 200 mm
         self.assertFalse(names["EYY"]["has_moved"])
         self.assertTrue(report["kinds"][0]["due"]["known"])
+
+    def test_a_reversal_that_grew_is_told_and_one_that_stayed_is_not(self):
+        """Four passes of x and y; from January to April the reversal of x grows from 2 to 5 um at the far end."""
+        (self.here / "machine.yaml").write_text("invar_machine: 1\nchain: [y, x]\ntravel: {x: [0, 0.2], y: [0, 0.2]}\n")
+        for month, worn in ((1, 0.0), (4, 3e-3)):
+            draw = random.Random(10 + month)
+            rows, motions = [], []
+            for axis in ("x", "y"):
+                for way, order in ((1, range(21)), (-1, range(20, -1, -1))) * 2:
+                    for i in order:
+                        q = 10 * i
+                        lost = 2e-3 + (worn * q / 200 if axis == "x" else 0.0)
+                        off = way * lost / 2 + draw.gauss(0, 1e-4)
+                        rows.append([axis, q if axis == "x" else 0, q if axis == "y" else 0, f"{1000 * off:.4f}", way])
+                        motions.append([f"E{2 * axis.upper()}", q, f"{1000 * (off + 1e-5 * q):.4f}", way])
+            self.write("lines.csv", "line,x [mm],y [mm],deviation [um],direction", rows)
+            self.write("c.csv", "component,position [mm],translation [um],direction", motions)
+            for command, argument, file in (("geometric", "--lines", "lines.csv"), ("components", "--readings", "c.csv")):
+                self.call("calibrate", command, "--machine", "machine.yaml", argument, file, "--out",
+                          f"{command}/2026-0{month}-01")
+        for command in ("geometric", "components"):
+            report = json.loads(self.call("calibrate", "history", command, "--json"))
+            names = {name["name"]: name for name in report["kinds"][0]["names"]}
+            self.assertTrue(names["reversal of x"]["has_moved"])
+            worst = names["reversal of x"]  # that many times its sigma: the far end, or a place beside it
+            at = float(worst["where"].split()[2])
+            self.assertGreater(at, 100)
+            self.assertAlmostEqual(worst["moved"], 0.015e-6 * at, delta=0.3e-6)
+            self.assertFalse(names["reversal of y"]["has_moved"])
+            self.assertIn("reversal of x at x = ", self.call("calibrate", "history", command))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ report::Plot component_plot(const ComponentsResult& result, int component) {
   const auto& fit = *result.fits[index(component)];
   const auto& network = fit.component;
   report::Plot plot;
-  plot.title = std::string{metrology::iso_name(component)} + ", " + metrology::seed_name(component);
+  plot.title = std::string{metrology::iso_name(component)} + ", " + metrology::thesis_symbol(component);
   plot.x_label = std::string(1, metrology::axis_letters[index(metrology::axis_of(component))]) + " [mm]";
   plot.y_label = is_rotation(component) ? "rotation [urad]" : "translation [um]";
   report::Series points;
@@ -126,7 +126,7 @@ report::Page components_page(const ComponentsResult& result) {
   for (int c = 0; c < component_count; ++c) {
     if (!result.fits[index(c)]) continue;
     const auto& fit = *result.fits[index(c)];
-    rows.push_back({std::string{metrology::iso_name(c)}, metrology::seed_name(c), result.depends_on(c),
+    rows.push_back({std::string{metrology::iso_name(c)}, metrology::thesis_symbol(c), result.depends_on(c),
                     std::to_string(fit.kept.size()) +
                         (fit.rejected > 0 ? ", " + std::to_string(fit.rejected) + " rejected" : ""),
                     si(fit.over_position, unit_of(c)), si(fit.left_out, unit_of(c)),

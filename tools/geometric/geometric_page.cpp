@@ -89,7 +89,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
     const double angle = metrology::squareness_angle_from_cosine(pair, model.squareness[index(pair)]);
     constexpr double arcsec = 4.84813681e-6;
     rows.push_back({std::string{metrology::squareness_iso_name(pair)},
-                    std::string{metrology::squareness_seed_name(pair)}, micro(angle, 5),
+                    std::string{metrology::squareness_thesis_symbol(pair)}, micro(angle, 5),
                     number(angle / arcsec, 5), micro(2.0 * model.squareness_sigma[index(pair)])});
   }
   page.table({"squareness", "thesis's symbol", "ISO [urad]", "[arcsec]", "2 sigma [urad]"}, rows);
@@ -108,7 +108,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
       highest = std::max(highest, model.component(c, q));
       sigma = std::max(sigma, model.component_sigma(c, q));
     }
-    rows.push_back({std::string{metrology::iso_name(c)}, metrology::seed_name(c), micro(lowest),
+    rows.push_back({std::string{metrology::iso_name(c)}, metrology::thesis_symbol(c), micro(lowest),
                     micro(highest), micro(2.0 * sigma), metrology::is_rotation(c) ? "urad" : "um"});
   }
   page.table({"component", "thesis's symbol", "lowest", "highest", "2 sigma at most", "unit"}, rows);

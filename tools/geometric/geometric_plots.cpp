@@ -147,7 +147,7 @@ Plot component_plot(const GeometricResult& result, int component) {
     band.u.push_back(value + sigma);
   }
   Plot plot;
-  plot.title = std::string{metrology::iso_name(component)} + " = " + metrology::seed_name(component);
+  plot.title = std::string{metrology::iso_name(component)} + " = " + metrology::thesis_symbol(component);
   plot.x_label = letter(axis) + " [mm]";
   plot.y_label = angle ? "[urad]" : "[um]";
   plot.series = {band, component_data(result, component), line};

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/base/fault.hpp"
+#include "core/compensation/component_file.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/model_file.hpp"
 #include "core/compensation/thermal_file.hpp"
@@ -50,19 +51,52 @@ void expect_common(const Range& range, const fs::path& file, const std::string& 
                    "compare calibrations of one machine"};
 }
 
-std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
-  std::vector<metrology::GeometricModel> models;
-  for (const auto& one : all) models.push_back(compensation::load_geometric(one.file));
+using Reversals = std::array<metrology::ReversalCurve, 3>;
+
+/// The lost motion of each axis over its travel: none of an axis that was read one way only.
+void add_reversals(const Reversals& curves, const std::array<Range, 3>& travel, Numbers& numbers) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (curves[axis].empty()) continue;
+    const std::string letter(1, metrology::axis_letters[axis]);
+    for (const double q : places(travel[axis], 9)) {
+      const double sigma = curves[axis].sigma_at(q);  // 0 in files that hold one value alone
+      numbers.push_back({"reversal of " + letter, letter + " = " + si(q, "m", 4), "m", curves[axis].value(q),
+                         sigma > 0.0 ? sigma : not_known, false});
+    }
+  }
+}
+
+void add_squareness(const metrology::Squareness& squareness, const metrology::Squareness& sigmas,
+                    Numbers& numbers) {
+  for (int pair = 0; pair < metrology::squareness_count; ++pair) {
+    const auto k = static_cast<std::size_t>(pair);
+    if (!(sigmas[k] > 0.0) || !std::isfinite(sigmas[k])) continue;
+    numbers.push_back({std::string{metrology::squareness_iso_name(pair)}, "", "rad",
+                       metrology::squareness_angle_from_cosine(pair, squareness[k]), sigmas[k], false});
+  }
+}
+
+/// What the travels of all models have in common.
+template <class Models>
+std::array<Range, 3> common_travel(const Models& models, const fs::path& file) {
   std::array<Range, 3> travel = models.front().travel;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::vector<Range> ranges;
     for (const auto& model : models) ranges.push_back(model.travel[axis]);
     travel[axis] = common(ranges);
-    expect_common(travel[axis], all.front().file, "travel");
+    expect_common(travel[axis], file, "travel");
   }
+  return travel;
+}
+
+std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
+  std::vector<metrology::GeometricModel> models;
+  for (const auto& one : all) models.push_back(compensation::load_geometric(one.file));
+  const std::array<Range, 3> travel = common_travel(models, all.front().file);
   std::vector<Numbers> out;
   for (const auto& model : models) {
     Numbers numbers;
+    add_reversals(model.reversal, travel, numbers);
     for (int c = 0; c < metrology::component_count; ++c) {
       const auto axis = static_cast<std::size_t>(metrology::axis_of(c));
       for (const double q : places(travel[axis], 9)) {
@@ -73,13 +107,7 @@ std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
                            metrology::is_rotation(c) ? "rad" : "m", model.component(c, q), sigma, false});
       }
     }
-    for (int pair = 0; pair < metrology::squareness_count; ++pair) {
-      const auto k = static_cast<std::size_t>(pair);
-      if (!(model.squareness_sigma[k] > 0.0) || !std::isfinite(model.squareness_sigma[k])) continue;
-      numbers.push_back({std::string{metrology::squareness_iso_name(pair)}, "", "rad",
-                         metrology::squareness_angle_from_cosine(pair, model.squareness[k]),
-                         model.squareness_sigma[k], false});
-    }
+    add_squareness(model.squareness, model.squareness_sigma, numbers);
     for (const double z : places(travel[2], 3))
       for (const double y : places(travel[1], 3))
         for (const double x : places(travel[0], 3)) {
@@ -92,6 +120,40 @@ std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
                                  "(" + si(x, "m") + ", " + si(y, "m") + ", " + si(z, "m") + ")", "m",
                                  error(k), sigma(k), true});
         }
+    out.push_back(std::move(numbers));
+  }
+  return out;
+}
+
+/// Error motions that were measured one by one, at the states in the middle of the first calibration's.
+std::vector<Numbers> components(const std::vector<Calibration>& all) {
+  std::vector<metrology::ComponentNetworks> models;
+  for (const auto& one : all) {
+    const auto yaml = config::Yaml::load(one.file);
+    models.push_back(compensation::read_components(yaml.root()));
+    if (yaml.root().fault_count() > 0) yaml.finish();
+  }
+  const std::array<Range, 3> travel = common_travel(models, all.front().file);
+  std::map<std::string, double> usual;
+  for (const auto& model : models)
+    for (const auto& state : model.states) usual.emplace(state.name, state.usual());
+  std::vector<Numbers> out;
+  for (const auto& model : models) {
+    Numbers numbers;
+    add_reversals(model.reversal, travel, numbers);
+    std::vector<double> states;
+    for (const auto& state : model.states) states.push_back(usual.at(state.name));
+    for (int c = 0; c < metrology::component_count; ++c) {
+      const auto axis = static_cast<std::size_t>(metrology::axis_of(c));
+      const auto& component = model.components[static_cast<std::size_t>(c)];
+      if (!component) continue;
+      for (const double q : places(travel[axis], 9))
+        numbers.push_back({std::string{metrology::iso_name(c)},
+                           std::string(1, metrology::axis_letters[axis]) + " = " + si(q, "m", 4),
+                           metrology::is_rotation(c) ? "rad" : "m", component->value(q, states),
+                           component->sigma_at(q, states), metrology::is_positioning(c)});
+    }
+    add_squareness(model.squareness, model.squareness_sigma, numbers);
     out.push_back(std::move(numbers));
   }
   return out;
@@ -245,6 +307,7 @@ std::vector<Numbers> comparable_numbers(const std::vector<Calibration>& calibrat
   const std::string& kind = calibrations.front().kind;
   std::vector<Numbers> all;
   if (kind == "geometric") all = geometric(calibrations);
+  if (kind == "components") all = components(calibrations);
   if (kind.starts_with("thermal")) all = thermal(calibrations);
   if (kind == "dispenser") all = dispenser(calibrations);
   if (kind == "thermistor") all = thermistor(calibrations);

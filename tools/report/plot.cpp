@@ -9,6 +9,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
@@ -284,9 +285,9 @@ std::string content_of(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// gnuplot on `script` in the folder, its complaints in `errors` there: no shell, none of the user's start files, and names of
-/// ours alone. False where it is missing or fails (without words where it is missing).
-bool run_gnuplot(const std::filesystem::path& folder) {
+/// gnuplot on `script` in the folder: no shell, none of the user's start files, and names of ours alone. Returns why it
+/// failed; empty where it did not.
+std::string fault_of_gnuplot(const std::filesystem::path& folder) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addchdir_np(&actions, folder.c_str());
@@ -298,11 +299,18 @@ bool run_gnuplot(const std::filesystem::path& folder) {
   pid_t child = 0;
   const int error = posix_spawnp(&child, "gnuplot", &actions, nullptr, arguments.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
-  if (error != 0) return false;
+  if (error == ENOENT) return "gnuplot is not there; install gnuplot-nox";
+  if (error != 0) return std::string{"gnuplot cannot be started: "} + std::strerror(error);
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return "";
+  if (const std::string said = content_of(folder / "errors"); !said.empty())
+    return "gnuplot says: " + printable(said);
+  return "gnuplot failed without a word (" +
+         (WIFEXITED(status) ? "status " + std::to_string(WEXITSTATUS(status))
+                            : "signal " + std::to_string(WTERMSIG(status))) +
+         "); try `gnuplot --version`";
 }
 
 /// Several drawings share one page: gnuplot's marker names must not clash.
@@ -324,16 +332,17 @@ std::vector<std::string> drawn_together(std::span<const Plot> plots, std::string
     script << std::setprecision(9) << "set encoding utf8\n";
     for (std::size_t i = 0; i < plots.size(); ++i) write_plot(script, plots[i], i, file(i), texts[i]);
   }
-  if (!run_gnuplot(folder.path())) {
-    const std::string words = content_of(folder / "errors");
-    fault = words.empty() ? "gnuplot is not there; install gnuplot-nox" : "gnuplot says: " + printable(words);
-    return {};
-  }
+  fault = fault_of_gnuplot(folder.path());
+  if (!fault.empty()) return {};
   std::vector<std::string> drawings;
   for (std::size_t i = 0; i < plots.size(); ++i) {
-    std::string svg = content_of(folder / file(i));
+    const std::string svg = content_of(folder / file(i));
     const auto begin = svg.find("<svg");
-    drawings.push_back(begin == std::string::npos ? "" : texts[i].written_into(svg.substr(begin)));
+    if (begin == std::string::npos) {
+      fault = "gnuplot wrote no drawing; try `gnuplot --version`";
+      return {};
+    }
+    drawings.push_back(texts[i].written_into(svg.substr(begin)));
   }
   return drawings;
 }

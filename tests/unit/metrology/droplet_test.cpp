@@ -15,7 +15,7 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 
-DropletTrajectory seed_trajectory() {
+DropletTrajectory thesis_trajectory() {
   DropletTrajectory path;
   path.placement << 2.0e-6, 118.2e-6;
   const double tilt = 0.304 * degree;
@@ -54,7 +54,7 @@ Droplets print(const DropletTrajectory& path, const std::vector<double>& heights
 }
 
 TEST(DropletTrajectory, HasTheGoldenOffsets) {
-  const DropletTrajectory path = seed_trajectory();
+  const DropletTrajectory path = thesis_trajectory();
   EXPECT_NEAR(path.slope.x(), 5.30508e-3, 1e-8);
   EXPECT_NEAR(path.slope.y(), 9.01832e-5, 1e-9);
   EXPECT_TRUE(path.offset(2e-3).isApprox(Eigen::Vector2d{12.610e-6, 118.380e-6}, 1e-4));
@@ -70,7 +70,7 @@ TEST(DropletTrajectory, HasTheGoldenOffsets) {
 
 TEST(TrajectoryIdentification, FindsTheParametersWithTheSigmasItStates) {
   // Section 11: 20 um of scatter, 20 droplets at 2 and at 20 mm: tilt 0.020 deg, xe 5.0 um (1 sigma).
-  const DropletTrajectory truth = seed_trajectory();
+  const DropletTrajectory truth = thesis_trajectory();
   double tilt_squares = 0.0;
   double placement_squares = 0.0;
   constexpr int trials = 60;
@@ -86,7 +86,7 @@ TEST(TrajectoryIdentification, FindsTheParametersWithTheSigmasItStates) {
 }
 
 TEST(TrajectoryIdentification, RejectsSatellitesWithAndWithoutTheirDiameter) {
-  const DropletTrajectory truth = seed_trajectory();
+  const DropletTrajectory truth = thesis_trajectory();
   for (const bool with_diameter : {true, false})
     for (unsigned seed = 1; seed <= 20; ++seed) {
       Droplets drops = print(truth, {2e-3, 20e-3}, 20, 10e-6, 0.5e-3, 5, seed);
@@ -102,7 +102,7 @@ TEST(TrajectoryIdentification, RejectsSatellitesWithAndWithoutTheirDiameter) {
 }
 
 TEST(TrajectoryIdentification, WeighsDropletsByTheScatterOfTheirHeight) {
-  const DropletTrajectory truth = seed_trajectory();
+  const DropletTrajectory truth = thesis_trajectory();
   double weighted = 0.0;
   double plain = 0.0;
   for (unsigned seed = 1; seed <= 60; ++seed) {
@@ -120,7 +120,7 @@ TEST(TrajectoryIdentification, WeighsDropletsByTheScatterOfTheirHeight) {
 }
 
 TEST(TrajectoryIdentification, SaysThatOneHeightCannotTellPlacementFromTilt) {
-  const DropletTrajectory truth = seed_trajectory();
+  const DropletTrajectory truth = thesis_trajectory();
   const TrajectoryFit fit = identify_trajectory(print(truth, {5e-3}, 20, 10e-6, 0.0, 6, 3));
   ASSERT_EQ(fit.unidentified.size(), 1U);
   EXPECT_THAT(fit.unidentified.front(), ::testing::HasSubstr("placement"));
@@ -130,14 +130,14 @@ TEST(TrajectoryIdentification, SaysThatOneHeightCannotTellPlacementFromTilt) {
 }
 
 TEST(TrajectoryIdentification, FindsTheEjectionSpeedFromBothDirections) {
-  DropletTrajectory truth = seed_trajectory();
+  DropletTrajectory truth = thesis_trajectory();
   truth.slowness = 0.5;  // 2 m/s
   const TrajectoryFit fit = identify_trajectory(print(truth, {2e-3, 20e-3}, 20, 10e-6, 0.0, 0, 4, 0.072));
   EXPECT_NEAR(1.0 / fit.trajectory.slowness, 2.0, 0.05);
 }
 
 TEST(TrajectoryIdentification, TellsTheDelayFromTheCarryAndBothFromSatellites) {
-  DropletTrajectory truth = seed_trajectory();
+  DropletTrajectory truth = thesis_trajectory();
   truth.slowness = 0.5;
   truth.delay = 4e-4;
   double squares = 0.0;
@@ -156,7 +156,7 @@ TEST(TrajectoryIdentification, TellsTheDelayFromTheCarryAndBothFromSatellites) {
 }
 
 TEST(TrajectoryIdentification, SaysThatOneVelocityLeavesTheCarryOpen) {
-  DropletTrajectory truth = seed_trajectory();
+  DropletTrajectory truth = thesis_trajectory();
   truth.slowness = 0.5;
   Droplets drops = print(truth, {2e-3, 20e-3}, 20, 10e-6, 0.0, 0, 4, 0.072);
   for (Eigen::Index i = 0; i < drops.height.size(); ++i) {
@@ -171,7 +171,7 @@ TEST(TrajectoryIdentification, SaysThatOneVelocityLeavesTheCarryOpen) {
 /// A head whose droplets slow down by `rate` of their speed a second; RMS error over the last half of the print of the model
 /// that was identified at its start, and of the tracked one.
 void print_with_drift(double rate, double& fixed, double& tracked, double& change) {
-  DropletTrajectory truth = seed_trajectory();
+  DropletTrajectory truth = thesis_trajectory();
   truth.slowness = 0.5;
   truth.delay = 3e-4;
   constexpr double scatter = 15e-6;
@@ -217,7 +217,7 @@ TEST(TrajectoryTracker, LeavesAHeadThatDoesNotDriftNearlyAsItWas) {
 }
 
 TEST(TrajectoryIdentification, AcceptsOneDropletAtEachOfSeveralHeights) {
-  const DropletTrajectory truth = seed_trajectory();
+  const DropletTrajectory truth = thesis_trajectory();
   const TrajectoryFit fit = identify_trajectory(print(truth, {2e-3, 8e-3, 14e-3, 20e-3}, 1, 5e-6, 0.0, 0, 5));
   EXPECT_EQ(fit.kept.sum(), 4.0);
   EXPECT_LT((fit.trajectory.offset(10e-3) - truth.offset(10e-3)).norm(), 15e-6);
@@ -284,7 +284,7 @@ TEST(TrajectoryIdentification, CallsWhatIsLeftScatterOnlyWhereATestDoes) {
   const TrajectoryFit drift = identify_trajectory(drifting);
   EXPECT_LT(drift.scatter.probability, significant);
   EXPECT_THAT(drift.scatter.pattern, ::testing::HasSubstr("from one droplet to the next"));
-  EXPECT_FALSE(identify_trajectory(print(seed_trajectory(), {2e-3}, 4, 1e-5, 0.0, 0, 1)).scatter.tested);
+  EXPECT_FALSE(identify_trajectory(print(thesis_trajectory(), {2e-3}, 4, 1e-5, 0.0, 0, 1)).scatter.tested);
 }
 
 TEST(TrajectoryIdentification, KeepsDropletsThatAreLargerThanTheirFellows) {
@@ -297,7 +297,7 @@ TEST(TrajectoryIdentification, KeepsDropletsThatAreLargerThanTheirFellows) {
   EXPECT_EQ(fit.kept(70), 0.0);
 }
 
-TEST(DropletStatistics, AreThoseOfTheSeedsSecondCase) {
+TEST(DropletStatistics, AreThoseOfTheThesisSecondCase) {
   // 400 readings of a normal distribution: 68.3 and 95.4 %, compatible with normal.
   std::mt19937 random{6};
   std::normal_distribution<double> normal{0.664e-3, 0.008e-3};

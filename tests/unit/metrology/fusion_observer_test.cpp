@@ -10,7 +10,7 @@ namespace {
 
 using namespace testing;
 
-TEST(FusionObserver, IsFarBetterThanTheEncoderOnTheSeedsSinusoids) {
+TEST(FusionObserver, IsFarBetterThanTheEncoderOnTheThesisSinusoids) {
   const Rig rig;
   FusionObserver observer{model_of(rig)};
   // Section 10 at 0.1 ms sampling: interval observer 0.024, 0.063, 0.098, 0.168 mm against 0.72 of the encoder.

@@ -219,7 +219,7 @@ TEST(Identification, ReducesReadingsToOneTemperatureAndFindsTheExpansion) {
   EXPECT_FALSE(identify(machine, without).model.reference_temperature);
 }
 
-TEST(Identification, TheSeedsStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
+TEST(Identification, TheThesisStepsImproveOnNothingAndAllLinesAtOnceOnThem) {
   std::mt19937_64 random{5};
   RecordProperty("seed", 5);
   double before = 0.0;

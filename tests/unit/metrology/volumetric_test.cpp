@@ -123,10 +123,10 @@ TEST(Volumetric, ShowsTheNullVectorOfTheFourLines) {
   EXPECT_NEAR(std::sqrt(all.squaredNorm() / 441), 1.3555 * um, 1e-10);
 }
 
-TEST(Components, NamesFollowIsoAndTheSeed) {
+TEST(Components, NamesFollowIsoAndTheThesis) {
   EXPECT_EQ(iso_name(translation(1, 0)), "EYX");
   EXPECT_EQ(iso_name(rotation(2, 1)), "ECY");
-  EXPECT_EQ(seed_name(rotation(2, 0)), "eps_z(x)");
+  EXPECT_EQ(thesis_symbol(rotation(2, 0)), "eps_z(x)");
   for (int c = 0; c < component_count; ++c) EXPECT_EQ(component_named(iso_name(c)), c);
   EXPECT_FALSE(component_named("EC0Y"));
 }

@@ -239,7 +239,7 @@ bool read_table(const std::string& name, Eigen::MatrixXd& selectors, Eigen::Vect
   return k == 49;
 }
 
-TEST(SeedTables, AreFittedWithALeaveOneOutErrorOfSixHundredths) {
+TEST(ThesisTables, AreFittedWithALeaveOneOutErrorOfSixHundredths) {
   for (const char* name : {"table4_1_k1_velocity_sensor_weight.csv", "table4_2_k2_encoder_weight.csv"}) {
     Eigen::MatrixXd selectors;
     Eigen::VectorXd weights;

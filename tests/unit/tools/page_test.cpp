@@ -9,6 +9,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/name.hpp"
@@ -178,6 +179,33 @@ TEST(Plots, APageIsWrittenWithoutGnuplot) {
   page.plot(plot_of("a"));
   const std::string text = page.text();
   EXPECT_NE(text.find("is not drawn: gnuplot is not there; install gnuplot-nox"), std::string::npos);
+}
+
+/// A gnuplot of ours, first on the path.
+void put_gnuplot(const std::filesystem::path& folder, const std::string& lines) {
+  std::ofstream{folder / "gnuplot"} << "#!/bin/sh\n" << lines << "\n";
+  std::filesystem::permissions(folder / "gnuplot", std::filesystem::perms::owner_all);
+}
+
+TEST(Plots, APageIsWrittenWithAGnuplotThatFails) {
+  const TemporaryFolder folder{"invar-test-plots"};
+  const char* path = std::getenv("PATH");
+  const Path ours{folder.path().string() + ":" + (path != nullptr ? path : "/bin")};
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"exit 3", "gnuplot failed without a word (status 3)"},
+      {"kill -9 $$", "gnuplot failed without a word (signal 9)"},
+      {"echo no such terminal >&2; exit 1", "gnuplot says: no such terminal"},
+      {"exit 0", "gnuplot wrote no drawing"},
+      {"echo '<html>' >0.svg", "gnuplot wrote no drawing"}};
+  for (const auto& [lines, words] : cases) {
+    put_gnuplot(folder.path(), lines);
+    Page page{"Title"};
+    page.plot(plot_of("a"));
+    page.plot(plot_of("b"));
+    const std::string text = page.text();
+    EXPECT_NE(text.find("The plot \""), std::string::npos) << lines;
+    EXPECT_NE(text.find("is not drawn: " + words), std::string::npos) << lines << '\n' << text;
+  }
 }
 
 TEST(Pages, ShowNamesAsLetters) {

@@ -76,7 +76,7 @@ struct Bench final : Component {
   }
 };
 
-TEST(SimulatedSubstrate, CarriesTiltsAndDelaysByTheSeedsNumbers) {
+TEST(SimulatedSubstrate, CarriesTiltsAndDelaysByTheThesisNumbers) {
   // Section 11: placement (2.0, 118.2) um, tilt 0.304 deg towards 0.9739 deg: (108.102, 120.004) um at 20 mm; 50 mm/s for
   // 0.4 ms and 20 mm at 2 m/s: 20 + 500 um.
   Bench bench;
@@ -106,7 +106,7 @@ TEST(SimulatedSubstrate, FindsToolAndVelocityBetweenTheCyclesOfAnAcceleratedStag
   EXPECT_NEAR(landed[0].position()[1], 0.02 * t + 0.02 * 5e-3, 1e-9);
 }
 
-TEST(SimulatedSubstrate, SizesAreThoseOfTheSeedsTwoCases) {
+TEST(SimulatedSubstrate, SizesAreThoseOfTheThesisTwoCases) {
   Bench bench;
   bench.bring_up();
   EXPECT_NEAR(bench.jet(0.02)[0].diameter(), 0.619e-3, 1e-9);

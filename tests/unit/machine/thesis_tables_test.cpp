@@ -76,7 +76,7 @@ const std::vector<Path> four{along_x, along_y, diagonal, along_y_at_x};
 const std::vector<Path> six{along_x, along_y, diagonal, along_y_at_x, half, anti};
 using enum metrology::IdentificationMethod;
 
-TEST(SeedTables, AerotechLikeIsRightToTwoMicrometresOnLinesThatWereNotFitted) {
+TEST(ThesisTables, AerotechLikeIsRightToTwoMicrometresOnLinesThatWereNotFitted) {
   const Machine table{"aerotech-like"};
   const auto seed = table.identified(four, displacement);
   const auto ours = table.identified(six, full);
@@ -94,7 +94,7 @@ TEST(SeedTables, AerotechLikeIsRightToTwoMicrometresOnLinesThatWereNotFitted) {
   EXPECT_NEAR(table.largest(diagonal, nullptr), 8e-6, 2e-6);
 }
 
-TEST(SeedTables, WinnerMotorLikeIsRightToAFewMicrometresWhereTheSeedLeftATenthOfAMillimetre) {
+TEST(ThesisTables, WinnerMotorLikeIsRightToAFewMicrometresWhereTheThesisLeftATenthOfAMillimetre) {
   const Machine table{"winnermotor-like"};
   const auto seed = table.identified(four, displacement);
   const auto ours = table.identified(six, full);
