@@ -12,8 +12,8 @@
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
-#include "core/diagnosis/search/options.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
+#include "core/diagnosis/search/options.hpp"
 #include "core/physics/library.hpp"
 #include "tests/support/mismatch/claims.hpp"
 #include "tests/support/mismatch/crowd.hpp"
@@ -225,9 +225,8 @@ int main(int argc, char** argv) {
       // A twin that nothing tells from the right name is marked as right; but it is as probable as it is said to be.
       const std::string name{finding.term.info->name};
       const auto& unlisted = row.machine.unlisted;
-      if (credit(row.machine, name) == 0.0 &&
-          std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
-        continue;
+      if (std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
+        continue;  // neither right nor wrong
       const double right = ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
       claims.add(finding, row.still_follows, std::min(right, credit(row.machine, name)),
                  plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),
