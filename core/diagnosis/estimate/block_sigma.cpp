@@ -9,7 +9,8 @@ namespace invar::diagnosis {
 
 namespace {
 
-constexpr std::size_t all_blocks = 20;  // fewer tell little of a spread, more are shorter than what is left goes on
+constexpr std::size_t all_blocks =
+    20;  // fewer tell little of a spread, more are shorter than what is left goes on
 
 std::size_t blocks_of(const Case& data) {
   const std::size_t recordings = std::max<std::size_t>(1, data.recordings.size());
@@ -40,12 +41,11 @@ Eigen::MatrixXd pulls(const Case& data, const Eigen::MatrixXd& columns, const Ei
 
 Eigen::VectorXd sigma_over_blocks(const Case& data, const Weighing& weighing, const Fit& fit) {
   if (fit.free.empty()) return fit.sigma;
-  const auto columns = whitened(data, weighing, sensitivities(data, fit.model, fit.free));
+  const auto columns = whitened(data, weighing, sensitivities(data, fit.model, fit.free)).dense();
   const Eigen::MatrixXd moved = weighing.temper * (fit.covariance * pulls(data, columns, fit.residual));
   const auto blocks = static_cast<double>(moved.cols());
   if (blocks < 2.0) return fit.sigma;
-  const Eigen::VectorXd spread =
-      (moved.rowwise().squaredNorm() * (blocks / (blocks - 1.0))).cwiseSqrt();
+  const Eigen::VectorXd spread = (moved.rowwise().squaredNorm() * (blocks / (blocks - 1.0))).cwiseSqrt();
   return fit.sigma.cwiseMax(spread.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
 }
 

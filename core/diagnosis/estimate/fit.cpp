@@ -6,7 +6,6 @@
 
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/estimate/common_factor.hpp"
-#include "core/diagnosis/estimate/own_rows.hpp"
 #include "core/diagnosis/estimate/priors.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/physics/counted_units.hpp"
@@ -27,8 +26,7 @@ bool same_term(const Model& a, const Model& b, std::size_t term) {
 }
 
 /// The sensitivities of `free`, as far as possible those of `near`.
-Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<Freedom>& free,
-                       const Fit* near) {
+Columns nearly(const Case& data, const Model& model, const std::vector<Freedom>& free, const Fit* near) {
   std::vector<Freedom> missing;
   std::vector<Eigen::Index> from(free.size(), -1);
   for (std::size_t k = 0; k < free.size(); ++k) {
@@ -44,12 +42,14 @@ Eigen::MatrixXd nearly(const Case& data, const Model& model, const std::vector<F
     if (from[k] < 0) missing.push_back(f);
   }
   if (missing.size() == free.size()) return sensitivities(data, model, free);
-  const Eigen::MatrixXd found = missing.empty() ? Eigen::MatrixXd{} : sensitivities(data, model, missing);
-  Eigen::MatrixXd all(near->columns.rows(), static_cast<Eigen::Index>(free.size()));
-  Eigen::Index next = 0;
+  const Columns found = missing.empty() ? Columns{} : sensitivities(data, model, missing);
+  std::vector<Eigen::Index> to_of_known(static_cast<std::size_t>(near->columns.cols()), -1), to_of_found;
   for (std::size_t k = 0; k < free.size(); ++k)
-    all.col(static_cast<Eigen::Index>(k)) = from[k] >= 0 ? near->columns.col(from[k]) : found.col(next++);
-  return all;
+    if (from[k] >= 0)
+      to_of_known[static_cast<std::size_t>(from[k])] = static_cast<Eigen::Index>(k);
+    else
+      to_of_found.push_back(static_cast<Eigen::Index>(k));
+  return joined(static_cast<Eigen::Index>(free.size()), {{near->columns, to_of_known}, {found, to_of_found}});
 }
 
 /// What a term in the user's own equations costs because few machines have it: a rate that goes with the third power of a
@@ -139,67 +139,41 @@ struct Trial {
 /// Derivatives of measured - simulated by each free number, as they stand and whitened.
 class Jacobian {
  public:
-  Jacobian(const Case& data, const Weighing& weighing, const Fit& at, Eigen::MatrixXd columns)
-      : data_{data}, weighing_{weighing}, of_window_(at.free.size()) {
-    for (std::size_t k = 0; k < of_window_.size(); ++k)
-      of_window_[k] =
-          at.free[k].where == Freedom::Where::parameter && is_start(at.model.parameters[at.free[k].index]);
+  Jacobian(const Case& data, const Weighing& weighing, Columns columns) : data_{data}, weighing_{weighing} {
     put(std::move(columns));
   }
 
   void find_anew(const Fit& at) { put(sensitivities(data_, at.model, at.free)); }
-  [[nodiscard]] Eigen::MatrixXd take_columns() { return std::move(columns_); }
+  [[nodiscard]] Columns take_columns() { return std::move(columns_); }
 
   /// The tempered J^T J.
-  [[nodiscard]] Eigen::MatrixXd normal() const {
-    constexpr Eigen::Index many = 40;
-    const double temper = weighing_.temper;
-    if (white_rows_.any()) return temper * white_rows_.normal(white_);  // windows: most of the rows are zero
-    if (white_.cols() <= many) return temper * (white_.transpose() * white_);
-    Eigen::MatrixXd half = Eigen::MatrixXd::Zero(white_.cols(), white_.cols());
-    half.selfadjointView<Eigen::Lower>().rankUpdate(white_.transpose(), temper);
-    return Eigen::MatrixXd{half.selfadjointView<Eigen::Lower>()};
-  }
+  [[nodiscard]] Eigen::MatrixXd normal() const { return weighing_.temper * white_.normal(); }
   /// The tempered J^T r.
   [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd& residual) const {
-    return weighing_.temper * (white_rows_.any() ? white_rows_.times(white_, residual)
-                                                 : Eigen::VectorXd{white_.transpose() * residual});
+    return weighing_.temper * white_.transpose_times(residual);
   }
 
   void divide(Eigen::Index column, double factor) {
-    white_.col(column) /= factor, columns_.col(column) /= factor;
+    white_.divide(column, factor), columns_.divide(column, factor);
   }
 
   /// Broyden's rule: afterwards the derivatives give the change that was seen from the point with these residuals.
   void update(const Trial& trial, const Eigen::VectorXd& raw, const Eigen::VectorXd& residual) {
     const auto &taken = trial.taken, &scale = trial.scale;
-    const Eigen::VectorXd by_scale = taken.cwiseQuotient(scale.cwiseProduct(scale));
-    const double length = taken.dot(by_scale);
-    if (!(length > 0.0)) return;
-    const Eigen::VectorXd error = trial.residual - residual - white_ * taken;
-    Eigen::VectorXd change = trial.raw - raw - columns_ * taken;
-    change = change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }).eval();
-    if (white_rows_.any()) {
-      white_rows_.update(white_, error, taken, scale);
-      raw_rows_.update(columns_, change, taken, scale);
-    } else {
-      white_ += error * by_scale.transpose() / length;
-      columns_ += change * by_scale.transpose() / length;
-    }
+    white_.update(trial.residual - residual - white_.times(taken), taken, scale);
+    const Eigen::VectorXd change = trial.raw - raw - columns_.times(taken);
+    columns_.update(change.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }), taken, scale);
   }
 
  private:
-  void put(Eigen::MatrixXd columns) {
+  void put(Columns columns) {
     columns_ = std::move(columns);
     white_ = whitened(data_, weighing_, columns_);
-    white_rows_ = OwnRows{white_, of_window_}, raw_rows_ = OwnRows{columns_, of_window_};
   }
 
   const Case& data_;
   const Weighing& weighing_;
-  std::vector<bool> of_window_;  // is the number a state at the beginning of a window?
-  Eigen::MatrixXd columns_, white_;
-  OwnRows white_rows_, raw_rows_;
+  Columns columns_, white_;
 };
 
 /// Maximum a posteriori estimate by Levenberg-Marquardt, with Broyden's updates of the Jacobian between fresh ones.
@@ -210,7 +184,7 @@ class Minimizer {
         weighing_{weighing},
         iterations_{iterations},
         at_{std::move(start)},
-        jacobian_{data, weighing, at_, nearly(data, at_.model, at_.free, near)},
+        jacobian_{data, weighing, nearly(data, at_.model, at_.free, near)},
         is_fresh_{near == nullptr},
         is_verified_{is_fresh_} {
     raw_ = differences(data_, simulate(data_, at_.model));

@@ -19,7 +19,7 @@ struct Fit {
   double evidence = 0.0;     // log, up to a constant common to all models of one weighing: BIC
   double unlikely = 0.0;     // log, in the evidence too: how rare its terms are, whatever the recording says
   Eigen::VectorXd residual;  // whitened
-  Eigen::MatrixXd columns;   // sensitivities at or near the solution, not whitened
+  Columns columns;           // sensitivities at or near the solution, not whitened
 };
 
 /// What it costs (log) to call a sine in time a current and not a force: one recording shows both alike. Hum sits at the

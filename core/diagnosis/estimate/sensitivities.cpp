@@ -43,16 +43,15 @@ void for_differences_of(const Case& data, const std::vector<Model>& models,
 
 namespace {
 
-/// Rows [first, last) of the residual column of one output that a window's states move: those of its recording from its
-/// restart to the next.
-struct Stretch {
+/// Rows [first, last) of the residual column of one output.
+struct Rows {
   Eigen::Index first = 0, last = 0;
 };
 
-/// The rows of all outputs that the start `name` moves.
-std::vector<Stretch> moved_by(const Case& data, const std::string& name) {
+/// The rows of all outputs that the start `name` of a window moves: those of its recording from its restart to the next.
+std::vector<Rows> moved_by(const Case& data, const std::string& name) {
   const std::size_t which = std::stoul(name.substr(name.find(".start") + 6));
-  std::vector<Stretch> rows;
+  std::vector<Rows> rows;
   Eigen::Index at = 0;
   for (const auto& recording : data.recordings) {
     const auto& restarts = recording.inputs.restarts;
@@ -68,7 +67,7 @@ std::vector<Stretch> moved_by(const Case& data, const std::string& name) {
 
 }  // namespace
 
-Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
+Columns sensitivities(const Case& data, const Model& model, const std::vector<Freedom>& free) {
   std::vector<Model> changed;
   std::vector<std::size_t> run_of(free.size());
   Eigen::VectorXd steps(static_cast<Eigen::Index>(free.size()));
@@ -106,22 +105,26 @@ Eigen::MatrixXd sensitivities(const Case& data, const Model& model, const std::v
   for_differences_of(data, changed, [&](std::size_t k, const Eigen::VectorXd& left) {
     runs.col(static_cast<Eigen::Index>(k)) = left;
   });
-  Eigen::MatrixXd columns(runs.rows(), static_cast<Eigen::Index>(free.size()));
+  std::vector<Columns::Stretch> stretches;
+  std::vector<Eigen::Index> full_at;
+  std::vector<Eigen::VectorXd> full;
   for (std::size_t j = 0; j < free.size(); ++j) {
     const auto to = static_cast<Eigen::Index>(j), from = place(run_of[j]);
     const Eigen::VectorXd moved =
         runs.col(from) - (beside ? runs.col(place(run_of[j] / group * group) - 1) : alone);
     const auto slope = [](double v) { return std::isfinite(v) ? v : 0.0; };
     if (!is_window(free[j])) {
-      columns.col(to) = (moved / steps(to)).unaryExpr(slope);
+      full.emplace_back((moved / steps(to)).unaryExpr(slope));
+      full_at.push_back(to);
       continue;
     }
-    columns.col(to).setZero();
     for (const auto& [first, last] : moved_by(data, model.parameters[free[j].index].name))
-      columns.col(to).segment(first, last - first) =
-          (moved.segment(first, last - first) / steps(to)).unaryExpr(slope);
+      stretches.push_back({to, first, (moved.segment(first, last - first) / steps(to)).unaryExpr(slope)});
   }
-  return columns;
+  Eigen::MatrixXd columns(runs.rows(), static_cast<Eigen::Index>(full.size()));
+  for (std::size_t k = 0; k < full.size(); ++k) columns.col(static_cast<Eigen::Index>(k)) = full[k];
+  return {static_cast<Eigen::Index>(free.size()), std::move(columns), std::move(full_at),
+          std::move(stretches)};
 }
 
 }  // namespace invar::diagnosis

@@ -12,7 +12,6 @@ namespace invar::diagnosis {
 void for_differences_of(const Case& data, const std::vector<physics::Model>& models,
                         const std::function<void(std::size_t, const Eigen::VectorXd&)>& take);
 /// Columns: change of measured - simulated by each freedom, row by row as they stand. Runs on all processors.
-Eigen::MatrixXd sensitivities(const Case& data, const physics::Model& model,
-                              const std::vector<Freedom>& free);
+Columns sensitivities(const Case& data, const physics::Model& model, const std::vector<Freedom>& free);
 
 }  // namespace invar::diagnosis

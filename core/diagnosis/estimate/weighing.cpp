@@ -74,15 +74,19 @@ Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs
 
 namespace {
 
+/// What is present but not finite ran away.
+void bound_run_away(const Whitening& filter, std::vector<double>& values) {
+  for (double& v : values)
+    if (!std::isfinite(v)) v = 1e3 * filter.sigma;
+}
+
 void whiten_all(const Case& data, const Weighing& weighing, const double* in, double* out) {
   std::vector<double> r;
   for (std::size_t rec = 0; rec < data.recordings.size(); ++rec)
     for (std::size_t o = 0; o < data.outputs.size(); ++o) {
       const std::size_t rows = data.recordings[rec].inputs.rows();
       r.assign(in, in + rows);
-      // What is present but not finite ran away.
-      for (std::size_t i = 0; i < rows; ++i)
-        if (!std::isfinite(r[i])) r[i] = 1e3 * weighing.filters[o].sigma;
+      bound_run_away(weighing.filters[o], r);
       whiten(weighing.filters[o], r, weighing.present[rec][o], out);
       in += rows;
       out += rows;
@@ -113,6 +117,58 @@ Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen
     whiten_all(data, weighing, columns.col(k).data(), out.col(k).data());
   });
   return out;
+}
+
+namespace {
+
+/// Rows first to last - 1 of one output of one recording, among the rows of all.
+struct Block {
+  std::size_t recording = 0, output = 0, first = 0, last = 0;
+};
+
+std::vector<Block> blocks_of(const Case& data) {
+  std::vector<Block> blocks;
+  std::size_t at = 0;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r)
+    for (std::size_t o = 0; o < data.outputs.size(); ++o) {
+      const std::size_t rows = data.recordings[r].inputs.rows();
+      blocks.push_back({r, o, at, at + rows});
+      at += rows;
+    }
+  return blocks;
+}
+
+/// A stretch through the filter of its output. The filter goes on behind its end for as many rows as it looks back, from
+/// one that is measured to the next.
+Columns::Stretch whitened(const Weighing& weighing, const Block& block, const Columns::Stretch& stretch) {
+  const auto& filter = weighing.filters[block.output];
+  const auto& present = weighing.present[block.recording][block.output];
+  const std::size_t first = static_cast<std::size_t>(stretch.first) - block.first;
+  std::size_t last = static_cast<std::size_t>(stretch.last()) - block.first;
+  for (std::size_t seen = 0; last < present.size() && seen < filter.a.size(); ++last)
+    seen = present[last] ? seen + 1 : 0;
+  std::vector<double> values(stretch.values.begin(), stretch.values.end());
+  bound_run_away(filter, values);
+  values.resize(last - first);
+  const std::vector<bool> known(present.begin() + static_cast<std::ptrdiff_t>(first),
+                                present.begin() + static_cast<std::ptrdiff_t>(last));
+  Columns::Stretch white{stretch.column, stretch.first,
+                         Eigen::VectorXd(static_cast<Eigen::Index>(values.size()))};
+  whiten(filter, values, known, white.values.data());
+  return white;
+}
+
+}  // namespace
+
+Columns whitened(const Case& data, const Weighing& weighing, const Columns& columns) {
+  const auto blocks = blocks_of(data);
+  std::vector<Columns::Stretch> stretches;
+  for (const auto& stretch : columns.stretches()) {
+    const auto block = std::upper_bound(blocks.begin(), blocks.end(), static_cast<std::size_t>(stretch.first),
+                                        [](std::size_t row, const Block& one) { return row < one.last; });
+    stretches.push_back(whitened(weighing, *block, stretch));
+  }
+  return {columns.cols(), whitened(data, weighing, columns.full()), columns.full_at(), std::move(stretches)};
 }
 
 }  // namespace invar::diagnosis

@@ -6,6 +6,7 @@
 
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/statistics.hpp"
+#include "core/diagnosis/estimate/columns.hpp"
 
 namespace invar::diagnosis {
 
@@ -33,6 +34,7 @@ Eigen::VectorXd residual(const Case& data, const Weighing& weighing,
 Eigen::VectorXd filtered(const Case& data, const Weighing& weighing, const Eigen::VectorXd& differences);
 /// Each column through the filters of the weighing.
 Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns);
+Columns whitened(const Case& data, const Weighing& weighing, const Columns& columns);
 /// Of all outputs of all recordings, one behind the other.
 Eigen::Index rows_of(const Case& data);
 /// measured - simulated of all recordings and outputs below one another; NaN where nothing was measured.

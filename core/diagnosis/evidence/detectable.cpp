@@ -28,7 +28,7 @@ class Series {
         d_{d},
         raw_{differences(data, simulate(data, d.best.model))},
         left_{residual(data, d.weighing, d.best.model)},
-        own_{whitened(data, d.weighing, d.best.columns)} {
+        own_{whitened(data, d.weighing, d.best.columns).dense()} {
     Eigen::MatrixXd curvature = own_.transpose() * own_;
     for (std::size_t k = 0; k < d.best.free.size(); ++k)
       if (const double sigma = d.best.free[k].sigma; sigma > 0.0) {
@@ -45,7 +45,7 @@ class Series {
     e.whitened = whitened(data_, d_.weighing, e.raw);
     if (own_.cols() == 0) return e;
     const Eigen::VectorXd gives_way = curvature_.solve(own_.transpose() * e.whitened);
-    e.raw -= d_.best.columns * gives_way;
+    e.raw -= d_.best.columns.times(gives_way);
     e.whitened -= own_ * gives_way;
     return e;
   }

@@ -18,7 +18,8 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
   n.columns = whitened(data, weighing,
                        base.columns.cols() == static_cast<Eigen::Index>(base.free.size())
                            ? base.columns
-                           : sensitivities(data, base.model, base.free));
+                           : sensitivities(data, base.model, base.free))
+                  .dense();
   Eigen::MatrixXd h = weighing.temper * (n.columns.transpose() * n.columns);
   for (Eigen::Index k = 0; k < h.rows(); ++k) {
     const double sigma = base.free[static_cast<std::size_t>(k)].sigma;

@@ -220,8 +220,7 @@ Fit with_columns(const Case& data, const Fit& base, const Screened& added) {
   Fit near;
   near.model = with(base, {&added});
   near.free = freedoms(near.model, data.model);
-  near.columns.resize(base.columns.rows(), base.columns.cols() + added.columns.cols());
-  near.columns << base.columns, added.columns;
+  near.columns = base.columns.with(added.columns);
   return near;
 }
 

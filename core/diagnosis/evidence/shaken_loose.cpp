@@ -95,7 +95,7 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
     const char *name, *kin;
     double size;
   };
-  const Eigen::MatrixXd columns = whitened(data, weighing, base.columns);
+  const Eigen::MatrixXd columns = whitened(data, weighing, base.columns).dense();
   constexpr double perhaps = 1.0;  // sigmas
   const Eigen::VectorXd roughly_at = differences(data, noise.shaken_mean(base.model, true));
   Eigen::VectorXd at;  // once something is seen

@@ -33,9 +33,7 @@ double independent_rows(const Case& data, const physics::Model& model) {
 /// The sum of squares that columns beside the fit's own would take from its residual.
 double squares_taken(const Weighing& weighing, const Case& data, const Fit& named,
                      const Eigen::MatrixXd& columns) {
-  Eigen::MatrixXd all(columns.rows(), named.columns.cols() + columns.cols());
-  all << named.columns, columns;
-  all = whitened(data, weighing, all);
+  const auto all = whitened(data, weighing, named.columns.with(columns)).dense();
   const auto own = named.columns.cols();
   const auto left = [&](Eigen::Index count) {
     const Eigen::VectorXd strength = all.leftCols(count).colPivHouseholderQr().solve(named.residual);
@@ -68,9 +66,7 @@ double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd
   if (shift.cols() == 0) return 0.0;
   const auto plain = weigh(data, simulate(data, named.model), false);
   const auto left = residual(data, plain, named.model).squaredNorm();
-  Eigen::MatrixXd all(shift.rows(), named.columns.cols() + 1);
-  all << named.columns, shift.rowwise().sum();
-  all = whitened(data, plain, all);
+  const auto all = whitened(data, plain, named.columns.with(shift.rowwise().sum())).dense();
   const auto own = named.columns.cols();
   Eigen::VectorXd apart = all.col(own);
   if (own > 0) apart -= all.leftCols(own) * all.leftCols(own).colPivHouseholderQr().solve(apart).eval();

@@ -138,6 +138,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
   for (std::size_t k = 0; k < fit.free.size() && fit.columns.rows() > 0; ++k) {
     const auto& f = fit.free[k];
     if (!is_of_a_law(data, fit, f)) continue;
+    const Eigen::VectorXd column = fit.columns.col(static_cast<Eigen::Index>(k));
     Eigen::VectorXd effect(rows);
     Eigen::Index from = 0, to = 0;
     for (const auto& recording : data.recordings) {
@@ -145,7 +146,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
       const auto o = static_cast<Eigen::Index>(output),
                  outputs = static_cast<Eigen::Index>(data.outputs.size());
       for (Eigen::Index i = 0; i < n; ++i) {
-        const double v = fit.columns(from + o * n + i, static_cast<Eigen::Index>(k));
+        const double v = column(from + o * n + i);
         effect(to + i) = std::isfinite(v) ? v : 0.0;
       }
       from += outputs * n, to += n;

@@ -95,7 +95,7 @@ void ask_what_is_known(const Case& data, const Fit& fold_fit, bool is_curved, We
         f.where == Freedom::Where::parameter && is_initial(fold_fit.model.parameters[f.index]))
       beginnings.push_back(static_cast<Eigen::Index>(k));
   if (!is_curved && beginnings.empty()) return;
-  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns);
+  const Eigen::MatrixXd known = whitened(data, test, fold_fit.columns).dense();
   Eigen::VectorXd open = (known * fold_fit.covariance).cwiseProduct(known).rowwise().sum();
   if (!is_curved) {
     const Eigen::MatrixXd begun = known(Eigen::all, beginnings);

@@ -29,7 +29,7 @@ double gain_of_lateness(const Case& data, const Diagnosis& d, std::size_t output
         if (k + 1 == spans.size()) at += static_cast<Eigen::Index>(one[o].size());
       }
   Eigen::MatrixXd columns(late.rows(), d.best.columns.cols() + late.cols());
-  columns << whitened(data, d.weighing, d.best.columns), whitened(data, d.weighing, late);
+  columns << whitened(data, d.weighing, d.best.columns).dense(), whitened(data, d.weighing, late);
   const Eigen::VectorXd strength = columns.colPivHouseholderQr().solve(d.best.residual);
   return 0.5 * d.weighing.temper *
          (d.best.residual.squaredNorm() - (d.best.residual - columns * strength).squaredNorm());
