@@ -26,7 +26,7 @@ using physics::Model;
 
 /// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
 /// says what it lacks; but each costs a fit as many numbers as there are states.
-constexpr std::size_t fewest_rows = 60, most_starts = 100;
+constexpr std::size_t fewest_rows = 60, most_starts = 200;
 /// A window is at most as long as a disturbance of its first state takes to grow so much.
 constexpr double most_growth = 30.0;
 /// As many windows where a disturbance grows no faster than the sum of a sum does.
