@@ -130,7 +130,7 @@ def of_fresh(result):
     rows = []
     for r in result["rows"]:
         errors = "; ".join(f"{o} {number(e['before'])}, {number(e['retuned'])}, {number(e['after'])}" + (f" {e['unit']}" if e["unit"] else "") for o, e in r["rmse"].items())
-        rows.append([r["set"], r["task"], r["expected"], r["said"].replace("_", " "), JUDGED[r["judged"]], f"{100 * r['false']:.0f} %" if r["false"] else "none", errors,
+        rows.append([r["set"], r["task"], r["expected"], r["said"].replace("_", " "), JUDGED[r["judged"]], f"{100 * r['false']:.3g} %" if r["false"] else "none", errors,
                      number(r["seconds"])])
     lines.append(table(["set", "model and machine", "expected before the run", "said (probability)", "judged", "highest false claim",
                         "held-out RMSE before, retuned, after", "s"], rows))
