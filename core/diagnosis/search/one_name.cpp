@@ -16,35 +16,37 @@
 
 namespace invar::diagnosis {
 
-Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit& base,
-                      const std::vector<physics::Model>& alone, const std::function<void()>& fitting) {
+namespace {
+
+bool by_evidence(const Fit& a, const Fit& b) { return a.evidence > b.evidence; }
+
+/// Candidates in the order of first order, two starts of a name at a place, as many as go on together: `most`, and what
+/// first order cannot tell from the last of them. Begins at `from`, which is moved behind them.
+std::vector<const Screened*> next_of(const std::vector<Screened>& screened, std::size_t& from,
+                                     std::map<std::string, int>& seen) {
+  constexpr std::size_t most = 9;
+  std::vector<const Screened*> next;
+  for (; from < screened.size(); ++from) {
+    const auto& s = screened[from];
+    if (s.impossible) continue;
+    if (s.merit < -3.0 || (next.size() >= most && s.merit < next.back()->merit - 0.5)) break;
+    if (seen[label(s.start.term)]++ < 2) next.push_back(&s);
+  }
+  return next;
+}
+
+/// A few steps each; those that lag far behind the leader are not driven further.
+std::vector<Fit> fits_of(const Naming& naming, const Weighing& weighing, const Fit& base,
+                         const std::vector<const Screened*>& tried) {
   const auto& data = naming.data;
   const auto& options = naming.options;
-  Shortlist list;
-  list.screened = screen(data, weighing, base, named_starts(data, weighing, base, options.without), 0);
-  std::vector<const Screened*> tried;
-  std::map<std::string, int> seen;
-  for (const auto& s : list.screened) {
-    if (s.impossible) {
-      if (s.merit > 3.0)
-        list.impossible.push_back({std::string{s.start.term.info->name}, why_impossible(s.start), s.merit});
-      continue;
-    }
-    // What first order cannot tell apart goes on together.
-    if (s.merit < -3.0 || (tried.size() >= 9 && s.merit < tried.back()->merit - 0.5)) break;
-    if (seen[label(s.start.term)]++ < 2) tried.push_back(&s);
-  }
-  fitting();
-  // A few steps each; those that lag far behind the leader are not driven further.
-  auto& fits = list.fits;
-  fits.resize(tried.size());
+  std::vector<Fit> fits(tried.size());
   const auto some = excerpt(data, weighing, base, 40 * fits.size());
   in_parallel(fits.size(), [&](std::size_t i) {
     fits[i] =
         some ? on_all(data, weighing, base, fit_with(some->data, some->weighing, some->base, *tried[i], 3))
              : fit_with(data, weighing, base, *tried[i], 3);
   });
-  const auto by_evidence = [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; };
   const auto go_on = [&](Fit& f) {
     if (!options.stopped || !options.stopped()) f = fit(data, weighing, f.model, data.model, 8, &f);
   };
@@ -62,9 +64,37 @@ Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit&
     for (auto& other : fits_of_other_laws(data, weighing, *first, place, options.without))
       fits.push_back(std::move(other));
   }
-  for (const auto& model : alone) fits.push_back(fit(data, weighing, model, data.model, 8));
   if (options.refuses)
     std::erase_if(fits, [&](const Fit& f) { return !stands(data, f, f.model.terms.size() - 1); });
+  return fits;
+}
+
+}  // namespace
+
+Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit& base,
+                      const std::vector<physics::Model>& alone, const std::function<void()>& fitting) {
+  const auto& data = naming.data;
+  Shortlist list;
+  list.screened = screen(data, weighing, base, named_starts(data, weighing, base, naming.options.without), 0);
+  fitting();
+  auto& fits = list.fits;
+  for (const auto& model : alone) fits.push_back(fit(data, weighing, model, data.model, 8));
+  if (naming.options.refuses)
+    std::erase_if(fits, [&](const Fit& f) { return !stands(data, f, f.model.terms.size() - 1); });
+  // First order is misled where the base is far from what is right: where the first do not stand once they are fitted, the
+  // next are tried.
+  constexpr int batches = 3;
+  std::size_t from = 0;
+  std::map<std::string, int> seen;
+  const auto is_better = [&](const Fit& f) { return f.evidence > base.evidence + claim_margin; };
+  for (int batch = 0; batch < batches && std::none_of(fits.begin(), fits.end(), is_better); ++batch) {
+    const auto tried = next_of(list.screened, from, seen);
+    if (tried.empty()) break;
+    for (auto& f : fits_of(naming, weighing, base, tried)) fits.push_back(std::move(f));
+  }
+  for (std::size_t i = 0; i < from; ++i)
+    if (const auto& s = list.screened[i]; s.impossible && s.merit > 3.0)
+      list.impossible.push_back({std::string{s.start.term.info->name}, why_impossible(s.start), s.merit});
   std::sort(fits.begin(), fits.end(), by_evidence);
   return list;
 }

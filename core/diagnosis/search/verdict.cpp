@@ -5,6 +5,7 @@
 
 #include "core/diagnosis/estimate/block_sigma.hpp"
 #include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/locate/left_over.hpp"
@@ -13,6 +14,9 @@
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
+
+using physics::Model;
+using physics::Term;
 
 namespace {
 
@@ -77,10 +81,27 @@ void give_sigmas(const Case& data, Diagnosis& d) {
 
 namespace {
 
+/// The model without a claimed term and the free courses over its own variable that stand beside it.
+Model without_its_courses(const Case& data, Model model, std::size_t place) {
+  const Term named = model.terms[place];
+  model = physics::without_term(std::move(model), place);
+  for (std::size_t t = model.terms.size(); t-- > data.model.terms.size();)
+    if (!model.terms[t].curve.knots.empty() && is_course_of(model.terms[t], named))
+      model = physics::without_term(std::move(model), t);
+  return model;
+}
+
+/// A name that is needed beside a free course over its own variable is what that course cannot follow: friction's jump at
+/// rest. The freer shape is no rival then, and what is left counts against both together. False: no such course.
+bool is_needed_beside_course(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
+  return finding.term.curve.knots.empty() && finding.gain > plainly * claim_margin &&
+         without_its_courses(data, best.model, place).terms.size() + 1 < best.model.terms.size();
+}
+
 /// Shares, gains and probabilities of the findings; returns what each leaves of the mismatch.
 std::vector<double> weigh_findings(const Case& data, const std::vector<double>& excess, Diagnosis& d) {
   std::vector<double> rests;
-  const auto beyond_best = [&](const physics::Model& model) {
+  const auto beyond_best = [&](const Model& model) {
     return residual(data, d.weighing, model).squaredNorm() - d.best.residual.squaredNorm();
   };
   const double mismatch = d.findings.empty() ? 0.0 : beyond_best(data.model),
@@ -95,7 +116,13 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
     finding.share_of_rest = std::max(finding.share, share_of(rest_of_retuned));
     const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
-    const double rest = rest_left_by(data, d.best, rival, excess);
+    const bool has_course = is_needed_beside_course(data, d.best, place, finding);
+    if (has_course) finding.other_shape = 0.0;
+    const double rest = rest_left_by(
+        data, d.best,
+        has_course ? fit(data, d.weighing, without_its_courses(data, d.best.model, place), data.model, 5)
+                   : rival,
+        excess);
     rests.push_back(rest);
     weigh_name(data, d, place, rest, finding);
   }
