@@ -94,7 +94,8 @@ Model without_its_courses(const Case& data, Model model, std::size_t place) {
 /// A name that is needed beside a free course over its own variable is what that course cannot follow: friction's jump at
 /// rest. The freer shape is no rival then, and what is left counts against both together. False: no such course.
 bool is_needed_beside_course(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
-  return finding.term.curve.knots.empty() && finding.gain > plainly * claim_margin &&
+  return finding.term.curve.knots.empty() && finding.term.info->depends_on.front() != "history" &&
+         finding.gain > plainly * claim_margin &&
          without_its_courses(data, best.model, place).terms.size() + 1 < best.model.terms.size();
 }
 
