@@ -148,10 +148,7 @@ int run(const Options& options) {
   if (diagnosis.is_partial && !interrupted()) diagnosis.budget = options.budget;
   diagnosis::check_runs(data, diagnosis.best.model, 0.0, options.model);
   if (!diagnosis.is_partial) diagnosis.assumed = diagnosis::fit_assumed(data, diagnosis, wanted);
-  for (auto& run : checks) {
-    diagnosis::compare(data, diagnosis, run);
-    diagnosis.other_runs.push_back(std::move(run));
-  }
+  for (auto& run : checks) diagnosis::check_on(data, diagnosis, std::move(run));
   const auto json = diagnosis::report_json(data, diagnosis);
   const auto page = diagnosis::page_text(data, diagnosis, options.model.string());
   patience.reset();

@@ -73,8 +73,9 @@ struct OtherRun {
   std::vector<FitRow> fit;   // of the outputs that were measured
   std::string how_windowed;  // judged over windows, and why; empty: in one free run
   std::vector<std::size_t>
-      left_out;           // found terms (places in the best model) that say nothing of this recording
-  bool is_worse = false;  // retuned or with what was found the model errs more than as given
+      left_out;                   // found terms (places in the best model) that say nothing of this recording
+  bool is_worse = false;          // retuned or with what was found the model errs more than as given
+  bool is_worse_patched = false;  // with what was found it errs more than as given or retuned
   bool is_worse_with_them = false;  // patched.yaml would be, with the terms that are left out here
 };
 

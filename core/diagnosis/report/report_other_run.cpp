@@ -22,7 +22,10 @@ std::string worse_on(const Diagnosis& d, const OtherRun& run) {
     text += (text.empty() ? "" : "; ") + row.signal + " " + error_of(row.before, row) + " as it is, " +
             error_of(row.retuned, row) + " retuned" +
             (found ? ", " + error_of(row.after, row) + " with what was found" : std::string{});
-  return "Worse on " + run.name + ", do not take it over: " + text + ".";
+  return "Worse on " + run.name +
+         (run.is_worse_patched ? ", do not take it over: "
+                               : " where it is only retuned, do not take over retuned.yaml: ") +
+         text + ".";
 }
 
 std::string left_out_of(const Case& data, const Diagnosis& d, const OtherRun& run) {

@@ -8,6 +8,7 @@
 #include "core/diagnosis/candidates/place.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/search/verdict.hpp"
+#include "core/diagnosis/segments/windows.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -61,8 +62,10 @@ Wanted wanted_of(const std::string& text) {
 }
 
 void check_wanted(const Case& data, const std::vector<Wanted>& wanted, const std::string& option) {
-  const auto weighing = weigh(data, simulate(data, data.model), false);
-  const auto base = fit(data, weighing, data.model, data.model, 0);
+  Case begun = data;  // from rest a pendulum never moves, and nothing could act on it
+  cut_into_windows(begun);
+  const auto weighing = weigh(begun, simulate(begun, begun.model), false);
+  const auto base = fit(begun, weighing, begun.model, begun.model, 0);
   for (const auto& [name, place] : wanted) {
     if (physics::find_term(data.model.plant, name) == nullptr) {
       std::set<std::string> names;
@@ -73,7 +76,7 @@ void check_wanted(const Case& data, const std::vector<Wanted>& wanted, const std
     }
     std::set<std::string> places;
     bool is_there = false;
-    for (const auto& start : starts_of(data, weighing, base, name)) {
+    for (const auto& start : starts_of(begun, weighing, base, name)) {
       places.insert(start.term.on.empty() ? site_of(data, start.term) : start.term.on);
       is_there = is_there || is_at(data, start.term, place);
     }

@@ -7,6 +7,7 @@
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
+#include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/search/handed_over.hpp"
 #include "core/diagnosis/segments/windows.hpp"
 #include "core/model/record_file.hpp"
@@ -218,9 +219,20 @@ void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run) {
   run.retuned = outputs_of(diagnosis.retuned.model);
   run.after = outputs_of(best_without(data, diagnosis, run.left_out));
   run.fit = rows_of(data, diagnosis, run, run.after);
-  run.is_worse = errs_more(run.fit) || is_worse(run.fit, &FitRow::retuned, &FitRow::before);
+  run.is_worse_patched = errs_more(run.fit);
+  run.is_worse = run.is_worse_patched || is_worse(run.fit, &FitRow::retuned, &FitRow::before);
   run.is_worse_with_them =
       !run.left_out.empty() && errs_more(rows_of(data, diagnosis, run, outputs_of(diagnosis.best.model)));
+}
+
+void check_on(const Case& data, Diagnosis& d, OtherRun run) {
+  compare(data, d, run);
+  // No fit saw these rows: what errs by more than noise there does not explain the machine.
+  const bool leaves_more = std::any_of(run.fit.begin(), run.fit.end(), [](const FitRow& row) {
+    return row.noise_floor > 0.0 && row.after > times_noise * row.noise_floor;
+  });
+  if (leaves_more && d.verdict == Verdict::explained) d.verdict = Verdict::partly_explained;
+  d.other_runs.push_back(std::move(run));
 }
 
 physics::Model best_without(const Case& data, const Diagnosis& diagnosis,

@@ -19,6 +19,9 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
 /// Runs the three models over it as `invar simulate` does, each over windows of its own states where the diagnosis did so, and
 /// compares. Found curves over time, or asked past their knots, are left out.
 void compare(const Case& data, const Diagnosis& diagnosis, OtherRun& run);
+/// Compares, and keeps the run with the diagnosis: `explained` is no more than `partly_explained` where the model with what was
+/// found errs by more than twice the noise there.
+void check_on(const Case& data, Diagnosis& diagnosis, OtherRun run);
 /// The best model without some of its found terms (places in it, in order), the rest fitted anew; without any it is the retuned
 /// one.
 physics::Model best_without(const Case& data, const Diagnosis& diagnosis,

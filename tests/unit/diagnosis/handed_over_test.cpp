@@ -189,6 +189,30 @@ TEST(OtherRecording, ACurveOverTimeOrPastItsKnotsIsLeftOutThereAndOfTheModelThat
   }
 }
 
+/// A motor with two volts too many in the recording of the fit, and none in the other.
+TEST(OtherRecording, WhereOnlyTheRetunedModelIsWorseTheLineSaysSo) {
+  const auto data = make_case(motor(), {run_of_motor(12.0, 4)});
+  auto d = with_curve(data, "u", {-2.0, 0.0, 2.0}, 0.0);
+  d.verdict = Verdict::explained;
+  for (auto& p : d.retuned.model.parameters)
+    if (p.name == "k") p.value *= 1.5;
+  check_on(data, d, other(run_of_motor(12.0, 5), data.model));
+  EXPECT_TRUE(d.other_runs.front().is_worse);
+  EXPECT_FALSE(d.other_runs.front().is_worse_patched);
+  EXPECT_THAT(summary(data, d), HasSubstr("Worse on other.csv where it is only retuned"));
+}
+
+/// An output that errs by more than twice the noise on rows that no fit saw is not explained.
+TEST(OtherRecording, WhatErrsFarAboveTheNoiseThereIsNotExplained) {
+  const auto data = make_case(motor(), {run_of_motor(12.0, 4)});
+  for (const double push : {0.0, 3.0}) {
+    auto d = with_curve(data, "u", {-2.0, 0.0, 2.0}, push);
+    d.verdict = Verdict::explained;
+    check_on(data, d, other(run_of_motor(12.0, 5), data.model));
+    EXPECT_EQ(d.verdict, push > 0.0 ? Verdict::partly_explained : Verdict::explained);
+  }
+}
+
 TEST(OtherRecording, AModelThatIntegratesIsComparedOverWindowsAsIsTheModelGiven) {
   const auto model = test::model_of(
       "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: volt}\n"
