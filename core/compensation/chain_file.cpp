@@ -73,6 +73,30 @@ void read_squareness(const config::Node& root, metrology::Squareness& squareness
   }
 }
 
+void write_curve(ModelText& text, const std::string& key, const metrology::ReversalCurve& curve) {
+  text.open(key).range("interval", curve.spline.interval());
+  text.numbers("coefficients", curve.coefficients).numbers("sigma", curve.sigma).close();
+}
+
+metrology::ReversalCurve read_curve(const config::Node& node, const char* unit, double largest) {
+  const Range interval = node.required("interval").as_range(unit);
+  const auto values = node.required("coefficients").as_numbers(unit);
+  if (values.size() < 4 || values.size() > 1000 || !(interval.width() > 0.0)) {
+    node["coefficients"].fault("holds " + std::to_string(values.size()) + " numbers",
+                               "a spline has 4 to 1000");
+    return {};
+  }
+  if (!std::all_of(values.begin(), values.end(), [&](double v) { return std::abs(v) <= largest; })) {
+    node["coefficients"].fault("a reversal beyond 10 " + std::string{unit[0] == 'm' ? "mm" : "mrad"},
+                               "calibrate again");
+    return {};
+  }
+  const auto sigma = exactly(node.required("sigma"), values.size() - 2, unit);
+  return {numerics::CubicBSpline{interval, static_cast<int>(values.size()) - 3},
+          Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<long>(values.size())),
+          Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<long>(sigma.size()))};
+}
+
 void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 3>& reversal) {
   std::array<double, 3> means{};
   for (std::size_t k = 0; k < 3; ++k) means[k] = reversal[k].mean();
@@ -86,8 +110,7 @@ void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 
   for (int k = 0; k < 3; ++k) {
     const metrology::ReversalCurve& curve = reversal[index(k)];
     if (curve.empty()) continue;
-    text.open(letter(k)).range("interval", curve.spline.interval());
-    text.numbers("coefficients", curve.coefficients).numbers("sigma", curve.sigma).close();
+    write_curve(text, letter(k), curve);
   }
   text.close();
 }
@@ -110,21 +133,7 @@ void read_reversal(const config::Node& root, const metrology::Chain& chain,
         reversal[index(k)] = metrology::constant_reversal(travel[index(k)], means[index(k)], 0.0);
       continue;
     }
-    const Range interval = one.required("interval").as_range("m");
-    const auto values = one.required("coefficients").as_numbers("m");
-    if (values.size() < 4 || values.size() > 1000 || !(interval.width() > 0.0)) {
-      one["coefficients"].fault("holds " + std::to_string(values.size()) + " numbers",
-                                "a spline has 4 to 1000");
-      continue;
-    }
-    if (!std::all_of(values.begin(), values.end(), [&](double v) { return allowed.contains(v); })) {
-      one["coefficients"].fault("a reversal beyond 10 mm", "calibrate again");
-      continue;
-    }
-    const auto sigma = exactly(one.required("sigma"), values.size() - 2, "m");
-    reversal[index(k)] = {numerics::CubicBSpline{interval, static_cast<int>(values.size()) - 3},
-                          Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<long>(values.size())),
-                          Eigen::Map<const Eigen::VectorXd>(sigma.data(), static_cast<long>(sigma.size()))};
+    reversal[index(k)] = read_curve(one, "m", most_reversal);
   }
 }
 

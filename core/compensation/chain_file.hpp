@@ -21,6 +21,10 @@ void write_squareness(ModelText& text, const metrology::Squareness& squareness,
 void read_squareness(const config::Node& root, metrology::Squareness& squareness,
                      metrology::Squareness& sigma);
 
+/// A reversal over position, as a map below `key`. Of one that is damaged the fault goes to the document's list.
+void write_curve(ModelText& text, const std::string& key, const metrology::ReversalCurve& curve);
+metrology::ReversalCurve read_curve(const config::Node& node, const char* unit, double largest);
+
 /// The mean of each axis under `reversal`, the curves under `reversal_over_position`. A file without curves holds the means
 /// everywhere; a mean of 0 without a curve was not measured.
 void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 3>& reversal);

@@ -194,4 +194,11 @@ ComponentFit identify_component(const ComponentReadings& readings) {
   return result;
 }
 
+ComponentReadings without_reversal(ComponentReadings readings, const ReversalCurve& reversal) {
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i)
+    readings.value[i] -=
+        0.5 * readings.direction[static_cast<std::size_t>(i)] * reversal.value(readings.position[i]);
+  return readings;
+}
+
 }  // namespace invar::metrology

@@ -36,4 +36,7 @@ inline constexpr Eigen::Index least_component_readings = 8;
 /// (within a twentieth of its range) are averaged. Needs `least_component_readings`, finite. Set-up only.
 ComponentFit identify_component(const ComponentReadings& readings);
 
+/// Readings as the mean of both directions would be: half the reversal is taken from each.
+ComponentReadings without_reversal(ComponentReadings readings, const ReversalCurve& reversal);
+
 }  // namespace invar::metrology

@@ -99,6 +99,35 @@ class Thermal(Calibrations):
             self.assertLess(abs(row["error"] - 6e-6), 0.5e-6)
 
 
+    def test_distortion_over_time_is_the_closed_form_at_the_two_outer_places(self):
+        """The slide warms by 5 K (1 - exp(-t / 30 min)); its reference point moves by 1 um/K, its scale by 12 um/(m K)."""
+        draw = random.Random(12)
+        warmed = lambda minutes: 5 * (1 - math.exp(-minutes / 30))
+        for minutes, hour in ((150, True), (50, False)):
+            rows = [[60 * k, x, f"{20 + warmed(k):.4f}", f"{(1 + 0.012 * x) * warmed(k) + draw.gauss(0, 0.02):.4f}", way]
+                    for k in range(minutes + 1) for x, way in ((0, 1), (100, 1), (200, 1), (200, -1), (0, -1))]
+            self.write("t.csv", self.HEADER + ",direction", rows)
+            said = self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+            found = self.report()["distortion"]
+            self.assertAlmostEqual(found["duration_s"], 60 * minutes)
+            self.assertEqual([(one["x_m"], one["direction"]) for one in found["places"]],
+                             [(0, -1), (0, 1), (0.2, -1), (0.2, 1)])
+            for one in found["places"]:
+                grows = 1e-6 * (1 + 12 * one["x_m"])
+                self.assertAlmostEqual(one["range_m"], grows * warmed(minutes), delta=0.15e-6)
+                self.assertAlmostEqual(one["end_minus_start_m"], grows * warmed(minutes), delta=0.15e-6)
+                if hour:
+                    self.assertAlmostEqual(one["range_60min_m"], grows * warmed(60), delta=0.15e-6)
+                else:
+                    self.assertIsNone(one["range_60min_m"])
+            self.assertAlmostEqual(found["growth_between_places_m"], 2.4e-6 * warmed(minutes), delta=0.2e-6)
+            self.assertIn("distortion over time (form of ISO 230-3)", said)
+            self.assertIn("The recording does not say what warmed the machine", self.page())
+            self.assertEqual("shorter than 60 min" in self.page(), not hour)
+        self.write("t.csv", "x [mm],temperature [degC],error [um]", [[row[1], *row[2:4]] for row in rows])
+        self.call("calibrate", "thermal", "--recording", "t.csv", "--out", "out")
+        self.assertNotIn("distortion", self.report())
+
     def test_a_report_is_written_where_gnuplot_fails_or_is_absent(self):
         self.write("t.csv", "x [mm],temperature [degC],error [um]",
                    [[x, t, f"{0.01 * x * (t - 20):.5f}"] for _ in range(3) for t in (20, 30) for x in (0, 20, 40, 60)])

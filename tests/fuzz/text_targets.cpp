@@ -10,6 +10,7 @@
 #include "core/compensation/component_file.hpp"
 #include "core/compensation/fusion_file.hpp"
 #include "core/compensation/geometric_file.hpp"
+#include "core/compensation/rotary_file.hpp"
 #include "core/compensation/thermal_file.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/config/yaml.hpp"
@@ -175,6 +176,18 @@ std::string geometric_compensation() {
   return text.sealed();
 }
 
+std::string rotary_compensation() {
+  metrology::ComponentReadings readings;
+  readings.position = Eigen::VectorXd::LinSpaced(40, 0.0, 6.283);
+  readings.value = 1e-5 * readings.position.array().sin();
+  readings.state.resize(0, 40);
+  for (int i = 0; i < 40; ++i) readings.direction.push_back(i % 4 < 2 ? 1 : -1);
+  for (int i = 0; i < 40; ++i) readings.position[i] = readings.position[2 * (i / 2)];
+  compensation::ModelText text{"rotary", {}};
+  compensation::write_rotary(text, metrology::identify_rotary('c', readings, {0.0, 6.283}).axis);
+  return text.sealed();
+}
+
 const std::string recorded =
     "t [s],r [m],x [m],i [A],note\n0,0,0,0.1,1\n0.001,1e-6,0,0.2,\n0.002,2e-6,1e-6,nan,3\n"
     "0.003,3e-6,\"2e-6\",-0.1,4\n";
@@ -271,6 +284,8 @@ std::vector<Target> text_targets() {
   all.push_back(
       compensation_target("components", texts({geometric_compensation()}),
                           [](const config::Node& root) { (void)compensation::read_components(root); }));
+  all.push_back(compensation_target("rotary", texts({rotary_compensation()}),
+                                    [](const config::Node& root) { (void)compensation::read_rotary(root); }));
   // --- tables
   const auto read_csv = [](const Bytes&, const fs::path& file) { read_table(file); };
   all.push_back({"recording_csv", ".csv", texts({recorded}), {" [mm]", "nan", ",,", "\"a,b\""}, read_csv});

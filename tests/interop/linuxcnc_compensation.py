@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # The real LinuxCNC, headless and not as root, loads the COMP files that `calibrate controller` writes: what it adds to the
-# commanded position must be what `invar predict` says, on every axis, in both directions, with a reversal that varies.
+# commanded position must be what `invar predict` says, on every axis, in both directions, with a reversal that varies; a
+# rotary axis too, in degrees.
 # usage: linuxcnc_compensation.py INVAR
 import csv
 import math
@@ -17,6 +18,9 @@ TRAVEL = {"x": (0.0, 200.0), "y": (-60.0, 60.0), "z": (-80.0, 0.0)}  # mm
 TARGETS = 5       # of each axis and direction
 BOUND = 0.03e-3   # mm, between LinuxCNC and predict
 LEAST = 2e-3      # mm, of the corrections: a table of zeros would agree too
+TURN = (0.0, 360.0)      # deg, of the rotary axis C
+BOUND_TURN = 0.02 / 3600  # deg
+LEAST_TURN = 2.0 / 3600   # deg
 
 
 def error(axis, q):  # um
@@ -29,6 +33,25 @@ def reversal(axis, q):  # um, forward minus backward
     low, high = TRAVEL[axis]
     u = (q - low) / (high - low)
     return {"x": 2.0 + 9.0 * u, "y": 4.0 * math.cos(4.0 * u), "z": 3.0}[axis]
+
+
+def error_c(q):  # arcsec
+    return 6.0 * math.sin(math.radians(q) + 0.3)
+
+
+def reversal_c(q):  # arcsec
+    return 5.0 + 2.0 * math.cos(math.radians(q))
+
+
+def write_turns(file):
+    noise = random.Random(SEED)
+    with open(file, "w", encoding="utf-8") as out:
+        out.write("c [deg],deviation [arcsec]\n")
+        for go in range(6):
+            way = 1 if go % 2 == 0 else -1
+            places = [10.0 * i for i in range(37)]
+            for q in places if way > 0 else reversed(places):
+                out.write(f"{q},{error_c(q) + 0.5 * way * reversal_c(q) + noise.gauss(0.0, 0.05):.6f}\n")
 
 
 def write_lines(file):
@@ -51,6 +74,8 @@ def write_lines(file):
 
 MACHINE = "invar_machine: 1\nchain: [y, x, z]\ntravel: {x: [0, 0.2], y: [-0.06, 0.06], z: [-0.08, 0]}\n"
 
+ROTARY = "invar_machine: 1\nchain: [c]\ntravel: {c: {interval: [0, 360], unit: deg}}\n"
+
 HAL = """loadrt [KINS]KINEMATICS
 loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS
 addf motion-command-handler servo-thread
@@ -58,6 +83,7 @@ addf motion-controller servo-thread
 net x joint.0.motor-pos-cmd => joint.0.motor-pos-fb
 net y joint.1.motor-pos-cmd => joint.1.motor-pos-fb
 net z joint.2.motor-pos-cmd => joint.2.motor-pos-fb
+net c joint.3.motor-pos-cmd => joint.3.motor-pos-fb
 net estop iocontrol.0.user-enable-out => iocontrol.0.emc-enable-in
 net tool-prepare iocontrol.0.tool-prepare => iocontrol.0.tool-prepared
 net tool-change iocontrol.0.tool-change => iocontrol.0.tool-changed
@@ -83,22 +109,22 @@ command.wait_complete()
 command.mode(linuxcnc.MODE_MANUAL)
 command.wait_complete()
 command.home(-1)
-until(lambda: status.homed[:3] == (1, 1, 1))
+until(lambda: status.homed[:4] == (1, 1, 1, 1))
 command.mode(linuxcnc.MODE_MDI)
 command.wait_complete()
 with open("offsets.csv", "w") as out:
     for row in open("targets.txt"):
         way, *target = row.split()
-        command.mdi("G53 G0 X%s Y%s Z%s" % tuple(target))
+        command.mdi("G53 G0 X%s Y%s Z%s C%s" % tuple(target))
         command.wait_complete(30)
         if way == "0":
             continue
         filtered = lambda: all(abs(hal.get_value("joint.%d.backlash-filt" % j) - hal.get_value("joint.%d.backlash-corr" % j))
-                               < 1e-9 for j in range(3))
+                               < 1e-9 for j in range(4))
         until(filtered)
-        at = [hal.get_value("joint.%d.pos-cmd" % j) for j in range(3)]
+        at = [hal.get_value("joint.%d.pos-cmd" % j) for j in range(4)]
         added = [hal.get_value("joint.%d.motor-pos-cmd" % j) - at[j] - hal.get_value("joint.%d.motor-offset" % j)
-                 for j in range(3)]
+                 for j in range(4)]
         out.write(" ".join([way] + ["%.9f" % v for v in at + added]) + "\\n")
 """
 
@@ -125,19 +151,20 @@ TOOL_TABLE = tool.tbl
 [HAL]
 HALFILE = machine.hal
 [TRAJ]
-COORDINATES = X Y Z
+COORDINATES = X Y Z C
 LINEAR_UNITS = mm
 ANGULAR_UNITS = degree
 MAX_LINEAR_VELOCITY = 1000
 DEFAULT_LINEAR_VELOCITY = 1000
 MAX_LINEAR_ACCELERATION = 20000
 [KINS]
-KINEMATICS = trivkins coordinates=XYZ
-JOINTS = 3
+KINEMATICS = trivkins coordinates=XYZC
+JOINTS = 4
 """
-    for number, (axis, (low, high)) in enumerate(TRAVEL.items()):
+    for number, (axis, (low, high)) in enumerate({**TRAVEL, "c": TURN}.items()):
+        kind = "ANGULAR" if axis == "c" else "LINEAR"
         limits = f"MIN_LIMIT = {low - 1}\nMAX_LIMIT = {high + 1}\nMAX_VELOCITY = 1000\nMAX_ACCELERATION = 20000\n"
-        text += f"[AXIS_{axis.upper()}]\n{limits}[JOINT_{number}]\nTYPE = LINEAR\n{limits}"
+        text += f"[AXIS_{axis.upper()}]\n{limits}[JOINT_{number}]\nTYPE = {kind}\n{limits}"
         text += f"COMP_FILE = linuxcnc-{axis}.comp\nCOMP_FILE_TYPE = 0\n"
         text += f"HOME = 0\nHOME_SEARCH_VEL = 0\nHOME_LATCH_VEL = 0\nHOME_SEQUENCE = {number}\n"
     return text
@@ -173,6 +200,25 @@ def run_linuxcnc(folder):
     return [[float(v) for v in row.split()] for row in rows]
 
 
+def check_turn(folder, turned, rows):
+    """The same of the rotary axis, the fourth joint."""
+    points, predicted = os.path.join(folder, "points.csv"), os.path.join(folder, "predicted.csv")
+    with open(points, "w", encoding="utf-8") as out:
+        out.write("c [deg],direction\n" + "".join(f"{row[4]!r},{int(row[0])}\n" for row in rows))
+    invar("predict", "--model", os.path.join(turned, "compensation.yaml"), "--inputs", points, "--output", predicted)
+    with open(predicted, encoding="utf-8") as table:
+        errors = [math.degrees(float(line["error_c [rad]"])) for line in csv.DictReader(table)]
+    worst = max(abs(row[8] + expected) for row, expected in zip(rows, errors))
+    for row, expected in zip(rows, errors):
+        truth = (error_c(row[4]) + 0.5 * row[0] * reversal_c(row[4])) / 3600
+        if abs(expected - truth) > 0.2 / 3600:
+            sys.exit(f"c = {row[4]:.3f} deg, way {row[0]:.0f}: predicted {expected:.7f}, true {truth:.7f} deg")
+    largest = max(map(abs, errors))
+    print(f"of the rotary axis by {3600 * worst:.4f} arcsec at most; corrections up to {3600 * largest:.1f} arcsec")
+    if worst > BOUND_TURN or largest < LEAST_TURN:
+        sys.exit("LinuxCNC corrects the rotary axis otherwise than `invar predict` says")
+
+
 def main():
     folder = tempfile.mkdtemp(prefix="invar_linuxcnc_")
     try:
@@ -183,22 +229,30 @@ def main():
               os.path.join(folder, "lines.csv"), "--out", result)
         invar("calibrate", "controller", "--model", os.path.join(result, "compensation.yaml"), "--out",
               os.path.join(folder, "controller"))
+        put(folder, "rotary.yaml", ROTARY)
+        write_turns(os.path.join(folder, "turns.csv"))
+        turned = os.path.join(folder, "turned")
+        invar("calibrate", "geometric", "--machine", os.path.join(folder, "rotary.yaml"), "--lines",
+              os.path.join(folder, "turns.csv"), "--out", turned)
+        invar("calibrate", "controller", "--model", os.path.join(turned, "compensation.yaml"), "--out",
+              os.path.join(folder, "controller"))
         cell = os.path.join(folder, "linuxcnc")
         os.mkdir(cell)
-        for axis in TRAVEL:
+        for axis in [*TRAVEL, "c"]:
             shutil.copy(os.path.join(folder, "controller", f"linuxcnc-{axis}.comp"), cell)
         put(cell, "machine.ini", ini())
         put(cell, "machine.hal", HAL)
         put(cell, "mover.py", MOVER)
         put(cell, "tool.tbl", "T1 P1 D1\n")
-        ends = {axis: (low - 0.9, high + 0.9) for axis, (low, high) in TRAVEL.items()}
-        targets = "0 " + " ".join(str(low) for low, _ in ends.values()) + "\n"
+        travels = [*TRAVEL.values(), TURN]
+        ends = [(low - 0.9, high + 0.9) for low, high in travels]
+        targets = "0 " + " ".join(str(low) for low, _ in ends) + "\n"
         for way in (1, -1):
             order = range(TARGETS) if way > 0 else reversed(range(TARGETS))
             for i in order:
-                at = [low + (high - low) * (i + 0.37) / TARGETS for low, high in TRAVEL.values()]
+                at = [low + (high - low) * (i + 0.37) / TARGETS for low, high in travels]
                 targets += f"{way} " + " ".join(f"{v:.4f}" for v in at) + "\n"
-            targets += "0 " + " ".join(str(high if way > 0 else low) for low, high in ends.values()) + "\n"
+            targets += "0 " + " ".join(str(high if way > 0 else low) for low, high in ends) + "\n"
         put(cell, "targets.txt", targets)
         os.chmod(folder, 0o755)
         rows = run_linuxcnc(cell)
@@ -218,7 +272,7 @@ def main():
             with open(predicted, encoding="utf-8") as table:
                 errors = [1e3 * float(line[f"error_{axis} [m]"]) for line in csv.DictReader(table)]
             for row, expected in zip(rows, errors):
-                added = row[4 + number]
+                added = row[5 + number]
                 worst = max(worst, abs(added + expected))
                 largest = max(largest, abs(expected))
                 way, q = int(row[0]), row[1 + number]
@@ -226,6 +280,7 @@ def main():
                 mean = 1e-3 * (error(axis, q) - error(axis, max(TRAVEL[axis][0], min(0.0, TRAVEL[axis][1]))))
                 if abs(expected - mean - truth) > 0.4e-3:
                     sys.exit(f"{axis} = {q:.3f} mm, way {way}: predicted {expected:.6f}, true {mean + truth:.6f} mm")
+        check_turn(folder, turned, rows)
         print(f"LinuxCNC and predict differ by {1e3 * worst:.4f} um at most; corrections up to {1e3 * largest:.1f} um")
         if worst > BOUND:
             sys.exit("LinuxCNC corrects otherwise than `invar predict` says")

@@ -26,6 +26,7 @@ recording::Table predict_thermistor(const config::Yaml& model, const recording::
 void add_calibrate_geometric(CLI::App& group);
 void add_calibrate_plan(CLI::App& group);
 void add_calibrate_controller(CLI::App& group);
+recording::Table predict_rotary(const config::Yaml& model, const recording::Table& inputs);
 recording::Table predict_geometric(const config::Yaml& model, const recording::Table& inputs);
 void add_calibrate_components(CLI::App& group);
 recording::Table predict_components(const config::Yaml& model, const recording::Table& inputs);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "tools/geometric/components_file.hpp"
 #include "tools/geometric/components_page.hpp"
 #include "tools/geometric/field_points.hpp"
+#include "tools/geometric/motion_figures.hpp"
 
 namespace invar::tools {
 
@@ -29,20 +31,20 @@ struct Options {
   std::filesystem::path machine;
   std::filesystem::path readings;
   std::filesystem::path out;
+  std::vector<std::string> tolerances;
+  double device = 0.0;
+  double environment = 0.0;
 };
 
-/// Readings as the mean of both directions would be: half the reversal is taken from each, where it was read.
+/// The reversal of a positioning goes to the model, and out of the readings that the network is fitted to.
 metrology::ComponentReadings without_reversal(ComponentsResult& result, int component) {
-  metrology::ComponentReadings readings = *result.readings[index(component)];
+  const metrology::ComponentReadings& readings = *result.readings[index(component)];
   if (readings.direction.empty() || !metrology::is_positioning(component)) return readings;
   const int axis = metrology::axis_of(component);
   metrology::ReversalCurve& curve = result.model.reversal[index(axis)];
   curve = metrology::reversal_of_readings(readings.position, readings.value, readings.direction,
                                           result.model.travel[index(axis)]);
-  for (Eigen::Index i = 0; i < readings.position.size(); ++i)
-    readings.value[i] -=
-        0.5 * readings.direction[static_cast<std::size_t>(i)] * curve.value(readings.position[i]);
-  return readings;
+  return metrology::without_reversal(readings, curve);
 }
 
 /// ISO names of what no reading told: components of the machine's axes, and squareness.
@@ -114,6 +116,39 @@ void drop_unused_states(ComponentsResult& result) {
   }
 }
 
+/// Figures of a motion's targets by ISO 230-2. Of a straightness only what no alignment of the straightedge changes.
+std::optional<PositioningTest> test_of_motion(const ComponentsResult& result, int component,
+                                              const Options& options) {
+  const bool along = metrology::is_positioning(component);
+  const bool turns = is_rotation(component);
+  const metrology::Iso230Conditions conditions{along ? options.device : 0.0,
+                                               turns ? 0.0 : options.environment};
+  auto test = test_of("", targets_of(*result.readings[index(component)]), conditions);
+  if (!test) return test;
+  test->motion = metrology::iso_name(component);
+  test->unit = turns ? "rad" : "m";
+  if (!along && !turns)
+    for (std::size_t f = static_cast<std::size_t>(metrology::Iso230Figure::E_forward);
+         f < metrology::iso230_figures; ++f)
+      test->figures.values[f] = test->figures.uncertainty[f] = std::nan("");
+  return test;
+}
+
+/// Figures by ISO 230-1 and -2 of every motion that depends on its position alone.
+void test_motions(ComponentsResult& result, const Options& options) {
+  result.motions = motion_figures(result.readings, result.fits, result.model, options.environment);
+  for (int c = 0; c < component_count; ++c) {
+    if (!result.fits[index(c)]) continue;
+    if (!result.fits[index(c)]->component.states.empty()) {
+      result.notes.push_back(std::string{metrology::iso_name(c)} + " depends on " + result.depends_on(c) +
+                             ": no figures of ISO 230, which are of one state");
+      continue;
+    }
+    if (auto test = test_of_motion(result, c, options)) result.tests.push_back(std::move(*test));
+  }
+  result.not_judged = unmet(result.tolerances, result.tests, result.motions);
+}
+
 nlohmann::json report_of(const ComponentsResult& result) {
   nlohmann::json report;
   report["kind"] = "components";
@@ -123,6 +158,9 @@ nlohmann::json report_of(const ComponentsResult& result) {
   report["rows"] = report::json_of(rows_of(result));
   report["unidentified"] = result.unidentified;
   report["notes"] = result.notes;
+  report["not_judged"] = result.not_judged;
+  report["positioning"] = positioning_json(result.tests, result.tolerances);
+  report["motions"] = motions_json(result.motions, result.tolerances);
   report["components"] = nlohmann::json::array();
   for (int c = 0; c < component_count; ++c) {
     if (!result.fits[index(c)]) continue;
@@ -155,6 +193,7 @@ void calibrate(const Options& options) {
   result.model.chain = machine.chain;
   result.model.travel = machine.travel;
   result.model.tool = machine.tool;
+  result.tolerances = read_tolerances(options.tolerances, false);
   read_components_file(options.readings, machine, result);
   {
     const Progress progress{"fitting the error motions"};
@@ -165,6 +204,7 @@ void calibrate(const Options& options) {
     drop_unused_states(result);
   }
   evaluate(result);
+  test_motions(result, options);
   compensation::ModelText text{"components", {options.machine, options.readings}};
   compensation::write_components(text, result.model);
   write_calibration(options.out, text, report_of(result), components_page(result));
@@ -182,8 +222,11 @@ void calibrate(const Options& options) {
     if (const auto& curve = result.model.reversal[index(k)]; !curve.empty())
       std::cout << "reversal of " << metrology::axis_letters[index(k)] << ": " << si(curve.mean(), "m")
                 << " in the mean over the travel\n";
+  print_motions(result.motions, result.tolerances, false, std::cout);
+  print_positioning(result.tests, result.tolerances, std::cout);
   std::cout << "error over the travels " << si(result.field_rms, "m") << " RMS, known to "
             << si(result.field_sigma, "m") << '\n';
+  for (const auto& what : result.not_judged) std::cout << "note: " << what << '\n';
   for (const auto& note : result.notes) std::cout << "note: " << note << '\n';
   if (!result.unidentified.empty())
     std::cout << "not measured, taken as zero: " << joined(result.unidentified) << '\n';
@@ -202,6 +245,12 @@ void add_calibrate_components(CLI::App& group) {
       "or rotation [rad]; optional direction (1, -1), which tells the reversal; and what it may depend on: "
       "temperature [degC], heating_rate [K/s], "
       "temperature_<zone> [degC].\n"
+      "Targets read more than once get the figures of ISO 230-2; straightness, angles and squareness those "
+      "of ISO "
+      "230-1.\n"
+      "Tolerances: \"A=10 um\" of every positioning, \"ECX:R=2 arcsec\" of one motion, \"EYX=3 um\" of its "
+      "figure by ISO "
+      "230-1.\n"
       "From displacement lines alone: invar calibrate geometric.");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
@@ -211,6 +260,17 @@ void add_calibrate_components(CLI::App& group) {
       ->required();
   command->add_option("--out", options->out, "folder for compensation.yaml, report.json, report.html")
       ->required();
+  command->add_option("--tolerance", options->tolerances,
+                      "a figure and its limit, \"A=10 um\" or \"EYX=3 um\": the report says pass or fail");
+  command
+      ->add_option(
+          "--device", options->device,
+          "standard uncertainty of the laser's scale, its alignment and the axis' temperature [of 1]")
+      ->check(CLI::Range(0.0, 1e-2));
+  command
+      ->add_option("--environment", options->environment,
+                   "standard uncertainty of what the surroundings move a reading of a length by [m]")
+      ->check(CLI::Range(0.0, 1e-2));
   command->callback([options] { calibrate(*options); });
 }
 

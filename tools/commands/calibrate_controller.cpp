@@ -10,6 +10,7 @@
 
 #include "core/base/new_file.hpp"
 #include "core/compensation/geometric_file.hpp"
+#include "core/compensation/rotary_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/geometric/controller_files.hpp"
@@ -45,12 +46,34 @@ std::set<std::string> unidentified_of(const std::filesystem::path& file) {
   return names;
 }
 
-void export_model(const Options& options) {
-  const auto model = compensation::load_geometric(options.model);
+void make_folder(const std::filesystem::path& folder) {
   std::error_code failed;
-  std::filesystem::create_directories(options.out, failed);
-  if (failed)
-    throw InputError{options.out.string(), "cannot be made", "name a folder that may be written to"};
+  std::filesystem::create_directories(folder, failed);
+  if (failed) throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
+}
+
+void export_rotary(const Options& options) {
+  const auto axis = compensation::load_rotary(options.model);
+  make_folder(options.out);
+  const std::string letter(1, axis.letter);
+  write(options.out / ("linuxcnc-" + letter + ".comp"), linuxcnc_compensation(axis));
+  if (const double off = linuxcnc_difference(axis); off > worth_saying)
+    std::cout << "  its 256 points are " << report::number(off * 206264.806, 3)
+              << " arcsec off the model between them at most\n";
+  if (axis.reversal.empty())
+    std::cout << "  the axis was read in one direction: both columns hold that one\n";
+  std::cout << "volcomp-isg.csv is not written: its grid has linear axes alone\n";
+}
+
+std::string kind_of(const std::filesystem::path& model) {
+  const auto yaml = config::Yaml::load(model);
+  return yaml.root().has("kind") ? yaml.root()["kind"].as_text() : "";
+}
+
+void export_model(const Options& options) {
+  if (kind_of(options.model) == "rotary") return export_rotary(options);
+  const auto model = compensation::load_geometric(options.model);
+  make_folder(options.out);
   const auto unidentified = unidentified_of(options.model);
   bool any = false;
   for (int axis = 0; axis < 3; ++axis) {
@@ -92,9 +115,9 @@ void add_calibrate_controller(CLI::App& group) {
       "measured, one for all axes moving forward and one for backward; one COMP_FILE an axis for LinuxCNC\n"
       "(COMP_FILE_TYPE = 0) with both directions; and the squareness as numbers for skew parameters. What no "
       "line told is left out,\n"
-      "never zero.");
+      "never zero. Of a rotary axis: its COMP_FILE in degrees.");
   auto options = std::make_shared<Options>();
-  command->add_option("--model", options->model, "compensation.yaml of kind geometric")->required();
+  command->add_option("--model", options->model, "compensation.yaml of kind geometric or rotary")->required();
   command->add_option("--out", options->out, "folder to write to")->required();
   command->add_option("--nodes", options->nodes, "nodes an axis of the ISG grid")
       ->check(CLI::Range(2, 101))

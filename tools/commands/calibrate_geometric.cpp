@@ -17,6 +17,7 @@
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"
 #include "tools/geometric/rotary.hpp"
+#include "tools/geometric/rotary_readings.hpp"
 #include "tools/live/terminal.hpp"
 #include "tools/positive.hpp"
 
@@ -38,8 +39,8 @@ struct Options {
 
 void calibrate(const Options& options) {
   if (const std::string axis = rotary_axis(options.machine); !axis.empty())
-    return test_rotary({options.machine, options.lines, options.out, axis, options.tolerances, options.device,
-                        std::max(options.environment, 0.0)});
+    return calibrate_rotary({options.machine, options.lines, options.out, axis, options.tolerances,
+                             options.device, std::max(options.environment, 0.0)});
   GeometricResult result;
   result.tolerances = read_tolerances(options.tolerances, false);
   result.machine_file = options.machine;
@@ -96,9 +97,11 @@ void add_calibrate_geometric(CLI::App& group) {
       "  travel: {x: [0, 0.2], y: [0, 0.2], z: [-0.1, 0]}   # m; two axes for an XY table\n"
       "  tool: {x: 0, y: 0, z: -0.05}                       # m, from the last axis to the reflector; "
       "optional\n"
-      "One axis: chain: [x]. A rotary one, chain: [c] (or a, b): columns c [deg] and deviation [arcsec]; its "
-      "report\n"
-      "has the figures and no compensation.yaml.");
+      "One axis: chain: [x]. A rotary one, chain: [c] (or a, b): columns c [deg] and deviation [arcsec]; "
+      "travel\n"
+      "{c: {interval: [0, 360], unit: deg}}. Over a whole turn its model comes round; deviations.csv has "
+      "the\n"
+      "means by target.");
   auto options = std::make_shared<Options>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--lines", options->lines, "readings of displacement lines, .csv or .csv.gz")
@@ -112,8 +115,9 @@ void add_calibrate_geometric(CLI::App& group) {
       ->capture_default_str();
   command->add_option("--interval", options->interval, "use only readings at this interval along a line [m]")
       ->check(positive());
-  command->add_option("--tolerance", options->tolerances,
-                      "a figure of ISO 230-2 and its limit, \"A=10 um\": the report says pass or fail");
+  command->add_option(
+      "--tolerance", options->tolerances,
+      "a figure and its limit, \"A=10 um\" or \"EYX=3 um\" (straightness): the report says pass or fail");
   command
       ->add_option(
           "--device", options->device,

@@ -125,7 +125,7 @@ void add_calibrate_history(CLI::App& group) {
   auto options = std::make_shared<Options>();
   command->add_option("folder", options->folder, "folder of calibrations")->required();
   command
-      ->add_option("--accuracy", options->accuracy, "wanted of the machine's error [m]; of a thermistor [K]")
+      ->add_option("--accuracy", options->accuracy, "wanted of the machine's error [m]; of a rotary axis [rad], a thermistor [K]")
       ->check(positive());
   command->add_option("--out", options->out, "folder for report.html and report.json");
   command->add_flag("--json", options->json, "print report.json instead of the summary");

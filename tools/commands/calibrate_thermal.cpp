@@ -9,6 +9,7 @@
 #include "core/metrology/thermal_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
+#include "tools/thermal/distortion.hpp"
 #include "tools/thermal/thermal_page.hpp"
 
 namespace invar::tools {
@@ -156,7 +157,11 @@ void calibrate(const Options& options) {
                                 {"lag_s", candidate.lag},
                                 {"chosen", candidate.chosen},
                                 {"verdict", candidate.verdict}});
-  write_calibration(folder, text, report, thermal_page(file, readings, fit, figures));
+  const Distortion distortion = distortion_of(readings, fit);
+  if (!distortion.places.empty()) report["distortion"] = json_of(distortion);
+  report::Page page = thermal_page(file, readings, fit, figures);
+  show(page, distortion);
+  write_calibration(folder, text, report, page);
 
   std::cout << "thermal error from " << readings.x.size() << " readings, noise " << si(fit.model.noise, "m")
             << '\n'
@@ -166,6 +171,7 @@ void calibrate(const Options& options) {
               << " on readings left out; " << candidate.verdict << '\n';
   std::cout << "RMS " << si(figures.before, "m") << " before, " << si(figures.after, "m")
             << " after (readings left out); systematic error known to " << si(figures.sigma, "m") << '\n';
+  print(distortion, std::cout);
   for (const auto& what : fit.unexplained) std::cout << "not explained: " << what << '\n';
   for (const auto& note : fit.notes) std::cout << "note: " << note << '\n';
   for (const auto& what : fit.unidentified) std::cout << "not identified: " << what << '\n';
@@ -176,7 +182,12 @@ void calibrate(const Options& options) {
 
 void add_calibrate_thermal(CLI::App& group) {
   auto* command = group.add_subcommand("thermal", "Error over position, temperature and heating rate");
-  command->footer("Example: invar calibrate thermal --recording thermal.csv --out result");
+  command->footer(
+      "Example: invar calibrate thermal --recording thermal.csv --out result\n"
+      "With a column t, places that were read again and again get ranges in the form of ISO 230-3: in the "
+      "first 60\n"
+      "min and over the recording. Without gnuplot the report is written all the same; a sentence stands for "
+      "each plot.");
   auto options = std::make_shared<Options>();
   command
       ->add_option("--recording", options->recording,

@@ -28,8 +28,6 @@ std::string calibrated_at() {
   return text;
 }
 
-namespace {
-
 void write_reports(const std::filesystem::path& folder, const nlohmann::json& report,
                    const report::Page& page) {
   std::error_code failed;
@@ -41,8 +39,6 @@ void write_reports(const std::filesystem::path& folder, const nlohmann::json& re
   dated["calibrated_at"] = calibrated_at();
   write_file(folder / "report.json", dated.dump(1) + "\n");
 }
-
-}  // namespace
 
 void write_calibration(const std::filesystem::path& folder, const compensation::ModelText& model,
                        const nlohmann::json& report, const report::Page& page) {

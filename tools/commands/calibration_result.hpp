@@ -30,6 +30,10 @@ void write_calibration(const std::filesystem::path& folder, const compensation::
 void write_calibration(const std::filesystem::path& folder, const std::string& name, const std::string& model,
                        const nlohmann::json& report, const report::Page& page);
 
+/// The reports alone, of readings that give no model.
+void write_reports(const std::filesystem::path& folder, const nlohmann::json& report,
+                   const report::Page& page);
+
 /// The time now as report.json has it: "2026-11-27T09:30:00Z".
 std::string calibrated_at();
 

@@ -16,6 +16,7 @@ const std::map<std::string, Predict>& kinds() {
       {"components", predict_components}, {"dispenser", predict_dispenser},
       {"fusion", predict_fusion},         {"thermal", predict_thermal},
       {"thermistor", predict_thermistor}, {"geometric", predict_geometric},
+      {"rotary", predict_rotary},
   };
   return table;
 }
@@ -50,6 +51,7 @@ void add_predict(CLI::App& program) {
       "What a table needs and what comes of it, by the kind of the model:\n"
       "  geometric, components  x, y, z [m] of the machine's axes -> error_x, error_y, error_z and their "
       "sigma_x ...\n"
+      "  rotary                 a, b or c [rad, deg] -> error_c, sigma_c [rad]\n"
       "  thermal                x [m], temperature [degC] -> error, sigma\n"
       "  dispenser              target_x, target_y, height [m] -> command_x, command_y (where to aim), "
       "offset_x, ...\n"

@@ -118,6 +118,7 @@ report::Page components_page(const ComponentsResult& result) {
   std::string missing;
   for (const auto& what : result.unidentified) missing += (missing.empty() ? "" : ", ") + what;
   if (!missing.empty()) page.callout("Not measured, taken as zero: " + missing, "warn");
+  for (const auto& what : result.not_judged) page.callout(what + ".", "warn");
   for (const auto& note : result.notes) page.paragraph(note);
   report::show(page, rows_of(result));
   page.heading("Components");
@@ -144,6 +145,8 @@ report::Page components_page(const ComponentsResult& result) {
                          metrology::squareness_angle_from_cosine(pair, result.model.squareness[index(pair)]),
                          result.model.squareness_sigma[index(pair)], "rad"));
   page.plots(std::move(plots), "Bands are two standard deviations of the curve.");
+  write_motions(page, result.motions, result.tolerances);
+  write_positioning(page, result.tests, result.tolerances);
   page.heading("Residual");
   page.plot(residual_plot(result));
   return page;

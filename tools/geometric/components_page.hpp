@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "core/metrology/component_identification.hpp"
+#include "tools/geometric/motion_figures.hpp"
+#include "tools/geometric/positioning.hpp"
 #include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 
@@ -17,13 +19,17 @@ struct ComponentsResult {
   std::filesystem::path machine_file;
   std::filesystem::path readings_file;
   metrology::ComponentNetworks model;
-  std::array<std::optional<metrology::ComponentReadings>, metrology::component_count> readings;
-  std::array<std::optional<metrology::ComponentFit>, metrology::component_count> fits;
+  MotionReadings readings;
+  MotionFits fits;
   std::size_t rows = 0;
   double field_rms = 0.0;    // m, of the error over the travels in the usual state
   double field_sigma = 0.0;  // m, RMS of what is not known of it there
   std::vector<std::string> unidentified;
   std::vector<std::string> notes;
+  std::vector<PositioningTest> tests;  // of motions with targets read more than once, by ISO 230-2
+  std::vector<MotionFigure> motions;   // by ISO 230-1
+  std::vector<Tolerance> tolerances;
+  std::vector<std::string> not_judged;  // tolerances without a figure
 
   /// "temperature, heating_rate" or "position alone".
   [[nodiscard]] std::string depends_on(int component) const;

@@ -14,9 +14,14 @@ namespace invar::tools {
 namespace {
 
 constexpr int most_points = 256;  // LinuxCNC's table
+constexpr double degree = 3.14159265358979323846 / 180.0;
 
 std::size_t index(int i) { return static_cast<std::size_t>(i); }
 char upper(int axis) { return "XYZ"[axis]; }
+
+double rotary_place(const metrology::RotaryAxis& axis, int i) {
+  return axis.travel.lower + axis.travel.width() * i / (most_points - 1);
+}
 
 Eigen::Vector3d home_of(const metrology::GeometricModel& model) {
   Eigen::Vector3d home = Eigen::Vector3d::Zero();
@@ -109,6 +114,30 @@ double linuxcnc_difference(const metrology::GeometricModel& model, int axis) {
       largest = std::max(largest,
                          std::abs(told(at + 0.5 * step, way) - 0.5 * (told(at, way) + told(at + step, way))));
   }
+  return largest;
+}
+
+std::string linuxcnc_compensation(const metrology::RotaryAxis& axis) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(9);
+  for (int i = 0; i < most_points; ++i) {
+    const double at = rotary_place(axis, i);
+    out << at / degree << ' ' << (at + axis.value(at, 1.0)) / degree << ' '
+        << (at + axis.value(at, -1.0)) / degree << '\n';
+  }
+  out << "# joint of " << static_cast<char>(axis.letter - 'a' + 'A')
+      << ": nominal, actual moving forward, actual moving backward [deg], COMP_FILE_TYPE = 0\n";
+  return out.str();
+}
+
+double linuxcnc_difference(const metrology::RotaryAxis& axis) {
+  double largest = 0.0;
+  for (int i = 0; i + 1 < most_points; ++i)
+    for (const double way : {1.0, -1.0}) {
+      const double low = rotary_place(axis, i), high = rotary_place(axis, i + 1);
+      const double straight = 0.5 * (axis.value(low, way) + axis.value(high, way));
+      largest = std::max(largest, std::abs(axis.value(0.5 * (low + high), way) - straight));
+    }
   return largest;
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/metrology/geometric_model.hpp"
+#include "core/metrology/rotary_axis.hpp"
 
 namespace invar::tools {
 
@@ -25,6 +26,11 @@ bool positioning_is_known(const metrology::GeometricModel& model, int axis,
 /// LinuxCNC [JOINT_n]COMP_FILE with COMP_FILE_TYPE = 0: nominal, actual forward, actual backward in mm, at most 256 points,
 /// along `axis` with the others at the origin of the travels.
 std::string linuxcnc_compensation(const metrology::GeometricModel& model, int axis);
+
+/// The same of a rotary axis, in degrees.
+std::string linuxcnc_compensation(const metrology::RotaryAxis& axis);
+/// In rad.
+double linuxcnc_difference(const metrology::RotaryAxis& axis);
 
 /// How far that table, straight between its points, may be from the model [m]: a screw's wave bends between them.
 double linuxcnc_difference(const metrology::GeometricModel& model, int axis);

@@ -220,7 +220,10 @@ report::Page report_page(const GeometricResult& result) {
                "Where an axis stands after moving forward, less where after moving backward, with the "
                "two-sigma band. "
                "Half of it lies to either side of the curves above.");
+  for (const auto& note : result.not_judged) page.callout(note + ".", "warn");
+  write_motions(page, result.motions, result.tolerances);
   write_positioning(page, result.tests, result.tolerances);
+  write_diagonals(page, result.diagonals);
   if (found.model.chain.axes > 1)
     page.plots(
         field_plots(found.model),

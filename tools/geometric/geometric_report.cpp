@@ -121,6 +121,9 @@ void test_positioning(GeometricResult& result, double device, double environment
       device, environment >= 0.0 ? environment : drift / (2.0 * std::sqrt(3.0))};
   for (const auto& line : result.input.lines)
     if (auto test = test_of(line, conditions)) result.tests.push_back(std::move(*test));
+  result.diagonals = diagonals_of(result.tests, result.machine);
+  result.motions = motion_figures(result.found, result.knowledge);
+  result.not_judged = unmet(result.tolerances, result.tests, result.motions);
 }
 
 std::string wave_words(const Identification& found) {
@@ -264,6 +267,9 @@ nlohmann::json report_json(const GeometricResult& result) {
     }
   }
   json["positioning"] = positioning_json(result.tests, result.tolerances);
+  json["diagonals"] = diagonals_json(result.diagonals);
+  json["motions"] = motions_json(result.motions, result.tolerances);
+  json["not_judged"] = result.not_judged;
   for (const auto& one : result.drifts)
     json["drift_at_one_point"].push_back({{"line", one.line},
                                           {"readings", one.readings},
@@ -359,6 +365,9 @@ void print_summary(const GeometricResult& result, std::ostream& out) {
         << " um in the mean over the travel, " << micro(lowest) << " to " << micro(highest) << " um\n";
   }
   print_positioning(result.tests, result.tolerances, out);
+  print_motions(result.motions, result.tolerances, true, out);
+  for (const auto& one : result.diagonals) out << words(one) << '\n';
+  for (const auto& note : result.not_judged) out << "note: " << note << '\n';
   for (const auto& one : result.drifts)
     out << "drift at one point, line " << one.line << ": range " << micro(one.range) << " um in "
         << one.readings << " readings\n";

@@ -11,7 +11,9 @@
 #include "core/metrology/geometric_identification.hpp"
 #include "core/metrology/identifiability.hpp"
 #include "core/metrology/line_plan.hpp"
+#include "tools/geometric/diagonals.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/geometric/motion_figures.hpp"
 #include "tools/geometric/positioning.hpp"
 #include "tools/report/page.hpp"
 
@@ -53,7 +55,10 @@ struct GeometricResult {
   std::vector<IntervalFigures> intervals;  // filled by study_intervals
   std::vector<LineFigures> figures;        // by line
   std::vector<PositioningTest> tests;      // by ISO 230-2 and -6
+  std::vector<MotionFigure> motions;       // by ISO 230-1
+  std::vector<DiagonalFigures> diagonals;  // by ISO 230-6
   std::vector<Tolerance> tolerances;
+  std::vector<std::string> not_judged;  // tolerances without a figure
   std::vector<DriftAtOnePoint> drifts;
   std::vector<Eigen::VectorXd> rest;  // by line and point: measured minus model, m; NaN for points left out
   std::vector<Eigen::VectorXd>
@@ -67,7 +72,7 @@ std::string micro(double value, int digits = 3);
 /// Fills the figures from `found`: each line also predicted from the others alone.
 void evaluate(GeometricResult& result);
 
-/// Figures of ISO 230-2 and -6, drift at one point. `device` of 1 and `environment` [m] are standard uncertainties; where
+/// Figures of ISO 230-1, -2 and -6, drift at one point; after `evaluate`. `device` of 1 and `environment` [m] are standard uncertainties; where
 /// the latter is not given (negative), the drift at one point gives it: a range is 2 sqrt(3) of one.
 void test_positioning(GeometricResult& result, double device, double environment);
 

@@ -8,6 +8,7 @@
 #include "core/base/fault.hpp"
 #include "core/recording/table.hpp"
 #include "tools/geometric/rtl_file.hpp"
+#include "tools/geometric/sense_of_motion.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -69,18 +70,13 @@ void add_nominal(DisplacementLine& line) {
         beam.direction.dot(reading.position + reading.tool - beam.start - beam.start_tool);
 }
 
-/// The sense of the motion that led to each reading; of one at the place of the last, that which follows.
 void infer_directions(DisplacementLine& line) {
   const auto beam = metrology::beam_of(line);
   auto& readings = line.readings;
-  const auto way = [&](std::size_t i) { return beam.direction.dot(readings[i].position - beam.start); };
-  constexpr double tolerance = 1e-7;  // m
-  int after = 1;
-  for (std::size_t i = readings.size(); i-- > 0;) {
-    const double step = i > 0 ? way(i) - way(i - 1) : 0.0;
-    if (std::abs(step) > tolerance) after = step > 0.0 ? 1 : -1;
-    readings[i].direction = after;
-  }
+  std::vector<double> way;
+  for (const Reading& reading : readings) way.push_back(beam.direction.dot(reading.position - beam.start));
+  const std::vector<int> senses = senses_of_motion(way);
+  for (std::size_t i = 0; i < readings.size(); ++i) readings[i].direction = senses[i];
 }
 
 /// Keeps the points that lie on multiples of `interval` from the start.

@@ -1,13 +1,9 @@
 #include "tools/geometric/positioning.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <ostream>
-
-#include "core/base/fault.hpp"
-#include "core/base/unit.hpp"
 
 namespace invar::tools {
 
@@ -21,37 +17,38 @@ using metrology::TargetReadings;
 using report::number;
 
 constexpr std::size_t most_targets = 500;  // a capture on the fly is no test of targets
+constexpr double cell = 1e-7;              // m or rad, commanded positions nearer than this are one target
 constexpr double arcsec = 4.84813681109536e-6;
 
-std::string title_of(const PositioningTest& test) {
-  if (test.axis.empty()) return "Diagonal " + test.line + " (ISO 230-6)";
-  return "Axis " + test.axis + (test.line.empty() ? "" : ", line " + test.line) + " (ISO 230-2)";
+/// EXX, EYY, EZZ: what the standard is written for.
+bool is_positioning(const PositioningTest& test) {
+  return test.motion.size() == 3 && test.motion[1] == test.motion[2];
 }
 
-const char* small_unit(const PositioningTest& test) { return test.rotary ? "arcsec" : "um"; }
-const char* place_unit(const PositioningTest& test) { return test.rotary ? "deg" : "mm"; }
-double small(const PositioningTest& test, double value) { return value / (test.rotary ? arcsec : 1e-6); }
+std::string title_of(const PositioningTest& test) {
+  const std::string along = test.line.empty() ? "" : ", line " + test.line;
+  if (!test.motion.empty())
+    return test.motion + (is_positioning(test) ? " (ISO 230-2)" : " (formulas of ISO 230-2)");
+  return test.axis.empty() ? "Diagonal " + test.line + " (ISO 230-6)"
+                           : "Axis " + test.axis + along + " (ISO 230-2)";
+}
+
+const char* small_unit(const PositioningTest& test) { return test.unit == "rad" ? "arcsec" : "um"; }
+const char* place_unit(const PositioningTest& test) { return test.place_unit == "rad" ? "deg" : "mm"; }
+double small(const PositioningTest& test, double value) {
+  return value / (test.unit == "rad" ? arcsec : 1e-6);
+}
 double place(const PositioningTest& test, double value) {
-  return value * (test.rotary ? 180.0 / 3.14159265358979323846 : 1e3);
+  return value * (test.place_unit == "rad" ? 180.0 / 3.14159265358979323846 : 1e3);
 }
 std::string shown(const PositioningTest& test, double value, int digits = 4) {
-  return std::isnan(value) ? "-" : number(small(test, value), digits);
+  return micro_or_arcsec(value, test.unit, digits);
 }
 
 std::string words(const PositioningTest& test, const Tolerance& tolerance) {
-  const auto figure = static_cast<std::size_t>(tolerance.figure);
-  const std::string value = std::string{iso230_names[figure]} + " = " +
-                            shown(test, test.figures.values[figure]) + " +- " +
-                            shown(test, test.figures.uncertainty[figure], 2) + " " + small_unit(test);
-  const std::string limit = shown(test, tolerance.limit) + " " + small_unit(test);
-  switch (verdict_of(test, tolerance)) {
-    case Verdict::within:
-      return value + ": pass, within " + limit;
-    case Verdict::beyond:
-      return value + ": fail, beyond " + limit;
-    default:
-      return value + ": neither pass nor fail is shown, the limit is " + limit;
-  }
+  const auto figure = static_cast<std::size_t>(*tolerance.figure);
+  return verdict_words(std::string{iso230_names[figure]}, test.figures.values[figure],
+                       test.figures.uncertainty[figure], tolerance.limit, test.unit);
 }
 
 report::Plot plot_of(const PositioningTest& test) {
@@ -116,32 +113,6 @@ int axis_along(const Eigen::Vector3d& direction) {
 
 }  // namespace
 
-std::vector<Tolerance> read_tolerances(const std::vector<std::string>& texts, bool rotary) {
-  std::vector<Tolerance> result;
-  for (const std::string& text : texts) {
-    const auto equal = text.find('=');
-    const std::string name = text.substr(0, equal);
-    const auto found = std::find(iso230_names.begin(), iso230_names.end(), name);
-    const std::string where = "--tolerance " + text;
-    if (equal == std::string::npos || found == iso230_names.end())
-      throw InputError{where, "names no figure of ISO 230-2",
-                       "write A, E, M, B, R, or one of a direction as R_forward: \"A=10 um\""};
-    const std::string rest = text.substr(equal + 1);
-    double value = 0.0;
-    const auto [end, flaw] = std::from_chars(rest.data(), rest.data() + rest.size(), value);
-    std::string unit{end, static_cast<std::size_t>(rest.data() + rest.size() - end)};
-    unit.erase(0, unit.find_first_not_of(' '));
-    const char* si = rotary ? "rad" : "m";
-    const auto carried = conversion(unit.empty() ? si : unit, si);
-    if (flaw != std::errc{} || !carried || !(value > 0.0))
-      throw InputError{where, "is no limit",
-                       std::string{"write a number above 0 with a unit of "} +
-                           (rotary ? "an angle: \"A=8 arcsec\"" : "a length: \"A=10 um\"")};
-    result.push_back({static_cast<Iso230Figure>(found - iso230_names.begin()), (*carried)(value)});
-  }
-  return result;
-}
-
 std::optional<PositioningTest> test_of(const std::string& axis, std::vector<TargetReadings> targets,
                                        const metrology::Iso230Conditions& conditions) {
   if (targets.size() < 2 || targets.size() > most_targets) return std::nullopt;
@@ -158,7 +129,6 @@ std::optional<PositioningTest> test_of(const std::string& axis, std::vector<Targ
 
 std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
                                        const metrology::Iso230Conditions& conditions) {
-  constexpr double cell = 1e-7;  // m, commanded positions nearer than this are one target
   const auto beam = metrology::beam_of(line);
   if (beam.length == 0.0) return std::nullopt;
   const int axis = axis_along(beam.direction);
@@ -177,16 +147,36 @@ std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
   for (auto& [key, one] : targets) all.push_back(std::move(one));
   auto test = test_of(axis >= 0 ? std::string(1, "XYZ"[axis]) : "", std::move(all), conditions);
   if (test) test->line = line.name;
+  if (test) test->span = beam.length * beam.direction;
   return test;
 }
 
+std::vector<TargetReadings> targets_of(const metrology::ComponentReadings& readings) {
+  std::map<long, TargetReadings> targets;
+  for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
+    TargetReadings& one = targets[std::lround(readings.position[i] / cell)];
+    one.position = readings.position[i];
+    const bool forward = readings.direction.empty() || readings.direction[static_cast<std::size_t>(i)] > 0;
+    (forward ? one.forward : one.backward).push_back(readings.value[i]);
+  }
+  std::vector<TargetReadings> result;
+  for (auto& [key, one] : targets) result.push_back(std::move(one));
+  return result;
+}
+
+std::vector<Tolerance> tolerances_of(const PositioningTest& test, const std::vector<Tolerance>& all) {
+  const std::string motion =
+      test.motion.empty() && !test.axis.empty() ? "E" + test.axis + test.axis : test.motion;
+  std::vector<Tolerance> result;
+  for (const Tolerance& one : all)
+    if (one.figure && one.unit == test.unit && (one.motion.empty() || one.motion == motion))
+      result.push_back(one);
+  return result;
+}
+
 Verdict verdict_of(const PositioningTest& test, const Tolerance& tolerance) {
-  const auto figure = static_cast<std::size_t>(tolerance.figure);
-  const double value = std::abs(test.figures.values[figure]);
-  const double doubt = test.figures.uncertainty[figure];
-  if (value + doubt <= tolerance.limit) return Verdict::within;
-  return value - doubt > tolerance.limit ? Verdict::beyond
-                                         : Verdict::open;  // a figure that is not there is open
+  const auto figure = static_cast<std::size_t>(*tolerance.figure);
+  return verdict_of(test.figures.values[figure], test.figures.uncertainty[figure], tolerance.limit);
 }
 
 nlohmann::json positioning_json(const std::vector<PositioningTest>& tests,
@@ -194,11 +184,13 @@ nlohmann::json positioning_json(const std::vector<PositioningTest>& tests,
   nlohmann::json list = nlohmann::json::array();
   const auto value = [](double v) { return std::isnan(v) ? nlohmann::json{} : nlohmann::json(v); };
   for (const PositioningTest& test : tests) {
-    nlohmann::json one{{"standard", test.axis.empty() ? "ISO 230-6" : "ISO 230-2"},
+    const bool diagonal = test.axis.empty() && test.motion.empty();
+    nlohmann::json one{{"standard", diagonal ? "ISO 230-6" : "ISO 230-2"},
                        {"line", test.line},
                        {"axis", test.axis},
                        {"cycles", test.cycles},
-                       {"unit", test.rotary ? "rad" : "m"}};
+                       {"unit", test.unit}};
+    if (!test.motion.empty()) one["motion"] = test.motion;
     for (std::size_t f = 0; f < iso230_figures; ++f) {
       one[std::string{iso230_names[f]}] = value(test.figures.values[f]);
       one["expanded_uncertainty"][std::string{iso230_names[f]}] = value(test.figures.uncertainty[f]);
@@ -214,13 +206,11 @@ nlohmann::json positioning_json(const std::vector<PositioningTest>& tests,
                                 {"R_forward", value(t.repeatability_forward)},
                                 {"R_backward", value(t.repeatability_backward)},
                                 {"R", value(t.repeatability)}});
-    for (const Tolerance& tolerance : tolerances) {
+    for (const Tolerance& tolerance : tolerances_of(test, tolerances)) {
       const Verdict verdict = verdict_of(test, tolerance);
-      one["tolerances"].push_back(
-          {{"figure", iso230_names[static_cast<std::size_t>(tolerance.figure)]},
-           {"limit", tolerance.limit},
-           {"verdict",
-            verdict == Verdict::within ? "pass" : (verdict == Verdict::beyond ? "fail" : "open")}});
+      one["tolerances"].push_back({{"figure", iso230_names[static_cast<std::size_t>(*tolerance.figure)]},
+                                   {"limit", tolerance.limit},
+                                   {"verdict", verdict_name(verdict)}});
     }
     list.push_back(std::move(one));
   }
@@ -238,10 +228,9 @@ void write_positioning(report::Page& page, const std::vector<PositioningTest>& t
       "the "
       "instrument's scale and the surroundings as given. Pass and fail by ISO 14253-1.");
   for (const PositioningTest& test : tests) {
-    for (const Tolerance& tolerance : tolerances) {
+    for (const Tolerance& tolerance : tolerances_of(test, tolerances)) {
       const Verdict verdict = verdict_of(test, tolerance);
-      page.callout(title_of(test) + ": " + words(test, tolerance),
-                   verdict == Verdict::within ? "good" : (verdict == Verdict::beyond ? "bad" : "warn"));
+      page.callout(title_of(test) + ": " + words(test, tolerance), callout_of(verdict));
     }
     write_test(page, test);
   }
@@ -250,16 +239,24 @@ void write_positioning(report::Page& page, const std::vector<PositioningTest>& t
 void print_positioning(const std::vector<PositioningTest>& tests, const std::vector<Tolerance>& tolerances,
                        std::ostream& out) {
   for (const PositioningTest& test : tests) {
-    if (test.axis.empty() && tolerances.empty()) continue;
+    const auto own = tolerances_of(test, tolerances);
+    if (test.axis.empty() && test.motion.empty() && own.empty()) continue;
     out << title_of(test) << ":";
-    for (const Iso230Figure figure :
-         {Iso230Figure::A, Iso230Figure::R, Iso230Figure::E, Iso230Figure::M, Iso230Figure::B}) {
-      const auto f = static_cast<std::size_t>(figure);
-      if (!std::isnan(test.figures.values[f]))
+    const auto show = [&](std::initializer_list<Iso230Figure> figures) {
+      bool any = false;
+      for (const Iso230Figure figure : figures) {
+        const auto f = static_cast<std::size_t>(figure);
+        if (std::isnan(test.figures.values[f])) continue;
         out << ' ' << iso230_names[f] << ' ' << shown(test, test.figures.values[f]);
-    }
+        any = true;
+      }
+      return any;
+    };
+    using enum Iso230Figure;
+    if (!show({A, R, E, M, B}))  // read in one direction
+      (void)show({A_forward, A_backward, R_forward, R_backward, E_forward, E_backward});
     out << ' ' << small_unit(test) << '\n';
-    for (const Tolerance& tolerance : tolerances) out << "  " << words(test, tolerance) << '\n';
+    for (const Tolerance& tolerance : own) out << "  " << words(test, tolerance) << '\n';
   }
 }
 

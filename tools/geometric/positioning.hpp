@@ -6,26 +6,23 @@
 #include <string>
 #include <vector>
 
+#include "core/metrology/component_identification.hpp"
 #include "core/metrology/displacement_line.hpp"
 #include "core/metrology/iso230.hpp"
+#include "tools/geometric/tolerance.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
 
-/// A figure of the standard and what it may be at most [m or rad].
-struct Tolerance {
-  metrology::Iso230Figure figure = metrology::Iso230Figure::A;
-  double limit = 0.0;
-};
-/// "A=10 um", "R_forward=4e-6", "E=8 arcsec". Throws InputError.
-std::vector<Tolerance> read_tolerances(const std::vector<std::string>& texts, bool rotary);
-
-/// Of one line along an axis or a diagonal that was read at each target more than once.
+/// Readings at targets in one or both directions, each target more than once: an axis, a diagonal, an error motion.
 struct PositioningTest {
   std::string line;
-  std::string axis;     // "X"; empty for a diagonal
-  bool rotary = false;  // positions and deviations in rad
-  int cycles = 0;       // readings of a target in one direction at least
+  std::string axis;                                // "X"; empty for a diagonal
+  std::string motion;                              // "EXX" where an error motion was measured itself
+  std::string place_unit = "m";                    // of the targets, or "rad"
+  std::string unit = "m";                          // of the deviations, or "rad"
+  Eigen::Vector3d span = Eigen::Vector3d::Zero();  // m, of the line, from its start
+  int cycles = 0;                                  // readings of a target in one direction at least
   metrology::Iso230 figures;
 };
 
@@ -35,10 +32,12 @@ std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
 std::optional<PositioningTest> test_of(const std::string& axis,
                                        std::vector<metrology::TargetReadings> targets,
                                        const metrology::Iso230Conditions& conditions);
+/// Readings by target, ascending; those nearer than 0.1 um or 0.1 urad are of one target.
+std::vector<metrology::TargetReadings> targets_of(const metrology::ComponentReadings& readings);
 
-/// By ISO 14253-1: within the tolerance or beyond it counts as shown only where the expanded uncertainty leaves no doubt.
-enum class Verdict { within, beyond, open };
 Verdict verdict_of(const PositioningTest& test, const Tolerance& tolerance);
+/// Those that mean this test.
+std::vector<Tolerance> tolerances_of(const PositioningTest& test, const std::vector<Tolerance>& all);
 
 nlohmann::json positioning_json(const std::vector<PositioningTest>& tests,
                                 const std::vector<Tolerance>& tolerances);

@@ -1,4 +1,4 @@
-// One rotary axis: the figures of ISO 230-2 from readings of its angle.
+// One rotary axis: its figures by ISO 230-2, its error over the angle as a model, the page.
 #pragma once
 
 #include <filesystem>
@@ -7,18 +7,15 @@
 
 namespace invar::tools {
 
-/// "a", "b" or "c" where the chain of a machine file is that one axis; empty otherwise, also where the file is no YAML.
-std::string rotary_axis(const std::filesystem::path& machine);
-
-struct RotaryTest {
+struct RotaryOptions {
   std::filesystem::path machine, lines, out;
-  std::string axis;
+  std::string axis;  // "a", "b" or "c"
   std::vector<std::string> tolerances;
   double device = 0.0;       // of 1
   double environment = 0.0;  // rad
 };
-/// Writes report.json, report.html and deviations.csv (position, forward, backward, their mean), prints the figures. Throws
-/// InputError.
-void test_rotary(const RotaryTest& test);
+/// Writes compensation.yaml (of kind rotary), report.json, report.html and deviations.csv (position, forward, backward, mean),
+/// prints the figures. Too few readings for figures or for a model are said, and the other is written. Throws InputError.
+void calibrate_rotary(const RotaryOptions& options);
 
 }  // namespace invar::tools

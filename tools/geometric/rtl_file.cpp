@@ -135,14 +135,4 @@ bool is_rtl(const std::filesystem::path& file) {
 
 RtlFile load_rtl(const std::filesystem::path& file) { return Reader{file}.run(); }
 
-std::vector<metrology::TargetReadings> targets_of(const RtlFile& rtl) {
-  std::vector<metrology::TargetReadings> targets;
-  for (const double position : rtl.targets) targets.push_back({position, {}, {}});
-  for (const RtlReading& one : rtl.readings)
-    (one.direction > 0 ? targets[one.target].forward : targets[one.target].backward).push_back(one.deviation);
-  std::sort(targets.begin(), targets.end(),
-            [](const auto& a, const auto& b) { return a.position < b.position; });
-  return targets;
-}
-
 }  // namespace invar::tools

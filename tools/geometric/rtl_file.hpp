@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/iso230.hpp"
-
 namespace invar::tools {
 
 /// Whether the file begins with such a section (`HEADER::`).
@@ -29,8 +27,5 @@ struct RtlFile {
 
 /// Targets in mm or deg, deviations in um or arcsec, as the file type says. Throws InputError with line and mend.
 RtlFile load_rtl(const std::filesystem::path& file);
-
-/// For the figures of ISO 230-2.
-std::vector<metrology::TargetReadings> targets_of(const RtlFile& rtl);
 
 }  // namespace invar::tools

@@ -71,6 +71,7 @@ std::string kind_of(const fs::path& file) {
   if (file.filename() == "camera.yaml")
     return "camera, " + (yaml.root().has("model") ? yaml.root()["model"].as_text() : std::string{"scale"});
   const std::string kind = yaml.root().text("kind");
+  if (kind == "rotary") return kind + " of " + yaml.root().text("axis");
   if (kind != "thermal") return kind;
   const auto place = compensation::read_place(yaml.root());
   return place.axis ? kind + " of " + "xyz"[*place.axis] : kind;

@@ -20,7 +20,7 @@ struct CalibratedNumber {
 
 struct Calibration {
   std::filesystem::path file;  // compensation.yaml, camera.yaml or patched.yaml
-  std::string kind;            // "geometric", "thermal of x", ...
+  std::string kind;            // "geometric", "thermal of x", "rotary of c" ...
   double time = 0.0;           // s since 1970, UTC
   std::string time_from;       // "the folder's name", "report.json", "the file's date"
 };

@@ -11,6 +11,7 @@
 #include "core/compensation/component_file.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/model_file.hpp"
+#include "core/compensation/rotary_file.hpp"
 #include "core/compensation/thermal_file.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/config/yaml.hpp"
@@ -154,6 +155,32 @@ std::vector<Numbers> components(const std::vector<Calibration>& all) {
                            component->sigma_at(q, states), metrology::is_positioning(c)});
     }
     add_squareness(model.squareness, model.squareness_sigma, numbers);
+    out.push_back(std::move(numbers));
+  }
+  return out;
+}
+
+/// Error and reversal of a rotary axis.
+std::vector<Numbers> rotary(const std::vector<Calibration>& all) {
+  std::vector<metrology::RotaryAxis> models;
+  std::vector<Range> ranges;
+  for (const auto& one : all) {
+    models.push_back(compensation::load_rotary(one.file));
+    ranges.push_back(models.back().travel);
+  }
+  const Range travel = common(ranges);
+  expect_common(travel, all.front().file, "travel");
+  std::vector<Numbers> out;
+  for (const auto& model : models) {
+    Numbers numbers;
+    const std::string letter(1, model.letter), upper(1, static_cast<char>(model.letter - 'a' + 'A'));
+    for (const double at : places(travel, 9)) {
+      const std::string place = letter + " = " + report::number(at * 57.29577951308232, 4) + " deg";
+      numbers.push_back({"E" + upper + upper, place, "rad", model.value(at), model.sigma(at), true});
+      if (model.reversal.empty()) continue;
+      numbers.push_back({"reversal of " + letter, place, "rad", model.reversal.value(model.place(at)),
+                         model.reversal.sigma_at(model.place(at)), false});
+    }
     out.push_back(std::move(numbers));
   }
   return out;
@@ -308,6 +335,7 @@ std::vector<Numbers> comparable_numbers(const std::vector<Calibration>& calibrat
   std::vector<Numbers> all;
   if (kind == "geometric") all = geometric(calibrations);
   if (kind == "components") all = components(calibrations);
+  if (kind.starts_with("rotary")) all = rotary(calibrations);
   if (kind.starts_with("thermal")) all = thermal(calibrations);
   if (kind == "dispenser") all = dispenser(calibrations);
   if (kind == "thermistor") all = thermistor(calibrations);

@@ -10,7 +10,9 @@
 #include "core/base/fault.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/geometric/lines_file.hpp"
+#include "tools/geometric/rotary_readings.hpp"
 #include "tools/geometric/rtl_file.hpp"
+#include "tools/geometric/sense_of_motion.hpp"
 
 namespace invar::tools {
 namespace {
@@ -98,12 +100,21 @@ TEST_F(Positioning, DirectionsThatNoColumnTellsAreThoseOfTheMotion) {
   expect_figures(input, false);
 }
 
+TEST(SenseOfMotion, IsThatOfTheStepAndAfterAReturnThatOfTheNextPass) {
+  EXPECT_EQ(senses_of_motion({0, 1, 2, 2, 1, 0, 0}), (std::vector<int>{1, 1, 1, -1, -1, -1, 1}));
+  EXPECT_EQ(senses_of_motion({0, 1, 2, 3, 0, 1, 2, 3}), (std::vector<int>{1, 1, 1, 1, 1, 1, 1, 1}));
+  EXPECT_EQ(senses_of_motion({3, 2, 1, 0, 3, 2, 1, 0}), (std::vector<int>{-1, -1, -1, -1, -1, -1, -1, -1}));
+  EXPECT_EQ(senses_of_motion({0, 1, 0, 1}), (std::vector<int>{1, 1, -1, 1}));  // two targets: no return
+  EXPECT_TRUE(senses_of_motion({}).empty());
+  EXPECT_EQ(senses_of_motion({5}), (std::vector<int>{1}));
+}
+
 TEST_F(Positioning, ARotaryRtlFileIsInAnglesAndNoLine) {
   const auto file = write("axis.rtl", rtl("rotary", "C"));
   const RtlFile found = load_rtl(file);
   EXPECT_TRUE(found.rotary);
   EXPECT_NEAR(found.targets[1], 20.0 * 3.14159265358979 / 180.0, 1e-12);
-  const auto test = test_of("C", targets_of(found), {});
+  const auto test = test_of("C", targets_of(read_rotary_readings(file, "c").readings), {});
   ASSERT_TRUE(test);
   EXPECT_NEAR(test->figures[Iso230Figure::B], 3.0 * 4.84813681109536e-6, 1e-12);
   EXPECT_THROW(read_lines(file, one_axis()), InputError);
