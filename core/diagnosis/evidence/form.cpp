@@ -14,6 +14,10 @@ std::string variable_of(const physics::Term& term) {
   return physics::goes_over(term);
 }
 
+bool is_over_time(const physics::Term& term) {
+  return !term.curve.knots.empty() && (term.curve.over == "time" || term.curve.over == "t");
+}
+
 namespace {
 
 /// Do two terms act at one place over one variable? Then the one is a course of the other, and one with a name.

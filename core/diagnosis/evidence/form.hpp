@@ -13,6 +13,8 @@ Start coarser(Start start, std::size_t knots);
 
 /// Over what a term in the user's equations goes; empty: over nothing.
 std::string variable_of(const physics::Term& term);
+/// A free course over time.
+bool is_over_time(const physics::Term& term);
 
 /// May this curve stand for another course of the term's own effect?
 bool is_course_of(const physics::Term& curve, const physics::Term& term);

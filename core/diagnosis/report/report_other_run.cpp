@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/base/quantity.hpp"
+#include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/report/report.hpp"
 
 namespace invar::diagnosis {
@@ -32,7 +33,7 @@ std::string left_out_of(const Case& data, const Diagnosis& d, const OtherRun& ru
   std::string text;
   for (const auto t : run.left_out) {
     const auto& term = d.best.model.terms[t];
-    const bool is_course = term.curve.over == "time" || term.curve.over == "t";
+    const bool is_course = is_over_time(term);
     text += (text.empty() ? "" : "; ") + std::string{"left out in "} + run.name + ": the curve over " +
             term.curve.over + " (" + place_of(data, term) + "), " +
             (is_course ? "which is of the recording that it was fitted to alone"

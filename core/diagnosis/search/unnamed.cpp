@@ -5,6 +5,7 @@
 
 #include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/evidence/claim.hpp"
+#include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
@@ -87,6 +88,18 @@ bool is_series(const Model& model, std::size_t given) {
   });
 }
 
+/// Does a course over time take over what a name explains? It follows anything slow, and the name's number would be wrong.
+bool robs_names(const Fit& named, const Fit& with_course, std::size_t given) {
+  constexpr double kept = 0.8;  // a crowd of small effects moves a number by a tenth
+  if (!is_over_time(with_course.model.terms.back())) return false;
+  for (std::size_t t = given; t < named.model.terms.size(); ++t)
+    for (std::size_t i = 0; i < named.model.terms[t].info->parameter_count(); ++i)
+      if (named.model.terms[t].info->parameters[i].role == physics::Role::amplitude &&
+          std::abs(with_course.model.terms[t].values[i]) < kept * std::abs(named.model.terms[t].values[i]))
+        return true;
+  return false;
+}
+
 /// Would an engineer see it in the residual, or does it pay when counted in independent rows?
 bool shows(const Case& data, const Fit& with, const Fit& without) {
   const double ratio = least_ratio(data, with, without);
@@ -113,7 +126,7 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
   const auto& term = s.start.term;
   // Noise that wanders has a course over time too, but none in proportion to what the machine does.
-  const bool may_wander = term.with.empty() && (term.curve.over == "time" || term.curve.over == "t");
+  const bool may_wander = term.with.empty() && is_over_time(term);
   if (const double counted = lead(data, rough, under_plain);
       gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
     if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
@@ -189,7 +202,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     }
   }
   // A rest counts where an engineer would see it.
-  if (!d.is_unnamed && beside.gain > margin &&
+  if (!d.is_unnamed && beside.gain > margin && !robs_names(d.best, beside.fit, given) &&
       least_ratio(data, beside.fit, d.best) < (named ? seen_beside : seen_alone)) {
     d.best = std::move(beside.fit);
     d.weighing = std::move(beside.weighing);

@@ -5,6 +5,8 @@
 #include <set>
 #include <string_view>
 
+#include "core/diagnosis/evidence/foretold.hpp"
+#include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/evidence/shape.hpp"
 #include "core/diagnosis/search/unnamed.hpp"
@@ -12,11 +14,22 @@
 
 namespace invar::diagnosis {
 
+namespace {
+
+/// Is most of what a name explains foretold on rows that no fit saw? A course over time takes anything slow and foretells
+/// nothing: it is no cause in place of such a name.
+bool foretells(const Case& data, const Diagnosis& d, std::size_t finding) {
+  const auto model = physics::without_term(d.best.model, data.model.terms.size() + finding);
+  return foretold(data, d.best, fit(data, d.weighing, model, data.model, 5)).is_plain();
+}
+
+}  // namespace
+
 void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     if (!beside) beside = courses_beside(data, d.best);
     const auto other = other_cause(data, *beside, data.model.terms.size() + i);
-    if (!other) {
+    if (!other || (is_over_time(other->fit.model.terms.back()) && foretells(data, d, i))) {
       d.findings[i].other_shape = other_shape(data, *beside, data.model.terms.size() + i).share;
       continue;
     }
