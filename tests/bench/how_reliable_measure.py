@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the diagnosis on every set of machines and writes figures alone to tests/bench/results/SET.json.
 
-    tests/bench/how_reliable_measure.py --bin build/bin [--only dev crowd second_crowd real fresh] [--fresh DIR] [--budget 300]
+    tests/bench/how_reliable_measure.py --bin build/bin [--only dev crowd second_crowd real fresh fresh_second] [--fresh DIR] [--budget 300]
 
 dev, crowd, real: the scorers of the folder INVAR_SHARED (else `shared` beside the checkout). second_crowd: bench_mismatch --crowd.
 fresh: a folder with one folder a set: model.yaml and set.json (tests/bench/fresh), train*.csv, held*_inputs.csv, held*_outputs.csv. In set.json
@@ -28,6 +28,7 @@ RIGHT = 0.9      # credit of a name from which on it counts as right: tests/supp
 PLAIN = 120.0    # gain from which on an effect is plain: tests/support/mismatch/marks.hpp
 FALSE = 0.5      # a name with this probability or more is a claim
 GAIN = 0.98      # a curve that takes less than this off the error on other runs is none
+SETS = ("dev", "crowd", "second_crowd", "real", "fresh", "fresh_second")
 SECOND_CROWD = "--crowd --each 1 --seed 61 --size 2"
 
 
@@ -253,20 +254,20 @@ def commit():
 def main():
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--bin", required=True, help="folder of invar and bench_mismatch")
-    ask.add_argument("--only", nargs="+", choices=("dev", "crowd", "second_crowd", "real", "fresh"), default=("dev", "crowd", "second_crowd", "real", "fresh"))
+    ask.add_argument("--only", nargs="+", choices=SETS, default=SETS[:4])
     ask.add_argument("--fresh", metavar="DIR", help="folder of the fresh sets")
     ask.add_argument("--budget", type=int, default=300, help="seconds of a diagnosis; beside other load the usual 60 cut it")
     given = ask.parse_args()
     RESULTS.mkdir(exist_ok=True)
     for which in given.only:
-        if which == "fresh" and not given.fresh:
-            continue
+        if which.startswith("fresh") and not given.fresh:
+            ask.error(f"--only {which} needs --fresh DIR")
         with tempfile.TemporaryDirectory() as work:
             tool = Tool(given.bin, given.budget, work)
             before = os.getloadavg()[0]
             measured = (challenge(tool, which, work) if which in ("dev", "crowd") else second_crowd(tool, work) if which == "second_crowd"
                         else real(tool, work) if which == "real" else fresh(tool, work, given.fresh))
-        result = {"command": f"tests/bench/how_reliable_measure.py --bin build/bin --only {which}" + (" --fresh DIR" if which == "fresh" else ""),
+        result = {"command": f"tests/bench/how_reliable_measure.py --bin build/bin --only {which}" + (" --fresh DIR" if which.startswith("fresh") else ""),
                   "date": datetime.date.today().isoformat(), "commit": commit(), "load": [round(before, 1), round(os.getloadavg()[0], 1)], **measured}
         (RESULTS / f"{which}.json").write_text(json.dumps(result, indent=1) + "\n")
         print(which, result["totals"], flush=True)
