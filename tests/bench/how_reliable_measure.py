@@ -28,6 +28,7 @@ RIGHT = 0.9      # credit of a name from which on it counts as right: tests/supp
 PLAIN = 120.0    # gain from which on an effect is plain: tests/support/mismatch/marks.hpp
 FALSE = 0.5      # a name with this probability or more is a claim
 GAIN = 0.98      # a curve that takes less than this off the error on other runs is none
+WORSE = 1.05     # a model handed over that errs more than this beside the retuned one on other runs is wrong, whatever was said
 SETS = ("dev", "crowd", "second_crowd", "real", "fresh", "fresh_second")
 SECOND_CROWD = "--crowd --each 1 --seed 61 --size 2"
 
@@ -207,6 +208,12 @@ def judged(about, report):
     return "right" if right else "located" if near else "honest", false
 
 
+def in_words(finding, place):
+    what = (f"{finding['term']} at {finding['site']}" if finding["term"] != "unmodelled"
+            else f"no name, {finding['site']} over {', '.join(place.get('depends_on') or ['nothing'])}")
+    return f"{what} ({finding['probability']:.2f})"
+
+
 def look(tool, folder, work):
     about, out = loaded(f"{folder}/set.json"), f"{work}/{folder.name}"
     command = [tool.invar, "diagnose", "--model", folder / "model.yaml", "--out", out]
@@ -219,13 +226,14 @@ def look(tool, folder, work):
     if status.returncode:
         return {**row, "judged": "wrong", "said": status.stderr.strip().splitlines()[-1], "false": 0.0, "rmse": {}}, []
     report = loaded(f"{out}/report.json")
-    said = [f"{f['term']} at {f['site']} ({f['probability']:.2f})" if f["term"] != "unmodelled" else f"no name, {f['site']} over {', '.join(p.get('depends_on') or ['nothing'])} ({f['probability']:.2f})"
-            for f, p in zip(items(report["findings"]), items(report["location"]) + [{}] * 9)]
+    said = [in_words(f, p) for f, p in zip(items(report["findings"]), items(report["location"]) + [{}] * 9)]
     row["said"] = report["verdict"] + (": " + "; ".join(said) if said else "")
     row["judged"], row["false"] = judged(about, report)
     row["rmse"] = {o: {"unit": unit, **{k: held_out(tool, folder, m, o, work) for k, m in
                                         (("before", folder / "model.yaml"), ("retuned", f"{out}/retuned.yaml"), ("after", f"{out}/patched.yaml"))}}
                    for o, unit in about["outputs"].items()}
+    if any(e["after"] is not None and e["retuned"] is not None and e["after"] > WORSE * e["retuned"] for e in row["rmse"].values()):
+        row["judged"] = "wrong"
     if row["judged"] == "located" and not any(e["after"] is not None and e["after"] < GAIN * e["retuned"] for e in row["rmse"].values()):
         row["judged"] = "honest"            # a place alone, with nothing fitted there
     if not about.get("unknown"):
