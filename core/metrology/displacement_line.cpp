@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
@@ -81,10 +82,12 @@ void find_points(LineFit& work) {
       middle = static_cast<int>(i);
 }
 
-bool is_revisited(const LineFit& work) {
-  std::vector<int> last(work.first_row.size(), -1);
+/// Whether some point is read again after others; `alike`: in the direction of before.
+bool is_revisited(const LineFit& work, bool alike) {
+  std::vector<std::array<int, 2>> last(work.first_row.size(), {-1, -1});
   for (std::size_t i = 0; i < work.point_of.size(); ++i) {
-    int& before = last[static_cast<std::size_t>(work.point_of[i])];
+    const std::size_t way = alike && work.line->readings[i].direction < 0 ? 1 : 0;
+    int& before = last[static_cast<std::size_t>(work.point_of[i])][way];
     if (before >= 0 && static_cast<std::size_t>(before) + 1 != i) return true;
     before = static_cast<int>(i);
   }
@@ -100,7 +103,8 @@ LineFit prepare(const DisplacementLine& line) {
   work.weights = Eigen::VectorXd::Ones(rows);
   work.regressors.resize(rows, nuisances);
   find_points(work);
-  work.revisited = is_revisited(work);
+  work.revisited = is_revisited(work, false);
+  work.tells_drift = is_revisited(work, true);
   for (Eigen::Index i = 0; i < rows; ++i) {
     const Reading& reading = line.readings[static_cast<std::size_t>(i)];
     const Eigen::Vector3d moved = reading.position + reading.tool - work.beam.start - work.beam.start_tool;
@@ -256,21 +260,26 @@ Beam beam_of(const DisplacementLine& line) {
 
 namespace {
 
+constexpr double least_degrees = 3.0;  // of freedom: fewer tell no noise, and so nothing beyond it
+constexpr double degrees_of_drift =
+    15.0;  // drift is judged line by line, not weighed: only by lines that tell it well
+
 /// How much the lines drift, and their reversal varies, by what their fits with either free say beyond their noise.
 NuisancePrior pooled_prior(const std::vector<LineFit>& works) {
   NuisancePrior pooled;
   int lines = 0;
   std::vector<std::pair<double, double>> shapes;  // square and variance of what a fit found
   for (const LineFit& work : works) {
-    if (work.degrees < 15.0 || !work.revisited) continue;
+    if (work.degrees < least_degrees || !work.revisited) continue;
     const auto beyond_noise = [&](Eigen::Index k) {
       return work.nuisance[k] * work.nuisance[k] - work.scale * work.scale * work.nuisance_covariance(k, k);
     };
-    ++lines;
-    for (int k = 0; k < drift_terms; ++k) pooled.drift[static_cast<std::size_t>(k)] += beyond_noise(1 + k);
     for (Eigen::Index k = work.first_shape; k < work.first_shape + work.reversal_shape.cols(); ++k)
       shapes.emplace_back(work.nuisance[k] * work.nuisance[k],
                           work.scale * work.scale * work.nuisance_covariance(k, k));
+    if (work.degrees < degrees_of_drift || !work.tells_drift) continue;
+    ++lines;
+    for (int k = 0; k < drift_terms; ++k) pooled.drift[static_cast<std::size_t>(k)] += beyond_noise(1 + k);
   }
   for (auto& variance : pooled.drift) variance = std::max(variance / std::max(lines, 1), 0.0);
   // Shapes that the readings hardly tell count little: each by the square of its own variance about the common one.
@@ -299,7 +308,9 @@ std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, 
   NuisancePrior free;
   free.drift.fill(1e-10);
   free.reversal = 1e-10;
-  for (LineFit& work : works) fit_robustly(work, free, floor * 0.1);
+  NuisancePrior still = free;
+  still.drift = {};
+  for (LineFit& work : works) fit_robustly(work, work.tells_drift ? free : still, floor * 0.1);
   const NuisancePrior pooled = pooled_prior(works);
   double sum = 0.0;
   double degrees = 0.0;

@@ -27,7 +27,8 @@ struct LineFit {
   Eigen::VectorXd y;           // reading minus nominal
   Eigen::MatrixXd regressors;  // rows x (reversal, drift, steps)
   std::vector<int> breaks;
-  bool revisited = false;  // some point is read again after others: only that tells drift from place
+  bool revisited = false;    // some point is read again after others: only that tells drift from place
+  bool tells_drift = false;  // and in the same direction: only that tells drift from a reversal over the line
   /// The reversal over the line: its values at places along the beam, straight in between, are a constant (the first
   /// regressor) and `reversal_shape` times as many regressors from `first_shape` on, each of the same size beforehand.
   std::vector<double> reversal_places;  // m from the start

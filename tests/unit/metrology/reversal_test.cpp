@@ -3,6 +3,8 @@
 
 #include <cmath>
 #include <random>
+#include <string>
+#include <utility>
 
 #include "core/metrology/geometric_identification.hpp"
 #include "core/metrology/line_plan.hpp"
@@ -49,6 +51,41 @@ TEST(Reversal, ThatVariesIsNoNoise) {
         EXPECT_NEAR(found.model.reversal[axis].value(q), machine.errors->reversal[axis](q), 0.5e-6)
             << slope << " m/m, axis " << k << " at " << q;
       }
+  }
+}
+
+// A test of few targets or of one cycle has few readings beyond its unknowns: they are no outliers for that.
+TEST(Reversal, ThatVariesIsNoNoiseOfAShortTest) {
+  std::mt19937_64 random{45};
+  RecordProperty("seed", 45);
+  std::normal_distribution<double> normal;
+  Machine machine;
+  machine.chain = {{0, 1, 2}, 1};
+  machine.travel[0] = {0.0, 0.2};
+  const auto reversal = [](double u) { return 4e-6 + 2e-6 * std::cos(5.0 * u); };
+  const auto error = [](double u) { return 8e-6 * u + 3e-6 * std::sin(6.0 * u); };
+  for (const auto& [targets, cycles] : {std::pair{5, 2}, {7, 2}, {9, 2}, {5, 3}, {21, 1}, {41, 1}, {41, 3}}) {
+    DisplacementLine line{"X", {}};
+    for (int go = 0; go < 2 * cycles; ++go)
+      for (int i = 0; i < targets; ++i) {
+        const int way = go % 2 == 0 ? 1 : -1;
+        const double u = static_cast<double>(way > 0 ? i : targets - 1 - i) / (targets - 1);
+        Reading reading;
+        reading.position = {0.2 * u, 0.0, 0.0};
+        reading.direction = way;
+        reading.displacement = 0.2 * u + error(u) + 0.5 * way * reversal(u) + 1e-7 * normal(random);
+        line.readings.push_back(reading);
+      }
+    const auto found = identify(machine, {line});
+    const std::string what = std::to_string(targets) + " targets, " + std::to_string(cycles) + " cycles";
+    EXPECT_EQ(found.lines[0].noise.outliers, 0) << what;
+    EXPECT_LT(found.noise, 0.3e-6) << what;
+    for (const double u : {0.0, 0.25, 0.5, 0.75, 1.0}) {  // targets of all but the shortest
+      EXPECT_NEAR(found.model.reversal[0].value(0.2 * u), reversal(u), 0.5e-6) << what << " at " << u;
+      EXPECT_NEAR(found.model.component(0, 0.2 * u) - found.model.component(0, 0.0), error(u) - error(0.0),
+                  0.6e-6)
+          << what << " at " << u;
+    }
   }
 }
 
