@@ -46,6 +46,7 @@ void Search::finish() {
       beside_ = courses_beside(data_, d_.best, &d_.best);
     const auto without_rest = d_;
     add_unnamed(data_, d_, *beside_);
+    name_friction_beside(data_, d_, options_.without);
     if (d_.has_rest && !noise_->shows(d_.best.model, without_rest.best.model, 0.9)) d_ = without_rest;
     return true;
   });

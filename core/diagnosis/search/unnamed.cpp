@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/form.hpp"
@@ -90,7 +92,7 @@ bool is_series(const Model& model, std::size_t given) {
 
 /// Does a course over time take over what a name explains? It follows anything slow, and the name's number would be wrong.
 bool robs_names(const Fit& named, const Fit& with_course, std::size_t given) {
-  constexpr double kept = 0.8;  // a crowd of small effects moves a number by a tenth
+  constexpr double kept = 0.95;  // what a crowd of small effects does to a number
   if (!is_over_time(with_course.model.terms.back())) return false;
   for (std::size_t t = given; t < named.model.terms.size(); ++t)
     for (std::size_t i = 0; i < named.model.terms[t].info->parameter_count(); ++i)
@@ -142,6 +144,13 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   return Curved{std::move(curved), own, gain};
 }
 
+/// Does a course beside the names leave plainly less than one in their place? Then it is the names' own rest.
+bool is_needed_beside(const Case& data, const Curved& beside, const Curved& instead, const Diagnosis& d,
+                      double margin) {
+  return beside.gain > margin && least_ratio(data, beside.fit, d.best) < seen_beside &&
+         lead(data, beside.fit, instead.fit) > margin;
+}
+
 }  // namespace
 
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
@@ -174,6 +183,34 @@ bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve) {
   return by_names < (1.0 - of_form) * by_curve;
 }
 
+void name_friction_beside(const Case& data, Diagnosis& d, const std::set<std::string, std::less<>>& without) {
+  // An axis is begun anew with two names at once where a course stands alone.
+  if (data.model.plant != physics::Plant::equations || !d.is_unnamed || d.findings.size() != 1) return;
+  const auto plain = weigh(data, simulate(data, d.best.model), false);
+  const Fit base = fit(data, plain, d.best.model, data.model, 4, &d.best);
+  auto starts = named_starts(data, plain, base, without);
+  std::erase_if(starts, [&](const Start& start) {
+    return !start.term.info->is_friction || !is_course_of(d.findings.front().term, start.term);
+  });
+  std::optional<Fit> best;
+  for (const auto& s : screen(data, plain, base, starts, 0)) {
+    if (s.impossible || s.merit < claim_margin) continue;
+    auto tried = fit_with(data, plain, base, s, 8);
+    if (stands(data, tried, tried.model.terms.size() - 1) && least_ratio(data, tried, base) < seen_beside &&
+        lead(data, tried, base) > plainly * claim_margin && (!best || lead(data, tried, *best) > 0.0))
+      best = std::move(tried);
+  }
+  if (!best) return;
+  auto& terms = best->model.terms;
+  std::swap(terms[terms.size() - 2], terms.back());  // names before their rest
+  d.weighing = weigh(data, simulate(data, best->model));
+  d.best = fit(data, d.weighing, best->model, data.model, 5);
+  d.findings.emplace(d.findings.begin())->term = d.best.model.terms[d.best.model.terms.size() - 2];
+  d.findings.back().term = d.best.model.terms.back();
+  d.is_unnamed = false, d.has_rest = true;
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+}
+
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
   if (beside_best.courses.empty() && beside_best.memories.empty()) return;
@@ -190,7 +227,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
       if (instead.fit.evidence > named_there.evidence + margin &&
           (is_series(d.best.model, given) ||
            instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) &&
-          leaves_less(data, instead.fit, d.best)) {
+          leaves_less(data, instead.fit, d.best) && !is_needed_beside(data, beside, instead, d, margin)) {
         for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
           d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
                    1.0);

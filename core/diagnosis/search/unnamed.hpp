@@ -1,6 +1,9 @@
 // Physics without a name: a curve over one variable, beside the named terms or instead of them.
 #pragma once
 
+#include <set>
+#include <string>
+
 #include "core/diagnosis/evidence/other_cause.hpp"
 
 namespace invar::diagnosis {
@@ -24,5 +27,10 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best);
 /// Does a curve take far more than the names do of what the retuned model leaves, in units of the noise? A name that takes most
 /// of it is right, and the rest is its form or the small effects beside it.
 bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve);
+
+/// Beside a course alone: friction over the course's own variable, where the two leave plainly less. A course rounds off its
+/// jump at rest, and may hide it from the search for names.
+void name_friction_beside(const Case& data, Diagnosis& diagnosis,
+                          const std::set<std::string, std::less<>>& without);
 
 }  // namespace invar::diagnosis

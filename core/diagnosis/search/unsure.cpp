@@ -5,6 +5,7 @@
 #include <set>
 #include <string_view>
 
+#include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/foretold.hpp"
 #include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
@@ -23,13 +24,27 @@ bool foretells(const Case& data, const Diagnosis& d, std::size_t finding) {
   return foretold(data, d.best, fit(data, d.weighing, model, data.model, 5)).is_plain();
 }
 
+/// Does a course over a name's own variable leave plainly more than the two together? Then the course is the name's rest, and
+/// no cause in its place: it rounds the jump of friction off.
+bool is_needed_beside(const Case& data, const Diagnosis& d, std::size_t finding, const OtherCause& other) {
+  const auto& course = other.fit.model.terms.back();
+  if (!is_course_of(course, d.best.model.terms[data.model.terms.size() + finding])) return false;
+  auto both = d.best.model;
+  both.terms.push_back(course);
+  const auto plain = weigh(data, simulate(data, other.fit.model), false);
+  const auto together = fit(data, plain, both, data.model, 8);
+  return is_affordable(data, together) && lead(data, together, other.fit) > plainly * claim_margin &&
+         least_ratio(data, together, other.fit) < seen_beside;
+}
+
 }  // namespace
 
 void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     if (!beside) beside = courses_beside(data, d.best);
     const auto other = other_cause(data, *beside, data.model.terms.size() + i);
-    if (!other || (is_over_time(other->fit.model.terms.back()) && foretells(data, d, i))) {
+    if (!other || (is_over_time(other->fit.model.terms.back()) && foretells(data, d, i)) ||
+        is_needed_beside(data, d, i, *other)) {
       d.findings[i].other_shape = other_shape(data, *beside, data.model.terms.size() + i).share;
       continue;
     }
