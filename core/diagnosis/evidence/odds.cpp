@@ -121,6 +121,8 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
     finding.other_cause += std::clamp(d.parameter_excursion / far_astray - 1.0, 0.0, most);
     sum += finding.relatives + finding.other_cause;
   }
+  // A course over time follows anything slow and foretells nothing: another place is as likely.
+  if (is_over_time(finding.term)) sum += 1.0;
   finding.probability = std::min(0.995, 1.0 / sum);
 }
 
