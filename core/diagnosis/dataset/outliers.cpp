@@ -35,6 +35,14 @@ std::vector<double> off_lines(const std::vector<double>& values) {
   return off;
 }
 
+/// How far values usually lie off the median of their neighbours. In a stretch that rises all the way each value is that
+/// median itself: where most do, noise in the other stretches would stand out. The lines through the neighbours know it.
+double scale_of(const std::vector<double>& off, const std::vector<double>& values, bool is_time_series) {
+  constexpr double of_lines = 0.74;  // 0.81 over 1.10, the two scales of white noise
+  const double scale = robust_sigma(off);
+  return is_time_series && scale > 0.0 ? std::max(scale, of_lines * robust_sigma(off_lines(values))) : scale;
+}
+
 /// By row, what one count of the converter is about its reading; 0 where readings are not in counts. Each converter has a
 /// finest step, of which all readings are multiples. One that is bent afterwards (a thermistor's) has steps that change
 /// along its range: there the steps between the values nearest to a reading count, where most values were read again.
@@ -227,7 +235,7 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
       const auto counts = counts_of(read);
       // Against the median of its neighbourhood, on the scale of all such differences.
       auto off = off_median(residual, data.is_time_series ? 3 : 40);
-      auto lone = far_from(off, robust_sigma(off), data.is_time_series, counts);
+      auto lone = far_from(off, scale_of(off, residual, data.is_time_series), data.is_time_series, counts);
       // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
       // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };

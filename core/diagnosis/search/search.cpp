@@ -55,6 +55,7 @@ void Search::finish() {
   if (!curved && any) take("the noise of what was found", [&] { return settle(), true; });
   if (!curved && any && options_.refuses)
     take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
+  if (!curved && options_.refuses) take(all_needed, [&] { return leave_out_drift(data_, d_); });
   if (d_.best.model.terms.size() > given() && options_.refuses)
     take(all_needed, [&] { return leave_out_nothings(data_, d_), true; });
   progress_(0.88, "checking on held-out stretches");

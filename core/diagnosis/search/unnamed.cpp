@@ -91,9 +91,8 @@ bool is_series(const Model& model, std::size_t given) {
 }
 
 /// Does a course over time take over what a name explains? It follows anything slow, and the name's number would be wrong.
-bool robs_names(const Fit& named, const Fit& with_course, std::size_t given) {
+bool takes_over(const Fit& named, const Fit& with_course, std::size_t given) {
   constexpr double kept = 0.95;  // what a crowd of small effects does to a number
-  if (!is_over_time(with_course.model.terms.back())) return false;
   for (std::size_t t = given; t < named.model.terms.size(); ++t)
     for (std::size_t i = 0; i < named.model.terms[t].info->parameter_count(); ++i)
       if (named.model.terms[t].info->parameters[i].role == physics::Role::amplitude &&
@@ -176,6 +175,28 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   return best;
 }
 
+bool leave_out_drift(const Case& data, Diagnosis& d) {
+  const std::size_t given = data.model.terms.size();
+  if (d.findings.size() < 2) return false;
+  for (std::size_t i = d.findings.size(); i-- > 0;) {
+    const auto drift = d.findings[i].term;
+    if (drift.info->depends_on.front() != "time" || drift.info->index_of("phase") < physics::most_parameters)
+      continue;
+    auto without = fit(data, d.weighing, physics::without_term(d.best.model, given + i), data.model, 10);
+    auto with = without;  // the drift last
+    with.model.terms.clear();
+    for (std::size_t t = 0; t < d.best.model.terms.size(); ++t)
+      if (t != given + i) with.model.terms.push_back(d.best.model.terms[t]);
+    with.model.terms.push_back(d.best.model.terms[given + i]);
+    if (!takes_over(without, with, given)) continue;
+    d.reject(std::string{drift.info->name}, "it takes over what the others explain", d.findings[i].gain);
+    d.best = std::move(without);
+    d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));
+    return true;
+  }
+  return false;
+}
+
 bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve) {
   const double all = squares_in_noise(data, d.retuned, d.best),
                by_names = all - squares_in_noise(data, d.best, d.best),
@@ -211,35 +232,43 @@ void name_friction_beside(const Case& data, Diagnosis& d, const std::set<std::st
   d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
 }
 
+namespace {
+
+/// A course in place of the names, where it explains far more than they do, and more than they do with one beside them.
+void put_in_place(const Case& data, Diagnosis& d, const Curved& beside, const Beside& beside_best,
+                  double margin) {
+  const std::size_t given = data.model.terms.size();
+  // What a curve in place of the names explains beyond them it would explain beside them too.
+  if (std::none_of(beside_best.courses.begin(), beside_best.courses.end(),
+                   [&](const Screened& s) { return s.gain > margin; }))
+    return;
+  auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
+  if (!(instead.gain > margin)) return;
+  const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
+  const double lead_of_curve = instead.fit.evidence - named_there.evidence;
+  if (!(lead_of_curve > margin) || !(is_series(d.best.model, given) || lead_of_curve > 0.25 * instead.gain) ||
+      !leaves_less(data, instead.fit, d.best) || is_needed_beside(data, beside, instead, d, margin))
+    return;
+  for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
+    d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more", 1.0);
+  d.best = std::move(instead.fit);
+  d.weighing = std::move(instead.weighing);
+  d.findings.clear();
+  d.is_unnamed = true;
+}
+
+}  // namespace
+
 void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
   if (beside_best.courses.empty() && beside_best.memories.empty()) return;
   const bool named = d.best.model.terms.size() > given;
   const double margin = 2.0 * claim_margin_of(d.weighing);
   auto beside = best_curve(data, d.best, beside_best);
-  // What a curve in place of the names explains beyond them it would explain beside them too.
-  const bool leaves_more = std::any_of(beside_best.courses.begin(), beside_best.courses.end(),
-                                       [&](const Screened& s) { return s.gain > margin; });
-  if (named && leaves_more) {
-    auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
-    if (instead.gain > margin) {
-      const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
-      if (instead.fit.evidence > named_there.evidence + margin &&
-          (is_series(d.best.model, given) ||
-           instead.fit.evidence - named_there.evidence > 0.25 * instead.gain) &&
-          leaves_less(data, instead.fit, d.best) && !is_needed_beside(data, beside, instead, d, margin)) {
-        for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
-          d.reject(std::string{d.best.model.terms[t].info->name}, "a curve without a name explains far more",
-                   1.0);
-        d.best = std::move(instead.fit);
-        d.weighing = std::move(instead.weighing);
-        d.findings.clear();
-        d.is_unnamed = true;
-      }
-    }
-  }
+  if (named) put_in_place(data, d, beside, beside_best, margin);
   // A rest counts where an engineer would see it.
-  if (!d.is_unnamed && beside.gain > margin && !robs_names(d.best, beside.fit, given) &&
+  if (!d.is_unnamed && beside.gain > margin &&
+      !(is_over_time(beside.fit.model.terms.back()) && takes_over(d.best, beside.fit, given)) &&
       least_ratio(data, beside.fit, d.best) < (named ? seen_beside : seen_alone)) {
     d.best = std::move(beside.fit);
     d.weighing = std::move(beside.weighing);

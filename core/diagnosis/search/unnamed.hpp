@@ -33,4 +33,8 @@ bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve);
 void name_friction_beside(const Case& data, Diagnosis& diagnosis,
                           const std::set<std::string, std::less<>>& without);
 
+/// Leaves out a name that goes with time alone where it takes over part of the size of others: it follows anything slow. True
+/// where one went.
+bool leave_out_drift(const Case& data, Diagnosis& diagnosis);
+
 }  // namespace invar::diagnosis

@@ -1,6 +1,7 @@
 // What is a slip of the instrument, and what the machine did: rows whose truth is written out here.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -46,6 +47,31 @@ TEST(Outliers, AreNotTheEndsOfSweepsAfterWhichTheErrorBeginsAnew) {
       {table});
   drop_outliers(data, simulate(data, data.model));
   EXPECT_EQ(dropped(data), std::set<std::size_t>{50});
+}
+
+/// A residual that rises for most of the recording and rests for the remainder: in the rise each value is the median of its
+/// neighbours, which says nothing of the noise.
+TEST(Outliers, AreNotTheNoiseOfRestsBesideALongRise) {
+  std::mt19937 random{7};
+  std::normal_distribution<double> reading{0.0, 0.02};
+  std::vector<double> time, u, y;
+  for (int i = 0; i < 900; ++i) {
+    time.push_back(i), u.push_back(0.0);
+    y.push_back(0.02 * std::clamp(i - 100, 0, 600) + reading(random));
+  }
+  y[820] += 0.5;
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("u", "1", u);
+  table.add("y", "m", y);
+  auto data =
+      make_case(test::model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+                               "states: {x: {derivative: 'k*u', initial: {value: 0, unit: m, sigma: 1}}}\n"
+                               "outputs: {y: {column: y, expression: x}}\n"
+                               "parameters: {k: {value: 1, unit: m/s, sigma: 0.1}}\nterms: []\n"),
+                {table});
+  drop_outliers(data, simulate(data, data.model));
+  EXPECT_EQ(dropped(data), std::set<std::size_t>{820});
 }
 
 /// Drops from three heights, with a slip now and then; `landed` of height and velocity.
