@@ -44,7 +44,8 @@ constexpr TermInfo unnamed(Plant plant, std::string_view site) {
           .plant = plant,
           .site = site,
           .description = no_name,
-          .source = "fitted to the recording"};
+          .source = "fitted to the recording",
+          .is_curve = true};
 }
 
 constexpr std::array unmodelled_infos{

@@ -313,11 +313,7 @@ std::vector<Start> equation_memories(const Case& data, const physics::Model& fit
 }
 
 bool same_law(const Term& one, const Term& other) {
-  const auto is_power = [](const Term& term) {
-    const auto name = term.info->name;
-    return name == "linear" || name == "coupling" || name == "quadratic" || name == "cubic";
-  };
-  return is_power(one) && is_power(other) && one.on == other.on && one.with == other.with;
+  return one.info->power > 0 && other.info->power > 0 && one.on == other.on && one.with == other.with;
 }
 
 std::vector<Start> equation_starts(const Case& data, const physics::Model& fitted) {

@@ -12,12 +12,6 @@ namespace invar::diagnosis {
 
 namespace {
 
-/// The power of the variable: 1, 2, 3; 0: none.
-int power_of(std::string_view name) {
-  if (name == "linear" || name == "coupling") return 1;
-  return name == "quadratic" ? 2 : name == "cubic" ? 3 : 0;
-}
-
 /// A found term of a model, in whose place others are put.
 struct Found {
   const Case& data;
@@ -28,27 +22,33 @@ struct Found {
   [[nodiscard]] const physics::Term& law() const { return model.terms[term]; }
 };
 
+/// Another law of the same plant; null where the user excludes it.
+const physics::TermInfo* law(const Found& at, std::string_view name) {
+  return at.without.contains(name) ? nullptr : physics::find_term(at.law().info->plant, name);
+}
+
 /// Another law in place of the found term; all its numbers are still zero.
-physics::Term& put(const Found& at, std::string_view law, std::vector<physics::Model>& others) {
+physics::Term& put(const Found& at, const physics::TermInfo* law, std::vector<physics::Model>& others) {
   auto& other = others.emplace_back(at.model).terms[at.term];
   other = {};
-  other.info = physics::find_term(at.law().info->plant, law);
+  other.info = law;
   return other;
 }
 
 /// A lag or a delay of the same time, here and at each input.
 std::vector<physics::Model> other_lags(const Found& at) {
   const auto& found = at.law();
-  const auto name = found.info->name;
-  const double time = found.values[found.info->index_of(name == "delay" ? "delay" : "time_constant")];
+  const auto& info = *found.info;
+  const double time =
+      found.values[info.has("delay") ? info.index_of("delay") : info.index_of("time_constant")];
   std::vector<std::string> places{found.on};
   for (const auto& input : at.model.equations.inputs)
     if (input.symbol != found.on) places.push_back(input.symbol);
   std::vector<physics::Model> others;
   for (const auto& place : places)
-    for (const char* law : {"lag", "delay"}) {
-      if ((name == law && place == found.on) || at.without.contains(law)) continue;
-      auto& other = put(at, law, others);
+    for (const auto* late : {law(at, "lag"), law(at, "delay")}) {
+      if (late == nullptr || (found.info == late && place == found.on)) continue;
+      auto& other = put(at, late, others);
       other.on = place;
       other.values[0] = time;
       other.given[0] = true;
@@ -68,22 +68,20 @@ double usual_velocity(const Case& data) {
 /// without friction a fit does not see the small excess at rest.
 std::vector<physics::Model> other_frictions(const Found& at) {
   const auto& found = at.law();
-  const auto name = found.info->name;
   const double usual = usual_velocity(at.data);
-  double level = found.values[0];
-  if (name == "stribeck_friction") {
-    const double speeds = usual / found.values[2];
-    level += (found.values[1] - level) * std::exp(-speeds * speeds);
-  }
+  const auto friction = physics::axis_kind(*found.info)->friction;
+  const double level = friction != nullptr ? friction(usual, found.values.data()) : found.values[0];
   std::vector<physics::Model> others;
-  if (name != "coulomb_friction" && !at.without.contains("coulomb_friction")) {
-    auto& other = put(at, "coulomb_friction", others);
+  const bool is_plain = !found.info->springs_first && !found.info->falls_with_speed;
+  if (const auto* plain = law(at, "coulomb_friction"); plain != nullptr && !is_plain) {
+    auto& other = put(at, plain, others);
     other.given.fill(true);
     other.values[0] = level;
   }
-  if (name == "stribeck_friction" || at.without.contains("stribeck_friction")) return others;
+  const auto* falling = law(at, "stribeck_friction");
+  if (found.info->falls_with_speed || falling == nullptr) return others;
   for (const double share : {0.1, 0.4}) {
-    auto& other = put(at, "stribeck_friction", others);
+    auto& other = put(at, falling, others);
     other.given.fill(true);
     other.values[0] = 0.8 * level, other.values[1] = 1.4 * level;
     other.values[2] = other.info->parameters[2].bounds.clamp(share * usual);
@@ -101,8 +99,9 @@ std::vector<physics::Model> friction_of_one_way(const Found& at) {
   const auto [low, high] = span_of(at.data, at.model, found.on);
   const double back = std::min(high, -low), forth = std::max(high, -low);
   const double level = high > -low ? -found.values[0] : found.values[0];
-  if (!(level > 0.0 && back < 0.2 * forth) || at.without.contains("dry_friction")) return others;
-  auto& other = put(at, "dry_friction", others);
+  const auto* friction = law(at, "dry_friction");
+  if (!(level > 0.0 && back < 0.2 * forth) || friction == nullptr) return others;
+  auto& other = put(at, friction, others);
   other.on = found.on;
   other.values[0] = level;
   other.given[0] = true;
@@ -113,19 +112,20 @@ std::vector<physics::Model> other_powers(const Found& at) {
   // First harmonic of sign(s) |s|^p under s = sin: how much a swing feels of each power.
   constexpr std::array harmonic{0.0, 1.0, 0.8488, 0.75};
   const auto& found = at.law();
-  const int power = power_of(found.info->name);
+  const int power = found.info->power;
   const auto& over = found.with.empty() ? found.on : found.with;
   const double swing =
       0.525 * inner_span_of(at.data, at.model, over);  // of a sine whose middle four fifths are so wide
   std::vector<physics::Model> others;
   if (!(swing > 0.0)) return others;
-  for (const char* law : {found.with.empty() ? "linear" : "coupling", "quadratic", "cubic"}) {
-    const int other = power_of(law);
-    if (other == power || at.without.contains(law)) continue;
+  const auto* first = found.with.empty() ? law(at, "linear") : law(at, "coupling");
+  for (const auto* instead : {first, law(at, "quadratic"), law(at, "cubic")}) {
+    if (instead == nullptr || instead->power == power) continue;
+    const int other = instead->power;
     const auto from = static_cast<std::size_t>(power), to = static_cast<std::size_t>(other);
     for (const double larger : {1.0, 1.5}) {
       auto& term = others.emplace_back(at.model).terms[at.term];
-      term.info = physics::find_term(physics::Plant::equations, law);
+      term.info = instead;
       term.values[0] *= std::pow(larger * swing, power - other) * harmonic[from] / harmonic[to];
     }
   }
@@ -140,9 +140,9 @@ std::vector<physics::Model> other_laws(const Case& data, const physics::Model& m
   const auto& info = *at.law().info;
   if (info.plant == physics::Plant::axis && info.is_friction) return other_frictions(at);
   if (info.plant != physics::Plant::equations) return {};
-  if (info.name == "lag" || info.name == "delay" || info.name == "hidden_state") return other_lags(at);
-  if (info.name == "constant") return friction_of_one_way(at);
-  return power_of(info.name) != 0 ? other_powers(at) : std::vector<physics::Model>{};
+  if (info.lateness != physics::Lateness::none) return other_lags(at);
+  if (info.is_steady) return friction_of_one_way(at);
+  return info.power != 0 ? other_powers(at) : std::vector<physics::Model>{};
 }
 
 std::vector<Fit> fits_of_other_laws(const Case& data, const Weighing& weighing, const Fit& start,

@@ -22,10 +22,12 @@ using physics::TermInfo;
 
 constexpr auto none = physics::most_parameters;
 
-bool has(const Case& data, const char* name) { return data.recordings.front().inputs.find(name) != nullptr; }
+bool has(const Case& data, std::string_view name) {
+  return data.recordings.front().inputs.find(name) != nullptr;
+}
 
 /// Does an input take values that differ by more than a thousandth of their size?
-bool varies(const Case& data, const char* name) {
+bool varies(const Case& data, std::string_view name) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const auto& recording : data.recordings)
     if (const auto* values = recording.inputs.find(name))
@@ -34,51 +36,38 @@ bool varies(const Case& data, const char* name) {
   return high - low > 1e-3 * std::max(std::abs(low), std::abs(high));
 }
 
+/// Does a model have this parameter, or a term that stands for it?
+bool has_in(const physics::Model& model, std::string_view parameter) {
+  return model.value(parameter) != 0.0 ||
+         std::any_of(model.terms.begin(), model.terms.end(),
+                     [&](const Term& term) { return term.info->stands_for == parameter; });
+}
+
 /// Does anything in the recordings let this term show?
 bool may_show(const Case& data, const physics::Model& model, const TermInfo& info) {
-  const auto name = info.name;
-  switch (info.plant) {
-    case Plant::thermal:
-      if (name == "speed_dependent_convection") return has(data, "speed");
-      if (name == "motor_heating") return has(data, "motor_current");
-      if (name == "node_coupling") return data.model.thermal.nodes.size() > 1;
-      if (name == "heater_saturation") return !data.model.thermal.heaters.empty();
-      return true;
-    case Plant::error_map: {
-      bool expands = model.value("expansion") != 0.0;
-      for (const auto& term : model.terms) expands = expands || term.info->name == "thermal_expansion";
-      if (name == "backlash") return has(data, "direction");
-      if (name == "thermal_expansion")
-        return has(data, "temperature") && data.model.find("expansion") == nullptr;
-      if (name == "heating_rate_lag") return has(data, "temperature") && expands;
-      if (name == "refractive_index") return has(data, "pressure");
-      // Beside one offset a tilt is any course over the position.
-      if (name == "abbe_offset") return varies(data, "offset");
-      return true;
-    }
-    case Plant::droplet:
-      if (name == "stage_velocity_carry" || name == "valve_delay") return has(data, "velocity_x");
-      if (name == "pressure_dependence") return has(data, "pressure");
-      if (name == "lens_distortion" || name == "camera_rotation") return has(data, "image_x");
-      return true;
-    default:
-      return true;
-  }
+  if (!info.needs.empty() && !has(data, info.needs)) return false;
+  if (!info.needs_varied.empty() && !varies(data, info.needs_varied)) return false;
+  if (!info.stands_for.empty() && data.model.find(info.stands_for) != nullptr) return false;
+  if (!info.acts_in.empty() && !has_in(model, info.acts_in)) return false;
+  const auto* kind = physics::thermal_kind(info);
+  if (kind == nullptr) return true;
+  return (!kind->couples || data.model.thermal.nodes.size() > 1) &&
+         (kind->heater == nullptr || !data.model.thermal.heaters.empty());
 }
 
 /// At which nodes or outputs the term may act.
 std::vector<std::string> places(const Case& data, const TermInfo& info) {
   switch (info.plant) {
     case Plant::thermal:
-      if (info.name == "ambient_drift") return {data.model.thermal.nodes.front()};  // one air for all
+      if (physics::thermal_kind(info)->ambient != nullptr)
+        return {data.model.thermal.nodes.front()};  // one air for all
       return data.model.thermal.nodes;
     case Plant::sensor: {
+      using physics::Instrument;
       std::vector<std::string> on;
       for (const auto& output : data.outputs) {
-        const bool encoder = output == "encoder";
-        if (info.name == "gain_droop" && encoder) continue;
-        if ((info.name == "periodic_error" || info.name == "hysteresis") && !encoder) continue;
-        on.push_back(output);
+        const auto instrument = output == "encoder" ? Instrument::counting : Instrument::analogue;
+        if (info.instrument == Instrument::any || info.instrument == instrument) on.push_back(output);
       }
       return on;
     }
@@ -127,9 +116,8 @@ void take_to_size(const Case& data, const physics::Model& model, std::vector<Sta
         auto& value = start.term.values[i];
         const double as_written = value;
         if (info.parameters[i].unit == "N") value = std::min(value, force);
-        if (info.name == "presliding_friction" &&
-            info.parameters[i].name == "level")  // they bend as far as before
-          start.term.values[info.index_of("stiffness")] *= value / as_written;
+        if (const auto shape = info.index_of(info.in_proportion.parameter); shape != none && i == 0)
+          start.term.values[shape] *= value / as_written;
         if (info.parameters[i].unit == "A") value = std::min(value, current);
       }
   }
@@ -157,9 +145,7 @@ void give(Term& term, std::size_t parameter, double value) {
   term.given[parameter] = true;
 }
 
-bool may_repeat(const TermInfo& info) {
-  return info.index_of("pitch") != none || info.index_of("frequency") != none;
-}
+bool may_repeat(const TermInfo& info) { return info.has("pitch") || info.has("frequency"); }
 
 /// The starts of a term from each shape; an angle may have a period that is too long for a length.
 void add_shapes(Laying& to, const Term& term, const std::vector<double>& shapes) {
@@ -186,7 +172,7 @@ void add_square_waves(Laying& to, Term wave) {
 void add_with_onsets(Laying& to, Term term, const std::vector<double>& shapes) {
   const auto add = [&] {
     add_shapes(to, term, shapes);
-    if (term.info->name == "additive_disturbance") add_square_waves(to, term);
+    if (term.info->has("squareness")) add_square_waves(to, term);
   };
   add();
   const auto onset = term.info->index_of("onset");
@@ -239,16 +225,16 @@ std::vector<double> power_limits(const Case& data, const std::string& node) {
 
 void add_thermal(Laying& to, Term term) {
   const auto& info = *term.info;
-  if (info.name == "hidden_node") return add_hidden_nodes(to, term);
-  if (info.name == "node_coupling") return add_couplings(to, term);
-  if (info.name == "speed_dependent_convection") give(term, info.index_of("at_speed"), mean_speed(to.data));
-  if (info.name == "ambient_drift") {
+  const auto& kind = *physics::thermal_kind(info);
+  if (info.lateness == physics::Lateness::store) return add_hidden_nodes(to, term);
+  if (kind.couples) return add_couplings(to, term);
+  if (info.has("at_speed")) give(term, info.index_of("at_speed"), mean_speed(to.data));
+  if (info.has("over")) {
     double until = 0.0;
     for (const auto& r : to.data.recordings) until = std::max(until, r.inputs.time.back());
     give(term, info.index_of("over"), until);
   }
-  add_with_onsets(to, term,
-                  info.name == "heater_saturation" ? power_limits(to.data, term.on) : std::vector<double>{});
+  add_with_onsets(to, term, kind.heater != nullptr ? power_limits(to.data, term.on) : std::vector<double>{});
 }
 
 void add_error_map(Laying& to, Term term) {
@@ -260,7 +246,7 @@ void add_error_map(Laying& to, Term term) {
     give(term, at, median(all));
     return add_starts(to.starts, term, {median(all), 1013.25, *low, *high});
   }
-  if (info.name == "heating_rate_lag") {
+  if (info.has("time_constant")) {
     // A lag of a minute and one of hours lie too far apart for one beginning.
     for (const double share : {0.01, 0.03, 0.1, 0.3}) {
       give(term, 0, info.parameters[0].bounds.clamp(share * longest(to.data)));
@@ -268,7 +254,7 @@ void add_error_map(Laying& to, Term term) {
     }
     return;
   }
-  if (info.name != "periodic_error") return add_with_onsets(to, term, {});
+  if (!info.has("pitch")) return add_with_onsets(to, term, {});
   const auto pitches = pitch_grid(finite_values(to.data, "position"), 400);
   if (!pitches.empty()) add_with_onsets(to, term, pitches);
 }
@@ -277,30 +263,30 @@ void add_droplet(Laying& to, Term term) {
   if (const auto at = term.info->index_of("reference_pressure"); at != none && has(to.data, "pressure"))
     give(term, at, median(finite_values(to.data, "pressure")));
   const double v = to.data.model.value("speed", 3.0);
-  const bool carries = term.info->name == "stage_velocity_carry";
+  const bool carries = term.info->has("speed");
   add_with_onsets(to, term, carries ? std::vector<double>{v, 0.6 * v, 1.7 * v} : std::vector<double>{});
 }
 
 void add_sensor(Laying& to, const Term& term) {
-  if (term.info->name != "periodic_error") return add_with_onsets(to, term, {});
+  if (!term.info->has("pitch")) return add_with_onsets(to, term, {});
   const auto pitches = sensor_pitches(to.data, to.fitted);
   if (!pitches.empty()) add_with_onsets(to, term, pitches);
 }
 
 std::vector<double> axis_shapes(const Laying& to, const TermInfo& info) {
-  const auto name = info.name;
-  if (name == "force_ripple") return to.periods.force_pitch;
-  if (name == "motor_constant_ripple") return to.periods.motor_pitch;
-  if (name == "encoder_periodic_error") return to.periods.reading_pitch;
-  if (name == "periodic_disturbance" || name == "additive_disturbance") return to.periods.force_frequency;
-  if (name == "presliding_friction") return bristles_for(to.data, info);
+  if (info.is_wave_in_time()) return to.periods.force_frequency;
+  if (info.is_wave())
+    return info.site == "actuator"      ? to.periods.motor_pitch
+           : info.site == "measurement" ? to.periods.reading_pitch
+                                        : to.periods.force_pitch;
+  if (info.springs_first) return bristles_for(to.data, info);
   std::vector<double> shapes;
-  if (name == "position_stiffness") {  // about a far center it is first of all a steady force
+  if (info.is_spring) {  // about a far center it is first of all a steady force
     shapes = {0.0};
     if (const auto way = covered(to.data, "reference")) shapes.push_back(0.5 * (way->lower + way->upper));
   }
   // A mode rings at one pitch: from far off it would seem to push the other way.
-  if (name == "flexible_mode") {
+  if (info.has("frequency")) {
     shapes = to.periods.mode_frequency;
     for (double f = 20.0; f < 350.0; f *= 1.45) shapes.push_back(f);
   }
@@ -333,7 +319,7 @@ void add_at(Laying& to, const Term& term) {
 
 /// Is the term in the model at this place, and such that it cannot act there twice?
 bool is_used_up(const physics::Model& model, const TermInfo& info, const std::string& on) {
-  if (may_repeat(info) && info.name != "flexible_mode") return false;
+  if (info.is_wave()) return false;
   return std::any_of(model.terms.begin(), model.terms.end(), [&](const Term& term) {
     return term.info == &info && (term.on.empty() || term.on == on);
   });
@@ -367,7 +353,7 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   for (const auto* info : physics::terms_of(data.model.plant)) {
     if (without.contains(info->name) || !may_show(data, model, *info)) continue;
     // Two laws of one friction fit what neither is: a course over the velocity says it without a name.
-    if (has_friction && info->name.ends_with("_friction")) continue;
+    if (has_friction && info->is_friction) continue;
     for (const auto& on : places(data, *info))
       if (!is_used_up(model, *info, on)) add_at(to, term_at(data, *info, on));
   }

@@ -34,7 +34,7 @@ std::vector<std::string> dependence(const Case& data, const physics::Term& term)
     if (term.with == "direction") names.emplace_back("velocity");  // whose sign it is
   }
   if (data.model.plant == physics::Plant::equations && term.curve.over.empty()) {
-    if (term.info->name == "overflow") names.push_back(term.on);  // `with` is where it goes
+    if (term.info->has("share")) names.push_back(term.on);  // `with` is where that goes
     names.push_back(physics::goes_over(term));
   }
   return names;
@@ -63,8 +63,8 @@ std::vector<std::string> recorded_as(const Case& data, const std::string& variab
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
   const auto unit = physics::unit_of_parameter(data.model, term, parameter);
   if (unit != "*") return unit;
-  const auto name = term.info->parameters[parameter].name;
-  if (name == "delay" || name == "time_constant" || (name == "period" && term.with == "t")) return "s";
+  const auto is = [&](std::string_view name) { return parameter == term.info->index_of(name); };
+  if (is("delay") || is("time_constant") || (is("period") && term.with == "t")) return "s";
   const auto* signal = data.model.signal(term.on);
   return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
 }

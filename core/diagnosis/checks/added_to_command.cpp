@@ -412,8 +412,7 @@ void settle_recorded_current(Case& data) {
   constexpr double acts = 0.5;
   if (felt < acts) {
     // What the controller read otherwise than was recorded looks like much of the command, but not like a wave.
-    const bool is_surely_there =
-        added->term.curve.over == "time" || added->term.info->name == "additive_disturbance";
+    const bool is_surely_there = added->term.curve.over == "time" || added->term.info->is_wave_in_time();
     if (!is_surely_there) return;
     data.doubts.push_back(
         "column `" + data.model.signal("current")->column + "` reads " + added->words +

@@ -10,6 +10,7 @@
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
+#include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
 
@@ -57,7 +58,7 @@ Columns nearly(const Case& data, const Model& model, const std::vector<Freedom>&
 /// a dead zone in which its input never was is no more than an offset.
 double rarity(const Case& data, const Model& model, const physics::Term& term) {
   if (model.plant != physics::Plant::equations) return 0.0;
-  if (term.info->name == "dead_zone") {
+  if (term.info->cut == physics::Cut::around_zero) {
     for (const auto& input : model.equations.inputs)
       if (const auto range = covered(data, input.signal); input.symbol == term.on && range)
         return range->lower >= term.values[0] || range->upper <= -term.values[0] ? 3.0 : 0.0;
@@ -66,10 +67,10 @@ double rarity(const Case& data, const Model& model, const physics::Term& term) {
   // A law bends over its own state; what another one does mostly goes straight (a coupling).
   if (!term.with.empty() && !physics::is_felt_by_others_alone(term))
     return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size())) +
-           (term.info->name == "quadratic" || term.info->name == "cubic" ? 3.0 : 0.0);
+           (term.info->power > 1 ? 3.0 : 0.0);
   const bool speed = std::any_of(model.equations.states.begin(), model.equations.states.end(),
                                  [&](const auto& state) { return state.derivative == term.on; });
-  return term.info->name == "cubic" && speed ? 3.0 : 0.0;
+  return term.info->power == 3 && speed ? 3.0 : 0.0;
 }
 
 /// The damped Newton step; a number that stands at a bound and would leave through it is held while the others move.
@@ -112,7 +113,8 @@ void keep_reached(const Case& data, const Model& model, std::vector<Freedom>& fr
   for (auto& f : free) {
     if (f.where != Freedom::Where::term || f.sigma > 0.0) continue;
     const auto& term = model.terms[f.term];
-    if (term.info->name != "heater_saturation") continue;
+    const auto* kind = physics::thermal_kind(*term.info);
+    if (kind == nullptr || kind->heater == nullptr) continue;
     if (const double top = highest_power(data, term.on); top > 0.0) f.bounds.upper = (1.0 - 1e-4) * top;
   }
 }
@@ -336,7 +338,7 @@ double complexity_of(const Weighing& weighing, const Model& believed, const Fit&
 double rarity_of_all(const Case& data, const Model& believed, const Model& model) {
   double unlikely = 0.0;
   for (std::size_t t = believed.terms.size(); t < model.terms.size(); ++t)
-    if (const auto& term = model.terms[t]; term.info->name == "additive_disturbance" &&
+    if (const auto& term = model.terms[t]; term.info->is_wave_in_time() && term.info->site == "actuator" &&
                                            !believed.records_applied &&
                                            term.values[term.info->index_of("squareness")] < 0.5)
       unlikely += price_of_current(term.values[term.info->index_of("frequency")]);

@@ -74,12 +74,13 @@ Freedom of_curve(const physics::Term& term, std::size_t t, std::size_t index, bo
 
 /// A typical change of a term's number that the user says nothing of.
 double scale_of(const physics::Term& term, std::size_t index) {
-  const auto& info = term.info->parameters[index];
-  if (info.name == "center") return 0.01;
-  if (info.role == Role::shape && (info.name == "pitch" || info.name == "frequency" || info.name == "period"))
+  const auto& number = term.info->parameters[index];
+  if (number.name == "center") return 0.01;
+  if (number.role == Role::shape &&
+      (number.name == "pitch" || number.name == "frequency" || number.name == "period"))
     return 0.003 * std::abs(term.values[index]);
-  if (info.role == Role::phase) return 0.3;
-  const double usual = std::abs(info.starts[0]);
+  if (number.role == Role::phase) return 0.3;
+  const double usual = std::abs(number.starts[0]);
   return std::max({0.1 * std::abs(term.values[index]), usual < 1e100 ? 0.02 * usual : 0.0, 1e-12});
 }
 
@@ -87,9 +88,9 @@ double scale_of(const physics::Term& term, std::size_t index) {
 std::optional<Freedom> of_term(const Model& model, std::size_t t, std::size_t index,
                                const physics::Term* believed) {
   const auto& term = model.terms[t];
-  const auto& info = term.info->parameters[index];
-  if (info.role == Role::reference || info.name == "squareness") return std::nullopt;
-  if (!term.given[index] && model.find(info.name) != nullptr)
+  const auto& number = term.info->parameters[index];
+  if (number.role == Role::reference || number.name == "squareness") return std::nullopt;
+  if (!term.given[index] && model.find(number.name) != nullptr)
     return std::nullopt;  // moves with the nominal one
   Freedom f;
   f.where = Freedom::Where::term, f.term = t, f.index = index;

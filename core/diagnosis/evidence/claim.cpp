@@ -27,10 +27,7 @@ namespace {
 
 /// Rates against the motion take energy out of it; one that brings some in is no drag, however well it fits.
 bool brings_energy(const physics::Model& model, const Term& term) {
-  const auto name = term.info->name;
-  if (!term.with.empty() || term.values[0] <= 0.0 ||
-      (name != "linear" && name != "quadratic" && name != "cubic"))
-    return false;
+  if (!term.with.empty() || term.values[0] <= 0.0 || term.info->power == 0) return false;
   return std::any_of(model.equations.states.begin(), model.equations.states.end(),
                      [&](const auto& state) { return state.derivative == term.on; });
 }
@@ -64,12 +61,11 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const auto [low, high] = span_of(data, model, over);
   const double size = std::max(std::abs(low), std::abs(high));
   // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.
-  if (term.info->name == "periodic")
+  if (term.info->is_wave())
     return (over == "t" ? high - low : inner_span_of(data, model, over)) >= 2.0 * term.values[1];
   // Friction that never turned nor held is a constant.
-  if (term.info->name == "dry_friction" && term.with == term.on) return turns(data, model, term.on);
-  if (term.info->name == "dry_friction")
-    return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, over);
+  if (term.info->is_friction && term.with == term.on) return turns(data, model, term.on);
+  if (term.info->is_friction) return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, over);
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
   // A limit that one or two rows touch is an outlier.
   auto free = model;
@@ -110,7 +106,7 @@ bool repeats(const Case& data, const Term& term) {
 /// play explains of it where nearly all points were approached from one side.
 bool turns_with_direction(const Case& data, const physics::Model& model, std::size_t term) {
   const auto& play = model.terms[term];
-  if (play.info->plant != physics::Plant::error_map || play.info->name != "backlash") return true;
+  if (play.info->plant != physics::Plant::error_map || !play.info->sticks_and_slips) return true;
   const auto without = simulate(data, physics::without_term(model, term));
   std::array<double, 2> sum{}, square{}, rows{};
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
@@ -132,11 +128,16 @@ bool turns_with_direction(const Case& data, const physics::Model& model, std::si
   return difference / play.values[0] > 0.5 && std::abs(difference) > 3.0 * std::sqrt(variance);
 }
 
+/// A store in equations, that is beside a signal or a state.
+bool is_store(const Term& term) {
+  return term.info->plant == physics::Plant::equations && term.info->lateness == physics::Lateness::store;
+}
+
 /// A store through which the whole of a signal goes is a lag: what makes it a store, the part that passes it by, is zero.
 bool is_lag(const Fit& fit, std::size_t term) {
   const auto& store = fit.model.terms[term];
   const auto& states = fit.model.equations.states;
-  if (store.info->plant != physics::Plant::equations || store.info->name != "hidden_state" ||
+  if (!is_store(store) ||
       std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == store.on; }))
     return false;
   double sigma = 0.0;
@@ -150,7 +151,7 @@ bool is_lag(const Fit& fit, std::size_t term) {
 /// in proportion and a steady one.
 bool never_fills(const Case& data, const Fit& fit, std::size_t term) {
   const auto& store = fit.model.terms[term];
-  if (store.info->plant != physics::Plant::equations || store.info->name != "hidden_state") return false;
+  if (!is_store(store)) return false;
   if (!(store.values[1] > longest(data))) return false;
   for (std::size_t k = 0; k < fit.free.size(); ++k)
     if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 1)
@@ -194,10 +195,10 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
       is_rounding(data, fit.model, term) || !turns_with_direction(data, fit.model, term))
     return false;
   if (is_lag(fit, term) || never_fills(data, fit, term)) return false;
-  if (info.name == "overflow" && values[1] < 0.05)
-    return false;  // what runs over to nowhere is an upper limit
+  // What runs over to nowhere is an upper limit.
+  if (info.has("share") && values[info.index_of("share")] < 0.05) return false;
   // Friction that is smaller at rest than at speed is none.
-  if (info.name == "stribeck_friction" && values[1] < 1.1 * values[0]) return false;
+  if (info.falls_with_speed && values[1] < 1.1 * values[0]) return false;
 
   for (std::size_t k = 0; k < fit.free.size(); ++k) {
     const auto& f = fit.free[k];

@@ -10,7 +10,7 @@ namespace invar::diagnosis {
 
 std::string variable_of(const physics::Term& term) {
   if (!term.curve.over.empty()) return term.curve.over;
-  if (term.info->name == "constant") return "";
+  if (term.info->is_steady) return "";
   return physics::goes_over(term);
 }
 

@@ -13,9 +13,7 @@ using physics::Plant;
 using physics::Term;
 
 bool comes_late(const Term& term) {
-  const auto name = term.info->name;
-  return name == "lag" || name == "delay" || name == "amplifier_lag" || name == "transport_delay" ||
-         name == "measurement_delay" || name == "sensor_lag";
+  return term.info->lateness == physics::Lateness::delay || term.info->lateness == physics::Lateness::lag;
 }
 
 namespace {
@@ -28,38 +26,29 @@ bool is_alternative(const Finding& finding, auto is) {
 /// One recording shows a sine in the motor's current and one at the carriage alike.
 double odds_of_other_site(const Finding& finding) {
   const auto& term = finding.term;
-  const bool is_current = term.info->name == "additive_disturbance";
-  if (!is_current && (term.info->name != "periodic_disturbance" || term.info->plant != Plant::axis))
-    return 0.0;
+  if (!term.info->is_wave_in_time()) return 0.0;
+  const bool is_current = term.info->site == "actuator";
   if (is_current && term.values[term.info->index_of("squareness")] > 0.5) return 0.0;
-  if (is_alternative(finding, [](const Term& a) {
-        return a.info->name == "additive_disturbance" || a.info->name == "periodic_disturbance";
-      }))
-    return 0.0;
+  if (is_alternative(finding, [](const Term& a) { return a.info->is_wave_in_time(); })) return 0.0;
   const double price = price_of_current(term.values[term.info->index_of("frequency")]);
   return std::exp(0.5 * (is_current ? price : -price));
-}
-
-/// Ends a value as it stands: on the way to a state as in it.
-bool is_bound(const Term& term) {
-  const auto name = term.info->name;
-  return name == "upper_limit" || name == "lower_limit" || name == "dead_zone";
 }
 
 /// A lag and a delay of one time T differ by (s T)^2 / 2 and more: how plainly would the recording show that?
 double odds_of_other_lateness(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
   if (!comes_late(finding.term) || is_alternative(finding, comes_late)) return 0.0;
   // The second difference of the effect over a half of the time to either side is (s T)^2 / 4 for a delay, / 2 for a lag.
-  const bool is_delay = finding.term.info->index_of("time_constant") == physics::most_parameters;
+  const bool is_delay = finding.term.info->lateness == physics::Lateness::delay;
   return std::exp(-lead_over_shift(data, best, (is_delay ? 2.0 : 1.0) * second_times(data, best, place)));
 }
 
 /// A spring before sliding that is stiff enough is no more than friction that slides at once.
 double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
   const auto& info = *finding.term.info;
-  if (info.name != "presliding_friction" ||
-      is_alternative(finding, [](const Term& a) { return a.info->name == "coulomb_friction"; }))
-    return 0.0;
+  const auto slides_at_once = [](const Term& a) {
+    return a.info->is_friction && !a.info->springs_first && !a.info->falls_with_speed;
+  };
+  if (!info.springs_first || is_alternative(finding, slides_at_once)) return 0.0;
   constexpr double stiffer = 10.0;
   auto limit = best.model;
   auto& stiffness = limit.terms[place].values[info.index_of("stiffness")];
@@ -95,7 +84,8 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative) {
 
 bool is_elsewhere(const Term& one, const Term& other) {
   return one.info == other.info && one.info->plant == Plant::equations && one.on != other.on &&
-         (comes_late(one) || one.info->name == "hidden_state" || is_bound(one) ||
+         // What comes late or is cut off does so on the way to a state as in it.
+         (one.info->lateness != physics::Lateness::none || one.info->cut != physics::Cut::nothing ||
           variable_of(one) == variable_of(other));
 }
 

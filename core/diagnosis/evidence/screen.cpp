@@ -184,19 +184,11 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
           p.bounds.lower >= 0.0
               ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
               : p.bounds.clamp(value);
-      // A store as fast as it was, however large.
-      if (info.name == "hidden_node" && d == 0) {
-        const auto capacity = info.index_of("capacity");
-        term.values[capacity] = info.parameters[capacity].bounds.clamp(
-            term.values[0] / s->start.term.values[0] * s->start.term.values[capacity]);
-      }
-      // Where the force is less than it began with, the loop goes over the same way: it is as much less stiff.
-      if (info.name == "presliding_friction" && d == 0) {
-        const auto stiffness = info.index_of("stiffness");
-        const double times =
-            std::min(1.0, term.values[direction.amplitude] / s->start.term.values[direction.amplitude]);
-        term.values[stiffness] =
-            info.parameters[stiffness].bounds.clamp(times * s->start.term.values[stiffness]);
+      // A store as fast as it was, however large; bristles that bend over the same way.
+      if (const auto shape = info.index_of(info.in_proportion.parameter); shape < none && d == 0) {
+        const double times = std::min(info.in_proportion.most, term.values[direction.amplitude] /
+                                                                   s->start.term.values[direction.amplitude]);
+        term.values[shape] = info.parameters[shape].bounds.clamp(times * s->start.term.values[shape]);
       }
     }
     model.terms.push_back(term);

@@ -84,15 +84,15 @@ std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, c
 std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise, const Weighing& weighing,
                                         const Fit& base, const std::set<std::string, std::less<>>& without) {
   if (!noise.is_fed_back() || data.outputs.size() < 2) return std::nullopt;
-  const auto has = [&](std::string_view part) {
+  const auto is_known = [&](std::string_view site) {
     return std::any_of(base.model.terms.begin(), base.model.terms.end(), [&](const auto& term) {
-      return term.info->name.find(part) != std::string_view::npos;
+      return term.info->sticks_and_slips && term.info->site == site;
     });
   };
   // Of about the size that the noise has: what is far smaller or larger takes a few steps more.
   const double current = weighing.filters[1].sigma, reading = weighing.filters[0].sigma;
   struct Bend {
-    const char *name, *kin;
+    const char *name, *site;
     double size;
   };
   const Eigen::MatrixXd columns = whitened(data, weighing, base.columns).dense();
@@ -101,9 +101,9 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
   Eigen::VectorXd at;  // once something is seen
   std::optional<ShakenLoose> best;
   for (const Bend& bend :
-       {Bend{"coulomb_friction", "friction", 0.05 * base.model.value("motor_constant", 1.0) * current},
-        Bend{"dead_zone", "dead_zone", 0.2 * current}, Bend{"backlash", "backlash", reading}}) {
-    if (without.contains(bend.name) || has(bend.kin)) continue;
+       {Bend{"coulomb_friction", "force", 0.05 * base.model.value("motor_constant", 1.0) * current},
+        Bend{"dead_zone", "actuator", 0.2 * current}, Bend{"backlash", "measurement", reading}}) {
+    if (without.contains(bend.name) || is_known(bend.site)) continue;
     if (!is_seen(looked_for(data, noise, weighing, base, columns, roughly_at, bend.name, bend.size, true),
                  perhaps))
       continue;

@@ -51,7 +51,7 @@ Eigen::MatrixXd second_times(const Case& data, const Fit& named, std::size_t ter
   if (info.depends_on.front() != "history") return columns;
   const Eigen::VectorXd at = differences(data, simulate(data, named.model));
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
-    if (info.parameters[i].name != "time_constant" && info.parameters[i].name != "delay") continue;
+    if (i != info.index_of("time_constant") && i != info.index_of("delay")) continue;
     physics::Model more = named.model, less = named.model;
     more.terms[term].values[i] *= 1.5, less.terms[term].values[i] *= 0.5;
     const Eigen::VectorXd bend = differences(data, simulate_once(data, more)) +

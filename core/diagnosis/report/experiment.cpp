@@ -11,44 +11,12 @@ namespace invar::diagnosis {
 
 namespace {
 
-/// Two names, in either order, and what tells them apart.
-struct Pair {
-  std::string_view one, other;
-  const char* experiment;
-};
-
-constexpr const char* both_ways =
-    "move in both directions: friction turns its sign with the motion, a constant force does not";
-constexpr const char* second_instrument =
-    "record the position with a second, direct instrument and diagnose with its column, `current` as an "
-    "input and "
-    "no controller: a late motor is found again, a late encoder is not";
-constexpr const char* quick =
-    "excite the axis up to some hundred hertz: a delay keeps the amplitude, a lag takes it down";
-constexpr const char* creep =
-    "move to and fro by some micrometres, and then by millimetres: before it slides a bristle springs, which "
-    "shows in the small motion alone";
-
-constexpr std::array pairs{
-    Pair{"coulomb_friction", "constant_force", both_ways},
-    Pair{"stribeck_friction", "constant_force", both_ways},
-    Pair{"presliding_friction", "constant_force", both_ways},
-    Pair{"coulomb_friction", "presliding_friction", creep},
-    Pair{"stribeck_friction", "presliding_friction", creep},
-    Pair{"transport_delay", "measurement_delay", second_instrument},
-    Pair{"transport_delay", "amplifier_lag", quick},
-    Pair{"measurement_delay", "amplifier_lag", quick},
-    Pair{"stage_velocity_carry", "valve_delay",
-         "print at two clearly different heights: carry grows with the height, a valve delay does not"},
-    Pair{"force_ripple", "motor_constant_ripple",
-         "cross the same places at high and at low current: the ripple of the motor constant goes with the "
-         "current"},
-    Pair{"periodic_disturbance", "force_ripple",
-         "run at another speed: a ripple along the way keeps its pitch, a disturbance in time its frequency"},
-    Pair{"periodic_disturbance", "additive_disturbance",
-         "record with the motor switched off and the carriage free: a force shakes it still"},
-    Pair{"delay", "lag",
-         "change the input quickly, up to the rate of the rows: a delay keeps the shape, a lag rounds it"}};
+/// The experiment that the file of the one term names for the other; null: none.
+const char* told_apart(const physics::TermInfo& one, const physics::TermInfo& other) {
+  for (const auto& pair : one.told_apart)
+    if (pair.from == other.name) return pair.experiment;
+  return nullptr;
+}
 
 /// How to find out whether an effect goes with this variable.
 std::string varied(const std::string& variable) {
@@ -77,10 +45,9 @@ std::string separating_experiment(const Case& data, const physics::Term& at, con
   if (at.info == beside.info)
     return "record with one instrument more, between the " + place_of(data, at) + " and the " +
            place_of(data, beside) + ": it shows the effect of the one and not that of the other";
+  if (const char* known = told_apart(*at.info, *beside.info)) return known;
+  if (const char* known = told_apart(*beside.info, *at.info)) return known;
   const auto one = at.info->name, other = beside.info->name;
-  for (const auto& pair : pairs)
-    if ((pair.one == one && pair.other == other) || (pair.one == other && pair.other == one))
-      return pair.experiment;
   const auto of_one = dependence(data, at), of_other = dependence(data, beside);
   for (const bool turned : {false, true}) {
     const auto variable = turned ? only_in(of_other, of_one) : only_in(of_one, of_other);

@@ -24,15 +24,12 @@ std::vector<std::string> dependence(const Case& data, const Finding& finding) {
 
 std::string title_of(const Finding& finding) {
   const auto& term = finding.term;
-  if (term.info->name == "unmodelled") return "an effect without a name";
-  auto title = readable(term.info->name);
+  if (term.info->is_curve) return "an effect without a name";
+  const auto title = readable(term.info->name);
   if (term.info->plant != physics::Plant::equations) return title;
   // A law's name alone says nothing of a machine.
-  const auto& over = physics::goes_over(term);
-  if (term.info->name == "coupling") return title + " to " + over;
-  for (const auto* law : {"linear", "quadratic", "cubic", "periodic"})
-    if (term.info->name == law) title += " in " + over;
-  return title;
+  if (term.info->joined_by.empty()) return title;
+  return title + " " + std::string{term.info->joined_by} + " " + physics::goes_over(term);
 }
 
 namespace {

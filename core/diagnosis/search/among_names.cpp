@@ -20,9 +20,9 @@ namespace {
 std::vector<Model> with_friction(const Case& data, const Term& removed, const Model& model,
                                  const std::set<std::string, std::less<>>& without) {
   std::vector<Model> all;
-  if (!removed.info->name.ends_with("_limit")) return all;
+  if (removed.info->cut != physics::Cut::beyond_a_limit) return all;
   for (std::size_t t = data.model.terms.size(); t < model.terms.size(); ++t)
-    if (model.terms[t].info->name == "constant" && model.terms[t].on == removed.on)
+    if (model.terms[t].info->is_steady && model.terms[t].on == removed.on)
       for (auto& other : other_laws(data, model, t, without)) all.push_back(std::move(other));
   return all;
 }
@@ -61,7 +61,7 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals,
     for (std::size_t t = given; t < model.terms.size(); ++t)
       if (removed.info->is_friction && model.terms[t].info->is_friction) {
         model.terms[t].values[0] += 0.7 * removed.values[0];
-        if (model.terms[t].info->name == "stribeck_friction") model.terms[t].values[1] += removed.values[0];
+        if (model.terms[t].info->falls_with_speed) model.terms[t].values[1] += removed.values[0];
       }
     auto without = fit(data, d.weighing, model, data.model, 10);
     for (const auto& other : with_friction(data, removed, model, without_names))

@@ -69,9 +69,9 @@ std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged
 
 bool comes_late_again(const Case& moved, const Diagnosis& d) {
   return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
-    const bool is_late = comes_late(finding.term) || finding.term.info->name == "hidden_state";
-    if (moved.model.plant != physics::Plant::equations) return is_late;
-    return is_late && std::any_of(moved.moved.begin(), moved.moved.end(), [&](std::size_t o) {
+    if (moved.model.plant != physics::Plant::equations) return comes_late(finding.term);
+    return finding.term.info->lateness != physics::Lateness::none &&
+           std::any_of(moved.moved.begin(), moved.moved.end(), [&](std::size_t o) {
              return finding.term.on == physics::place_of_output(moved.model.equations, moved.outputs[o]);
            });
   });

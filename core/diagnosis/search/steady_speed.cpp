@@ -37,13 +37,15 @@ Line line_of(const Case& data) {
 
 std::optional<physics::Term> twin_at_steady_speed(const Case& data, const physics::Term& term) {
   using physics::Plant;
-  constexpr const char *along = "force_ripple", *in_time = "periodic_disturbance";
-  const bool is_along = term.info->name == along;
-  if (term.info->plant != Plant::axis || (!is_along && term.info->name != in_time)) return std::nullopt;
+  const auto& info = *term.info;
+  if (info.plant != Plant::axis || !info.is_wave()) return std::nullopt;
+  const bool is_along = info.has("pitch") && info.site == "force";
+  if (!is_along && !(info.is_wave_in_time() && info.site == "disturbance")) return std::nullopt;
   const auto line = line_of(data);
   if (line.speed == 0.0) return std::nullopt;
   physics::Term twin;
-  twin.info = physics::find_term(Plant::axis, is_along ? in_time : along);
+  twin.info = is_along ? physics::find_term(Plant::axis, "periodic_disturbance")
+                       : physics::find_term(Plant::axis, "force_ripple");
   for (std::size_t i = 0; i < twin.info->parameter_count(); ++i)
     twin.values[i] = twin.info->parameters[i].starts[0], twin.given[i] = true;
   const auto of = [](const physics::Term& one, const char* name) { return one.info->index_of(name); };

@@ -155,7 +155,7 @@ double goes_on(const Case& data, const Model& near, const Recording& recording) 
 bool is_held(const Case& data) {
   const auto& terms = data.model.terms;
   const auto spring = std::find_if(terms.begin(), terms.end(), [](const physics::Term& term) {
-    return term.info->name == "position_stiffness" && term.values[term.info->index_of("stiffness")] > 0.0;
+    return term.info->is_spring && term.values[term.info->index_of("stiffness")] > 0.0;
   });
   if (spring == terms.end()) return false;
   constexpr double soon = 0.05;

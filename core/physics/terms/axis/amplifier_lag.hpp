@@ -17,7 +17,8 @@ struct AmplifierLag {
       .parameters = {{{"time_constant", "s", {0.0, 0.1}, Role::amplitude, {2e-4}, "of the current loop"}}},
       .description =
           "The current loop has a bandwidth: the motor current follows its command like a first-order lag.",
-      .source = "di/dt = (u - i) / time_constant"};
+      .source = "di/dt = (u - i) / time_constant",
+      .lateness = Lateness::lag};
   static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::amplifier_lag};
 };
 

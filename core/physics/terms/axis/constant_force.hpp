@@ -16,7 +16,8 @@ struct ConstantForce {
       .depends_on = {},
       .parameters = {{{"force", "N", {-2000.0, 2000.0}, Role::amplitude, {0.3}, "towards +x"}}},
       .description = "The axis is not level, or a weight or a spring of constant force pulls at it.",
-      .source = "F = mass g sin(tilt)"};
+      .source = "F = mass g sin(tilt)",
+      .is_steady = true};
   static double force(const AxisPoint& /*at*/, const double* p) { return p[0]; }
   static constexpr AxisTermKind kind{.info = &info, .force = force};
 };

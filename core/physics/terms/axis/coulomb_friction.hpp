@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/physics/axis_hooks.hpp"
+#include "core/physics/experiments.hpp"
 
 namespace invar::physics {
 
@@ -19,7 +20,9 @@ struct CoulombFriction {
           "Dry friction of guideway and seals: of constant size, against the motion; it also holds the "
           "carriage at rest up to that size.",
       .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 1",
-      .is_friction = true};
+      .is_friction = true,
+      .told_apart = {
+          {{"constant_force", experiments::both_ways}, {"presliding_friction", experiments::creep}}}};
   static double friction(double /*speed*/, const double* p) { return p[0]; }
   static constexpr AxisTermKind kind{.info = &info, .friction = friction};
 };

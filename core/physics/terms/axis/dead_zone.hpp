@@ -20,7 +20,8 @@ struct DeadZone {
           "Cross-over of the output stage: commands smaller than the width give nothing, larger ones lose "
           "it.",
       .source = "u - width sign(u) where |u| > width, else 0",
-      .sticks_and_slips = true};
+      .sticks_and_slips = true,
+      .cut = Cut::around_zero};
   static double command(double u, double /*time*/, double /*step*/, const double* p) {
     return u > p[0] ? u - p[0] : (u < -p[0] ? u + p[0] : 0.0);
   }

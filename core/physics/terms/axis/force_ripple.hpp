@@ -20,7 +20,10 @@ struct ForceRipple {
       .description =
           "Cogging: the magnets pull the iron of the carriage towards places that repeat with the "
           "pole pitch, whether or not a current flows.",
-      .source = "Otten, de Vries, van Amerongen, IEEE/ASME Trans. Mechatronics 2 (1997), sect. II"};
+      .source = "Otten, de Vries, van Amerongen, IEEE/ASME Trans. Mechatronics 2 (1997), sect. II",
+      .told_apart = {{{"motor_constant_ripple",
+                       "cross the same places at high and at low current: the ripple of the motor constant "
+                       "goes with the current"}}}};
   static double force(const AxisPoint& at, const double* p) {
     return p[0] * std::sin(2.0 * std::numbers::pi * at.position / p[1] + p[2]);
   }

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/physics/axis_hooks.hpp"
+#include "core/physics/experiments.hpp"
 
 namespace invar::physics {
 
@@ -18,7 +19,9 @@ struct MeasurementDelay {
       .description =
           "Interpolation electronics and serial transfer take time: the controller sees where the carriage "
           "was.",
-      .source = "y(t) = x(t - delay)"};
+      .source = "y(t) = x(t - delay)",
+      .lateness = Lateness::delay,
+      .told_apart = {{{"amplifier_lag", experiments::quick}}}};
   static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::measurement_delay};
 };
 

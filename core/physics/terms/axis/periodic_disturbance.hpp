@@ -19,7 +19,13 @@ struct PeriodicDisturbance {
                       {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at time zero"},
                       {"onset", "s", {-1e12, 1e12}, Role::reference, {-1e9}, "when it begins"}}},
       .description = "A pump, a fan or a neighbouring machine shakes the axis in its own rhythm.",
-      .source = "F = amplitude sin(2 pi frequency t + phase)"};
+      .source = "F = amplitude sin(2 pi frequency t + phase)",
+      .told_apart = {
+          {{"force_ripple",
+            "run at another speed: a ripple along the way keeps its pitch, a disturbance in time "
+            "its frequency"},
+           {"additive_disturbance",
+            "record with the motor switched off and the carriage free: a force shakes it still"}}}};
   static double force(const AxisPoint& at, const double* p) {
     if (at.time < p[3]) return 0.0;
     return p[0] * std::sin(2.0 * std::numbers::pi * p[1] * at.time + p[2]);

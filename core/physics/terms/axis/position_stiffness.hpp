@@ -17,7 +17,8 @@ struct PositionStiffness {
       .parameters = {{{"stiffness", "N/m", {0.0, 1e6}, Role::amplitude, {5.0}, "force per way"},
                       {"center", "m", {-2.0, 2.0}, Role::shape, {0.0}, "where it pulls neither way"}}},
       .description = "A cable chain, a hose, a bellows or leaf springs pull the carriage towards one place.",
-      .source = "Hooke: F = -stiffness (x - center)"};
+      .source = "Hooke: F = -stiffness (x - center)",
+      .is_spring = true};
   static double force(const AxisPoint& at, const double* p) { return -p[0] * (at.position - p[1]); }
   static constexpr AxisTermKind kind{.info = &info, .force = force};
 };

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/physics/axis_hooks.hpp"
+#include "core/physics/experiments.hpp"
 
 namespace invar::physics {
 
@@ -29,7 +30,10 @@ struct PreslidingFriction {
       .source =
           "LuGre at constant level; Dahl, AIAA Journal 14 (1976), exponent 1: dF/dx = stiffness (1 - F/level "
           "sign(v))",
-      .is_friction = true};
+      .is_friction = true,
+      .springs_first = true,
+      .in_proportion = {"stiffness", 1.0},  // they bend as far as before
+      .told_apart = {{{"constant_force", experiments::both_ways}}}};
   /// The bristle deflection after moving by `way` from a deflection `z` (both m): the exact solution for one
   /// direction of motion, whatever the speed.
   static double deflection(double z, double way, const double* p) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/physics/axis_hooks.hpp"
+#include "core/physics/experiments.hpp"
 
 namespace invar::physics {
 
@@ -26,7 +27,10 @@ struct StribeckFriction {
           "Dry friction that falls from its value at rest to the Coulomb level as a lubricant film "
           "builds up.",
       .source = "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994), eq. 4, exponent 2",
-      .is_friction = true};
+      .is_friction = true,
+      .falls_with_speed = true,
+      .told_apart = {
+          {{"constant_force", experiments::both_ways}, {"presliding_friction", experiments::creep}}}};
   static double friction(double speed, const double* p) {
     const double s = speed / p[2];
     return p[0] + (p[1] - p[0]) * std::exp(-s * s);

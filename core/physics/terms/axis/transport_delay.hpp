@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/physics/axis_hooks.hpp"
+#include "core/physics/experiments.hpp"
 
 namespace invar::physics {
 
@@ -17,7 +18,13 @@ struct TransportDelay {
       .parameters = {{{"delay", "s", {0.0, 0.05}, Role::amplitude, {2e-4}, "dead time before the motor"}}},
       .description =
           "Computation, bus and amplifier take time: the current of one instant acts some time later.",
-      .source = "u(t - delay)"};
+      .source = "u(t - delay)",
+      .lateness = Lateness::delay,
+      .told_apart = {{{"measurement_delay",
+                       "record the position with a second, direct instrument and diagnose with its column, "
+                       "`current` as an input and no controller: a late motor is found again, a late encoder "
+                       "is not"},
+                      {"amplifier_lag", experiments::quick}}}};
   static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::transport_delay};
 };
 

@@ -15,7 +15,8 @@ struct CameraRotation {
       .depends_on = {"image"},
       .parameters = {{{"angle", "rad", {-0.5, 0.5}, Role::amplitude, {2e-3}, "counter-clockwise"}}},
       .description = "The image is turned: what lies off its centre is taken for a shift across.",
-      .source = "shift = angle (-image_y, image_x)"};
+      .source = "shift = angle (-image_y, image_x)",
+      .needs = "image_x"};
   static void apply(Droplet& d, const double* p) {
     d.shift_x -= p[0] * d.image_y, d.shift_y += p[0] * d.image_x;
   }

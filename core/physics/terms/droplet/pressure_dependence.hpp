@@ -21,7 +21,8 @@ struct PressureDependence {
                        {1e5},
                        "at which the nominal speed holds"}}},
       .description = "The drop leaves faster under higher pressure, so it flies for less time.",
-      .source = "Bernoulli has exponent 1/2: speed (pressure / reference_pressure)^exponent"};
+      .source = "Bernoulli has exponent 1/2: speed (pressure / reference_pressure)^exponent",
+      .needs = "pressure"};
   static void apply(Droplet& d, const double* p) {
     if (d.pressure > 0.0) d.speed_factor *= std::pow(d.pressure / p[1], p[0]);
   }

@@ -16,7 +16,11 @@ struct StageVelocityCarry {
       .parameters = {{{"speed", "m/s", {0.05, 50.0}, Role::shape, {3.0}, "of the drop at the nozzle"}}},
       .description =
           "Printing on the fly, the drop flies on with the stage: it lands velocity times flight time ahead.",
-      .source = "shift = velocity height / speed"};
+      .source = "shift = velocity height / speed",
+      .needs = "velocity_x",
+      .told_apart = {{{"valve_delay",
+                       "print at two clearly different heights: carry grows with the height, a valve delay "
+                       "does not"}}}};
   static void apply(Droplet& d, const double* p) {
     d.speed = p[0];
     d.carried = true;

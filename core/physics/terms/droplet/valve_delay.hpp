@@ -16,7 +16,8 @@ struct ValveDelay {
       .parameters = {{{"delay", "s", {0.0, 0.2}, Role::amplitude, {5e-4}, "from trigger to drop"}}},
       .description =
           "Between trigger and drop the stage moves on: the drop lands velocity times delay ahead.",
-      .source = "shift = velocity delay"};
+      .source = "shift = velocity delay",
+      .needs = "velocity_x"};
   static void apply(Droplet& d, const double* p) { d.delay += p[0]; }
   static constexpr DropletTermKind kind{.info = &info, .apply = apply};
 };

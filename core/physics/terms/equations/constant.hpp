@@ -16,7 +16,8 @@ struct Constant {
       .depends_on = {},
       .parameters = {{{"value", "*", {}, Role::amplitude, {0.01}, "added to the rate"}}},
       .description = "An offset: a leak at constant rate, a tilt, a bias of an input.",
-      .source = "constant rate"};
+      .source = "constant rate",
+      .is_steady = true};
   static double rate(double /*s*/, const double* p) { return p[0]; }
   static constexpr EquationsTermKind kind{.info = &info, .rate = rate};
 };

@@ -16,7 +16,9 @@ struct Coupling {
       .depends_on = {},
       .parameters = {{{"coefficient", "*", {}, Role::amplitude, {0.01}, "rate per variable"}}},
       .description = "Another part of the system acts here, which the equations leave out.",
-      .source = "linear in the other variable"};
+      .source = "linear in the other variable",
+      .power = 1,
+      .joined_by = "to"};
   static double rate(double s, const double* p) { return p[0] * s; }
   static constexpr EquationsTermKind kind{.info = &info, .rate = rate};
 };

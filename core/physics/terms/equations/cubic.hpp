@@ -16,7 +16,9 @@ struct Cubic {
       .depends_on = {},
       .parameters = {{{"coefficient", "*", {}, Role::amplitude, {0.01}, "rate per cube"}}},
       .description = "A spring that hardens or softens, or another odd characteristic.",
-      .source = "Duffing 1918: s^3"};
+      .source = "Duffing 1918: s^3",
+      .power = 3,
+      .joined_by = "in"};
   static double rate(double s, const double* p) { return p[0] * s * s * s; }
   static constexpr EquationsTermKind kind{.info = &info, .rate = rate};
 };

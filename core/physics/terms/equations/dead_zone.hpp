@@ -19,7 +19,8 @@ struct DeadZone {
       .source =
           "s - width sign(s) where |s| > width, else 0; of a state: in all rates, or (`with: others`) in all "
           "but its own",
-      .sticks_and_slips = true};
+      .sticks_and_slips = true,
+      .cut = Cut::around_zero};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dead_zone};
 };
 

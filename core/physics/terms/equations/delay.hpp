@@ -16,7 +16,11 @@ struct Delay {
       .depends_on = {"history"},
       .parameters = {{{"delay", "*", {0.0, 1e6}, Role::amplitude, {1e-3}, "in the unit of time"}}},
       .description = "Transport through a pipe, a bus or a computation.",
-      .source = "s(t - delay); of a state: in all rates, or (`with: others`) in all but its own"};
+      .source = "s(t - delay); of a state: in all rates, or (`with: others`) in all but its own",
+      .lateness = Lateness::delay,
+      .told_apart = {{{"lag",
+                       "change the input quickly, up to the rate of the rows: a delay keeps the shape, a lag "
+                       "rounds it"}}}};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::delay};
 };
 

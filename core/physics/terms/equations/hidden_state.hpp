@@ -20,7 +20,8 @@ struct HiddenState {
       .source =
           "adds coefficient (z - s), of a state to its rate, of an input or output to itself (then a share); "
           "dz/dt = (s - z) / "
-          "time_constant, z in balance at the start"};
+          "time_constant, z in balance at the start",
+      .lateness = Lateness::store};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::hidden_state};
 };
 

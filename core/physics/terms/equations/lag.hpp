@@ -18,7 +18,8 @@ struct Lag {
       .description = "An actuator or a sensor that follows like a first-order lag.",
       .source =
           "z for s, dz/dt = (s - z) / time_constant; of a state: in all rates, or (`with: others`) in all "
-          "but its own"};
+          "but its own",
+      .lateness = Lateness::lag};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::lag};
 };
 

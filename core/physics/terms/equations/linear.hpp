@@ -16,7 +16,9 @@ struct Linear {
       .depends_on = {},
       .parameters = {{{"coefficient", "*", {}, Role::amplitude, {0.01}, "rate per state"}}},
       .description = "A leak, a damping or a spring in proportion that the equations leave out.",
-      .source = "series of the missing rate, first order"};
+      .source = "series of the missing rate, first order",
+      .power = 1,
+      .joined_by = "in"};
   static double rate(double s, const double* p) { return p[0] * s; }
   static constexpr EquationsTermKind kind{.info = &info, .rate = rate};
 };

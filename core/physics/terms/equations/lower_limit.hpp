@@ -16,7 +16,8 @@ struct LowerLimit {
       .depends_on = {},
       .parameters = {{{"limit", "*", {}, Role::shape, {-1e300}, "smallest value"}}},
       .description = "A stop, a bottom, an end of a range.",
-      .source = "max(s, limit)"};
+      .source = "max(s, limit)",
+      .cut = Cut::beyond_a_limit};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::lower_limit};
 };
 

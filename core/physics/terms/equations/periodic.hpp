@@ -18,7 +18,8 @@ struct Periodic {
                       {"period", "*", {1e-9, 1e12}, Role::shape, {1.0}, "of the variable"},
                       {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "at zero"}}},
       .description = "Something repeats: teeth, magnets, a pump, the day.",
-      .source = "amplitude sin(2 pi s / period + phase)"};
+      .source = "amplitude sin(2 pi s / period + phase)",
+      .joined_by = "in"};
   static double rate(double s, const double* p) {
     return p[0] * std::sin(2.0 * std::numbers::pi * s / p[1] + p[2]);
   }

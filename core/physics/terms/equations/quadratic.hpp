@@ -16,7 +16,9 @@ struct Quadratic {
       .depends_on = {},
       .parameters = {{{"coefficient", "*", {}, Role::amplitude, {0.01}, "rate per square"}}},
       .description = "Drag of air or turbulent flow: it grows with the square and keeps its sign.",
-      .source = "s |s|"};
+      .source = "s |s|",
+      .power = 2,
+      .joined_by = "in"};
   static double rate(double s, const double* p) { return p[0] * s * std::abs(s); }
   static constexpr EquationsTermKind kind{.info = &info, .rate = rate};
 };

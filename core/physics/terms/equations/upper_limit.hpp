@@ -15,7 +15,8 @@ struct UpperLimit {
                                  .depends_on = {},
                                  .parameters = {{{"limit", "*", {}, Role::shape, {1e300}, "largest value"}}},
                                  .description = "A stop, an edge, an end of a range.",
-                                 .source = "min(s, limit)"};
+                                 .source = "min(s, limit)",
+                                 .cut = Cut::beyond_a_limit};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::upper_limit};
 };
 

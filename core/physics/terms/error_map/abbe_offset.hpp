@@ -31,7 +31,8 @@ struct AbbeOffset {
              "one way in the first half, the other in the second"}}},
       .description =
           "The carriage pitches or yaws; beside the scale that moves the point by offset times angle.",
-      .source = "Abbe 1890; ISO 230-1: error = offset angle(position), the angle a cubic along the way"};
+      .source = "Abbe 1890; ISO 230-1: error = offset angle(position), the angle a cubic along the way",
+      .needs_varied = "offset"};  // beside one offset a tilt is any course over the position
   static double error(const MapPoint& at, const double* p) {
     const double s = (at.position - at.first) / (at.last - at.first);
     const double u = 2.0 * s - 1.0;

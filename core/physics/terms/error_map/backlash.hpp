@@ -30,7 +30,8 @@ struct Backlash {
           "Play or elastic wind-up in the drive: a point reached from below differs from the same point "
           "reached from above.",
       .source = "ISO 230-2, reversal value: middle + width / 2 times the direction",
-      .sticks_and_slips = true};
+      .sticks_and_slips = true,
+      .needs = "direction"};
   static double error(const MapPoint& at, const double* p) { return 0.5 * p[0] * at.direction + p[1]; }
   static constexpr ErrorMapTermKind kind{.info = &info, .error = error};
 };

@@ -23,7 +23,9 @@ struct HeatingRateLag {
       .description =
           "The thermometer sits elsewhere than the scale: while the machine warms, the expansion that the "
           "thermometer foretells comes later.",
-      .source = "dT_scale/dt = (T - T_scale) / time_constant, in the expansion of the model"};
+      .source = "dT_scale/dt = (T - T_scale) / time_constant, in the expansion of the model",
+      .needs = "temperature",
+      .acts_in = "expansion"};
   static constexpr ErrorMapTermKind kind{.info = &info, .delays_warmth = true};
 };
 

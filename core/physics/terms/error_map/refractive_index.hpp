@@ -25,7 +25,8 @@ struct RefractiveIndex {
       .description =
           "The wavelength of an interferometer is shorter in denser air: without correction it counts "
           "more of them and reads longer at higher pressure.",
-      .source = "Edlen 1966, Birch and Downs, Metrologia 30 (1993): about 2.7e-7 per hPa"};
+      .source = "Edlen 1966, Birch and Downs, Metrologia 30 (1993): about 2.7e-7 per hPa",
+      .needs = "pressure"};
   static double error(const MapPoint& at, const double* p) {
     return p[0] * (at.pressure - p[1]) * at.position;
   }

@@ -19,7 +19,9 @@ struct ThermalExpansion {
       .description =
           "Scale and table expand unlike each other: the error grows with the position and with the "
           "temperature above the reference.",
-      .source = "ISO 230-3: coefficient (T - T_ref) position"};
+      .source = "ISO 230-3: coefficient (T - T_ref) position",
+      .needs = "temperature",
+      .stands_for = "expansion"};
   static double error(const MapPoint& at, const double* p) { return p[0] * at.warmth * at.position; }
   static constexpr ErrorMapTermKind kind{.info = &info, .error = error};
 };

@@ -17,7 +17,8 @@ struct Bias {
       .parameters =
           {{{"value", "*", {-1e3, 1e3}, Role::amplitude, {1e-6}, "added to the reading, in its unit"}}},
       .description = "Offset of an amplifier or of a zero point.",
-      .source = "y = x + value"};
+      .source = "y = x + value",
+      .is_steady = true};
   static double reading(const SensorPoint& /*at*/, const double* p) { return p[0]; }
   static constexpr SensorTermKind kind{.info = &info, .reading = reading};
 };

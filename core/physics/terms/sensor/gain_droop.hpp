@@ -19,7 +19,8 @@ struct GainDroop {
       .description =
           "The signal falls with speed (bandwidth, field, eddy currents): the reading is too small when "
           "fast.",
-      .source = "y = x (1 - coefficient |velocity|)"};
+      .source = "y = x (1 - coefficient |velocity|)",
+      .instrument = Instrument::analogue};
   static double reading(const SensorPoint& at, const double* p) {
     return -p[0] * std::abs(at.velocity) * at.value;
   }

@@ -17,7 +17,8 @@ struct Hysteresis {
       .parameters = {{{"width", "m", {0.0, 1e-2}, Role::amplitude, {1e-6}, "the whole gap"}}},
       .description =
           "A coupling with play or a sticking head: after a reversal the reading comes late by the width.",
-      .source = "play operator: y stays within x - width/2 .. x + width/2"};
+      .source = "play operator: y stays within x - width/2 .. x + width/2",
+      .instrument = Instrument::counting};
   static constexpr SensorTermKind kind{.info = &info, .plays = true};
 };
 

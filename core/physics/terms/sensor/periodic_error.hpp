@@ -18,7 +18,8 @@ struct PeriodicError {
                       {"pitch", "m", {1e-6, 1.0}, Role::shape, {2e-3}, "period of the scale or tape"},
                       {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "phase at position zero"}}},
       .description = "Interpolation between the lines of a scale is not perfect.",
-      .source = "Heydemann, Applied Optics 20 (1981)"};
+      .source = "Heydemann, Applied Optics 20 (1981)",
+      .instrument = Instrument::counting};
   static double reading(const SensorPoint& at, const double* p) {
     return p[0] * std::sin(2.0 * std::numbers::pi * at.position / p[1] + p[2]);
   }

@@ -23,7 +23,9 @@ struct HiddenNode {
       .description =
           "A part behind a contact takes up heat while the node warms and gives it back later; nobody "
           "measures it.",
-      .source = "lumped network: C2 dT2/dt = conductance (T - T2); in balance at the start"};
+      .source = "lumped network: C2 dT2/dt = conductance (T - T2); in balance at the start",
+      .lateness = Lateness::store,
+      .in_proportion = {"capacity"}};  // it fills as fast as before
   static constexpr ThermalTermKind kind{.info = &info, .memory = ThermalMemory::hidden_node};
 };
 

@@ -20,7 +20,8 @@ struct MotorHeating {
                        {0.2},
                        "of the winding, as far as its heat comes here"}}},
       .description = "The winding turns current into heat, part of which arrives at this node.",
-      .source = "Joule: P = resistance I^2"};
+      .source = "Joule: P = resistance I^2",
+      .needs = "motor_current"};
   static double heat(const ThermalPoint& at, const double* p) {
     return p[0] * at.motor_current * at.motor_current;
   }

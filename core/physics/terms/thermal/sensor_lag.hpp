@@ -17,7 +17,8 @@ struct SensorLag {
           {{{"time_constant", "s", {0.0, 1e4}, Role::amplitude, {2.0}, "of the sensor on its place"}}},
       .description =
           "The sensor has a heat capacity and sits behind glue or paste: it shows where the node was.",
-      .source = "dT_sensor/dt = (T - T_sensor) / time_constant"};
+      .source = "dT_sensor/dt = (T - T_sensor) / time_constant",
+      .lateness = Lateness::lag};
   static constexpr ThermalTermKind kind{.info = &info, .memory = ThermalMemory::sensor_lag};
 };
 

@@ -22,7 +22,8 @@ struct SpeedDependentConvection {
           "forced convection: P = coefficient |speed| (|speed| / at_speed)^(exponent - 1) (T - T_amb); the "
           "exponent is 0.5 in "
           "laminar and 0.8 in turbulent flow (Incropera, Fundamentals of Heat and Mass Transfer, 7.2), and 1 "
-          "over a small range"};
+          "over a small range",
+      .needs = "speed"};
   static double heat(const ThermalPoint& at, const double* p) {
     const double speed = std::abs(at.speed), meant = p[2] > 0.0 ? p[2] : 1.0;
     const double bent = speed > 0.0 && p[1] > 0.0 && p[1] != 1.0 ? std::pow(speed / meant, p[1] - 1.0) : 1.0;
