@@ -35,7 +35,7 @@ Tried attempt(ThermalRegression& identifier, const std::string& name, const Want
   Tried tried{terms, start, {}, {}};
   identifier.use(terms);
   identifier.search(tried.hyper, step);
-  tried.posterior = identifier.fit(tried.hyper, true);
+  tried.posterior = identifier.fit(tried.hyper, numerics::Covariance::found);
   tried.candidate.name = name;
   tried.candidate.log_evidence = tried.posterior.log_evidence;
   tried.candidate.left_out_rms = identifier.left_out_rms(tried.posterior, std::exp(tried.hyper.at("noise")));
@@ -109,7 +109,7 @@ std::optional<Tried> with_lag(const ThermalReadings& readings, const Tried& quic
     for (const double less_noise : {0.0, 0.7, 1.4, 2.1}) {
       ThermalHyper hyper = quick.hyper;
       hyper["noise"] -= less_noise;
-      most = std::max(most, lagged.fit(hyper, false).log_evidence);
+      most = std::max(most, lagged.fit(hyper, numerics::Covariance::left_out).log_evidence);
     }
     return most;
   };

@@ -139,8 +139,8 @@ void ThermalRegression::reweigh(const Eigen::VectorXd& weights) {
   sums_ = NormalEquations::of(rows_, readings_.error, weights_);
 }
 
-Posterior ThermalRegression::fit(const ThermalHyper& hyper, bool with_covariance) const {
-  return posterior(sums_, prior(hyper), std::exp(hyper.at("noise")), with_covariance);
+Posterior ThermalRegression::fit(const ThermalHyper& hyper, numerics::Covariance covariance) const {
+  return posterior(sums_, prior(hyper), std::exp(hyper.at("noise")), covariance);
 }
 
 void ThermalRegression::search(ThermalHyper& hyper, double step) const {
@@ -161,7 +161,7 @@ void ThermalRegression::search(ThermalHyper& hyper, double step) const {
       const double spread = name.ends_with("length") ? 1.0 : 3.0;
       log_prior -= 0.5 * std::pow((p(k) - defaults.at(name)) / spread, 2);
     }
-    return fit(trial, false).log_evidence + log_prior;
+    return fit(trial, numerics::Covariance::left_out).log_evidence + log_prior;
   };
   const Eigen::VectorXd best = numerics::maximise(objective, start, step, 0.2);
   for (Eigen::Index k = 0; k < best.size(); ++k) hyper[names[static_cast<std::size_t>(k)]] = best(k);
@@ -176,7 +176,7 @@ void ThermalRegression::reject_outliers() {
   Eigen::VectorXd residual = readings_.error;
   for (int round = 0; round < 8; ++round) {
     hyper["noise"] = std::log(std::max(0.3 * robust_size(residual), 1e-12));
-    const Posterior p = fit(hyper, false);
+    const Posterior p = fit(hyper, numerics::Covariance::left_out);
     residual = readings_.error - rows_ * p.mean;
     const double sigma = std::max(robust_size(residual), finest);
     reweigh((1.0 + (residual.array() / (2.0 * sigma)).square()).inverse());
@@ -230,7 +230,7 @@ double ThermalRegression::held_out_rms(const ThermalHyper& hyper) const {
     for (std::size_t i = 0; i < fold.size(); ++i)
       if (fold[i] == out) kept(static_cast<Eigen::Index>(i)) = 0.0;
     const auto p = posterior(NormalEquations::of(rows_, readings_.error, kept), prior(hyper),
-                             std::exp(hyper.at("noise")), false);
+                             std::exp(hyper.at("noise")), numerics::Covariance::left_out);
     for (std::size_t k = 0; k < fold.size(); ++k) {
       const auto i = static_cast<Eigen::Index>(k);
       if (fold[k] != out || weights_(i) <= 0.0) continue;

@@ -35,7 +35,7 @@ class ThermalRegression {
 
   void use(const WantedTerms& terms);
   void reweigh(const Eigen::VectorXd& weights);
-  [[nodiscard]] numerics::Posterior fit(const ThermalHyper& hyper, bool with_covariance) const;
+  [[nodiscard]] numerics::Posterior fit(const ThermalHyper& hyper, numerics::Covariance covariance) const;
   /// Fills in what is missing of `hyper`, then maximises evidence and hyperprior over all that matter.
   void search(ThermalHyper& hyper, double step) const;
   /// Weights of zero for readings that stand alone beyond 4.5 standard deviations, one for the others: a stretch of

@@ -29,7 +29,8 @@ NormalEquations NormalEquations::of(const Eigen::Ref<const Eigen::MatrixXd>& row
 }
 
 Posterior posterior(const NormalEquations& data, const std::vector<Eigen::MatrixXd>& prior_factors,
-                    double noise, bool with_covariance) {
+                    double noise, Covariance covariance) {
+  const bool with_covariance = covariance == Covariance::found;
   const double precision = 1.0 / (noise * noise);
   const Eigen::Index size = data.gram.rows();
   Eigen::MatrixXd h(size, size);  // lower part only

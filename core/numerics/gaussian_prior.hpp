@@ -26,10 +26,12 @@ struct Posterior {
   double log_evidence = 0.0;   // log p(y | prior, noise), all constants in
 };
 
+enum class Covariance { left_out, found };
+
 /// theta = L z, z ~ N(0, I): the prior covariance is L L', L lower triangular, block diagonal in the given
 /// order. Whitening keeps the problem well conditioned however flat the prior is. O(M^3).
 Posterior posterior(const NormalEquations& data, const std::vector<Eigen::MatrixXd>& prior_factors,
-                    double noise, bool with_covariance);
+                    double noise, Covariance covariance);
 
 /// Matern covariance of smoothness 5/2 at distance r, unit variance: once-differentiable curvature, hence
 /// heavier tails in frequency than a Gaussian, hence an honest sigma between readings.

@@ -10,8 +10,8 @@
 #include "core/diagnosis/estimate/weighing.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
-#include "core/diagnosis/search/options.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
+#include "core/diagnosis/search/options.hpp"
 #include "core/model/record_file.hpp"
 #include "core/physics/simulation.hpp"
 #include "tests/support/mismatch/marks.hpp"
@@ -43,8 +43,8 @@ Fit refitted(const Case& data, diagnosis::Weighing& weighing) {
   Fit best;
   best.model = data.model;
   for (int again = 0; again < 3; ++again) {
-    weighing = diagnosis::weigh(data, diagnosis::simulate(data, best.model), false);
-    best = diagnosis::fit(data, weighing, best.model, data.model, 10);
+    weighing = diagnosis::weigh(data, diagnosis::simulate(data, best.model), diagnosis::Colour::white);
+    best = diagnosis::fit(data, weighing, best.model, data.model, diagnosis::Effort::follow(10));
   }
   return best;
 }
@@ -259,12 +259,12 @@ Answer stepwise(const Machine& machine, const Case& data, diagnosis::Weighing we
         diagnosis::screen(data, weighing, best, diagnosis::named_starts(data, weighing, best, {}), 0);
     Fit next = best;
     for (std::size_t i = 0; i < std::min<std::size_t>(3, screened.size()); ++i)
-      if (auto tried = diagnosis::fit_with(data, weighing, best, screened[i], 8);
+      if (auto tried = diagnosis::fit_with(data, weighing, best, screened[i], diagnosis::Effort::follow(8));
           tried.evidence > next.evidence)
         next = std::move(tried);
     if (next.model.terms.size() == best.model.terms.size()) break;
-    weighing = diagnosis::weigh(data, diagnosis::simulate(data, next.model), false);
-    best = diagnosis::fit(data, weighing, next.model, data.model, 6, &next);
+    weighing = diagnosis::weigh(data, diagnosis::simulate(data, next.model), diagnosis::Colour::white);
+    best = diagnosis::fit(data, weighing, next.model, data.model, diagnosis::Effort::follow(6), &next);
   }
   return of_model(machine, data, best.model);
 }

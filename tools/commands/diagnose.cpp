@@ -10,6 +10,8 @@
 #include <limits>
 #include <memory>
 #include <sstream>
+#include <stop_token>
+#include <thread>
 
 #include "core/diagnosis/checks/clock.hpp"
 #include "core/diagnosis/dataset/load.hpp"
@@ -32,6 +34,8 @@
 namespace invar::tools {
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 struct Options {
   std::filesystem::path model;
@@ -69,6 +73,24 @@ class ProgressLine {
   bool is_seen_ = isatty(STDERR_FILENO) == 1;
 };
 
+/// Requests a stop of the search at the first Ctrl-C, so that what is known is reported, or when its time is over. A second
+/// Ctrl-C ends the program.
+class Ending {
+ public:
+  explicit Ending(Clock::time_point deadline)
+      : watch_{[this, deadline](const std::stop_token& gone) {
+          constexpr std::chrono::milliseconds pause{20};
+          while (!gone.stop_requested() && !interrupted() && Clock::now() < deadline)
+            std::this_thread::sleep_for(pause);
+          source_.request_stop();
+        }} {}
+  [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
+
+ private:
+  std::stop_source source_;
+  std::jthread watch_;
+};
+
 /// What a fit has seen proves nothing of it.
 void check_are_others(const Options& options) {
   for (const auto& check : options.checks)
@@ -103,7 +125,6 @@ void print(const std::string& summary) {
 }
 
 int run(const Options& options) {
-  using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
   keep_memory();
   if (!(options.budget > 0.0) || !std::isfinite(options.budget))
@@ -133,13 +154,11 @@ int run(const Options& options) {
   std::vector<diagnosis::Wanted> wanted;
   for (const auto& text : options.assumed) wanted.push_back(diagnosis::wanted_of(text));
   if (!wanted.empty()) diagnosis::check_wanted(data, wanted, "--assume");
-  // The first Ctrl-C ends the search and reports what it knows; a second one ends the program.
-  diagnosis::Options how;
-  how.stopped = [&] {
-    const std::chrono::duration<double> took = Clock::now() - began;
-    return interrupted() || took.count() > for_search * options.budget;
-  };
   (void)interrupted();
+  const Ending ending{began + std::chrono::duration_cast<Clock::duration>(
+                                  std::chrono::duration<double>{for_search * options.budget})};
+  diagnosis::Options how;
+  how.stop = ending.token();
   diagnosis::ReportFolder{options.out};
   auto patience =
       std::make_unique<Patience>("invar: stopped before there was anything to say; no report was written");

@@ -114,7 +114,7 @@ std::optional<Start> curve_start(const Case& data, const Fit& fitted, const Choi
   }
   // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
   if (data.model.plant == Plant::axis && start.term.info->site == "measurement")
-    start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), false).filters[0].sigma;
+    start.term.curve.usual = 10.0 * weigh(data, simulate(data, fitted.model), Colour::white).filters[0].sigma;
   start.step = step_of_curve(data, fitted, start.term);
   if (choice.memory == Memory::relaxation) start.step /= high - low;
   return start;

@@ -233,7 +233,8 @@ void lay_knots(Start& start, const Span& span, std::size_t count) {
 
 }  // namespace
 
-std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, bool products) {
+std::vector<Start> equation_curves(const Case& data, const physics::Model& fitted, Curves curves) {
+  const bool products = curves == Curves::times_a_variable;
   const Spans spans{data, fitted};
   const std::size_t most = products ? 6 : 8, knots = std::clamp<std::size_t>(spans.rows / 20, 4, most);
   const auto& equations = data.model.equations;

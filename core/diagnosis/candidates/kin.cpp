@@ -149,11 +149,14 @@ std::vector<Fit> fits_of_other_laws(const Case& data, const Weighing& weighing, 
                                     std::size_t term, const std::set<std::string, std::less<>>& without) {
   const auto others = other_laws(data, start.model, term, without);
   std::vector<Fit> fits(others.size());
-  in_parallel(fits.size(), [&](std::size_t i) { fits[i] = fit(data, weighing, others[i], data.model, 4); });
+  in_parallel(fits.size(), [&](std::size_t i) {
+    fits[i] = fit(data, weighing, others[i], data.model, Effort::follow(4));
+  });
   std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.evidence > b.evidence; });
   if (fits.size() > 2) fits.resize(2);  // the others lag behind
-  in_parallel(fits.size(),
-              [&](std::size_t i) { fits[i] = fit(data, weighing, fits[i].model, data.model, 8, &fits[i]); });
+  in_parallel(fits.size(), [&](std::size_t i) {
+    fits[i] = fit(data, weighing, fits[i].model, data.model, Effort::follow(8), &fits[i]);
+  });
   return fits;
 }
 

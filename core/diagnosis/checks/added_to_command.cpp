@@ -229,8 +229,11 @@ std::vector<double> about(double frequency, const Series& series) {
   return evenly(frequency - 0.5 / lasts, frequency + 0.5 / lasts, 0.05 / lasts);
 }
 
-Guess from_wave(const Series& series, const Wave& wave, double frequency, double phase, bool is_square,
+enum class Form { sine, square };
+
+Guess from_wave(const Series& series, const Wave& wave, double frequency, double phase, Form form,
                 bool has_level) {
+  const bool is_square = form == Form::square;
   const double half = std::numbers::pi * frequency * (series.time[1] - series.time[0]);
   const double amplitude = std::hypot(wave.cosine, wave.sine);
   Guess guess;
@@ -253,7 +256,7 @@ Guess sine(const Series& series, double near, bool has_level) {
   const auto left = [&](double frequency) { return wave_at(series, frequency).left; };
   const double frequency = least_of(about(near, series), left);
   const auto wave = wave_at(series, frequency);
-  return from_wave(series, wave, frequency, std::atan2(wave.cosine, wave.sine), false, has_level);
+  return from_wave(series, wave, frequency, std::atan2(wave.cosine, wave.sine), Form::sine, has_level);
 }
 
 Guess square(const Series& series, double near, double phase, bool has_level) {
@@ -273,7 +276,7 @@ Guess square(const Series& series, double near, double phase, bool has_level) {
   phase = phase_of(frequency, turn);
   auto wave = square_at(series, frequency, phase);
   if (wave.sine < 0.0) wave.sine = -wave.sine, phase += std::numbers::pi;
-  return from_wave(series, wave, frequency, phase, true, has_level);
+  return from_wave(series, wave, frequency, phase, Form::square, has_level);
 }
 
 /// Of the longest recording, whose rows without a word of the law count as its mean.

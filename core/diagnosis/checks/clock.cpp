@@ -105,8 +105,10 @@ Retuned retuned(const Case& data, const Recording& recording, double factor) {
   for (auto& [signal, values] : inputs.signals) values.resize(rows);
   for (auto& column : measured) column.resize(rows);
   simulation = physics::prepare(some.model, inputs);
-  auto found = fit(some, weigh(some, simulate(some, some.model), false), some.model, some.model, 8);
-  found = fit(some, weigh(some, simulate(some, found.model), false), found.model, some.model, 8);
+  auto found = fit(some, weigh(some, simulate(some, some.model), Colour::white), some.model, some.model,
+                   Effort::follow(8));
+  found = fit(some, weigh(some, simulate(some, found.model), Colour::white), found.model, some.model,
+              Effort::follow(8));
   const auto simulated = simulate(some, found.model);
   Retuned all{0.0, excursion_of(found)};
   for (std::size_t o = 0; o < measured.size(); ++o) {

@@ -38,8 +38,8 @@ void check_own_units(const Case& data, const Fit& retuned) {
     const auto* input = input_of(data.model, one.signal);
     if (input == nullptr) continue;
     const auto changed = as_it_stands(data, one);
-    const auto weighing = weigh(changed, simulate(changed, changed.model), false);
-    const auto found = fit(changed, weighing, changed.model, changed.model, 8);
+    const auto weighing = weigh(changed, simulate(changed, changed.model), Colour::white);
+    const auto found = fit(changed, weighing, changed.model, changed.model, Effort::follow(8));
     const auto in_si = squares_left(data, retuned.model), as_written = squares_left(changed, found.model);
     double farther = 1e300;
     for (std::size_t o = 0; o < in_si.size(); ++o)

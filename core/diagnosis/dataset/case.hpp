@@ -1,9 +1,9 @@
 // Case: the model that the user believes and the recordings of the machine, ready to be compared.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -28,8 +28,19 @@ struct Recording {
   std::shared_ptr<const physics::Simulation> simulation;
 };
 
-/// Thrown where a simulation is asked for after `Case::stopped` said so.
+/// Thrown where a simulation is asked for after a stop was requested.
 struct Stopped {};
+
+/// Does a step; nothing where a stop was requested before its end.
+template <class Step>
+auto unless_stopped(const std::stop_token& stop, Step step) -> std::optional<decltype(step())> {
+  if (stop.stop_requested()) return std::nullopt;
+  try {
+    return step();
+  } catch (const Stopped&) {
+    return std::nullopt;
+  }
+}
 
 /// A column in a unit that is none of SI's, beside equations that do not say which they count it in.
 struct TakenInSi {
@@ -58,11 +69,11 @@ struct Case {
   };
   Windows windows;
   std::optional<physics::Term>
-      beside_law;                 // what is added to the current or changed in it, as the recorded one shows
-  std::size_t quiet_rows = 0;     // over which inputs were replaced by their running median; 0: as recorded
-  double left_of_inputs = 0.0;    // log likelihood that what noise is left on these inputs may yield
-  bool is_time_series = true;     // rows follow one another; false for droplets
-  std::function<bool()> stopped;  // asked before each simulation; empty: never
+      beside_law;               // what is added to the current or changed in it, as the recorded one shows
+  std::size_t quiet_rows = 0;   // over which inputs were replaced by their running median; 0: as recorded
+  double left_of_inputs = 0.0;  // log likelihood that what noise is left on these inputs may yield
+  bool is_time_series = true;   // rows follow one another; false for droplets
+  std::stop_token stop;         // looked at before each simulation
   std::shared_ptr<Remembered> remembered = std::make_shared<Remembered>();
 };
 

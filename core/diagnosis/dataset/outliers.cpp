@@ -75,10 +75,13 @@ std::vector<double> counts_of(const std::vector<double>& values) {
   return counts;
 }
 
+enum class Order { in_time, none };
+
 /// Which are alone far from zero; nothing where most are zero. A step of two counts, and half of one for the rounding of what
 /// it is compared with, is how a converter reads: `counts` by row.
-std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off, double scale,
-                                                 bool is_time_series, const std::vector<double>& counts) {
+std::optional<std::vector<std::size_t>> far_from(const std::vector<double>& off, double scale, Order order,
+                                                 const std::vector<double>& counts) {
+  const bool is_time_series = order == Order::in_time;
   if (!(scale > 0.0)) return std::nullopt;
   constexpr double read_alike = 2.5;  // counts
   const double limit = (is_time_series ? 6.0 : 5.0) * scale;
@@ -230,24 +233,24 @@ void drop_outliers(Case& data, const std::vector<physics::Outputs>& simulated) {
         }
       if (residual.size() < 20) continue;
       const auto plant = data.model.plant;
+      const auto order = data.is_time_series ? Order::in_time : Order::none;
       const bool is_row_by_row = is_static(plant), is_swept = is_row_by_row && data.is_time_series;
       if (!is_row_by_row) drop(data, measured, rows, ends_apart(residual));
       const auto counts = counts_of(read);
       // Against the median of its neighbourhood, on the scale of all such differences.
       auto off = off_median(residual, data.is_time_series ? 3 : 40);
-      auto lone = far_from(off, scale_of(off, residual, data.is_time_series), data.is_time_series, counts);
+      auto lone = far_from(off, scale_of(off, residual, data.is_time_series), order, counts);
       // Of a residual that runs smoothly or in coarse steps, most values are the median themselves, and next to
       // nothing is the scale: then the straight lines through the neighbours count. One row in ten is no outlier.
       const auto are_too_many = [&] { return !lone || 10 * lone->size() > residual.size(); };
       if ((are_too_many() && !is_row_by_row) || (!lone && is_swept)) {
         off = off_lines(residual);
-        lone = far_from(off, robust_sigma(off), true, counts);
+        lone = far_from(off, robust_sigma(off), Order::in_time, counts);
         if (are_too_many() && !is_row_by_row) continue;
       }
       if (!lone) continue;
       if (is_swept) forget_continued(*lone, residual, off);
-      if (are_too_many() && is_row_by_row)
-        lone = far_from(off, wider_scale(off), data.is_time_series, counts);
+      if (are_too_many() && is_row_by_row) lone = far_from(off, wider_scale(off), order, counts);
       if (lone && is_row_by_row) keep_effects(*lone, off, recorded_at(data, r, rows));
       if (!lone) continue;
       drop(data, measured, rows, *lone);

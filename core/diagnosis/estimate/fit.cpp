@@ -181,10 +181,10 @@ class Jacobian {
 /// Maximum a posteriori estimate by Levenberg-Marquardt, with Broyden's updates of the Jacobian between fresh ones.
 class Minimizer {
  public:
-  Minimizer(const Case& data, const Weighing& weighing, Fit start, int iterations, const Fit* near)
+  Minimizer(const Case& data, const Weighing& weighing, Fit start, Effort effort, const Fit* near)
       : data_{data},
         weighing_{weighing},
-        iterations_{iterations},
+        effort_{effort},
         at_{std::move(start)},
         jacobian_{data, weighing, nearly(data, at_.model, at_.free, near)},
         is_fresh_{near == nullptr},
@@ -200,7 +200,7 @@ class Minimizer {
   Fit minimize() {
     take_factor();
     find_slopes();
-    for (int i = 0; i < iterations_ && count() > 0; ++i)
+    for (int i = 0; i < effort_.steps && count() > 0; ++i)
       if (!step()) break;
     at_.columns = jacobian_.take_columns();
     find_covariance();
@@ -209,8 +209,6 @@ class Minimizer {
 
  private:
   [[nodiscard]] Eigen::Index count() const { return static_cast<Eigen::Index>(at_.free.size()); }
-  /// So few steps only polish a fit that has been at its end before: the derivatives are not looked at again.
-  [[nodiscard]] bool only_polishes() const { return iterations_ < 4; }
 
   /// False where no further step is worth its cost.
   bool step() {
@@ -220,7 +218,7 @@ class Minimizer {
     if (!step.allFinite()) return false;
     Trial trial = try_out(step);
     if (trial.cost < at_.cost) return go_to(std::move(trial));
-    if (trial.cost < at_.cost + as_good && (is_fresh_ || only_polishes())) return false;
+    if (trial.cost < at_.cost + as_good && (is_fresh_ || effort_.only_polishes)) return false;
     if (!is_fresh_) {  // carried derivatives may be what misled the step
       find_jacobian();
       find_slopes();
@@ -264,7 +262,7 @@ class Minimizer {
     at_.data_cost = trial.data_cost;
     take_factor();
     damping_ = std::max(1e-9, 0.1 * damping_);
-    if (is_settled && (is_verified_ || only_polishes())) return false;
+    if (is_settled && (is_verified_ || effort_.only_polishes)) return false;
     if (is_settled || is_cheap_)  // carried derivatives cannot say that the fit has arrived
       find_jacobian();
     else
@@ -306,7 +304,7 @@ class Minimizer {
 
   const Case& data_;
   const Weighing& weighing_;
-  const int iterations_;
+  const Effort effort_;
   Fit at_;
   Eigen::VectorXd raw_;
   Jacobian jacobian_;
@@ -349,9 +347,9 @@ double rarity_of_all(const Case& data, const Model& believed, const Model& model
 
 }  // namespace
 
-Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, int iterations,
+Fit fit(const Case& data, const Weighing& weighing, const Model& start, const Model& believed, Effort effort,
         const Fit* near) {
-  Minimizer minimizer{data, weighing, begin_at(data, start, believed), iterations, near};
+  Minimizer minimizer{data, weighing, begin_at(data, start, believed), effort, near};
   Fit best = minimizer.minimize();
   best.unlikely = rarity_of_all(data, believed, best.model);
   best.evidence = -best.cost - complexity_of(weighing, believed, best) - best.unlikely;

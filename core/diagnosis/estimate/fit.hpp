@@ -9,6 +9,19 @@
 
 namespace invar::diagnosis {
 
+/// How far a fit is followed.
+struct Effort {
+  int steps = 0;              // at most
+  bool only_polishes = true;  // the derivatives are not looked at again
+
+  /// The start as it stands.
+  static constexpr Effort evaluate() { return {}; }
+  /// A few steps of a fit that has been at its end before.
+  static constexpr Effort polish(int steps) { return {steps, true}; }
+  /// To its end, or so many steps.
+  static constexpr Effort follow(int steps) { return {steps, false}; }
+};
+
 struct Fit {
   physics::Model model;
   std::vector<Freedom> free;
@@ -26,9 +39,8 @@ struct Fit {
 /// mains' frequencies, shaking anywhere.
 double price_of_current(double frequency);
 
-/// From the numbers in `start`. `iterations` 0 only evaluates. The sensitivities of freedoms that `near` has too are
-/// taken from there and then kept up to date by Broyden's rule; they are found anew where a step fails.
+/// From the numbers in `start`. The sensitivities of freedoms that `near` has too are taken from there and then kept up to date by Broyden's rule; they are found anew where a step fails.
 Fit fit(const Case& data, const Weighing& weighing, const physics::Model& start,
-        const physics::Model& believed, int iterations, const Fit* near = nullptr);
+        const physics::Model& believed, Effort effort, const Fit* near = nullptr);
 
 }  // namespace invar::diagnosis

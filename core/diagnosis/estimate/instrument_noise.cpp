@@ -81,7 +81,7 @@ double instrument_noise(const Case& data, const std::vector<physics::Outputs>& s
 
 double squares_in_noise(const Case& data, const Fit& fit, const Fit& best) {
   const auto near = simulate(data, best.model), simulated = simulate(data, fit.model);
-  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  const auto left = squares_left(data, simulated, weigh(data, simulated, Colour::white));
   double sum = 0.0;
   for (std::size_t o = 0; o < left.size(); ++o)
     if (const double noise = instrument_noise(data, near, o); noise > 0.0)

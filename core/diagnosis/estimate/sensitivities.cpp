@@ -26,7 +26,7 @@ void for_differences_of(const Case& data, const std::vector<Model>& models,
                                    ? std::clamp<std::size_t>((models.size() + threads - 1) / threads, 1, 4)
                                    : 1;
   in_parallel((models.size() + together - 1) / together, [&](std::size_t group) {
-    if (data.stopped && data.stopped()) throw Stopped{};
+    if (data.stop.stop_requested()) throw Stopped{};
     const std::size_t begin = group * together, end = std::min(models.size(), begin + together);
     std::vector<const Model*> some;
     for (std::size_t k = begin; k < end; ++k) some.push_back(&models[k]);

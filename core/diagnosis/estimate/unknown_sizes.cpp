@@ -35,7 +35,7 @@ void find_unknown_sizes(Case& data) {
   const auto size_of = [&](const Range& bounds, const std::function<void(physics::Model&, double)>& set) {
     if (!weighing) {
       const auto simulated = simulate(data, data.model);
-      weighing = weigh(data, simulated, false);
+      weighing = weigh(data, simulated, Colour::white);
       as_written = differences(data, simulated);
     }
     return usual_size(data, *weighing, as_written, bounds, set);

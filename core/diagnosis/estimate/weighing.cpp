@@ -18,13 +18,13 @@ std::vector<physics::Outputs> simulate(const Case& data, const Model& model) {
 }
 
 std::vector<physics::Outputs> simulate_once(const Case& data, const Model& model) {
-  if (data.stopped && data.stopped()) throw Stopped{};
+  if (data.stop.stop_requested()) throw Stopped{};
   std::vector<physics::Outputs> all(data.recordings.size());
   for (std::size_t r = 0; r < all.size(); ++r) data.recordings[r].simulation->run(model, all[r]);
   return all;
 }
 
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured) {
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, Colour colour) {
   Weighing weighing;
   weighing.left_of_inputs = data.left_of_inputs;
   weighing.present.resize(data.recordings.size());
@@ -44,7 +44,8 @@ Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated,
       weighing.present[r].push_back(std::move(present));
       weighing.rows += static_cast<Eigen::Index>(measured.size());
     }
-    const std::size_t most = coloured && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
+    const std::size_t most =
+        colour == Colour::fitted && data.is_time_series ? std::min<std::size_t>(16, used / 150) : 0;
     auto filter = fit_whitening(series, most);
     // Hardly any values: nothing but the user's word says how good they are.
     if (used < 20 && std::isfinite(data.given_noise[o])) filter = {{}, data.given_noise[o]};

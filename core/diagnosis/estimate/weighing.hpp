@@ -20,9 +20,15 @@ struct Weighing {
       1.0;  // what one nat of log likelihood counts: outputs of one loop tell the same thing twice
 };
 
-/// Rows that are measured; filters as fitted to the residuals of these simulations. Without `coloured` every row counts
-/// alike: right for looking for physics in a residual that is not noise yet.
-Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated, bool coloured = true);
+/// How the noise is taken to go on from row to row.
+enum class Colour {
+  fitted,  // as the residual does
+  white,   // every row counts alike: right for looking for physics in a residual that is not noise yet
+};
+
+/// Rows that are measured; filters as fitted to the residuals of these simulations.
+Weighing weigh(const Case& data, const std::vector<physics::Outputs>& simulated,
+               Colour colour = Colour::fitted);
 
 std::vector<physics::Outputs> simulate(const Case& data, const physics::Model& model);
 /// The same of a model that nobody will ask for again; it pushes no other out of what is remembered.

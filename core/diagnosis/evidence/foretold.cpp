@@ -31,8 +31,11 @@ std::vector<bool> kept_back(const physics::Record& inputs, std::size_t quarter) 
   return kept;
 }
 
+enum class Rows { kept_back, others };
+
 /// The weighing of the rows that a quarter keeps back, or of all others.
-Weighing rows_of_quarter(const Case& data, Weighing weighing, std::size_t quarter, bool inside) {
+Weighing rows_of_quarter(const Case& data, Weighing weighing, std::size_t quarter, Rows rows_of) {
+  const bool inside = rows_of == Rows::kept_back;
   for (std::size_t r = 0; r < data.recordings.size(); ++r) {
     const auto kept = kept_back(data.recordings[r].inputs, quarter);
     for (auto& rows : weighing.present[r])
@@ -60,18 +63,17 @@ bool Foretold::is_plain() const {
 Foretold foretold(const Case& data, const Fit& with, const Fit& without) {
   if (has_few_stretches(data)) return {};
   const auto near = simulate(data, with.model);
-  const auto plain = weigh(data, near, false);
+  const auto plain = weigh(data, near, Colour::white);
   std::vector<double> noise;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) noise.push_back(instrument_noise(data, near, o));
   std::array<std::array<double, 2>, quarters> left{};
   in_parallel(2 * quarters, [&](std::size_t k) {
     const auto quarter = k / 2;
     const auto& whole = k % 2 == 0 ? with : without;
-    constexpr int steps = 4;
-    const auto fitted =
-        fit(data, rows_of_quarter(data, plain, quarter, false), whole.model, data.model, steps, &whole);
-    const auto squares =
-        squares_left(data, simulate(data, fitted.model), rows_of_quarter(data, plain, quarter, true));
+    const auto fitted = fit(data, rows_of_quarter(data, plain, quarter, Rows::others), whole.model,
+                            data.model, Effort::follow(4), &whole);
+    const auto squares = squares_left(data, simulate(data, fitted.model),
+                                      rows_of_quarter(data, plain, quarter, Rows::kept_back));
     for (std::size_t o = 0; o < squares.size(); ++o)
       if (noise[o] > 0.0) left[quarter][k % 2] += squares[o].sum / (noise[o] * noise[o]);
   });

@@ -79,7 +79,7 @@ std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, 
     // To first order a curve gains all that it can: it is linear in its values.
     if (screened[i].merit < 0.0 || screened[i].columns.size() == 0) break;
     const Fit near = with_columns(data, base, screened[i]);
-    const auto fitted = fit(data, weighing, near.model, data.model, 4, &near);
+    const auto fitted = fit(data, weighing, near.model, data.model, Effort::follow(4), &near);
     if (fitted.evidence <= further.evidence || (best && fitted.evidence <= best->evidence)) continue;
     for (std::size_t t = data.model.terms.size(); t < base.model.terms.size(); ++t)
       if (is_course_of(screened[i].start.term, base.model.terms[t])) best = {t, fitted.evidence};

@@ -44,7 +44,7 @@ std::vector<LoopNoise::Readings> shaken(const physics::Model& model, const Case&
                                         std::size_t shifts) {
   std::vector<LoopNoise::Readings> runs(2 * shifts, LoopNoise::Readings(noise.size()));
   in_parallel(runs.size() * noise.size(), [&](std::size_t at) {
-    if (data.stopped && data.stopped()) throw Stopped{};
+    if (data.stop.stop_requested()) throw Stopped{};
     const std::size_t k = at % runs.size(), r = at / runs.size();
     const auto& time = data.recordings[r].inputs.time;
     const std::size_t n = time.size(), by = (k / 2 + 1) * n / (shifts + 1);
@@ -208,11 +208,11 @@ double LoopNoise::take_off(const physics::Model& model) {
   return is_judged ? untold / rows : 0.0;
 }
 
-std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model, bool roughly) const {
+std::vector<physics::Outputs> LoopNoise::shaken_mean(const physics::Model& model, Runs runs) const {
   auto mean = simulate(data_, model);
   const auto position = fed_back(data_);
   if (!position) return mean;
-  const auto off = softened(data_, recorded_, model, *position, roughly ? 1 : few_shifts);
+  const auto off = softened(data_, recorded_, model, *position, runs == Runs::two ? 1 : few_shifts);
   for (std::size_t r = 0; r < off.size(); ++r)
     for (std::size_t o = 0; o < off[r].size(); ++o)
       for (std::size_t i = 0; i < off[r][o].size(); ++i) mean[r][o][i] += off[r][o][i];

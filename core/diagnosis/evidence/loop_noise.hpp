@@ -24,9 +24,10 @@ class LoopNoise {
   [[nodiscard]] Readings now() const;
   /// Rows that are left out now since chance decides in them.
   [[nodiscard]] std::size_t left_to_chance() const;
-  /// The mean of runs of a model that the noise shakes which it leaves itself; `roughly`: of two runs alone.
+  enum class Runs { few, two };
+  /// The mean of runs of a model that the noise shakes which it leaves itself.
   [[nodiscard]] std::vector<physics::Outputs> shaken_mean(const physics::Model& model,
-                                                          bool roughly = false) const;
+                                                          Runs runs = Runs::few) const;
   /// Does `with` lie nearer than `without`, by this ratio of the residual of any output, when it is shaken too? Play that is
   /// finer than the noise shows in a run without noise alone.
   [[nodiscard]] bool shows(const physics::Model& with, const physics::Model& without, double ratio) const;

@@ -53,8 +53,8 @@ double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t pl
   auto limit = best.model;
   auto& stiffness = limit.terms[place].values[info.index_of("stiffness")];
   stiffness = std::min(stiffer * stiffness, info.parameters[info.index_of("stiffness")].bounds.upper);
-  const auto plain = weigh(data, simulate(data, best.model), false);
-  auto stiff = fit(data, plain, limit, data.model, 0);
+  const auto plain = weigh(data, simulate(data, best.model), Colour::white);
+  auto stiff = fit(data, plain, limit, data.model, Effort::evaluate());
   // Two numbers fewer.
   std::erase_if(stiff.free, [&](const Freedom& f) {
     return f.where == Freedom::Where::term && f.term == place && f.index > 0;

@@ -85,8 +85,8 @@ namespace {
 Beside beside(const Case& data, const Fit& best,
               const std::function<std::vector<Start>(const Fit& under_plain)>& starts) {
   Beside one;
-  one.plain = weigh(data, simulate(data, best.model), false);
-  one.fit = fit(data, one.plain, best.model, data.model, 4, &best);
+  one.plain = weigh(data, simulate(data, best.model), Colour::white);
+  one.fit = fit(data, one.plain, best.model, data.model, Effort::follow(4), &best);
   one.courses = screen(data, one.plain, one.fit, starts(one.fit), tried_curves);
   return one;
 }
@@ -108,14 +108,15 @@ Beside courses_beside(const Case& data, const Fit& best, const Fit* spanned) {
 }
 
 Beside products_beside(const Case& data, const Fit& best) {
-  return beside(data, best, [&](const Fit&) { return equation_curves(data, best.model, true); });
+  return beside(data, best,
+                [&](const Fit&) { return equation_curves(data, best.model, Curves::times_a_variable); });
 }
 
 std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, std::size_t term) {
   const auto& [plain, named, courses, memories] = beside;
   if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
     return std::nullopt;
-  const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, 6);
+  const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, Effort::follow(6));
   // In place of a law of friction a course of it along the way is a cause of its own, which beside the law is none.
   const auto starts = unmodelled_starts(data, data.model.plant == physics::Plant::axis ? base : named);
   const auto instead = screen(data, plain, base, starts, 4);
@@ -125,7 +126,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
     const Fit start = with_columns(data, base, s);
     if (data.model.plant == physics::Plant::equations && !is_affordable(data, start)) continue;
     OtherCause one;
-    one.fit = fit(data, plain, start.model, data.model, 4, &start);
+    one.fit = fit(data, plain, start.model, data.model, Effort::follow(4), &start);
     one.lead = lead(data, one.fit, named);
     // Another course over the term's own variable is a matter of form, unless next to nothing is left of the name.
     // Friction need not be the same everywhere to be friction. What a state beside it passes on comes to the same.

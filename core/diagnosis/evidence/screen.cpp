@@ -197,9 +197,9 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
 }
 
 Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const Screened& added,
-             int iterations) {
+             Effort effort) {
   const physics::Model whole = with(base, {&added});
-  const auto from_whole = [&] { return fit(data, weighing, whole, data.model, iterations, &base); };
+  const auto from_whole = [&] { return fit(data, weighing, whole, data.model, effort, &base); };
   physics::Model best = whole;
   double least = residual(data, weighing, best).squaredNorm();
   bool is_whole = true;
@@ -210,7 +210,7 @@ Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const 
   }
   if (is_whole) return from_whole();
   // The whole strength may be right once the other numbers give way, which they have not here.
-  auto near = fit(data, weighing, best, data.model, iterations, &base);
+  auto near = fit(data, weighing, best, data.model, effort, &base);
   auto far = from_whole();
   return far.evidence > near.evidence ? far : near;
 }

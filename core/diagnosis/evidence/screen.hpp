@@ -39,7 +39,7 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
 /// A fit that begins with the screened term at whatever share of its first-order strength comes nearest: where the
 /// system bends, first order may overshoot by far.
 Fit fit_with(const Case& data, const Weighing& weighing, const Fit& base, const Screened& added,
-             int iterations);
+             Effort effort);
 
 /// For a curve: model, freedoms and sensitivities from which a fit may begin without finding them again.
 Fit with_columns(const Case& data, const Fit& base, const Screened& added);

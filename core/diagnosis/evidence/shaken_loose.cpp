@@ -44,8 +44,8 @@ Step solved(const Weighing& weighing, const Fit& base, const Eigen::MatrixXd& co
 /// Size and numbers as the runs of this size say, if `at` are those without it.
 Step looked_for(const Case& data, const LoopNoise& noise, const Weighing& weighing, const Fit& base,
                 const Eigen::MatrixXd& columns, const Eigen::VectorXd& at, const char* name, double size,
-                bool roughly) {
-  const Eigen::VectorXd raw = differences(data, noise.shaken_mean(with_bend(base, name, size), roughly)) - at;
+                LoopNoise::Runs runs) {
+  const Eigen::VectorXd raw = differences(data, noise.shaken_mean(with_bend(base, name, size), runs)) - at;
   return solved(weighing, base, columns, filtered(data, weighing, raw), size);
 }
 
@@ -59,7 +59,7 @@ std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, c
   constexpr double sure = 3.0;  // sigmas
   Step step;
   for (int i = 0; i < 5; ++i) {
-    step = looked_for(data, noise, weighing, base, columns, at, name, size, false);
+    step = looked_for(data, noise, weighing, base, columns, at, name, size, LoopNoise::Runs::few);
     if (!is_seen(step, sure)) return std::nullopt;
     const double next = std::clamp(step.size, 0.1 * size, 10.0 * size);
     const bool arrived = std::abs(next - size) < 0.1 * size;
@@ -73,7 +73,7 @@ std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, c
                                   step.numbers(static_cast<Eigen::Index>(k))));
   ShakenLoose found{with_bend(moved, name, size), {}, {}, 0.0};
   found.weighing = weigh(data, noise.shaken_mean(found.model));
-  found.without = fit(data, found.weighing, base.model, data.model, 4, &base).model;
+  found.without = fit(data, found.weighing, base.model, data.model, Effort::follow(4), &base).model;
   const double rows = std::max(10.0, found.weighing.temper * static_cast<double>(base.residual.size()));
   found.gain = noise.gain(found.model, found.without, found.weighing) - 0.5 * std::log(rows);
   return found;
@@ -97,14 +97,15 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
   };
   const Eigen::MatrixXd columns = whitened(data, weighing, base.columns).dense();
   constexpr double perhaps = 1.0;  // sigmas
-  const Eigen::VectorXd roughly_at = differences(data, noise.shaken_mean(base.model, true));
+  const Eigen::VectorXd roughly_at = differences(data, noise.shaken_mean(base.model, LoopNoise::Runs::two));
   Eigen::VectorXd at;  // once something is seen
   std::optional<ShakenLoose> best;
   for (const Bend& bend :
        {Bend{"coulomb_friction", "force", 0.05 * base.model.value("motor_constant", 1.0) * current},
         Bend{"dead_zone", "actuator", 0.2 * current}, Bend{"backlash", "measurement", reading}}) {
     if (without.contains(bend.name) || is_known(bend.site)) continue;
-    if (!is_seen(looked_for(data, noise, weighing, base, columns, roughly_at, bend.name, bend.size, true),
+    if (!is_seen(looked_for(data, noise, weighing, base, columns, roughly_at, bend.name, bend.size,
+                            LoopNoise::Runs::two),
                  perhaps))
       continue;
     if (at.size() == 0) at = differences(data, noise.shaken_mean(base.model));

@@ -64,7 +64,7 @@ Eigen::MatrixXd second_times(const Case& data, const Fit& named, std::size_t ter
 
 double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd& shift) {
   if (shift.cols() == 0) return 0.0;
-  const auto plain = weigh(data, simulate(data, named.model), false);
+  const auto plain = weigh(data, simulate(data, named.model), Colour::white);
   const auto left = residual(data, plain, named.model).squaredNorm();
   const auto all = whitened(data, plain, named.columns.with(shift.rowwise().sum())).dense();
   const auto own = named.columns.cols();
@@ -98,7 +98,8 @@ OtherShape other_shape(const Case& data, const Beside& beside, std::size_t term)
     weigh_up(squares_taken(plain, data, named, late), late.cols());
   if (found.lead < claim_margin) return found;
   const auto without = physics::without_term(named.model, term);
-  const double all = fit(data, plain, without, data.model, 6).residual.squaredNorm() - squares + taken;
+  const double all =
+      fit(data, plain, without, data.model, Effort::follow(6)).residual.squaredNorm() - squares + taken;
   found.share = all > 0.0 ? std::clamp(taken / all, 0.0, 1.0) : 0.0;
   return found;
 }

@@ -41,7 +41,7 @@ bool looks_alike(const Case& data, const Fit& best, const Fit& rival, std::size_
   if (!twin || twin->info != rival.model.terms[place].info || least_ratio(data, best, rival) < a_tenth)
     return false;
   const auto simulated = simulate(data, best.model);
-  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  const auto left = squares_left(data, simulated, weigh(data, simulated, Colour::white));
   for (std::size_t o = 0; o < left.size(); ++o)
     if (left[o].rms() > times_noise * instrument_noise(data, simulated, o)) return true;
   return false;
@@ -63,9 +63,10 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals,
         model.terms[t].values[0] += 0.7 * removed.values[0];
         if (model.terms[t].info->falls_with_speed) model.terms[t].values[1] += removed.values[0];
       }
-    auto without = fit(data, d.weighing, model, data.model, 10);
+    auto without = fit(data, d.weighing, model, data.model, Effort::follow(10));
     for (const auto& other : with_friction(data, removed, model, without_names))
-      if (auto one = fit(data, d.weighing, other, data.model, 10); one.evidence > without.evidence)
+      if (auto one = fit(data, d.weighing, other, data.model, Effort::follow(10));
+          one.evidence > without.evidence)
         without = std::move(one);
     bool possible = true;
     for (std::size_t t = given; t < without.model.terms.size(); ++t)
@@ -88,8 +89,8 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals,
     if (i < rivals.size()) rivals.erase(rivals.begin() + at);
     if (i < d.findings.size()) d.findings.erase(d.findings.begin() + at);
     d.weighing = weigh(data, simulate(data, d.best.model));
-    d.best = fit(data, d.weighing, d.best.model, data.model, 4, &d.best);
-    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+    d.best = fit(data, d.weighing, d.best.model, data.model, Effort::follow(4), &d.best);
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
     i = static_cast<std::size_t>(-1);
   }
 }
@@ -99,19 +100,19 @@ void put_laws_right(const Case& data, Diagnosis& d, Rivals& rivals,
   for (std::size_t i = 0; i < rivals.size(); ++i) {
     const std::size_t place = data.model.terms.size() + i;
     const Term claimed = d.best.model.terms[place];
-    const auto plain = weigh(data, simulate(data, d.best.model), false);
-    auto best = fit(data, plain, d.best.model, data.model, 0, &d.best);
+    const auto plain = weigh(data, simulate(data, d.best.model), Colour::white);
+    auto best = fit(data, plain, d.best.model, data.model, Effort::evaluate(), &d.best);
     for (auto& other : fits_of_other_laws(data, plain, best, place, without))
       if (other.evidence > best.evidence && stands(data, other, place)) best = std::move(other);
     if (label(best.model.terms[place]) == label(claimed)) continue;
     rivals[i].push_back(claimed);
     d.weighing = weigh(data, simulate(data, best.model));
-    d.best = fit(data, d.weighing, best.model, data.model, 8, &best);
-    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+    d.best = fit(data, d.weighing, best.model, data.model, Effort::follow(8), &best);
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
   }
 }
 
-void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool refuses) {
+void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, Claims claims) {
   for (int pass = 0; pass < 2; ++pass)
     for (std::size_t i = 0; i < rivals.size(); ++i) {
       const std::size_t place = data.model.terms.size() + i;
@@ -119,12 +120,12 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool ref
       Finding finding;
       std::vector<Term> kept;
       for (const auto& rival : rivals[i]) {
-        if (data.stopped && data.stopped()) break;
+        if (data.stop.stop_requested()) break;
         const auto is_same = [&](const Term& other) { return label(other) == label(rival); };
         if (is_same(d.best.model.terms[place]) || std::any_of(kept.begin(), kept.end(), is_same)) continue;
         Model model = d.best.model;
         model.terms[place] = rival;
-        auto f = fit(data, d.weighing, model, data.model, 8, &d.best);
+        auto f = fit(data, d.weighing, model, data.model, Effort::follow(8), &d.best);
         double odds = advantage(data, d.weighing, f, d.best);
         if (odds > 0.0 && !data.model.controller)  // not what pleases the filters only
           odds = std::min(odds, lead(data, f, d.best));
@@ -135,7 +136,7 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool ref
           d.best = std::move(f);
           continue;
         }
-        if (refuses && !stands(data, f, place)) continue;
+        if (claims == Claims::checked && !stands(data, f, place)) continue;
         kept.push_back(f.model.terms[place]);
         if (looks_alike(data, d.best, f, place)) odds = std::max(odds, of_twins);
         finding.alternatives.push_back({f.model.terms[place], odds});

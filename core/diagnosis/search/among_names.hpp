@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/search/options.hpp"
 
 namespace invar::diagnosis {
 
@@ -20,6 +21,6 @@ void put_laws_right(const Case& data, Diagnosis& d, Rivals& rivals,
                     const std::set<std::string, std::less<>>& without);
 
 /// Puts each rival in the place of its name, the other claims beside it; the best stays, the findings tell of the others.
-void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, bool refuses);
+void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, Claims claims);
 
 }  // namespace invar::diagnosis

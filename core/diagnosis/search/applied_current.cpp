@@ -13,9 +13,9 @@ bool Search::is_another_controller() {
 }
 
 void Search::stop_at_the_law() {
-  check(options_.refuses);
-  d_.best =
-      fit(data_, d_.weighing, data_.model, data_.model, 0);  // numbers that a wrong loop asks for are none
+  check(options_.claims());
+  d_.best = fit(data_, d_.weighing, data_.model, data_.model,
+                Effort::evaluate());  // numbers that a wrong loop asks for are none
   for (auto* rows : {&d_.heldout, &d_.train})
     for (auto& row : *rows) row.after = row.before;
   conclude(data_, d_);
@@ -35,13 +35,13 @@ bool Search::add_applied() {
   progress_(0.06, "looking at the current beside the controller's law");
   auto model = d_.best.model;
   model.terms.push_back(*added);
-  for (const int iterations : {8, 6, 4}) {  // the nearer the fit, the finer its scale
-    const auto weighing = weigh(data_, simulate(data_, model), false);
-    model = fit(data_, weighing, model, data_.model, iterations).model;
+  for (const int steps : {8, 6, 4}) {  // the nearer the fit, the finer its scale
+    const auto weighing = weigh(data_, simulate(data_, model), Colour::white);
+    model = fit(data_, weighing, model, data_.model, Effort::follow(steps)).model;
   }
   d_.weighing = weigh(data_, simulate(data_, model));
-  d_.best = fit(data_, d_.weighing, model, data_.model, 4);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  d_.best = fit(data_, d_.weighing, model, data_.model, Effort::follow(4));
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(5), &d_.retuned);
   if (added->curve.knots.empty()) {
     rivals_.emplace_back();
   } else {

@@ -40,13 +40,13 @@ std::optional<std::pair<Fit, Weighing>> nearest(const Case& data, const Fit& bas
   constexpr std::size_t tried = 4;
   std::optional<std::pair<Fit, Weighing>> best;
   for (std::size_t i = 0; i < std::min(tried, screened.size()); ++i) {
-    auto weighing = weigh(data, simulate(data, base.model), false);
-    auto fitted = fit_with(data, weighing, base, screened[i], 8);
-    weighing = weigh(data, simulate(data, fitted.model), false);
-    fitted = fit(data, weighing, fitted.model, data.model, 8, &fitted);
+    auto weighing = weigh(data, simulate(data, base.model), Colour::white);
+    auto fitted = fit_with(data, weighing, base, screened[i], Effort::follow(8));
+    weighing = weigh(data, simulate(data, fitted.model), Colour::white);
+    fitted = fit(data, weighing, fitted.model, data.model, Effort::follow(8), &fitted);
     // Filters that follow the colour of what is still missing may lead away.
     auto coloured = weigh(data, simulate(data, fitted.model));
-    if (auto near = fit(data, coloured, fitted.model, data.model, 8, &fitted);
+    if (auto near = fit(data, coloured, fitted.model, data.model, Effort::follow(8), &fitted);
         least_ratio(data, fitted, near) > 0.9)
       fitted = std::move(near), weighing = std::move(coloured);
     if (!best || least_ratio(data, fitted, best->first) < 1.0) best.emplace(fitted, weighing);
@@ -64,8 +64,8 @@ Wanted wanted_of(const std::string& text) {
 void check_wanted(const Case& data, const std::vector<Wanted>& wanted, const std::string& option) {
   Case begun = data;  // from rest a pendulum never moves, and nothing could act on it
   cut_into_windows(begun);
-  const auto weighing = weigh(begun, simulate(begun, begun.model), false);
-  const auto base = fit(begun, weighing, begun.model, begun.model, 0);
+  const auto weighing = weigh(begun, simulate(begun, begun.model), Colour::white);
+  const auto base = fit(begun, weighing, begun.model, begun.model, Effort::evaluate());
   for (const auto& [name, place] : wanted) {
     if (physics::find_term(data.model.plant, name) == nullptr) {
       std::set<std::string> names;
@@ -93,8 +93,8 @@ void check_wanted(const Case& data, const std::vector<Wanted>& wanted, const std
 std::vector<Assumed> fit_assumed(const Case& data, const Diagnosis& d, const std::vector<Wanted>& wanted) {
   std::vector<Assumed> all;
   for (const auto& [name, place] : wanted) {
-    const auto weighing = weigh(data, simulate(data, d.retuned.model), false);
-    const auto base = fit(data, weighing, d.retuned.model, data.model, 0);
+    const auto weighing = weigh(data, simulate(data, d.retuned.model), Colour::white);
+    const auto base = fit(data, weighing, d.retuned.model, data.model, Effort::evaluate());
     auto starts = starts_of(data, weighing, base, name);
     std::erase_if(starts, [&, &at = place](const Start& start) { return !is_at(data, start.term, at); });
     auto found = nearest(data, base, screen(data, weighing, base, starts, 0));
@@ -107,7 +107,7 @@ std::vector<Assumed> fit_assumed(const Case& data, const Diagnosis& d, const std
     alone.train.clear();
     alone.findings.assign(1, {});
     alone.findings.front().term = alone.best.model.terms.back();
-    hold_out(data, data, alone, false);
+    hold_out(data, data, alone, Claims::kept);
     give_sigmas(data, alone);
     all.push_back({std::move(alone.findings.front()), std::move(alone.heldout)});
   }

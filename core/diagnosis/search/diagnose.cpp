@@ -65,64 +65,42 @@ constexpr std::array readings{
               return !is_nearer(data, d, quiet, found);
             }}};
 
-/// Steps beside the search proper: one that is interrupted counts for nothing, and is named.
-class Interruptible {
- public:
-  Interruptible(Case& data, const Options& options) : data_{data}, options_{options} {}
-
-  template <class Step>
-  auto take(const char* what, Step step) -> decltype(step()) {
-    data_.stopped = options_.stopped;
-    try {
-      if (!data_.stopped || !data_.stopped()) {
-        auto found = step();
-        data_.stopped = {};
-        return found;
-      }
-    } catch (const Stopped&) {
-    }
-    data_.stopped = {};
-    leave(what);
-    return {};
-  }
-  void leave(const char* what) { add_once(not_tried, what); }
-
-  std::vector<std::string> not_tried;
-
- private:
-  Case& data_;
-  const Options& options_;
-};
-
 }  // namespace
 
 Diagnosis diagnose(Case& data, const Progress& progress, const Options& options) {
-  Interruptible steps{data, options};
+  std::vector<std::string> not_tried;
+  // A step beside the search proper: one that is interrupted counts for nothing, and is named.
+  const auto take = [&](const char* what, const auto& step) -> decltype(step()) {
+    data.stop = options.stop;
+    auto found = unless_stopped(options.stop, step);
+    data.stop = {};
+    if (found) return std::move(*found);
+    add_once(not_tried, what);
+    return {};
+  };
   if (data.model.plant == physics::Plant::axis) {  // before any physics: what the recordings hold
-    steps.take("how the reference goes on between rows", [&] { return settle_hold(data), true; });
-    steps.take("the current beside the controller's law",
-               [&] { return settle_recorded_current(data), true; });
+    take("how the reference goes on between rows", [&] { return settle_hold(data), true; });
+    take("the current beside the controller's law", [&] { return settle_recorded_current(data), true; });
   }
   Case as_read = data;
-  as_read.stopped = {};
   auto best = Search{data, progress, options}.run();
   if (!options.refuses) return best;
   for (const auto& reading : readings) {
     if (best.is_partial) break;
-    auto other = steps.take(reading.name, [&] { return reading.read(as_read, data, best); });
+    auto other = take(reading.name, [&] { return reading.read(as_read, data, best); });
     if (!other) continue;
     other->remembered = std::make_shared<Remembered>();
     const Case other_as_read = *other;
     auto found = Search{*other, progress, options}.run();
     if (found.is_partial) {
-      steps.leave(reading.name);
+      add_once(not_tried, reading.name);
     } else if (reading.is_better(*other, found, data, best)) {
       as_read = other_as_read;
       data = std::move(*other);
       best = std::move(found);
     }
   }
-  say_not_tried(best, steps.not_tried);
+  say_not_tried(best, not_tried);
   return best;
 }
 

@@ -37,7 +37,7 @@ void take_back(const Case& data, Diagnosis& d, std::size_t finding, const std::s
   const auto place = data.model.terms.size() + finding;
   const bool is_rest = d.has_rest && finding + 1 == d.findings.size();
   d.reject(std::string{d.best.model.terms[place].info->name}, why, 0.0);
-  d.best = fit(data, d.weighing, physics::without_term(d.best.model, place), data.model, 6);
+  d.best = fit(data, d.weighing, physics::without_term(d.best.model, place), data.model, Effort::follow(6));
   d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(finding));
   if (is_rest) d.has_rest = false;
   if (d.findings.empty()) d.has_rest = d.is_unnamed = false;

@@ -51,8 +51,9 @@ Fold fold_of(const Case& data, const Weighing& all, std::size_t which) {
 /// The weights under which this model is the best of its kind: coloured ones may follow the colour of what is still
 /// missing and lead away from it; then every row counts alike.
 Weighing weights_of(const Case& data, const Weighing& coloured, const Fit& whole) {
-  const auto again = fit(data, coloured, whole.model, data.model, 6, &whole);
-  return least_ratio(data, whole, again) < 0.97 ? weigh(data, simulate(data, whole.model), false) : coloured;
+  const auto again = fit(data, coloured, whole.model, data.model, Effort::follow(6), &whole);
+  return least_ratio(data, whole, again) < 0.97 ? weigh(data, simulate(data, whole.model), Colour::white)
+                                                : coloured;
 }
 
 /// How many rows of what a model leaves are independent, as a share of them: of the output that has the least.
@@ -73,22 +74,25 @@ double independent_share_of(const Case& data, const std::vector<physics::Outputs
 /// counted in every one of them, a part of the recording would outweigh what the user believes, and lead astray elsewhere.
 Weighing weights_of_rival(const Case& data, const Fit& whole) {
   const auto simulated = simulate(data, whole.model);
-  auto weights = weigh(data, simulated, false);
+  auto weights = weigh(data, simulated, Colour::white);
   weights.temper *= independent_share_of(data, simulated);
   return weights;
 }
 
 /// The model fitted anew without the held-out rows. It begins where the whole recording put it: what is asked is whether
 /// the model holds where it was not fitted, not whether the search finds it again.
-Fit refitted(const Case& data, const Weighing& weights, std::size_t fold, const Fit& whole, int iterations) {
+Fit refitted(const Case& data, const Weighing& weights, std::size_t fold, const Fit& whole, Effort effort) {
   const auto train = fold_of(data, weights, fold).train;
-  return fit(data, train, whole.model, data.model, iterations, &whole);
+  return fit(data, train, whole.model, data.model, effort, &whole);
 }
+
+enum class Course { none, free };
 
 /// A free course knows nothing of a place that the rows of a fold never came to, and whoever asks it there gets whatever the
 /// last rows beside it leave open; so does a state of what it began at, once the rows that would say so are kept back. Rows
 /// that a fit leaves more open than their noise is, by its courses or by its beginnings, are not asked for.
-void ask_what_is_known(const Case& data, const Fit& fold_fit, bool is_curved, Weighing& test) {
+void ask_what_is_known(const Case& data, const Fit& fold_fit, Course course, Weighing& test) {
+  const bool is_curved = course == Course::free;
   std::vector<Eigen::Index> beginnings;
   for (std::size_t k = 0; k < fold_fit.free.size(); ++k)
     if (const auto& f = fold_fit.free[k];
@@ -142,7 +146,8 @@ std::array<Runs, folds> run_folds(const Case& data, const Diagnosis& d) {
   const bool any = has_found(data, d);
   const auto for_retuned = d.is_partial ? d.weighing : weights_of(data, d.weighing, d.retuned);
   const auto for_best = any && !d.is_partial ? weights_of(data, d.weighing, d.best) : for_retuned;
-  const int iterations = d.is_partial ? 1 : 6;  // who stopped it does not want to wait
+  const auto effort =
+      d.is_partial ? Effort::polish(1) : Effort::follow(6);  // who stopped it does not want to wait
   // A claim must win by the weights of what it leaves itself; shown is the rival by those that suit it.
   const bool differs = any && !d.is_partial;
   const auto for_rival = differs ? weights_of_rival(data, d.retuned) : for_retuned;
@@ -150,16 +155,17 @@ std::array<Runs, folds> run_folds(const Case& data, const Diagnosis& d) {
   in_parallel(folds, [&](std::size_t k) {
     auto& [fold, retuned, after, rival] = runs[k];
     fold = fold_of(data, d.weighing, k);
-    const auto fitted = refitted(data, for_retuned, k, d.retuned, iterations);
+    const auto fitted = refitted(data, for_retuned, k, d.retuned, effort);
     after = retuned = simulate(data, fitted.model);
     if (any) {
-      const auto best = refitted(data, for_best, k, d.best, iterations);
-      ask_what_is_known(data, best, d.is_unnamed || d.has_rest, fold.test);
+      const auto best = refitted(data, for_best, k, d.best, effort);
+      ask_what_is_known(data, best, d.is_unnamed || d.has_rest ? Course::free : Course::none, fold.test);
       after = simulate(data, best.model);
     } else {
-      ask_what_is_known(data, fitted, false, fold.test);
+      ask_what_is_known(data, fitted, Course::none, fold.test);
     }
-    rival = differs ? simulate(data, refitted(data, for_rival, k, d.retuned, 3).model) : retuned;
+    rival =
+        differs ? simulate(data, refitted(data, for_rival, k, d.retuned, Effort::polish(3)).model) : retuned;
   });
   return runs;
 }
@@ -225,7 +231,7 @@ void copy_rows(Diagnosis& d, OfModel to, OfModel from) {
 /// Numbers that lead away from what was not seen are not taken over.
 void keep_given_numbers(const Case& data, Diagnosis& d) {
   const bool any = has_found(data, d);
-  d.retuned = fit(data, d.weighing, data.model, data.model, 0);
+  d.retuned = fit(data, d.weighing, data.model, data.model, Effort::evaluate());
   copy_rows(d, &FitRow::retuned, &FitRow::before);
   if (any) return;
   d.best = d.retuned;
@@ -244,11 +250,11 @@ void take_all_back(Diagnosis& d) {
 
 }  // namespace
 
-void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses) {
+void hold_out(const Case& data, const Case& recorded, Diagnosis& d, Claims claims) {
   constexpr double least_gain = 3.0;  // in log likelihood of the held-out rows
   auto all = compare(data, recorded, d, run_folds(data, d));
   tabulate(data, recorded, all, d);
-  if (!refuses) return;
+  if (claims == Claims::kept) return;
   if (errs_more(all, d, &FitRow::retuned, &FitRow::before)) {
     keep_given_numbers(data, d);
     all.gain = all.over_given;
@@ -263,7 +269,7 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses
     take_last_back(data, d, "with it the model is worse on held-out data");
     d.heldout.clear();
     d.train.clear();
-    hold_out(data, recorded, d, refuses);
+    hold_out(data, recorded, d, claims);
     return;
   }
   if (all.gain < least_gain || misleads || !(is_loop || is_nearer)) take_all_back(d);

@@ -45,14 +45,17 @@ Search::Sought Search::seek(From from, double share) {
   Sought sought;
   const Weighing weighing =
       coloured ? d_.weighing
-               : weigh(data_, simulate(data_, from == From::believed ? data_.model : d_.best.model), false);
-  sought.base = coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, 4, &d_.best);
+               : weigh(data_, simulate(data_, from == From::believed ? data_.model : d_.best.model),
+                       Colour::white);
+  sought.base =
+      coloured ? d_.best : fit(data_, weighing, d_.best.model, data_.model, Effort::follow(4), &d_.best);
   progress_(share, "screening candidates");
   const Naming naming{data_, *noise_, options_, rivals_.empty(), margin()};
   const bool is_first = d_.best.model.terms.size() == given();
   auto list = shortlisted(
       naming, weighing,
-      from == From::believed ? fit(data_, weighing, data_.model, data_.model, 0) : sought.base,
+      from == From::believed ? fit(data_, weighing, data_.model, data_.model, Effort::evaluate())
+                             : sought.base,
       is_first ? alone_ : std::vector<Model>{}, [&] { progress_(share + 0.04, "fitting the short list"); });
   for (const auto& r : list.impossible) d_.reject(r.term, r.why, r.gain);
   last_screen_ = std::move(list.screened);
@@ -79,12 +82,12 @@ std::optional<std::string> Search::why_not(const OneName& name) {
 bool Search::leads_out(const OneName& name) {
   if (std::exchange(led_out_, true)) return false;
   const auto model = physics::without_term(name.with.model, given());
-  auto anew = fit(data_, name.weighing, model, data_.model, 8, &name.with);
+  auto anew = fit(data_, name.weighing, model, data_.model, Effort::follow(8), &name.with);
   if (!(anew.cost < name.without.cost) || least_ratio(data_, anew, name.without) > 0.7) return false;
-  d_.weighing = weigh(data_, simulate(data_, anew.model), false);
-  anew = fit(data_, d_.weighing, anew.model, data_.model, 8, &anew);
+  d_.weighing = weigh(data_, simulate(data_, anew.model), Colour::white);
+  anew = fit(data_, d_.weighing, anew.model, data_.model, Effort::follow(8), &anew);
   d_.weighing = weigh(data_, simulate(data_, anew.model));
-  d_.best = d_.retuned = fit(data_, d_.weighing, anew.model, data_.model, 4, &anew);
+  d_.best = d_.retuned = fit(data_, d_.weighing, anew.model, data_.model, Effort::follow(4), &anew);
   return true;
 }
 
@@ -141,7 +144,7 @@ void Search::claim(Sought sought) {
     rivals.push_back(std::move(*twin));
   d_.weighing = std::move(best->weighing);
   d_.best = std::move(best->with);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(5), &d_.retuned);
   rivals_.push_back(std::move(rivals));
 }
 
@@ -184,8 +187,8 @@ double Search::quieten() {
   if (!options_.refuses || data_.model.plant != physics::Plant::axis) return 0.0;
   const double untold = noise_->take_off(d_.best.model);
   d_.weighing = weigh(data_, simulate(data_, d_.best.model));
-  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, 4, &d_.best);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 4, &d_.retuned);
+  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, Effort::follow(4), &d_.best);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(4), &d_.retuned);
   return untold;
 }
 
@@ -206,7 +209,7 @@ bool Search::add_pair(const Fit* rival) {
   d_.best = std::move(claim->fit);
   d_.weighing = std::move(claim->weighing);
   rivals_ = std::move(claim->rivals);
-  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 5, &d_.retuned);
+  d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(5), &d_.retuned);
   (void)quieten();
   return true;
 }
@@ -243,9 +246,10 @@ void Search::name(int first_round) {
        [&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
   if (options_.refuses) take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
   progress_(0.7, "comparing with near twins");
-  if (!take(rivals_weighed, [&] { return weigh_alternatives(data_, d_, rivals_, options_.refuses), true; })) {
-    data_.stopped = {};
-    weigh_alternatives(data_, d_, rivals_, options_.refuses);  // the terms as they stand
+  if (!take(rivals_weighed,
+            [&] { return weigh_alternatives(data_, d_, rivals_, options_.claims()), true; })) {
+    data_.stop = {};
+    weigh_alternatives(data_, d_, rivals_, options_.claims());  // the terms as they stand
   }
 }
 

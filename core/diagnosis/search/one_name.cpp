@@ -43,12 +43,12 @@ std::vector<Fit> fits_of(const Naming& naming, const Weighing& weighing, const F
   std::vector<Fit> fits(tried.size());
   const auto some = excerpt(data, weighing, base, 40 * fits.size());
   in_parallel(fits.size(), [&](std::size_t i) {
-    fits[i] =
-        some ? on_all(data, weighing, base, fit_with(some->data, some->weighing, some->base, *tried[i], 3))
-             : fit_with(data, weighing, base, *tried[i], 3);
+    fits[i] = some ? on_all(data, weighing, base,
+                            fit_with(some->data, some->weighing, some->base, *tried[i], Effort::polish(3)))
+                   : fit_with(data, weighing, base, *tried[i], Effort::polish(3));
   });
   const auto go_on = [&](Fit& f) {
-    if (!options.stopped || !options.stopped()) f = fit(data, weighing, f.model, data.model, 8, &f);
+    if (!options.stop.stop_requested()) f = fit(data, weighing, f.model, data.model, Effort::follow(8), &f);
   };
   if (const auto best = std::min_element(fits.begin(), fits.end(), by_evidence); best != fits.end()) {
     go_on(*best);
@@ -83,7 +83,7 @@ Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit&
   list.screened = screen(data, weighing, base, named_starts(data, weighing, base, naming.options.without), 0);
   fitting();
   auto& fits = list.fits;
-  for (const auto& model : alone) fits.push_back(fit(data, weighing, model, data.model, 8));
+  for (const auto& model : alone) fits.push_back(fit(data, weighing, model, data.model, Effort::follow(8)));
   if (naming.options.refuses)
     std::erase_if(fits, [&](const Fit& f) { return !stands(data, f, f.model.terms.size() - 1); });
   // First order is misled where the base is far from what is right: where the first do not stand once they are fitted, the
@@ -121,28 +121,29 @@ bool is_sought(const physics::Term& term) { return term.info->index_of("phase") 
 Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool has_rivals) {
   const auto& [data, noise, options, is_first, margin] = naming;
   // Filters that a wrong residual asked for would keep it wrong: all rows alike first, then the filters of what is left.
-  Weighing plain = weigh(data, simulate(data, start.model), false);
-  auto settled = fit(data, plain, start.model, data.model, 6, &start);
+  Weighing plain = weigh(data, simulate(data, start.model), Colour::white);
+  auto settled = fit(data, plain, start.model, data.model, Effort::follow(6), &start);
   for (int again = 0; again < 3; ++again) {  // the nearer the fit, the finer its scale
-    plain = weigh(data, simulate(data, settled.model), false);
-    auto nearer = fit(data, plain, settled.model, data.model, 5, &settled);
+    plain = weigh(data, simulate(data, settled.model), Colour::white);
+    auto nearer = fit(data, plain, settled.model, data.model, Effort::follow(5), &settled);
     const bool arrived = least_ratio(data, nearer, settled) > 0.97;
     settled = std::move(nearer);
     if (arrived) break;
   }
   Weighing own = weigh(data, simulate(data, settled.model));
-  auto with = fit(data, own, settled.model, data.model, 6, &settled);
+  auto with = fit(data, own, settled.model, data.model, Effort::follow(6), &settled);
   // Weights that follow the colour of what is still missing may lead away.
-  if (least_ratio(data, settled, with) < 0.9) with = fit(data, own, settled.model, data.model, 0, &settled);
-  auto without = fit(data, own, base.model, data.model, 4, &base);
+  if (least_ratio(data, settled, with) < 0.9)
+    with = fit(data, own, settled.model, data.model, Effort::evaluate(), &settled);
+  auto without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
   double evidence = advantage(data, own, with, without);
   // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
   // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
   if (options.refuses && !noise.is_fed_back() && data.is_time_series && data.windows.count == 0 &&
       least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
     own = plain;
-    with = fit(data, own, settled.model, data.model, 6, &settled);
-    without = fit(data, own, base.model, data.model, 4, &base);
+    with = fit(data, own, settled.model, data.model, Effort::follow(6), &settled);
+    without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
     evidence = advantage(data, own, with, without);
   }
   double gain = std::min(evidence, noise.is_fed_back() ? noise.beyond(with.model, without.model, own)

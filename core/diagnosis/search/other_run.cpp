@@ -241,7 +241,7 @@ physics::Model best_without(const Case& data, const Diagnosis& diagnosis,
   if (terms.empty()) return model;
   if (data.model.terms.size() + terms.size() == model.terms.size()) return diagnosis.retuned.model;
   for (std::size_t k = terms.size(); k-- > 0;) model = physics::without_term(std::move(model), terms[k]);
-  return fit(data, diagnosis.weighing, model, data.model, 8).model;
+  return fit(data, diagnosis.weighing, model, data.model, Effort::follow(8)).model;
 }
 
 std::vector<std::size_t> of_one_recording(const Diagnosis& diagnosis) {

@@ -27,13 +27,13 @@ struct Settled {
 Settled settle(const Case& data, Fit start, int rounds) {
   Settled s{std::move(start), {}, 0.0};
   for (int round = 0; round < rounds; ++round) {
-    s.weighing = weigh(data, simulate(data, s.fit.model), false);
-    auto nearer = fit(data, s.weighing, s.fit.model, data.model, 8, &s.fit);
+    s.weighing = weigh(data, simulate(data, s.fit.model), Colour::white);
+    auto nearer = fit(data, s.weighing, s.fit.model, data.model, Effort::follow(8), &s.fit);
     const bool arrived = least_ratio(data, nearer, s.fit) > 0.995;
     s.fit = std::move(nearer);
     if (arrived) break;
   }
-  s.weighing = weigh(data, simulate(data, s.fit.model), false);
+  s.weighing = weigh(data, simulate(data, s.fit.model), Colour::white);
   double rows = 0.0;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     double count = 0.0;
@@ -62,7 +62,7 @@ Fit begin(const Case& data, const Weighing& weighing, const Fit& base, const Scr
       const double square = residual(data, weighing, tried).squaredNorm();
       if (square < least) least = square, best = std::move(tried);
     }
-  return fit(data, weighing, best, data.model, 8, &base);
+  return fit(data, weighing, best, data.model, Effort::follow(8), &base);
 }
 
 /// The single terms that do most to first order, each once, followed to their end.
@@ -76,7 +76,7 @@ std::vector<Settled> singles(const Case& data, const Weighing& plain, const Fit&
     if (best.size() < most && !s.impossible && seen.insert(label(s.start.term)).second) best.push_back(&s);
   std::vector<Settled> settled(best.size());
   in_parallel(settled.size(), [&](std::size_t i) {
-    settled[i] = settle(data, fit_with(data, plain, under, *best[i], 8), 3);
+    settled[i] = settle(data, fit_with(data, plain, under, *best[i], Effort::follow(8)), 3);
   });
   return settled;
 }
@@ -88,7 +88,8 @@ bool drifts_alone(const Case& data, const Weighing& plain, const Fit& under, con
   std::erase_if(starts, [](const Start& start) { return start.term.curve.over != "t"; });
   const auto screened = screen(data, plain, under, starts, most);
   for (std::size_t i = 0; i < std::min(most, screened.size()); ++i)
-    if (lead(data, pair.fit, settle(data, fit_with(data, plain, under, screened[i], 8), 3).fit) < 0.0)
+    if (lead(data, pair.fit,
+             settle(data, fit_with(data, plain, under, screened[i], Effort::follow(8)), 3).fit) < 0.0)
       return true;
   return false;
 }
@@ -141,7 +142,7 @@ bool needs_both(const Case& data, const Settled& best, std::size_t first, Pairs&
   bool needed = true;
   for (const std::size_t dropped : {first, first + 1}) {
     const auto alone = physics::without_term(best.fit.model, dropped);
-    const auto single = settle(data, fit(data, best.weighing, alone, data.model, 8), 3);
+    const auto single = settle(data, fit(data, best.weighing, alone, data.model, Effort::follow(8)), 3);
     const bool adds = least_ratio(data, best.fit, single.fit) < 0.8;
     if (!adds) keep(found, single.fit.model);
     needed = needed && adds;
@@ -169,10 +170,10 @@ std::vector<std::vector<physics::Term>> rivals_of(const Settled& best, const std
 std::optional<JointClaim> claimed(const Case& data, const Fit& base, const Settled& best) {
   JointClaim claim;
   claim.weighing = weigh(data, simulate(data, best.fit.model));
-  claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 6, &best.fit);
+  claim.fit = fit(data, claim.weighing, best.fit.model, data.model, Effort::follow(6), &best.fit);
   if (least_ratio(data, best.fit, claim.fit) < 0.9)
-    claim.fit = fit(data, claim.weighing, best.fit.model, data.model, 0, &best.fit);
-  const auto neither = fit(data, claim.weighing, base.model, data.model, 6, &base);
+    claim.fit = fit(data, claim.weighing, best.fit.model, data.model, Effort::evaluate(), &best.fit);
+  const auto neither = fit(data, claim.weighing, base.model, data.model, Effort::follow(6), &base);
   if (claim.fit.evidence - neither.evidence < 2.0 * claim_margin_of(claim.weighing)) return std::nullopt;
   return claim;
 }
@@ -183,8 +184,8 @@ Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, 
                  const Fit* rival) {
   Pairs found;
   const bool own = data.model.plant == physics::Plant::equations;
-  const Weighing plain = weigh(data, simulate(data, base.model), false);
-  const Fit under = fit(data, plain, base.model, data.model, 4, &base);
+  const Weighing plain = weigh(data, simulate(data, base.model), Colour::white);
+  const Fit under = fit(data, plain, base.model, data.model, Effort::follow(4), &base);
   const auto settled = settled_pairs(data, plain, under, without);
   for (const auto& best : settled) {
     const std::size_t first = best.fit.model.terms.size() - 2;

@@ -42,8 +42,9 @@ void Search::begin() {
   progress_(0.02, "simulating the nominal model");
   const auto simulated = simulate(data_, data_.model);
   drop_outliers(data_, simulated);
-  d_.weighing = weigh(data_, simulated, false);  // far from the truth a filter would hide what to follow
-  d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 8);
+  d_.weighing =
+      weigh(data_, simulated, Colour::white);  // far from the truth a filter would hide what to follow
+  d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, Effort::follow(8));
 }
 
 void Search::prepare() {
@@ -54,7 +55,7 @@ void Search::prepare() {
   begin();
   if (goes_another_way(data_, d_.retuned))
     if (const auto near = begun_in_windows(data_)) {
-      const auto found = fit(data_, d_.weighing, *near, data_.model, 8);
+      const auto found = fit(data_, d_.weighing, *near, data_.model, Effort::follow(8));
       if (least_ratio(data_, found, d_.retuned) < 0.5) d_.retuned = found;
       // What is thrown here and there by the least disturbance has no one run.
       if (auto cut = as_given; goes_another_way(data_, d_.retuned)) {
@@ -68,23 +69,23 @@ void Search::prepare() {
     }
   drop_outliers_anew(data_, as_read, simulate(data_, d_.retuned.model));
   for (int again = 0; again < 2; ++again) {  // the nearer the fit, the finer its scale
-    d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
-    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
+    d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), Colour::white);
+    d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(8));
   }
   std::vector<double> noise;
   for (const auto& filter : d_.weighing.filters) noise.push_back(filter.sigma);
   if (step_finely(data_, d_.retuned.model, noise))
     for (int again = 0; again < 2; ++again) {
-      d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), false);
-      d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, 8);
+      d_.weighing = weigh(data_, simulate(data_, d_.retuned.model), Colour::white);
+      d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(8));
     }
   check_own_units(data_, d_.retuned);
   noise_.emplace(data_);
   d_.weighing = weigh(data_, simulate(data_, d_.retuned.model));
   // Coloured weights may follow the colour of what is missing; a fit that they make plainly worse is not taken.
-  auto coloured = fit(data_, d_.weighing, d_.retuned.model, data_.model, 6, &d_.retuned);
+  auto coloured = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(6), &d_.retuned);
   d_.retuned = least_ratio(data_, d_.retuned, coloured) < 0.9
-                   ? fit(data_, d_.weighing, d_.retuned.model, data_.model, 0, &d_.retuned)
+                   ? fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::evaluate(), &d_.retuned)
                    : std::move(coloured);
   d_.best = d_.retuned;
 }

@@ -54,11 +54,11 @@ Case quietened(const Case& data, std::size_t reach) {
 
 /// What each claim gains, in log evidence.
 std::vector<double> gains(const Case& data, const Diagnosis& d) {
-  const auto best = fit(data, d.weighing, d.best.model, data.model, 5);
+  const auto best = fit(data, d.weighing, d.best.model, data.model, Effort::follow(5));
   std::vector<double> all;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto without = physics::without_term(best.model, data.model.terms.size() + i);
-    all.push_back(best.evidence - fit(data, d.weighing, without, data.model, 5).evidence);
+    all.push_back(best.evidence - fit(data, d.weighing, without, data.model, Effort::follow(5)).evidence);
   }
   return all;
 }
@@ -86,7 +86,7 @@ std::optional<Case> with_quiet_inputs(const Case& as_read, const Case& judged, c
   for (const std::size_t tried : {1U, 2U, 4U, 8U, 16U}) {
     auto other = quietened(judged, tried);
     if (!takes_noise_alone(judged, other)) break;
-    const double now = fit(other, d.weighing, d.retuned.model, model, 0).cost;
+    const double now = fit(other, d.weighing, d.retuned.model, model, Effort::evaluate()).cost;
     if (!(now < cost)) continue;
     cost = now, reach = tried;
     quiet = std::move(other);

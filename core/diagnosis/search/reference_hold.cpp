@@ -41,10 +41,10 @@ void settle_hold(Case& data) {
   if (has_every_cycle(data)) return;
   auto goes_on = going_on(data);
   if (!are_apart(data, goes_on)) return;
-  const auto weighing = weigh(data, simulate(data, model), false);
-  constexpr int steps = 8;
-  const auto held = fit(data, weighing, model, model, steps);
-  const auto smooth = fit(goes_on, weighing, goes_on.model, goes_on.model, steps);
+  const auto weighing = weigh(data, simulate(data, model), Colour::white);
+  constexpr auto effort = Effort::follow(8);
+  const auto held = fit(data, weighing, model, model, effort);
+  const auto smooth = fit(goes_on, weighing, goes_on.model, goes_on.model, effort);
   // Numbers that are retuned make up for a reference that is off by a part of a row; as they are believed they do not.
   const auto off = [&](const Case& as) { return residual(as, weighing, as.model).squaredNorm(); };
   if (!(smooth.cost < held.cost - claim_margin) || !(off(goes_on) < off(data))) return;

@@ -18,12 +18,12 @@ void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better be
   const auto screened = std::exchange(last_screen_, {});
   rivals_.assign(begun.best.model.terms.size() - given(), {});
   beside_.reset();
-  data_.stopped = options_.stopped;
+  data_.stop = options_.stop;
   if (take("the search begun anew", [&] { return start(before); })) {
     name(next);
     finish();
   }
-  data_.stopped = {};
+  data_.stop = {};
   auto anew = noise_->put_back();
   if (!better(before)) {
     before.is_partial = before.is_partial || stopped();

@@ -19,11 +19,11 @@ using physics::Model;
 using physics::Plant;
 using physics::Term;
 
-void Search::check(bool refuses) {
+void Search::check(Claims claims) {
   const Case fitted_to = data_;
   auto readings = noise_->put_back();
   try {
-    hold_out(fitted_to, data_, d_, refuses);
+    hold_out(fitted_to, data_, d_, claims);
   } catch (const Stopped&) {
     noise_->put(std::move(readings));
     throw;
@@ -59,20 +59,20 @@ void Search::finish() {
   if (d_.best.model.terms.size() > given() && options_.refuses)
     take(all_needed, [&] { return leave_out_nothings(data_, d_), true; });
   progress_(0.88, "checking on held-out stretches");
-  const auto checked = [&] { return check(options_.refuses), true; };
+  const auto checked = [&] { return check(options_.claims()), true; };
   if (!take("refits to their end on held-out stretches", checked)) {  // in few steps, and not to be stopped
     d_.is_partial = true;
-    data_.stopped = {};
+    data_.stop = {};
     (void)checked();
   }
   d_.is_partial = stopped();
-  data_.stopped = {};
+  data_.stop = {};
   if (curved && d_.findings.empty() &&
       !std::get<3>(named).empty()) {  // the curve does not hold, what has a name may
     std::tie(d_.best, d_.weighing, d_.retuned, d_.findings) = named;
     d_.heldout.clear();
     d_.train.clear();
-    check(true);
+    check(Claims::checked);
   }
   smallest_effects(data_, last_screen_, d_);
   conclude(data_, d_);
@@ -80,15 +80,15 @@ void Search::finish() {
 }
 
 Diagnosis Search::run() {
-  data_.stopped = options_.stopped;
+  data_.stop = options_.stop;
   try {
     prepare();
   } catch (const Stopped&) {  // the model as it stands
-    data_.stopped = {};
+    data_.stop = {};
     if (!noise_) noise_.emplace(data_);
-    d_.weighing = weigh(data_, simulate(data_, data_.model), false);
-    d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, 0);
-    data_.stopped = options_.stopped;
+    d_.weighing = weigh(data_, simulate(data_, data_.model), Colour::white);
+    d_.best = d_.retuned = fit(data_, d_.weighing, data_.model, data_.model, Effort::evaluate());
+    data_.stop = options_.stop;
     leave(own_numbers);
   }
   const bool is_applied =
@@ -115,7 +115,7 @@ Diagnosis Search::run() {
     if (set_aside(data_, d_)) {
       d_.heldout.clear();
       d_.train.clear();
-      check(true);
+      check(Claims::checked);
       if (d_.findings.empty())
         d_ = stated;  // the curve does not hold
       else

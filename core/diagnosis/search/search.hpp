@@ -93,7 +93,7 @@ class Search {
   /// hold it takes too small.
   void settle();
   /// Holds the model out: on the readings that it was fitted to, and told of those recorded.
-  void check(bool refuses);
+  void check(Claims claims);
   /// Takes a step; one that is interrupted counts for nothing, so that nothing is claimed on half a fit. False: not taken,
   /// or the step says so.
   template <class Step>
@@ -101,17 +101,14 @@ class Search {
     if (was_stopped(what)) return false;
     const auto kept = std::tuple{d_, rivals_};
     const auto readings = noise_->now();
-    try {
-      return step();
-    } catch (const Stopped&) {
-      std::tie(d_, rivals_) = kept;
-      noise_->put(readings);
-      beside_.reset();
-      leave(what);
-      return false;
-    }
+    if (const auto done = unless_stopped(options_.stop, step)) return *done;
+    std::tie(d_, rivals_) = kept;
+    noise_->put(readings);
+    beside_.reset();
+    leave(what);
+    return false;
   }
-  [[nodiscard]] bool stopped() const { return options_.stopped && options_.stopped(); }
+  [[nodiscard]] bool stopped() const { return options_.stop.stop_requested(); }
   void leave(const std::string& what) { add_once(not_tried_, what); }
   /// Is it over? Then `what` is not tried.
   [[nodiscard]] bool was_stopped(const std::string& what) {

@@ -45,11 +45,12 @@ void sharpen(const Case& data, Curved& found) {
     const bool is_force = model.terms.back().with.empty();  // friction and damping are everywhere
     fine.values.push_back(curve(fine.knots.back()) - (is_force ? level : 0.0));
   }
-  auto rough = fit(data, weighing, model, data.model, 4);
+  auto rough = fit(data, weighing, model, data.model, Effort::follow(4));
   const Weighing own = weigh(data, simulate(data, rough.model));
-  auto sharp = fit(data, own, rough.model, data.model, 4, &rough);
-  if (least_ratio(data, rough, sharp) < 0.97) sharp = fit(data, own, rough.model, data.model, 0, &rough);
-  const auto blunt = fit(data, own, curved.model, data.model, 3, &curved);
+  auto sharp = fit(data, own, rough.model, data.model, Effort::follow(4), &rough);
+  if (least_ratio(data, rough, sharp) < 0.97)
+    sharp = fit(data, own, rough.model, data.model, Effort::evaluate(), &rough);
+  const auto blunt = fit(data, own, curved.model, data.model, Effort::polish(3), &curved);
   if (sharp.evidence < blunt.evidence || least_ratio(data, curved, sharp) < 0.97) return;
   found.gain += sharp.evidence - blunt.evidence;
   curved = std::move(sharp);
@@ -65,14 +66,14 @@ Fit load_or_motor(const Case& data, const Weighing& weighing, Fit load) {
   motor.info = physics::unmodelled(physics::Plant::axis, "actuator");
   motor.with.clear();
   for (double& value : motor.curve.values) value /= -model.value("mass", 1.0);
-  auto faded = fit(data, weighing, model, data.model, 5);
+  auto faded = fit(data, weighing, model, data.model, Effort::follow(5));
   return faded.evidence > load.evidence ? faded : load;
 }
 
 /// Does every output lie within the noise that the user gave?
 bool is_within_noise(const Case& data, const Fit& fit) {
   const auto simulated = simulate(data, fit.model);
-  const auto left = squares_left(data, simulated, weigh(data, simulated, false));
+  const auto left = squares_left(data, simulated, weigh(data, simulated, Colour::white));
   for (std::size_t o = 0; o < left.size(); ++o)
     if (!(left[o].rms() <= data.given_noise[o])) return false;
   return true;
@@ -117,12 +118,13 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   const double margin = claim_margin_of(plain);
   const Fit near = with_columns(data, under_plain, s);
   if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) return std::nullopt;
-  auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, 2, &near));
+  auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, Effort::polish(2), &near));
   const Weighing own = weigh(data, simulate(data, rough.model));
-  auto curved = fit(data, own, rough.model, data.model, 3, &rough);
+  auto curved = fit(data, own, rough.model, data.model, Effort::polish(3), &rough);
   // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
-  if (least_ratio(data, rough, curved) < 0.97) curved = fit(data, own, rough.model, data.model, 0, &rough);
-  const auto without = fit(data, own, base.model, data.model, 4, &base);
+  if (least_ratio(data, rough, curved) < 0.97)
+    curved = fit(data, own, rough.model, data.model, Effort::evaluate(), &rough);
+  const auto without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
   const double evidence = curved.evidence - without.evidence;
   double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
   const auto& term = s.start.term;
@@ -298,7 +300,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
     d.weighing = std::move(next.weighing);
     find_last();
   }
-  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
 }
 
 }  // namespace invar::diagnosis

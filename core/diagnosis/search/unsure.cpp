@@ -56,8 +56,8 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
     const auto model = physics::without_term(d.best.model, data.model.terms.size() + i);
     d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));
     d.weighing = weigh(data, simulate(data, other->fit.model));
-    d.best = fit(data, d.weighing, model, data.model, 8);
-    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+    d.best = fit(data, d.weighing, model, data.model, Effort::follow(8));
+    d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
   }
 }
 
@@ -81,8 +81,8 @@ bool set_aside(const Case& data, Diagnosis& d) {
   }
   if (!nearest) return false;
   if (nearest->stand_in != nullptr) nearest->term.info = nearest->stand_in;
-  const auto plain = weigh(data, simulate(data, d.best.model), false);
-  const Fit base = fit(data, plain, model, data.model, 6);
+  const auto plain = weigh(data, simulate(data, d.best.model), Colour::white);
+  const Fit base = fit(data, plain, model, data.model, Effort::follow(6));
   // The curves must do better than the name: drops move in two directions, and heat in several nodes.
   Curved found;
   found.fit = base;
@@ -107,7 +107,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
     finding.alternatives.push_back({nearest->term, -2.0 * std::log(nearest->other_cause)});
     d.findings.push_back(finding);
   }
-  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
   return true;
 }
 

@@ -115,7 +115,8 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
     const auto share_of = [&](double all) { return all > 0.0 ? std::clamp(lost / all, 0.0, 1.0) : 0.0; };
     finding.share = share_of(mismatch);
     finding.share_of_rest = std::max(finding.share, share_of(rest_of_retuned));
-    const auto rival = fit(data, d.weighing, without, data.model, d.is_partial ? 1 : 5);
+    const auto rival =
+        fit(data, d.weighing, without, data.model, d.is_partial ? Effort::polish(1) : Effort::follow(5));
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
     const bool has_course = is_needed_beside_course(data, d.best, place, finding);
     if (has_course) finding.other_shape = 0.0;
@@ -197,7 +198,7 @@ void conclude(const Case& data, Diagnosis& d) {
   d.parameter_excursion = excursion_of(d.best);
   give_sigmas(data, d);
   const auto rests = weigh_findings(data, excess, d);
-  d.nominal = fit(data, d.weighing, data.model, data.model, 0, &d.retuned);
+  d.nominal = fit(data, d.weighing, data.model, data.model, Effort::evaluate(), &d.retuned);
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
   d.unexplained = times_noise_left(d);
   const double beyond_unrelated = times_unrelated(data, d);

@@ -2,12 +2,13 @@
 #pragma once
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/search/options.hpp"
 
 namespace invar::diagnosis {
 
 /// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them. What a
 /// model gains is asked of the readings that it was fitted to, what it leaves is told of those `recorded`.
-void hold_out(const Case& data, const Case& recorded, Diagnosis& d, bool refuses = true);
+void hold_out(const Case& data, const Case& recorded, Diagnosis& d, Claims claims = Claims::checked);
 /// The findings' terms as the best model has them, with their sigmas.
 void give_sigmas(const Case& data, Diagnosis& d);
 /// Probabilities, shares, sigmas and the verdict.

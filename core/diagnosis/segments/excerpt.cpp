@@ -105,7 +105,7 @@ std::optional<Excerpt> excerpt(const Case& whole, const Weighing& weighing, cons
                                     model.parameters.end());
   for (auto& stretch : some.data.recordings)
     stretch.simulation = physics::prepare(some.data.model, stretch.inputs);
-  some.base = fit(some.data, some.weighing, model, some.data.model, 3);
+  some.base = fit(some.data, some.weighing, model, some.data.model, Effort::polish(3));
   return some;
 }
 
@@ -115,7 +115,7 @@ Fit on_all(const Case& whole, const Weighing& weighing, const Fit& base, const F
       base.model.parameters.size());  // without the states at the beginning of its stretches
   for (std::size_t i = 0; i < model.parameters.size(); ++i)
     if (model.parameters[i].name.ends_with(".initial")) model.parameters[i] = base.model.parameters[i];
-  return fit(whole, weighing, model, whole.model, 2, &base);
+  return fit(whole, weighing, model, whole.model, Effort::polish(2), &base);
 }
 
 }  // namespace invar::diagnosis

@@ -168,8 +168,10 @@ bool is_held(const Case& data) {
 
 using Rows = std::vector<std::vector<std::size_t>>;  // by recording
 
+enum class Past { kept, forgotten };
+
 /// The case with states of their own from these rows on. Where the model forgets, its run says how wide they go.
-Case with_starts(const Case& whole, const Rows& rows, bool forgets) {
+Case with_starts(const Case& whole, const Rows& rows, Past past) {
   Case data = whole;
   const auto states = physics::states_of(whole.model);
   std::size_t next = 0;
@@ -189,7 +191,7 @@ Case with_starts(const Case& whole, const Rows& rows, bool forgets) {
         const double value = guess_of(whole, recording, free, i, rows[r][k]);
         sizes[i] =
             std::max({sizes[i], std::abs(value), initial.sigma.value_or(0.0), std::abs(initial.value), 1e-9});
-        if (const double far = reach(free[i], 0.0, 1.0); forgets && far < 1e6)
+        if (const double far = reach(free[i], 0.0, 1.0); past == Past::forgotten && far < 1e6)
           sizes[i] = std::max(sizes[i], far);
         data.model.parameters.push_back(
             {states[i] + ".start" + std::to_string(next), initial.unit, value, 1.0, initial.bounds});
@@ -222,7 +224,7 @@ Case in_windows(const Case& whole, std::size_t rows, const Rows& anew) {
     }
     std::sort(all[r].begin(), all[r].end());
   }
-  auto data = with_starts(whole, all, false);
+  auto data = with_starts(whole, all, Past::kept);
   data.windows = windows;
   return data;
 }
@@ -264,9 +266,9 @@ void estimate_starts(Case& data) {
     if (!is_start(parameter)) parameter.sigma = 0.0;
   for (auto& term : fixed.terms) term.sigmas.fill(0.0);
   for (int again = 0; again < 2; ++again) {
-    const auto plain = weigh(data, simulate(data, data.model), false);
+    const auto plain = weigh(data, simulate(data, data.model), Colour::white);
     data.model.parameters = [&] {
-      auto found = fit(data, plain, data.model, fixed, 8).model.parameters;
+      auto found = fit(data, plain, data.model, fixed, Effort::follow(8)).model.parameters;
       for (std::size_t p = 0; p < found.size(); ++p) found[p].sigma = data.model.parameters[p].sigma;
       return found;
     }();
@@ -294,7 +296,7 @@ void cut_into_windows(Case& data, const Model& near) {
   if (!goes) {
     if (std::all_of(anew.begin(), anew.end(), [](const auto& rows_anew) { return rows_anew.empty(); }))
       return;
-    data = with_starts(data, anew, true);
+    data = with_starts(data, anew, Past::forgotten);
     estimate_starts(data);
     return;
   }
@@ -332,8 +334,8 @@ std::optional<Model> begun_in_windows(const Case& data) {
   if (rows < 4 * window) return std::nullopt;
   auto cut = in_windows(data, window, Rows(data.recordings.size()));
   estimate_starts(cut);
-  const auto plain = weigh(cut, simulate(cut, cut.model), false);
-  auto near = fit(cut, plain, cut.model, cut.model, 12).model;
+  const auto plain = weigh(cut, simulate(cut, cut.model), Colour::white);
+  auto near = fit(cut, plain, cut.model, cut.model, Effort::follow(12)).model;
   std::erase_if(near.parameters, is_start);
   return near;
 }

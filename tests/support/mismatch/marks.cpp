@@ -31,13 +31,13 @@ diagnosis::Case case_of(const Machine& machine) {
 namespace {
 
 double to_be_won(const Machine& machine, diagnosis::Case quiet) {
-  auto weighing = diagnosis::weigh(quiet, diagnosis::simulate(quiet, quiet.model), false);
+  auto weighing = diagnosis::weigh(quiet, diagnosis::simulate(quiet, quiet.model), diagnosis::Colour::white);
   for (std::size_t o = 0; o < quiet.outputs.size(); ++o) {
     const auto& column = quiet.model.signal(quiet.outputs[o])->column;
     weighing.filters[o] = diagnosis::fit_whitening({machine.noise.at(column)}, 16);
   }
-  auto best = diagnosis::fit(quiet, weighing, quiet.model, quiet.model, 10);
-  best = diagnosis::fit(quiet, weighing, best.model, quiet.model, 10);
+  auto best = diagnosis::fit(quiet, weighing, quiet.model, quiet.model, diagnosis::Effort::follow(10));
+  best = diagnosis::fit(quiet, weighing, best.model, quiet.model, diagnosis::Effort::follow(10));
   return best.cost;
 }
 

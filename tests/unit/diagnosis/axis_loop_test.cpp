@@ -254,8 +254,8 @@ TEST(AxisLoop, FrictionThatFallsWithTheSpeedIsReachedFromCoulombs) {
   term.info = physics::find_term(physics::Plant::axis, "coulomb_friction");
   term.values[0] = axis.friction;
   term.given[0] = true;
-  const auto plain = weigh(data, simulate(data, model), false);
-  const auto coulomb = fit(data, plain, model, data.model, 8);
+  const auto plain = weigh(data, simulate(data, model), Colour::white);
+  const auto coulomb = fit(data, plain, model, data.model, Effort::follow(8));
   const auto others = fits_of_other_laws(data, plain, coulomb, 0, {});
   ASSERT_FALSE(others.empty());
   EXPECT_GT(others[0].evidence, coulomb.evidence + 100.0);
@@ -360,8 +360,8 @@ TEST(AxisLoop, AWaveThatOnlyShakesFrictionLooseIsNone) {
     }
     auto model = with_term(with_term(data.model, "coulomb_friction", {0.12}), "constant_force", {-0.12});
     model = with_term(model, "periodic_disturbance", {0.15, frequency, phase});
-    const auto plain = weigh(data, simulate(data, model), false);
-    auto found = fit(data, plain, model, data.model, 0);
+    const auto plain = weigh(data, simulate(data, model), Colour::white);
+    auto found = fit(data, plain, model, data.model, Effort::evaluate());
     EXPECT_FALSE(stands(data, found, 2)) << seed;
   }
 }
@@ -375,13 +375,13 @@ TEST(AxisLoop, NoRivalIsLedAstrayByTheStretchesThatItIsFittedTo) {
   axis.noise = 1e-8;
   const auto data = recorded(axis, 0.1, 4);
   Diagnosis d;
-  d.best =
-      fit(data, weigh(data, simulate(data, data.model), false),
-          with_term(data.model, "presliding_friction", {axis.bristles, axis.stiffness, 0.0}), data.model, 8);
+  d.best = fit(data, weigh(data, simulate(data, data.model), Colour::white),
+               with_term(data.model, "presliding_friction", {axis.bristles, axis.stiffness, 0.0}), data.model,
+               Effort::follow(8));
   d.weighing = weigh(data, simulate(data, d.best.model));
-  d.best = fit(data, d.weighing, d.best.model, data.model, 6);
-  d.retuned = fit(data, d.weighing, data.model, data.model, 8);
-  hold_out(data, data, d, true);
+  d.best = fit(data, d.weighing, d.best.model, data.model, Effort::follow(6));
+  d.retuned = fit(data, d.weighing, data.model, data.model, Effort::follow(8));
+  hold_out(data, data, d);
   ASSERT_EQ(d.heldout.size(), 2U);
   EXPECT_LT(d.heldout[0].retuned, 1.02 * d.heldout[0].before);  // counted in every row it was 1.08
 }

@@ -42,15 +42,15 @@ Case motor(double drag, unsigned seed) {
 }
 
 Foretold quadratic_in(const Case& data) {
-  const auto plain = weigh(data, simulate(data, data.model), false);
-  const auto without = fit(data, plain, data.model, data.model, 10);
+  const auto plain = weigh(data, simulate(data, data.model), Colour::white);
+  const auto without = fit(data, plain, data.model, data.model, Effort::follow(10));
   auto model = without.model;
   auto& term = model.terms.emplace_back();
   term.info = physics::find_term(physics::Plant::equations, "quadratic");
   term.on = "w";
   term.values[0] = -0.01;
   term.given[0] = true;
-  return foretold(data, fit(data, plain, model, data.model, 12), without);
+  return foretold(data, fit(data, plain, model, data.model, Effort::follow(12)), without);
 }
 
 TEST(Foretold, DragIsPlainThoughTheReadingWanders) {

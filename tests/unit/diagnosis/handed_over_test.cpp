@@ -63,12 +63,13 @@ recording::Table run_of_motor(double gain, unsigned seed, std::size_t rows = 120
 
 Diagnosis fitted(const Case& data, const physics::Model& best) {
   Diagnosis d;
-  d.weighing = weigh(data, simulate(data, data.model), false);
-  d.retuned = fit(data, d.weighing, data.model, data.model, 10);
-  d.weighing = weigh(data, simulate(data, d.retuned.model), false);
-  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5);
-  d.best =
-      best.terms.size() > data.model.terms.size() ? fit(data, d.weighing, best, data.model, 8) : d.retuned;
+  d.weighing = weigh(data, simulate(data, data.model), Colour::white);
+  d.retuned = fit(data, d.weighing, data.model, data.model, Effort::follow(10));
+  d.weighing = weigh(data, simulate(data, d.retuned.model), Colour::white);
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5));
+  d.best = best.terms.size() > data.model.terms.size()
+               ? fit(data, d.weighing, best, data.model, Effort::follow(8))
+               : d.retuned;
   for (std::size_t t = data.model.terms.size(); t < d.best.model.terms.size(); ++t)
     d.findings.emplace_back().term = d.best.model.terms[t];
   return d;
@@ -118,7 +119,7 @@ TEST(HandedOver, ATermOfNothingIsNotClaimed) {
   const auto data = make_case(motor(), {run_of_motor(12.0, 2)});
   auto d = fitted(data, with(data.model, "constant", 0.1));
   d.best.model.terms.back().values[0] = 0.0;
-  d.best = fit(data, d.weighing, d.best.model, data.model, 0);
+  d.best = fit(data, d.weighing, d.best.model, data.model, Effort::evaluate());
   EXPECT_TRUE(leave_out_nothings(data, d));
   EXPECT_TRUE(d.findings.empty());
   EXPECT_TRUE(d.best.model.terms.empty());
@@ -267,9 +268,9 @@ TEST(Page, DrawsNoRunThatWentAwayAndSaysSo) {
   d.best.model = with(data.model, "linear", -15.0);
   if (std::abs(simulate(data, d.best.model)[0][0].back()) > 1e3)
     d.best.model = with(data.model, "linear", 15.0);
-  d.weighing = weigh(data, simulate(data, d.best.model), false);
-  d.retuned = fit(data, d.weighing, data.model, data.model, 0);
-  d.best = fit(data, d.weighing, d.best.model, data.model, 0);
+  d.weighing = weigh(data, simulate(data, d.best.model), Colour::white);
+  d.retuned = fit(data, d.weighing, data.model, data.model, Effort::evaluate());
+  d.best = fit(data, d.weighing, d.best.model, data.model, Effort::evaluate());
   auto& finding = d.findings.emplace_back();
   finding.term = d.best.model.terms[0];
   finding.sigmas.assign(finding.term.info->parameter_count(), 0.1);

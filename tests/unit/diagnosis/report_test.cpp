@@ -8,8 +8,8 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/diagnosis/search/options.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
+#include "core/diagnosis/search/options.hpp"
 #include "tests/support/mismatch/marks.hpp"
 #include "tools/diagnose/report_page.hpp"
 
@@ -177,7 +177,9 @@ TEST(Report, OfASearchThatWasStoppedSaysFirstThatNothingCanBeSaid) {
   for (const char* effect : {"none", "parameter", "sensor_lag"}) {
     auto data = case_of(make("thermal", effect, 1.0, 3));
     diagnosis::Options stop;
-    stop.stopped = [] { return true; };
+    std::stop_source requested;
+    requested.request_stop();
+    stop.stop = requested.get_token();
     const auto d = diagnosis::diagnose(
         data, [](double, const std::string&) {}, stop);
     EXPECT_TRUE(d.is_partial);

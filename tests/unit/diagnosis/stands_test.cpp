@@ -54,8 +54,8 @@ Fit with_store(const Case& data, double time_constant) {
   store.values = {0.09, time_constant};
   store.given = {true, true};
   model.terms.push_back(store);
-  const auto plain = weigh(data, simulate(data, model), false);
-  return fit(data, plain, model, data.model, 30);
+  const auto plain = weigh(data, simulate(data, model), Colour::white);
+  return fit(data, plain, model, data.model, Effort::follow(30));
 }
 
 TEST(Stands, AStoreThatNeverFillsIsNone) {
@@ -102,7 +102,8 @@ std::pair<Case, Fit> under_a_wave(int rows) {
   wave.values = {0.25, period, 0.1};
   wave.given = {true, true, true};
   model.terms.push_back(wave);
-  auto found = fit(data, weigh(data, simulate(data, model), false), model, data.model, 20);
+  auto found =
+      fit(data, weigh(data, simulate(data, model), Colour::white), model, data.model, Effort::follow(20));
   return {std::move(data), std::move(found)};
 }
 

@@ -86,8 +86,8 @@ TEST(WithoutAName, WhatIsLeftFarAboveTheNoiseIsSeenBesideMissingValues) {
   testing::TemporaryFolder folder;
   elastic_motor(4).write(folder / "recording.csv");
   auto data = load_case(rigid_motor(), {folder / "recording.csv"});
-  const auto weighing = weigh(data, simulate(data, data.model), false);
-  const auto rigid = fit(data, weighing, data.model, data.model, 12);
+  const auto weighing = weigh(data, simulate(data, data.model), Colour::white);
+  const auto rigid = fit(data, weighing, data.model, data.model, Effort::follow(12));
   EXPECT_GT(far_share(data, rigid, 3.0).front(), 0.8);
   EXPECT_GT(followed_share(data, rigid).front(), 0.05);
 }

@@ -19,7 +19,7 @@ TEST(GaussianPrior, EvidenceEqualsTheDensityOfTheReadings) {
   Eigen::MatrixXd l(2, 2);
   l << 0.8, 0.0, 0.3, 1.5;
   const double noise = 0.25;
-  const Posterior p = posterior(NormalEquations::of(a, y, w), {l}, noise, true);
+  const Posterior p = posterior(NormalEquations::of(a, y, w), {l}, noise, Covariance::found);
   const Eigen::MatrixXd k = l * l.transpose();
   Eigen::MatrixXd c = a * k * a.transpose();
   c.diagonal() += noise * noise * w.cwiseInverse();
@@ -36,8 +36,8 @@ TEST(GaussianPrior, AReadingOfNoWeightChangesNothing) {
   const Eigen::MatrixXd l = Eigen::MatrixXd::Identity(1, 1);
   const auto with = NormalEquations::of(rows, Eigen::Vector3d{1.0, 2.0, 1e9}, Eigen::Vector3d{1.0, 1.0, 0.0});
   const auto without = NormalEquations::of(rows.head(2), Eigen::Vector2d{1.0, 2.0}, Eigen::Vector2d::Ones());
-  EXPECT_DOUBLE_EQ(posterior(with, {l}, 0.1, false).log_evidence,
-                   posterior(without, {l}, 0.1, false).log_evidence);
+  EXPECT_DOUBLE_EQ(posterior(with, {l}, 0.1, Covariance::left_out).log_evidence,
+                   posterior(without, {l}, 0.1, Covariance::left_out).log_evidence);
 }
 
 TEST(Maximise, FindsTheTopOfATiltedValley) {
