@@ -41,8 +41,9 @@ MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "
 # The rooms of core/diagnosis by stage: each may use those before it.
 STAGES = ["dataset", "estimate", "segments", "locate", "checks", "candidates", "evidence", "search", "report"]
 DIAGNOSIS = ["core/base", "core/config", "core/numerics", "core/physics", "core/model", "core/recording", "Eigen"]
+ROOMS["core/diagnosis"] = []  # thresholds.hpp
 for at, stage in enumerate(STAGES):
-    ROOMS[f"core/diagnosis/{stage}"] = DIAGNOSIS + [f"core/diagnosis/{earlier}" for earlier in STAGES[:at]]
+    ROOMS[f"core/diagnosis/{stage}"] = DIAGNOSIS + ["core/diagnosis"] + [f"core/diagnosis/{earlier}" for earlier in STAGES[:at]]
 ROOMS["core/diagnosis/report"].append("nlohmann-json")
 
 # Modules that still include one another; no further ones may, and a set that is cut leaves the list.

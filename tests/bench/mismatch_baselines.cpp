@@ -98,7 +98,7 @@ class ResidualProcess {
       }
   }
 
-  [[nodiscard]] bool claims() const { return gain_ > diagnosis::claim_margin; }
+  [[nodiscard]] bool claims() const { return gain_ > diagnosis::thresholds::claim_margin; }
 
  private:
   static Eigen::MatrixXd features_of(const physics::Record& inputs, const physics::Outputs& simulated) {

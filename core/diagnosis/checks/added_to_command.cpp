@@ -9,6 +9,7 @@
 
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/locate/lines.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -16,11 +17,6 @@ namespace invar::diagnosis {
 namespace {
 
 using physics::Term;
-
-/// A kind explains what the law leaves where it takes more than this of the squares beyond noise.
-constexpr double most_of_it = 0.5;
-/// [log likelihood] that a kind must gain over noise: the margin of a claim, and the places a wave was looked for in.
-constexpr double least_gain = 30.0;
 
 /// Cycles one behind the other of all recordings, with what the law asks for and what the current is beyond.
 struct Series {
@@ -179,8 +175,7 @@ Guess steps(const Series& series) {
   // Steps whose count over the range is off by a quarter are lost: so fine a scan, from what noise hides to the range.
   const double rms = std::sqrt(series.squares / static_cast<double>(series.beyond.size()));
   std::vector<double> values;
-  constexpr double finest = 2e-4;  // of the range: steps of 14 bits are no physics of a drive
-  for (double step = std::max(2.0 * rms, finest * top); step < std::min(top, 6.0 * rms);
+  for (double step = std::max(2.0 * rms, thresholds::finest_steps * top); step < std::min(top, 6.0 * rms);
        step *= 1.0 + 0.2 * step / top)
     values.push_back(step);
   Guess guess;
@@ -295,7 +290,7 @@ std::vector<Guess> waves(const Case& data, const std::vector<LawRows>& law, cons
   // Beside the right place a wave wins less, but not by far.
   const auto rows_of_all = static_cast<double>(series.time.size());
   const auto pays = [&](const Wave& wave) {
-    return 0.5 * rows_of_all * std::log(series.squares / wave.left) > 0.3 * least_gain;
+    return 0.5 * rows_of_all * std::log(series.squares / wave.left) > 0.3 * thresholds::added_gain;
   };
   for (const double frequency : lines.frequency)
     if (pays(wave_at(series, frequency))) all.push_back(sine(series, frequency, has_level));
@@ -313,8 +308,7 @@ bool stays_at(const std::vector<LawRows>& law, double limit) {
         current += std::pow(std::abs(one.asked[i] + one.beyond[i]) - limit, 2.0);
         command += std::pow(asked - limit, 2.0), rows += 1.0;
       }
-  constexpr double enough = 30.0, far_less = 0.1;
-  return rows > enough && current < far_less * command;
+  return rows > thresholds::limited_rows && current < thresholds::limited_far_less * command;
 }
 
 /// Does what a kind makes of the command stand in the current where the command is as the model expects it? Readings that the
@@ -338,8 +332,8 @@ bool stands_without_noise(const Case& data, const std::vector<LawRows>& law, con
       if (step > 0.0) off += std::pow(std::remainder(asked + beyond, step) / step, 2.0), rows += 1.0;
     }
   // Of values anywhere between two steps the RMS distance from the nearer is 0.29 steps.
-  constexpr double half = 0.5, plainly_nearer = 0.2;
-  return step > 0.0 ? std::sqrt(off / rows) < plainly_nearer : seen > half * expected && expected > 0.0;
+  return step > 0.0 ? std::sqrt(off / rows) < thresholds::nearer_to_steps
+                    : seen > thresholds::added_at_least * expected && expected > 0.0;
 }
 
 }  // namespace
@@ -373,15 +367,17 @@ std::optional<Added> added_to_command(const Case& data, const std::vector<LawRow
   const auto series = series_of(data, law);
   double asked = 0.0;
   for (const double u : series.asked) asked += u * u;
-  constexpr double of_rounding = 1e-10;  // of the squares: no ammeter reads a hundred-thousandth
-  if (series.time.size() < fewest_rows_of_law || !(series.squares > of_rounding * asked)) return std::nullopt;
+  if (series.time.size() < thresholds::fewest_rows_of_law ||
+      !(series.squares > thresholds::current_rounding * asked))
+    return std::nullopt;
   const auto rows = static_cast<double>(series.time.size());
   for (auto& guess : guesses_of(data, law, series)) {
     const double noise = std::min(guess.left, rows * series.noise * series.noise),
                  won = series.squares - guess.left, gain = 0.5 * rows * std::log(series.squares / guess.left);
     guess.added.share = won / (series.squares - noise);
-    if (!(gain > least_gain)) break;
-    if (!(guess.added.share > most_of_it) || !stands_without_noise(data, law, guess)) continue;
+    if (!(gain > thresholds::added_gain)) break;
+    if (!(guess.added.share > thresholds::added_explains) || !stands_without_noise(data, law, guess))
+      continue;
     const auto law_off = off_the_law(data);
     const double goes_with_motion = law_off ? rows * law_off->off * law_off->off : 0.0;
     // Another law leaves less of what it does than a kind that follows the motion by chance.
@@ -412,8 +408,7 @@ void settle_recorded_current(Case& data) {
   const auto added = added_to_command(data, law);
   if (!added) return;
   const double felt = felt_by_carriage(data, law);
-  constexpr double acts = 0.5;
-  if (felt < acts) {
+  if (felt < thresholds::added_is_felt) {
     // What the controller read otherwise than was recorded looks like much of the command, but not like a wave.
     const bool is_surely_there = added->term.curve.over == "time" || added->term.info->is_wave_in_time();
     if (!is_surely_there) return;

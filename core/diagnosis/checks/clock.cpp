@@ -9,6 +9,7 @@
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/dataset/statistics.hpp"
 #include "core/diagnosis/estimate/fit_comparison.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -41,7 +42,6 @@ double squares_off(const std::vector<double>& measured, const std::vector<double
 /// By output, the squares that a model may leave which follows the recording, where as read it leaves those of `as_read`.
 /// Empty: too little is measured to say.
 std::vector<double> followed_by(const Recording& recording, const physics::Outputs& as_read) {
-  constexpr double share = 0.2;  // of the spread, and of what is missed as read
   std::vector<double> most(as_read.size(), std::numeric_limits<double>::infinity());
   bool any = false;
   for (std::size_t o = 0; o < most.size(); ++o) {
@@ -50,8 +50,8 @@ std::vector<double> followed_by(const Recording& recording, const physics::Outpu
       if (std::isfinite(y)) sum += y, squares += y * y, n += 1.0;
     if (n < 8.0) continue;
     any = true;
-    most[o] =
-        share * share * std::min(squares - sum * sum / n, squares_off(recording.measured[o], as_read[o]));
+    most[o] = thresholds::follows_share * thresholds::follows_share *
+              std::min(squares - sum * sum / n, squares_off(recording.measured[o], as_read[o]));
   }
   return any ? most : std::vector<double>{};
 }
@@ -94,12 +94,11 @@ struct Retuned {
 
 /// Were the time multiplied: of the first rows, which are enough to know a clock by.
 Retuned retuned(const Case& data, const Recording& recording, double factor) {
-  constexpr std::size_t enough = 3000;
   Case some = data;
   some.remembered = std::make_shared<Remembered>();
   some.recordings = {recording};
   auto& [name, inputs, measured, simulation] = some.recordings.front();
-  const std::size_t rows = std::min(enough, inputs.rows());
+  const std::size_t rows = std::min(thresholds::rows_of_a_clock, inputs.rows());
   inputs.time.resize(rows);
   for (double& t : inputs.time) t *= factor;
   for (auto& [signal, values] : inputs.signals) values.resize(rows);
@@ -125,7 +124,6 @@ Retuned retuned(const Case& data, const Recording& recording, double factor) {
 /// Numbers that are a little off, or of which the user is less sure, may hide a wrong clock: they are let give way. Refused is a time
 /// that the model follows with the numbers near what is believed, where as read it does not, or only with others.
 void check_retuned_clock(const Case& data) {
-  constexpr double follows_it = 0.2, near = 3.0, times_worse = 5.0;
   const auto& parameters = data.model.parameters;
   if (data.model.plant != physics::Plant::equations || data.model.equations.states.empty() ||
       !data.model.equations.controlled_input.empty() ||
@@ -133,13 +131,16 @@ void check_retuned_clock(const Case& data) {
     return;
   const auto& recording = data.recordings.front();
   const auto as_read = retuned(data, recording, 1.0);
-  if (as_read.left < follows_it && as_read.excursion <= far_astray) return;
+  if (as_read.left < thresholds::follows_share_retuned && as_read.excursion <= thresholds::far_astray) return;
   for (const auto& clock : clocks) {
     if (clock.factor != 1e3 && clock.factor != 1e-3) continue;  // less is within what a number may be off
     const auto other = retuned(data, recording, clock.factor);
-    const bool is_nearer = as_read.left > times_worse * other.left && other.excursion <= far_astray,
-               is_likelier = as_read.excursion > far_astray && other.excursion <= near;
-    if (other.left < follows_it && (is_nearer || is_likelier)) refuse(data, recording, clock);
+    const bool is_nearer = as_read.left > thresholds::clock_times_worse * other.left &&
+                           other.excursion <= thresholds::far_astray,
+               is_likelier =
+                   as_read.excursion > thresholds::far_astray && other.excursion <= thresholds::near_sigmas;
+    if (other.left < thresholds::follows_share_retuned && (is_nearer || is_likelier))
+      refuse(data, recording, clock);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/library.hpp"
 
@@ -201,8 +202,8 @@ std::optional<LawOff> off_the_law(const Case& data) {
   Eigen::Index rows = 0;
   for (const auto& stretch : stretches)
     rows += static_cast<Eigen::Index>(stretch.end - stretch.begin - settles);
-  constexpr Eigen::Index blocks = 20, least = 50;
-  if (rows < blocks * least) return std::nullopt;
+  constexpr Eigen::Index blocks = 20;
+  if (rows < blocks * thresholds::rows_of_law_block) return std::nullopt;
   const auto simulated = simulate(data, data.model);
   Eigen::VectorXd left(rows), current(rows);
   Eigen::MatrixXd motion(rows, parts);

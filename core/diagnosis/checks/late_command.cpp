@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/quantity.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -37,13 +38,11 @@ std::vector<double> lagged(const std::vector<double>& asked, double cycles) {
   return late;
 }
 
-constexpr std::size_t most_cycles_late = 30;
-
 /// The first is not late at all.
 std::vector<Late> late_commands(const Case& data, const std::vector<LawRows>& law) {
   const double cycle = 1.0 / data.model.controller->rate;
   std::vector<Late> all;
-  for (std::size_t d = 0; d <= most_cycles_late; ++d) {
+  for (std::size_t d = 0; d <= thresholds::most_cycles_late; ++d) {
     auto& late = all.emplace_back(
         Late{started("transport_delay"), "a delay of " + si(static_cast<double>(d) * cycle, "s"), {}});
     late.term.values[0] = (static_cast<double>(d) - 0.5) * cycle;  // what is held for a cycle comes within it
@@ -54,7 +53,7 @@ std::vector<Late> late_commands(const Case& data, const std::vector<LawRows>& la
     }
   }
   constexpr double finer = 1.15;
-  for (double cycles = 0.3; cycles < static_cast<double>(most_cycles_late); cycles *= finer) {
+  for (double cycles = 0.3; cycles < static_cast<double>(thresholds::most_cycles_late); cycles *= finer) {
     auto& late =
         all.emplace_back(Late{started("amplifier_lag"), "a lag of " + si(cycles * cycle, "s", 2), {}});
     late.term.values[0] = cycles * cycle;
@@ -75,8 +74,9 @@ std::optional<Added> comes_late_from_law(const Case& data, const std::vector<Law
   Eigen::VectorXd white = Eigen::VectorXd::Zero(product.cols()), instruments(lags), left(product.cols());
   double rows = 0.0;
   for (std::size_t r = 0; r < law.size(); ++r)
-    for (std::size_t i = most_cycles_late; i < law[r].asked.size(); ++i) {
-      if (!std::isfinite(law[r].asked[i]) || !std::isfinite(law[r].asked[i - most_cycles_late])) continue;
+    for (std::size_t i = thresholds::most_cycles_late; i < law[r].asked.size(); ++i) {
+      if (!std::isfinite(law[r].asked[i]) || !std::isfinite(law[r].asked[i - thresholds::most_cycles_late]))
+        continue;
       const auto& expected = simulated[r][static_cast<std::size_t>(place)];
       for (std::size_t j = 0; j < static_cast<std::size_t>(lags); ++j)
         instruments(static_cast<Eigen::Index>(j)) = expected[i - j] - expected[i - j - 1];
@@ -85,18 +85,18 @@ std::optional<Added> comes_late_from_law(const Case& data, const std::vector<Law
       square += instruments * instruments.transpose(), product += instruments * left.transpose();
       white += left.cwiseAbs2(), rows += 1.0;
     }
-  if (rows < static_cast<double>(fewest_rows_of_law) || !(square.trace() > 0.0)) return std::nullopt;
+  if (rows < static_cast<double>(thresholds::fewest_rows_of_law) || !(square.trace() > 0.0))
+    return std::nullopt;
   square.diagonal().array() += 1e-9 * square.trace();
   const Eigen::VectorXd goes_with = product.cwiseProduct(square.ldlt().solve(product)).colwise().sum();
   Eigen::Index best = 0;
   if (!goes_with.allFinite()) return std::nullopt;
   goes_with.minCoeff(&best);
   // By chance as many squares of a row go with the instruments as there are of these; a late command leaves no more.
-  constexpr double beyond_chance = 4.0, leaves = 0.2;
   const auto by_chance = [&](Eigen::Index k) {
-    return beyond_chance * static_cast<double>(lags) * white(k) / rows;
+    return thresholds::late_beyond_chance * static_cast<double>(lags) * white(k) / rows;
   };
-  if (best == 0 || goes_with(0) < by_chance(0) || goes_with(best) > leaves * goes_with(0) ||
+  if (best == 0 || goes_with(0) < by_chance(0) || goes_with(best) > thresholds::late_leaves * goes_with(0) ||
       goes_with(best) > by_chance(best))
     return std::nullopt;
   const auto& late = all[static_cast<std::size_t>(best)];

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/diagnosis/checks/control_law.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -15,9 +16,6 @@ struct Added {
   std::string words;   // "a square wave of 2.5 A at 1 Hz"
   double share = 0.0;  // of the squares that the law leaves of the current beyond its noise
 };
-
-/// Fewer say nothing of a loop.
-inline constexpr std::size_t fewest_rows_of_law = 1000;
 
 /// A term of an axis with the numbers from which a fit of it begins.
 physics::Term started(const char* name);

@@ -6,6 +6,7 @@
 #include "core/base/fault.hpp"
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/estimate/fit_comparison.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -33,7 +34,6 @@ const physics::Equations::Input* input_of(const physics::Model& model, const std
 }  // namespace
 
 void check_own_units(const Case& data, const Fit& retuned) {
-  constexpr double far = 5.0;
   for (const auto& one : data.taken_in_si) {
     const auto* input = input_of(data.model, one.signal);
     if (input == nullptr) continue;
@@ -44,7 +44,7 @@ void check_own_units(const Case& data, const Fit& retuned) {
     double farther = 1e300;
     for (std::size_t o = 0; o < in_si.size(); ++o)
       if (as_written[o] > 0.0) farther = std::min(farther, std::sqrt(in_si[o] / as_written[o]));
-    if (!(farther > far)) continue;
+    if (!(farther > thresholds::far_worse_in_si)) continue;
     throw InputError{data.recordings.front().name + ": column `" + one.column + "`",
                      "is in `" + one.unit + "` and taken in SI, times " + number(one.factor, 4) +
                          ", which leaves " + number(farther, 2) + " times as much as the column as it stands",

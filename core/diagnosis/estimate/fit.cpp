@@ -8,6 +8,7 @@
 #include "core/diagnosis/estimate/common_factor.hpp"
 #include "core/diagnosis/estimate/priors.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
@@ -61,16 +62,16 @@ double rarity(const Case& data, const Model& model, const physics::Term& term) {
   if (term.info->cut == physics::Cut::around_zero) {
     for (const auto& input : model.equations.inputs)
       if (const auto range = covered(data, input.signal); input.symbol == term.on && range)
-        return range->lower >= term.values[0] || range->upper <= -term.values[0] ? 3.0 : 0.0;
+        return range->lower >= term.values[0] || range->upper <= -term.values[0] ? thresholds::rare_law : 0.0;
     return 0.0;
   }
   // A law bends over its own state; what another one does mostly goes straight (a coupling).
   if (!term.with.empty() && !physics::is_felt_by_others_alone(term))
     return std::log(static_cast<double>(model.equations.states.size() + model.equations.inputs.size())) +
-           (term.info->power > 1 ? 3.0 : 0.0);
+           (term.info->power > 1 ? thresholds::rare_law : 0.0);
   const bool speed = std::any_of(model.equations.states.begin(), model.equations.states.end(),
                                  [&](const auto& state) { return state.derivative == term.on; });
-  return term.info->power == 3 && speed ? 3.0 : 0.0;
+  return term.info->power == 3 && speed ? thresholds::rare_law : 0.0;
 }
 
 /// The damped Newton step; a number that stands at a bound and would leave through it is held while the others move.
@@ -102,8 +103,8 @@ Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorX
 
 double price_of_current(double frequency) {
   for (const double hum : {50.0, 60.0, 100.0, 120.0, 150.0, 180.0, 300.0, 360.0})
-    if (std::abs(frequency - hum) < 0.003 * hum) return -4.0;
-  return 4.0;
+    if (std::abs(frequency - hum) < thresholds::at_the_mains * hum) return -thresholds::current_or_force;
+  return thresholds::current_or_force;
 }
 
 namespace {
@@ -328,7 +329,7 @@ double complexity_of(const Weighing& weighing, const Model& believed, const Fit&
     for (const char* scanned : {"pitch", "frequency", "period"})
       if (fit.model.terms[t].info->index_of(scanned) < physics::most_parameters &&
           fit.model.terms[t].info->index_of("phase") < physics::most_parameters)
-        complexity += 0.7 * std::log(observations);
+        complexity += thresholds::look_elsewhere * std::log(observations);
   return complexity;
 }
 

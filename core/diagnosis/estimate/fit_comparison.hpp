@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/diagnosis/estimate/fit.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -18,8 +19,6 @@ std::vector<Squares> squares_left(const Case& data, const std::vector<physics::O
                                   const Weighing& on);
 /// Sum of squares of measured - simulated by output.
 std::vector<double> squares_left(const Case& data, const physics::Model& model);
-/// So many of his sigmas no engineer is wrong, and of 150 right names of two authors none led his numbers so far.
-inline constexpr double far_astray = 10.0;
 /// By how many of the user's sigmas his numbers moved at most; where a window begins is none of them.
 double excursion_of(const Fit& fit);
 /// The smallest ratio of residual RMS of any output, a over b.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/diagnosis/estimate/fit_comparison.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -10,8 +11,6 @@ namespace invar::diagnosis {
 /// step in which it counts, whichever is most. What goes on from row to row is none of it.
 double instrument_noise(const Case& data, const std::vector<physics::Outputs>& simulated, std::size_t output);
 
-/// So many times the noise is mismatch.
-inline constexpr double times_noise = 2.0;
 /// What a model leaves in units of the instruments' noise, squared: the mean of the rows, summed over the outputs. The noise is
 /// that beside `best`, the nearer of the models that are compared.
 double squares_in_noise(const Case& data, const Fit& fit, const Fit& best);

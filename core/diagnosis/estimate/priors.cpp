@@ -1,4 +1,5 @@
 #include "core/diagnosis/estimate/priors.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 #include <cmath>
 
@@ -8,25 +9,19 @@ using physics::Model;
 
 namespace {
 
-/// What users believe has a heavy tail (Student's t, 3 degrees of freedom): one parameter that is far off is likelier
-/// than several that are each a little off.
-constexpr double degrees_of_freedom = 3.0;
-/// A knot that no row visits lies between its neighbours: the sigma of the difference of two neighbours, as a share of the
-/// sigma of one knot alone.
-constexpr double neighbour_share = 0.1;
-
 bool is_gaussian(const Freedom& f) { return f.where == Freedom::Where::curve; }
 
 double cost_of(const Freedom& f, double value) {
   const double z = (value - f.center) / f.sigma;
-  return is_gaussian(f) ? 0.5 * z * z
-                        : 0.5 * (degrees_of_freedom + 1.0) * std::log1p(z * z / degrees_of_freedom);
+  return is_gaussian(f)
+             ? 0.5 * z * z
+             : 0.5 * (thresholds::belief_freedom + 1.0) * std::log1p(z * z / thresholds::belief_freedom);
 }
 
 /// The weight of a Gaussian prior that has the same slope here.
 double weight_of(const Freedom& f, double value) {
   const double z = (value - f.center) / f.sigma;
-  return (is_gaussian(f) ? 1.0 : (degrees_of_freedom + 1.0) / (degrees_of_freedom + z * z)) /
+  return (is_gaussian(f) ? 1.0 : (thresholds::belief_freedom + 1.0) / (thresholds::belief_freedom + z * z)) /
          (f.sigma * f.sigma);
 }
 
@@ -37,7 +32,7 @@ void for_neighbours(const std::vector<Freedom>& free, F f) {
     if (is_gaussian(free[k]) && is_gaussian(free[k + 1]) && free[k].term == free[k + 1].term) f(k);
 }
 
-double neighbour_weight(const Freedom& f) { return 1.0 / std::pow(neighbour_share * f.sigma, 2); }
+double neighbour_weight(const Freedom& f) { return 1.0 / std::pow(thresholds::neighbour_share * f.sigma, 2); }
 
 }  // namespace
 
@@ -47,7 +42,7 @@ double cost_of_priors(const Model& model, const std::vector<Freedom>& free) {
     if (f.sigma > 0.0) sum += cost_of(f, get(model, f));
   for_neighbours(free, [&](std::size_t k) {
     const double apart = get(model, free[k + 1]) - get(model, free[k]);
-    sum += 0.5 * std::pow(apart / (neighbour_share * free[k].sigma), 2);
+    sum += 0.5 * std::pow(apart / (thresholds::neighbour_share * free[k].sigma), 2);
   });
   return sum;
 }

@@ -8,6 +8,7 @@
 #include "core/diagnosis/dataset/variables.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/diagnosis/evidence/waves.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 
@@ -62,10 +63,13 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
   const double size = std::max(std::abs(low), std::abs(high));
   // What repeats must have been seen to repeat, and not by a few rows: half a wave is any bent law. Time goes on steadily.
   if (term.info->is_wave())
-    return (over == "t" ? high - low : inner_span_of(data, model, over)) >= 2.0 * term.values[1];
+    return (over == "t" ? high - low : inner_span_of(data, model, over)) >=
+           thresholds::waves_seen * term.values[1];
   // Friction that never turned nor held is a constant.
   if (term.info->is_friction && term.with == term.on) return turns(data, model, term.on);
-  if (term.info->is_friction) return (low < -0.03 * size && high > 0.03 * size) || rests(data, model, over);
+  if (term.info->is_friction)
+    return (low < -thresholds::goes_both_ways * size && high > thresholds::goes_both_ways * size) ||
+           rests(data, model, over);
   if (!term.info->parameters[0].name.starts_with("limit")) return true;
   // A limit that one or two rows touch is an outlier.
   auto free = model;
@@ -77,7 +81,7 @@ bool acts(const Case& data, const physics::Model& model, const Term& term) {
     for (std::size_t o = 0; o < with[r].size(); ++o)
       for (std::size_t i = 0; i < with[r][o].size(); ++i)
         rows += std::abs(with[r][o][i] - without[r][o][i]) > 1e-6 * std::abs(with[r][o][i]) ? 1U : 0U;
-  return rows >= 5;
+  return rows >= thresholds::rows_at_a_limit;
 }
 
 /// Was what repeats seen to repeat? Less than two waves are any bent course. Of an axis one and a half will do: there a free
@@ -98,7 +102,8 @@ bool repeats(const Case& data, const Term& term) {
   if (all.empty()) return true;
   std::sort(all.begin(), all.end());
   const double span = all[all.size() - 1 - all.size() / 200] - all[all.size() / 200];
-  const double least = in_place && data.model.plant == physics::Plant::axis ? 1.5 : 2.0;
+  const double least = in_place && data.model.plant == physics::Plant::axis ? thresholds::waves_seen_on_axis
+                                                                            : thresholds::waves_seen;
   return span * (in_place ? 1.0 / term.values[pitch] : term.values[frequency]) >= least;
 }
 
@@ -125,7 +130,8 @@ bool turns_with_direction(const Case& data, const physics::Model& model, std::si
     difference += side == 1 ? mean : -mean;
     variance += (square[side] / rows[side] - mean * mean) / (rows[side] - 1.0);
   }
-  return difference / play.values[0] > 0.5 && std::abs(difference) > 3.0 * std::sqrt(variance);
+  return difference / play.values[0] > thresholds::play_turns &&
+         std::abs(difference) > thresholds::sure_sigmas * std::sqrt(variance);
 }
 
 /// A store in equations, that is beside a signal or a state.
@@ -144,7 +150,7 @@ bool is_lag(const Fit& fit, std::size_t term) {
   for (std::size_t k = 0; k < fit.free.size(); ++k)
     if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 0)
       sigma = fit.sigma(static_cast<Eigen::Index>(k));
-  return store.values[0] > 1.0 - std::max(0.05, 3.0 * sigma);
+  return store.values[0] > 1.0 - std::max(thresholds::whole_store, thresholds::sure_sigmas * sigma);
 }
 
 /// A store behind a state that fills so slowly that the recording cannot tell it from one that never does: that is a rate
@@ -155,20 +161,19 @@ bool never_fills(const Case& data, const Fit& fit, std::size_t term) {
   if (!(store.values[1] > longest(data))) return false;
   for (std::size_t k = 0; k < fit.free.size(); ++k)
     if (const auto& f = fit.free[k]; f.where == Freedom::Where::term && f.term == term && f.index == 1)
-      return store.values[1] <
-             3.0 * fit.sigma(static_cast<Eigen::Index>(k));  // 1 / time constant: 0 +- sigma
+      return store.values[1] < thresholds::sure_sigmas *
+                                   fit.sigma(static_cast<Eigen::Index>(k));  // 1 / time constant: 0 +- sigma
   return false;
 }
 
 }  // namespace
 
 bool is_affordable(const Case& data, const Fit& fit) {
-  constexpr double rows_a_number = 14.0;
   double rows = 0.0;
   for (const auto& recording : data.recordings)
     for (const auto& measured : recording.measured)
       for (double v : measured) rows += std::isfinite(v) ? 1.0 : 0.0;
-  return rows >= rows_a_number * static_cast<double>(fit.free.size());
+  return rows >= thresholds::rows_a_number * static_cast<double>(fit.free.size());
 }
 
 bool stands(const Case& data, const Fit& fit, std::size_t term) {
@@ -178,13 +183,18 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
     auto p = info.parameters[i];
     p.bounds = physics::bounds_of_parameter(data.model, fit.model.terms[term], i);
-    if (p.role == Role::amplitude && p.bounds.upper < 1e100 && std::abs(values[i]) > 0.99 * p.bounds.upper)
+    if (p.role == Role::amplitude && p.bounds.upper < 1e100 &&
+        std::abs(values[i]) > thresholds::at_upper_bound * p.bounds.upper)
       return false;
     if (p.role != Role::shape || p.name == "center" || p.name == "limit" || p.name == "squareness") continue;
-    if (p.name == "damping_ratio" && values[i] < 0.5) continue;  // what rings for long is a mode all the same
-    if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower && values[i] < 1.3 * p.bounds.lower)
+    if (p.name == "damping_ratio" && values[i] < thresholds::rings_long)
+      continue;  // what rings for long is a mode all the same
+    if (p.bounds.lower > 0.0 && p.bounds.upper > 100.0 * p.bounds.lower &&
+        values[i] < thresholds::at_lower_bound * p.bounds.lower)
       return false;
-    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 && values[i] > 0.99 * p.bounds.upper) return false;
+    if (p.bounds.upper < 1e100 && p.bounds.upper > 0.0 &&
+        values[i] > thresholds::at_upper_bound * p.bounds.upper)
+      return false;
   }
   if (data.model.plant == physics::Plant::equations &&
       (brings_energy(fit.model, fit.model.terms[term]) || !is_affordable(data, fit) ||
@@ -196,15 +206,16 @@ bool stands(const Case& data, const Fit& fit, std::size_t term) {
     return false;
   if (is_lag(fit, term) || never_fills(data, fit, term)) return false;
   // What runs over to nowhere is an upper limit.
-  if (info.has("share") && values[info.index_of("share")] < 0.05) return false;
+  if (info.has("share") && values[info.index_of("share")] < thresholds::arrives_elsewhere) return false;
   // Friction that is smaller at rest than at speed is none.
-  if (info.falls_with_speed && values[1] < 1.1 * values[0]) return false;
+  if (info.falls_with_speed && values[1] < thresholds::falls_at_least * values[0]) return false;
 
   for (std::size_t k = 0; k < fit.free.size(); ++k) {
     const auto& f = fit.free[k];
     if (f.where != Freedom::Where::term || f.term != term) continue;
     if (info.parameters[f.index].role != Role::amplitude) continue;
-    if (std::abs(get(fit.model, f)) > 3.0 * fit.sigma(static_cast<Eigen::Index>(k))) return true;
+    if (std::abs(get(fit.model, f)) > thresholds::sure_sigmas * fit.sigma(static_cast<Eigen::Index>(k)))
+      return true;
   }
   for (std::size_t i = 0; i < info.parameter_count(); ++i)
     if (info.parameters[i].role == Role::amplitude) return false;

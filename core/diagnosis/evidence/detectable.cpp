@@ -8,13 +8,12 @@
 #include "core/diagnosis/dataset/in_parallel.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/counted_units.hpp"
 
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr double price = 12.0;  // of a term's numbers, log
 
 /// What an effect changes in measured - simulated once the model's own numbers have given way to it.
 struct Effect {
@@ -57,7 +56,7 @@ class Series {
     other.residual = left_ - times * effect.whitened;
     one.data_cost = 0.5 * d_.weighing.temper * one.residual.squaredNorm();
     other.data_cost = 0.5 * d_.weighing.temper * other.residual.squaredNorm();
-    one.evidence = -one.data_cost - price;
+    one.evidence = -one.data_cost - thresholds::price_of_a_term;
     other.evidence = -other.data_cost;
     one.model = other.model = d_.best.model;
     const double margin = claim_margin_of(d_.weighing);
@@ -65,8 +64,8 @@ class Series {
     const auto [ratio, lead, independent] = led(effect, times);
     const bool coloured = std::any_of(d_.weighing.filters.begin(), d_.weighing.filters.end(),
                                       [](const Whitening& filter) { return !filter.a.empty(); });
-    if (!coloured && lead - price < margin) return false;
-    return (ratio < 0.995 || lead > claim_margin) &&
+    if (!coloured && lead - thresholds::price_of_a_term < margin) return false;
+    return (ratio < thresholds::seen_first || lead > thresholds::claim_margin) &&
            advantage_over_wander(data_, d_.weighing, one, other) > margin;
   }
 
@@ -129,7 +128,8 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
         !(s.gain > 0.0))
       continue;
     // The gain goes with the square of the strength: where it would just reach the margin.
-    const double value = s.strength.norm() * std::sqrt((claim_margin_of(d.weighing) + price) / s.gain);
+    const double value =
+        s.strength.norm() * std::sqrt((claim_margin_of(d.weighing) + thresholds::price_of_a_term) / s.gain);
     auto& [least, most] = ranges[std::string{info.name}];
     if (least.screened == nullptr || value < least.value) least = {&s, value};
     if (most.screened == nullptr || value > most.value) most = {&s, value};

@@ -5,6 +5,7 @@
 
 #include "core/diagnosis/dataset/in_parallel.hpp"
 #include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -56,8 +57,7 @@ bool has_few_stretches(const Case& data) {
 }  // namespace
 
 bool Foretold::is_plain() const {
-  constexpr double seen = 0.3;  // a sixth of the RMS
-  return quarters > 0 && share > seen && better + 1 >= quarters;
+  return quarters > 0 && share > thresholds::foretold_share && better + 1 >= quarters;
 }
 
 Foretold foretold(const Case& data, const Fit& with, const Fit& without) {

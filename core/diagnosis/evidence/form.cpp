@@ -4,6 +4,7 @@
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/equations_columns.hpp"
 
 namespace invar::diagnosis {
@@ -88,11 +89,10 @@ std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, 
 }
 
 bool is_trifle(const Case& data, const Fit& retuned, const Fit& base, const Fit& further) {
-  constexpr double share = 1e-4;  // of its power: a percent of its size
   const auto all = squares_left(data, retuned.model), before = squares_left(data, base.model),
              after = squares_left(data, further.model);
   for (std::size_t o = 0; o < all.size(); ++o)
-    if (before[o] - after[o] > share * (all[o] - after[o])) return false;
+    if (before[o] - after[o] > thresholds::trifle_of_power * (all[o] - after[o])) return false;
   return true;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/diagnosis/candidates/kin.hpp"
 #include "core/diagnosis/dataset/in_parallel.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -104,7 +105,6 @@ LoopNoise::Readings softened(const Case& data, const LoopNoise::Readings& record
 /// carriage sticks in one run and slips in another, none says when it did in the recording.
 std::vector<std::vector<bool>> told_by(const LoopNoise::Readings& variance,
                                        const LoopNoise::Readings& without_bends) {
-  constexpr double most = 4.0;
   constexpr std::size_t beside = 10;  // rows, since eight runs alone say little of their scatter
   std::vector<std::vector<bool>> told(variance.size());
   for (std::size_t r = 0; r < told.size(); ++r) {
@@ -115,7 +115,7 @@ std::vector<std::vector<bool>> told_by(const LoopNoise::Readings& variance,
         double with = 0.0, expected = 0.0;
         for (std::size_t k = i > beside ? i - beside : 0; k < std::min(n, i + beside + 1); ++k)
           with += variance[r][o][k], expected += without_bends[r][o][k];
-        if (with > most * expected) told[r][i] = false;
+        if (with > thresholds::told_scatter * expected) told[r][i] = false;
       }
   }
   return told;
@@ -196,8 +196,7 @@ double LoopNoise::take_off(const physics::Model& model) {
     untold += static_cast<double>(std::count(one.begin(), one.end(), false));
   }
   // Where chance would decide in most rows there would be nothing left to judge by: a loop that hardly holds scatters so.
-  constexpr double most = 0.9;
-  const bool is_judged = untold < most * rows;
+  const bool is_judged = untold < thresholds::most_left_to_chance * rows;
   for (std::size_t r = 0; r < off.size(); ++r)
     for (std::size_t o = 0; o < off[r].size(); ++o)
       for (std::size_t i = 0; i < off[r][o].size(); ++i) {
@@ -225,11 +224,12 @@ bool LoopNoise::shows(const physics::Model& with, const physics::Model& without,
   const auto off = softened(data_, recorded_, with, *position);
   const auto simulated = simulate(data_, with);
   // Where a shaken carriage sticks here and slips there the average says little; then what takes a fifth off without noise counts.
-  constexpr double plain = 0.8;
   const auto shaken = squares(recorded_, simulated, &off), quiet = squares(recorded_, simulated, nullptr),
              farther = squares(now(), simulate(data_, without), nullptr);
   for (std::size_t o = 0; o < shaken.size(); ++o)
-    if (shaken[o] < ratio * ratio * farther[o] || quiet[o] < plain * plain * farther[o]) return true;
+    if (shaken[o] < ratio * ratio * farther[o] ||
+        quiet[o] < thresholds::plain_without_noise * thresholds::plain_without_noise * farther[o])
+      return true;
   return false;
 }
 

@@ -6,6 +6,7 @@
 #include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/evidence/shape.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -49,10 +50,10 @@ double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t pl
     return a.info->is_friction && !a.info->springs_first && !a.info->falls_with_speed;
   };
   if (!info.springs_first || is_alternative(finding, slides_at_once)) return 0.0;
-  constexpr double stiffer = 10.0;
   auto limit = best.model;
   auto& stiffness = limit.terms[place].values[info.index_of("stiffness")];
-  stiffness = std::min(stiffer * stiffness, info.parameters[info.index_of("stiffness")].bounds.upper);
+  stiffness = std::min(thresholds::stiff_as_sliding * stiffness,
+                       info.parameters[info.index_of("stiffness")].bounds.upper);
   const auto plain = weigh(data, simulate(data, best.model), Colour::white);
   auto stiff = fit(data, plain, limit, data.model, Effort::evaluate());
   // Two numbers fewer.
@@ -65,9 +66,11 @@ double odds_of_sliding_at_once(const Case& data, const Fit& best, std::size_t pl
 }  // namespace
 
 double odds_of_another_cause(double gain, double left, double shape, double share) {
-  constexpr double at_100 = 0.18, slope = 0.52, by_left = 28.0, by_shape = 0.5, form = 0.005, ideal = 5e-4;
-  return at_100 * std::pow(std::max(gain, 1.0) / 100.0, -slope) + by_left * (left + shape) +
-         by_shape * std::min(1.0, shape / form) + (share < 1.0 ? ideal / std::max(share, 1e-6) : 0.0);
+  return thresholds::other_cause_at_100 *
+             std::pow(std::max(gain, 1.0) / 100.0, -thresholds::other_cause_slope) +
+         thresholds::other_cause_by_left * (left + shape) +
+         thresholds::other_cause_by_shape * std::min(1.0, shape / thresholds::other_cause_form) +
+         (share < 1.0 ? thresholds::other_cause_ideal / std::max(share, 1e-6) : 0.0);
 }
 
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
@@ -93,7 +96,7 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
   double all = 0.0, most = 0.0;
   for (const double one : won) all += std::max(0.0, one);
   for (std::size_t o = 0; o < won.size(); ++o)
-    if (won[o] > 0.1 * all) most = std::max(most, excess[o] / (excess[o] + won[o]));
+    if (won[o] > thresholds::part_of_gain * all) most = std::max(most, excess[o] / (excess[o] + won[o]));
   return most;
 }
 
@@ -107,13 +110,13 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
     finding.other_cause =
         odds_of_another_cause(finding.gain, std::max(rest, d.still_follows), finding.other_shape,
                               d.findings.size() > 1 ? finding.share_of_rest : 1.0);
-    constexpr double most = 3.0;  // a sigma that is too small alone takes no name away
-    finding.other_cause += std::clamp(d.parameter_excursion / far_astray - 1.0, 0.0, most);
+    finding.other_cause += std::clamp(d.parameter_excursion / thresholds::far_astray - 1.0, 0.0,
+                                      thresholds::other_cause_by_excursion);
     sum += finding.relatives + finding.other_cause;
   }
   // A course over time follows anything slow and foretells nothing: another place is as likely.
   if (is_over_time(finding.term)) sum += 1.0;
-  finding.probability = std::min(0.995, 1.0 / sum);
+  finding.probability = std::min(thresholds::surest, 1.0 / sum);
 }
 
 }  // namespace invar::diagnosis

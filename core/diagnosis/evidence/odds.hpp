@@ -3,14 +3,9 @@
 #pragma once
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
-
-/// With more than these another cause is so much likelier that a name is right in three cases of ten at most.
-inline constexpr double unlikely_odds = 7.0 / 3.0;
-
-/// A name that leaves more than this share of what there was to explain beyond the noise is unlikely by that alone.
-inline constexpr double plain_rest = 0.08;
 
 /// Odds of "some other cause" against a claimed name: they fall with the log evidence by which the name wins (a small
 /// effect looks like many things; the evidence is counted in independent rows), rise with the share of the mismatch that

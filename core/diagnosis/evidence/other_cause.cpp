@@ -11,6 +11,7 @@
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -62,7 +63,8 @@ double advantage(const Case& data, const Weighing& weighing, const Fit& one, con
 }
 
 double margins_of_a_further(const Case& data, double evidence, double counted) {
-  return !data.model.controller && is_white(evidence, counted) ? 2.0 : plainly;
+  return !data.model.controller && is_white(evidence, counted) ? thresholds::white_margins
+                                                               : thresholds::margins_of_a_trifle;
 }
 
 namespace {
@@ -114,7 +116,7 @@ Beside products_beside(const Case& data, const Fit& best) {
 
 std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, std::size_t term) {
   const auto& [plain, named, courses, memories] = beside;
-  if (courses.empty() || courses[0].merit < claim_margin || courses[0].columns.size() == 0)
+  if (courses.empty() || courses[0].merit < thresholds::claim_margin || courses[0].columns.size() == 0)
     return std::nullopt;
   const Fit base = fit(data, plain, physics::without_term(named.model, term), data.model, Effort::follow(6));
   // In place of a law of friction a course of it along the way is a cause of its own, which beside the law is none.
@@ -122,7 +124,7 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
   const auto instead = screen(data, plain, base, starts, 4);
   std::optional<OtherCause> found;
   for (const auto& s : instead) {
-    if (s.merit < claim_margin || s.columns.size() == 0) break;
+    if (s.merit < thresholds::claim_margin || s.columns.size() == 0) break;
     const Fit start = with_columns(data, base, s);
     if (data.model.plant == physics::Plant::equations && !is_affordable(data, start)) continue;
     OtherCause one;
@@ -134,7 +136,8 @@ std::optional<OtherCause> other_cause(const Case& data, const Beside& beside, st
                          (data.model.plant == physics::Plant::equations &&
                           variable_of(s.start.term) == variable_of(named.model.terms[term])) ||
                          (s.start.term.with == "direction" && named.model.terms[term].info->is_friction);
-    if (one.lead < claim_margin || lost_share(data, base, named, one.fit) < (is_form ? of_form : 0.02))
+    if (one.lead < thresholds::claim_margin ||
+        lost_share(data, base, named, one.fit) < (is_form ? thresholds::of_form : 0.02))
       continue;
     if (!leaves_less(data, one.fit, named)) continue;
     if (!found || one.lead > found->lead) found = std::move(one);

@@ -5,12 +5,9 @@
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
-
-/// Of what a free course takes, the share that a name over the same variable may leave: its own form, which is idealised, and
-/// small effects that go with that variable too.
-inline constexpr double of_form = 0.3;
 
 /// measured - simulated by output and recording; NaN where nothing was measured.
 using Left = std::vector<std::vector<std::vector<double>>>;
@@ -22,8 +19,6 @@ struct Lead {
 };
 Lead lead_of(const Case& data, const Left& one, const Left& other);
 
-/// Of an RMS: what takes half of the squares is no noise, whatever its colour, outside a loop that feeds noise back.
-inline constexpr double half_of_squares = 0.7;
 /// log likelihood of `one` over `other` counted in independent rows of the residual that `one` leaves, less the price
 /// of the numbers that it has more: says which is right whatever the colour of the noise.
 double lead(const Case& data, const Fit& one, const Fit& other);
@@ -33,7 +28,7 @@ double lead(const Case& data, const Fit& one, const Fit& other);
 double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
 
 /// Of the evidence under the filters most counts in independent rows too: no noise that wanders is left.
-inline bool is_white(double evidence, double counted) { return counted > 0.7 * evidence; }
+inline bool is_white(double evidence, double counted) { return counted > thresholds::white_share * evidence; }
 /// So many times the margin a further claim must gain that hardly moves the size of the residual.
 double margins_of_a_further(const Case& data, double evidence, double counted);
 

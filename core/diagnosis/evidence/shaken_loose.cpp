@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -56,11 +57,10 @@ bool is_seen(const Step& step, double sigmas) {
 std::optional<ShakenLoose> best_size(const Case& data, const LoopNoise& noise, const Weighing& weighing,
                                      const Fit& base, const Eigen::MatrixXd& columns,
                                      const Eigen::VectorXd& at, const char* name, double size) {
-  constexpr double sure = 3.0;  // sigmas
   Step step;
   for (int i = 0; i < 5; ++i) {
     step = looked_for(data, noise, weighing, base, columns, at, name, size, LoopNoise::Runs::few);
-    if (!is_seen(step, sure)) return std::nullopt;
+    if (!is_seen(step, thresholds::shaken_sure)) return std::nullopt;
     const double next = std::clamp(step.size, 0.1 * size, 10.0 * size);
     const bool arrived = std::abs(next - size) < 0.1 * size;
     size = next;
@@ -96,7 +96,6 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
     double size;
   };
   const Eigen::MatrixXd columns = whitened(data, weighing, base.columns).dense();
-  constexpr double perhaps = 1.0;  // sigmas
   const Eigen::VectorXd roughly_at = differences(data, noise.shaken_mean(base.model, LoopNoise::Runs::two));
   Eigen::VectorXd at;  // once something is seen
   std::optional<ShakenLoose> best;
@@ -106,7 +105,7 @@ std::optional<ShakenLoose> shaken_loose(const Case& data, const LoopNoise& noise
     if (without.contains(bend.name) || is_known(bend.site)) continue;
     if (!is_seen(looked_for(data, noise, weighing, base, columns, roughly_at, bend.name, bend.size,
                             LoopNoise::Runs::two),
-                 perhaps))
+                 thresholds::shaken_perhaps))
       continue;
     if (at.size() == 0) at = differences(data, noise.shaken_mean(base.model));
     auto one = best_size(data, noise, weighing, base, columns, at, bend.name, bend.size);

@@ -96,7 +96,7 @@ OtherShape other_shape(const Case& data, const Beside& beside, std::size_t term)
     if (s.columns.size() > 0) weigh_up(squares_taken(plain, data, named, s.columns), s.columns.cols());
   if (const auto late = second_times(data, named, term); late.cols() > 0)
     weigh_up(squares_taken(plain, data, named, late), late.cols());
-  if (found.lead < claim_margin) return found;
+  if (found.lead < thresholds::claim_margin) return found;
   const auto without = physics::without_term(named.model, term);
   const double all =
       fit(data, plain, without, data.model, Effort::follow(6)).residual.squaredNorm() - squares + taken;

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -56,10 +57,9 @@ Wander wander_of(const std::vector<std::vector<double>>& series, bool is_instrum
   for (const auto& one : series) longest = std::max(longest, one.size());
   // White noise alone seems to wander by a nat or two, the best of many tried. What many rows do not show, however long it
   // could last, hides nothing in a reading; a few hundred would not show it.
-  constexpr std::size_t many = 1500;
   std::size_t rows = 0;
   for (const auto& one : series) rows += one.size();
-  const double by_chance = is_instrument && rows >= many ? 3.0 : 0.0;
+  const double by_chance = is_instrument && rows >= thresholds::rows_that_show_wander ? 3.0 : 0.0;
   Wander best;
   double most = likelihood(series, best) + by_chance;
   for (double memory = 8.0; memory < 4.0 * static_cast<double>(longest); memory *= 4.0) {

@@ -8,6 +8,7 @@
 
 #include "core/diagnosis/dataset/variables.hpp"
 #include "core/diagnosis/estimate/weighing.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/equations_columns.hpp"
 
 namespace invar::diagnosis {
@@ -143,7 +144,7 @@ bool lasts(const Case& data, const physics::Model& model, std::size_t term) {
   }
   double all = 0.0;
   for (const double one : gain) all += one;
-  return *std::max_element(gain.begin(), gain.end()) < 0.6 * all;
+  return *std::max_element(gain.begin(), gain.end()) < thresholds::lasts_share * all;
 }
 
 namespace {
@@ -288,7 +289,7 @@ bool is_rounding(const Case& data, const physics::Model& model, std::size_t term
         }
       }
     }
-    if (std::abs(rounded) > 0.4 * std::abs(seen)) return true;
+    if (std::abs(rounded) > thresholds::rounding_share * std::abs(seen)) return true;
   }
   return false;
 }

@@ -6,6 +6,7 @@
 
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/report/report.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -88,11 +89,10 @@ std::string like_a_slip(double ratio) {
 /// Before anything is measured: columns that do not stand beside one another, and a number far from what was believed, are
 /// first of all slips in a file.
 std::string look_at_numbers(const Case& data, const Diagnosis& d) {
-  constexpr double far = 3.0;  // times the noise: what is missing moved them
   if (!data.moved.empty()) return "First look at how the columns were put together. ";
-  if (d.unexplained >= far) return "";
+  if (d.unexplained >= thresholds::slip_unless_left) return "";
   std::string text;
-  for (const auto& one : moved_numbers(d, far_moved)) {
+  for (const auto& one : moved_numbers(d, thresholds::far_moved)) {
     const auto slip = one.believed != 0.0 ? like_a_slip(one.value / one.believed) : std::string{};
     text += (text.empty() ? "" : ", ") + one.name +
             (slip.empty() ? "" : " (" + number(one.value / one.believed, 4) + " of it, " + slip + ")");

@@ -8,6 +8,7 @@
 #include "core/config/yaml.hpp"
 #include "core/diagnosis/candidates/place.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -53,8 +54,6 @@ struct MovedNumber {
   double value = 0.0, believed = 0.0;  // SI, or as the user's own equations count
   double sigmas = 0.0;                 // of what was believed
 };
-/// So many sigmas: the model has become another.
-inline constexpr double far_moved = 10.0;
 /// Those that moved by more than `least` sigmas.
 std::vector<MovedNumber> moved_numbers(const Diagnosis& diagnosis, double least);
 /// The motion or recording that would tell two terms apart.

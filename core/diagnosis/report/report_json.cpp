@@ -9,6 +9,7 @@
 #include "core/diagnosis/report/region.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/curve_memory.hpp"
 
 namespace invar::diagnosis {
@@ -30,7 +31,7 @@ json fit_json(const std::vector<FitRow>& rows) {
 
 /// How unlikely (log) white noise makes an RMS so many times its own: Chernoff's bound for chi squared.
 double above_noise(const Case& data, double times) {
-  if (!(times > times_noise)) return 0.0;
+  if (!(times > thresholds::times_noise)) return 0.0;
   double rows = 0.0;
   for (const auto& recording : data.recordings) rows += static_cast<double>(recording.inputs.rows());
   const double power = times * times;
@@ -70,7 +71,8 @@ json mismatch_json(const Case& data, const Diagnosis& d) {
   // What moves within the user's own uncertainty is no mismatch, however far the residual of his best guess is above the noise.
   const bool is_believed = d.verdict == Verdict::no_mismatch && !d.is_partial;
   const double left = most_over_noise(d);
-  return {{"significant", !is_believed && (d.mismatch_gain > claim_margin || left > times_noise)},
+  return {{"significant",
+           !is_believed && (d.mismatch_gain > thresholds::claim_margin || left > thresholds::times_noise)},
           {"residual_over_noise", over},
           {"p_value", is_believed ? std::erfc(d.parameter_excursion / std::sqrt(2.0))
                                   : std::exp(-std::clamp(std::max(d.mismatch_gain, above_noise(data, left)),
@@ -146,10 +148,9 @@ void add_finding(json& report, const Case& data, const Diagnosis& d, const Findi
 void add_suspect(json& report, const Diagnosis& d) {
   if (!d.suspect) return;
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) {
-    constexpr double of_its_place = 0.9;
     report["findings"].push_back({{"term", "unmodelled"},
                                   {"site", d.suspect->site},
-                                  {"probability", of_its_place},
+                                  {"probability", thresholds::sure_of_its_place},
                                   {"share", d.still_follows},
                                   {"parameters", json::object()},
                                   {"alternatives", json::array()},

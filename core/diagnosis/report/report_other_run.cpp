@@ -4,15 +4,15 @@
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/report/report.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
 std::string error_of(double value, const FitRow& row) {
   // A machine's error is known to one in a million at best; beyond, it is the model that left.
-  constexpr double runs_away = 1e6;
-  constexpr double nowhere = 1e30;  // in whatever unit
-  const bool is_far = row.noise_floor > 0.0 && value > runs_away * row.noise_floor && value > runs_away;
-  return !std::isfinite(value) || is_far || value > nowhere ? "runs away" : si(value, row.unit);
+  const bool is_far = row.noise_floor > 0.0 && value > thresholds::runs_away * row.noise_floor &&
+                      value > thresholds::runs_away;
+  return !std::isfinite(value) || is_far || value > thresholds::nowhere ? "runs away" : si(value, row.unit);
 }
 
 std::string worse_on(const Diagnosis& d, const OtherRun& run) {

@@ -10,6 +10,7 @@
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
@@ -43,7 +44,8 @@ std::string times(double ratio) {
 std::string nearest_of(const Diagnosis& d, const Finding& finding) {
   const double left = most_over_noise(d);
   return readable(finding.stand_in->name) + " fits best, but " +
-         (left > times_noise ? "leaves " + times(left) + " times the noise" : "another cause is likelier");
+         (left > thresholds::times_noise ? "leaves " + times(left) + " times the noise"
+                                         : "another cause is likelier");
 }
 
 }  // namespace
@@ -167,11 +169,10 @@ std::vector<MovedNumber> moved_numbers(const Diagnosis& d, double least) {
 }
 
 std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
-  constexpr double much = 3.0;  // times the noise
-  const auto moved = d.findings.empty() ? std::string{} : listed(moved_numbers(d, far_moved));
+  const auto moved = d.findings.empty() ? std::string{} : listed(moved_numbers(d, thresholds::far_moved));
   std::string text;
   if (!moved.empty()) text = (d.findings.size() == 1 ? "with it " : "with them ") + moved;
-  if (d.unexplained >= much)
+  if (d.unexplained >= thresholds::much_left)
     text += (text.empty() ? "" : "; ") + std::string{"what remains is "} + times(d.unexplained) +
             " times the noise";
   if (d.off_law && d.off_law->is_beside())
@@ -179,9 +180,8 @@ std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
             " RMS off what the controller makes of the recorded reference and position (" +
             number(100.0 * d.off_law->share, 2) + " % of the mismatch): look at the controller block";
   for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + doubt;
-  constexpr std::size_t one_in = 20;  // a slip of an instrument is rarer
   const std::size_t values = data.count.rows * data.outputs.size();
-  if (data.count.outliers > 0 && one_in * data.count.outliers >= values)
+  if (data.count.outliers > 0 && thresholds::one_in_outliers * data.count.outliers >= values)
     text +=
         (text.empty() ? "" : "; ") + std::to_string(data.count.outliers) + " of " + std::to_string(values) +
         " readings are left out as outliers, far more than slips of an instrument: look at what was recorded";

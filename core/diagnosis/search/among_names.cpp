@@ -7,6 +7,7 @@
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/search/steady_speed.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -31,19 +32,16 @@ std::vector<Model> with_friction(const Case& data, const Term& removed, const Mo
 
 namespace {
 
-/// log odds of a force that repeats in time against one along the way, where a recording cannot tell them apart.
-constexpr double of_twins = -1.0;
-
 /// Were the two told apart at a steady speed by a tenth of a residual that is far above noise? What nobody listed does that too.
 bool looks_alike(const Case& data, const Fit& best, const Fit& rival, std::size_t place) {
-  constexpr double a_tenth = 0.9;
   const auto twin = twin_at_steady_speed(data, best.model.terms[place]);
-  if (!twin || twin->info != rival.model.terms[place].info || least_ratio(data, best, rival) < a_tenth)
+  if (!twin || twin->info != rival.model.terms[place].info ||
+      least_ratio(data, best, rival) < thresholds::told_by_a_tenth)
     return false;
   const auto simulated = simulate(data, best.model);
   const auto left = squares_left(data, simulated, weigh(data, simulated, Colour::white));
   for (std::size_t o = 0; o < left.size(); ++o)
-    if (left[o].rms() > times_noise * instrument_noise(data, simulated, o)) return true;
+    if (left[o].rms() > thresholds::times_noise * instrument_noise(data, simulated, o)) return true;
   return false;
 }
 
@@ -75,11 +73,12 @@ void prune(const Case& data, Diagnosis& d, Rivals& rivals,
     const double gain = advantage(data, d.weighing, d.best, without), margin = claim_margin_of(d.weighing),
                  counted = lead(data, d.best, without);
     // Nor is it dropped because filters that grew on what the others leave see little of it.
-    if (!data.model.controller && counted > 0.0 && least_ratio(data, d.best, without) < half_of_squares)
+    if (!data.model.controller && counted > 0.0 &&
+        least_ratio(data, d.best, without) < thresholds::half_of_squares)
       continue;
     // What makes the readings themselves lie farther off pleases the filters only.
     if (gain > margin && counted > 0.0 &&
-        (least_ratio(data, d.best, without) < 0.95 ||
+        (least_ratio(data, d.best, without) < thresholds::seen_further ||
          gain > margins_of_a_further(data, gain, counted) * margin))
       continue;
     d.reject(std::string{removed.info->name}, "the others explain it without",
@@ -129,7 +128,8 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, Claims c
         double odds = advantage(data, d.weighing, f, d.best);
         if (odds > 0.0 && !data.model.controller)  // not what pleases the filters only
           odds = std::min(odds, lead(data, f, d.best));
-        if (odds > 0.5 && stands(data, f, place)) {  // better after all, beside the other terms
+        if (odds > thresholds::better_after_all &&
+            stands(data, f, place)) {  // better after all, beside the other terms
           kept.push_back(d.best.model.terms[place]);
           finding.alternatives.push_back({d.best.model.terms[place], -odds});
           for (auto& a : finding.alternatives) a.log_odds -= odds;
@@ -138,7 +138,7 @@ void weigh_alternatives(const Case& data, Diagnosis& d, Rivals& rivals, Claims c
         }
         if (claims == Claims::checked && !stands(data, f, place)) continue;
         kept.push_back(f.model.terms[place]);
-        if (looks_alike(data, d.best, f, place)) odds = std::max(odds, of_twins);
+        if (looks_alike(data, d.best, f, place)) odds = std::max(odds, thresholds::odds_of_twins);
         finding.alternatives.push_back({f.model.terms[place], odds});
       }
       rivals[i] = kept;

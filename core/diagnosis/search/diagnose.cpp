@@ -11,6 +11,7 @@
 #include "core/diagnosis/search/quiet_inputs.hpp"
 #include "core/diagnosis/search/reference_hold.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -26,11 +27,10 @@ int named_by(const Diagnosis& d) {
 /// Does the one leave plainly less of an output than the other? What lags behind its inputs is like one whose inputs were
 /// smoothed, but not as near.
 bool is_nearer(const Case& data, const Diagnosis& d, const Case& other_data, const Diagnosis& other) {
-  constexpr double plainly_less = 0.7;  // of the squares
   const auto left = squares_left(data, d.best.model),
              left_by_other = squares_left(other_data, other.best.model);
   for (std::size_t o = 0; o < left.size(); ++o)
-    if (left[o] < plainly_less * left_by_other[o]) return true;
+    if (left[o] < thresholds::other_reading_leaves * left_by_other[o]) return true;
   return false;
 }
 

@@ -3,21 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
 
 namespace {
-
-/// The RMS of fifty independent values is uncertain by a tenth, and few recordings hold more of them.
-constexpr double by_chance = 1.1;
-/// In the power of the noise: what lies within half the noise cannot be told from it.
-constexpr double within_noise = 0.25;
-/// An output that is half as bad again is seen by everybody, whatever the others gain.
-constexpr double plainly_worse = 1.5;
-
-/// In power: what changes a residual by less than a thousandth of its size changes nothing that anybody could see.
-constexpr double nothing = 1e-6;
 
 bool is_zero(const physics::Term& term) {
   bool any = false;
@@ -46,7 +37,8 @@ void take_back(const Case& data, Diagnosis& d, std::size_t finding, const std::s
 }  // namespace
 
 bool is_worse(double one, double than, double noise) {
-  return !(one <= by_chance * than) && !(one * one - than * than <= within_noise * noise * noise);
+  return !(one <= thresholds::worse_by_chance * than) &&
+         !(one * one - than * than <= thresholds::within_noise * noise * noise);
 }
 
 bool is_worse(const std::vector<FitRow>& fit, OfModel one, OfModel than) {
@@ -58,7 +50,7 @@ bool is_worse(const std::vector<FitRow>& fit, OfModel one, OfModel than) {
     sum += std::log(std::max(row.*one, least) / std::max(row.*than, least));
     if (!is_worse(row.*one, row.*than, row.noise_floor)) continue;
     any = true;
-    if (!(row.*one <= plainly_worse * row.*than)) return true;
+    if (!(row.*one <= thresholds::plainly_worse * row.*than)) return true;
   }
   return any && !(sum <= 0.0);
 }
@@ -71,7 +63,8 @@ bool leave_out_nothings(const Case& data, Diagnosis& d) {
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     const std::size_t place = data.model.terms.size() + i;
     const double lost = beyond_best(physics::without_term(d.best.model, place));
-    if (!is_zero(d.best.model.terms[place]) && lost > nothing * beyond_best(d.retuned.model)) continue;
+    if (!is_zero(d.best.model.terms[place]) && lost > thresholds::does_nothing * beyond_best(d.retuned.model))
+      continue;
     take_back(data, d, i, "with the size that fits best it explains nothing");
     any = true;
   }

@@ -9,6 +9,7 @@
 #include "core/diagnosis/search/handed_over.hpp"
 #include "core/diagnosis/search/verdict.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -215,10 +216,9 @@ void tabulate(const Case& data, const Case& recorded, const Comparison& all, Dia
 
 /// Is a model worse than another on the outputs that have held-out readings enough?
 bool errs_more(const Comparison& all, const Diagnosis& d, OfModel one, OfModel than) {
-  constexpr double enough = 8.0;  // readings; a start value alone is compared with nothing
   std::vector<FitRow> compared;
   for (std::size_t o = 0; o < all.tested.size(); ++o)
-    if (all.tested[o].before.count >= enough) compared.push_back(d.heldout[o]);
+    if (all.tested[o].before.count >= thresholds::held_out_readings) compared.push_back(d.heldout[o]);
   return is_worse(compared, one, than);
 }
 
@@ -251,7 +251,6 @@ void take_all_back(Diagnosis& d) {
 }  // namespace
 
 void hold_out(const Case& data, const Case& recorded, Diagnosis& d, Claims claims) {
-  constexpr double least_gain = 3.0;  // in log likelihood of the held-out rows
   auto all = compare(data, recorded, d, run_folds(data, d));
   tabulate(data, recorded, all, d);
   if (claims == Claims::kept) return;
@@ -272,7 +271,7 @@ void hold_out(const Case& data, const Case& recorded, Diagnosis& d, Claims claim
     hold_out(data, recorded, d, claims);
     return;
   }
-  if (all.gain < least_gain || misleads || !(is_loop || is_nearer)) take_all_back(d);
+  if (all.gain < thresholds::held_out_gain || misleads || !(is_loop || is_nearer)) take_all_back(d);
 }
 
 }  // namespace invar::diagnosis

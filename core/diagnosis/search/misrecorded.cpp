@@ -8,6 +8,7 @@
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/evidence/odds.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/equations_columns.hpp"
 
 namespace invar::diagnosis {
@@ -37,13 +38,13 @@ std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged
              believed = simulate(judged, judged.model);
   for (std::size_t o = 0; o < judged.outputs.size(); ++o) {
     constexpr std::size_t most = 20;
-    constexpr double far_less = 0.25;  // of the squares
     const auto when_later = [&](std::size_t rows) {
       return std::min(squares_when_later(judged, retuned, o, rows, most),
                       squares_when_later(judged, believed, o, rows, most));
     };
     std::size_t rows = 0;
-    double least = far_less * std::min(when_later(0), squares_when_later(judged, best, o, 0, most));
+    double least = thresholds::moved_column_leaves *
+                   std::min(when_later(0), squares_when_later(judged, best, o, 0, most));
     for (std::size_t later = 1; later <= most; ++later)
       if (const double left = when_later(later); left < least) least = left, rows = later;
     if (rows == 0 || rows == most) continue;  // at the end of what was tried it is no minimum

@@ -16,6 +16,7 @@
 #include "core/diagnosis/search/one_name.hpp"
 #include "core/diagnosis/search/pairs.hpp"
 #include "core/diagnosis/search/steady_speed.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -67,8 +68,8 @@ Search::Sought Search::seek(From from, double share) {
 std::optional<std::string> Search::why_not(const OneName& name) {
   if (rivals_.empty() || !options_.refuses) return std::nullopt;
   const auto &with = name.with, &without = name.without;
-  if (!noise_->shows(with.model, without.model, 0.95) &&
-      noise_->gain(with.model, without.model, name.weighing) < plainly * margin())
+  if (!noise_->shows(with.model, without.model, thresholds::seen_further) &&
+      noise_->gain(with.model, without.model, name.weighing) < thresholds::margins_of_a_trifle * margin())
     return "in the noise of this loop its effect would not show";
   if (is_trifle(data_, d_.retuned, without, with))
     return "less than what the idealised form of the others may leave";
@@ -83,7 +84,9 @@ bool Search::leads_out(const OneName& name) {
   if (std::exchange(led_out_, true)) return false;
   const auto model = physics::without_term(name.with.model, given());
   auto anew = fit(data_, name.weighing, model, data_.model, Effort::follow(8), &name.with);
-  if (!(anew.cost < name.without.cost) || least_ratio(data_, anew, name.without) > 0.7) return false;
+  if (!(anew.cost < name.without.cost) ||
+      least_ratio(data_, anew, name.without) > thresholds::half_of_squares)
+    return false;
   d_.weighing = weigh(data_, simulate(data_, anew.model), Colour::white);
   anew = fit(data_, d_.weighing, anew.model, data_.model, Effort::follow(8), &anew);
   d_.weighing = weigh(data_, simulate(data_, anew.model));
@@ -115,7 +118,8 @@ bool Search::add_named(double round) {
     if ((is_first || !is_equations()) && data_.is_time_series && !noise_->is_fed_back() &&
         from == From::coloured)
       rather(From::plain);
-    if (is_first && is_equations() && excursion_of(sought.best->with) > far_astray) rather(From::believed);
+    if (is_first && is_equations() && excursion_of(sought.best->with) > thresholds::far_astray)
+      rather(From::believed);
     const auto& best = *sought.best;
     if (is_first && is_equations() && leads_out(best)) return add_named(round);
     if (const auto why = why_not(best)) {
@@ -151,7 +155,8 @@ void Search::claim(Sought sought) {
 bool Search::take_shaken(const Fit& base, Fit* otherwise) {
   if (!options_.refuses) return false;
   const auto found = shaken_loose(data_, *noise_, d_.weighing, base, options_.without);
-  if (!found || found->gain < (rivals_.empty() ? 1.0 : plainly) * margin()) return false;
+  if (!found || found->gain < (rivals_.empty() ? 1.0 : thresholds::margins_of_a_trifle) * margin())
+    return false;
   if (otherwise != nullptr) {
     const double numbers =
                      static_cast<double>(otherwise->free.size()) - static_cast<double>(base.free.size()),
@@ -215,7 +220,7 @@ bool Search::add_pair(const Fit* rival) {
 }
 
 bool Search::put_one_in_place(const Diagnosis& begun) {
-  if (!(excursion_of(d_.best) > far_astray)) return false;
+  if (!(excursion_of(d_.best) > thresholds::far_astray)) return false;
   auto pair = std::exchange(d_, begun);
   auto pairs_rivals = std::exchange(rivals_, {});
   auto screened = last_screen_;

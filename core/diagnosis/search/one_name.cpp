@@ -13,6 +13,7 @@
 #include "core/diagnosis/evidence/wander.hpp"
 #include "core/diagnosis/locate/left_over.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -59,7 +60,7 @@ std::vector<Fit> fits_of(const Naming& naming, const Weighing& weighing, const F
     const bool all_go_on = data.model.plant != physics::Plant::equations;
     for (auto& f : fits)
       if (&f != &*best && (f.evidence > best->evidence - std::max(15.0, 0.5 * gained) ||
-                           (all_go_on && f.evidence > base.evidence + claim_margin)))
+                           (all_go_on && f.evidence > base.evidence + thresholds::claim_margin)))
         near.push_back(&f);
     in_parallel(near.size(), [&](std::size_t i) { go_on(*near[i]); });
   }
@@ -91,7 +92,7 @@ Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit&
   constexpr int batches = 3;
   std::size_t from = 0;
   std::map<std::string, int> seen;
-  const auto is_better = [&](const Fit& f) { return f.evidence > base.evidence + claim_margin; };
+  const auto is_better = [&](const Fit& f) { return f.evidence > base.evidence + thresholds::claim_margin; };
   for (int batch = 0; batch < batches && std::none_of(fits.begin(), fits.end(), is_better); ++batch) {
     const auto tried = next_of(list.screened, from, seen);
     if (tried.empty()) break;
@@ -111,9 +112,6 @@ struct Followed {
   std::optional<OneName> name;  // nothing: it does not show
   double rank = -1e300;
 };
-
-/// So many margins of evidence a name has that plainly foretells: enough for a further claim.
-constexpr double foretold_margins = 3.5;
 
 /// A wave was looked for at many frequencies.
 bool is_sought(const physics::Term& term) { return term.info->index_of("phase") < physics::most_parameters; }
@@ -140,7 +138,8 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows
   // say (a sign turns within a row, and they look at what comes anew in each), all rows count alike.
   if (options.refuses && !noise.is_fed_back() && data.is_time_series && data.windows.count == 0 &&
-      least_ratio(data, with, without) < half_of_squares && evidence < lead(data, with, without)) {
+      least_ratio(data, with, without) < thresholds::half_of_squares &&
+      evidence < lead(data, with, without)) {
     own = plain;
     with = fit(data, own, settled.model, data.model, Effort::follow(6), &settled);
     without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
@@ -157,14 +156,16 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   // A wave was looked for at many frequencies, and goes with anything that is slow.
   if (options.refuses && gain < margin && !noise.is_fed_back() && counted > 0.0 &&
       !is_sought(with.model.terms.back()) && foretold(data, with, without).is_plain())
-    gain = std::max(gain, foretold_margins * margin);
+    gain = std::max(gain, thresholds::foretold_margins * margin);
   // A further claim must be one that an engineer would see in the residual, or far beyond its price. A first one need
   // not, where the noise is loud at other frequencies, if it pays when counted in independent rows; nor in a loop, where
   // 200 machines that lacked nothing came nowhere near the margin.
-  const double ratio = !options.refuses ? 1.0 : is_first ? 0.995 : 0.95;
-  const double beyond = is_sought(with.model.terms.back()) ? 2.0 : 1.1;
-  const bool pays = is_first ? counted > claim_margin || (noise.is_fed_back() && gain > beyond * margin)
-                             : gain > margins_of_a_further(data, evidence, counted) * margin;
+  const double ratio = !options.refuses ? 1.0 : is_first ? thresholds::seen_first : thresholds::seen_further;
+  const double beyond =
+      is_sought(with.model.terms.back()) ? thresholds::wave_margins : thresholds::loop_margins;
+  const bool pays =
+      is_first ? counted > thresholds::claim_margin || (noise.is_fed_back() && gain > beyond * margin)
+               : gain > margins_of_a_further(data, evidence, counted) * margin;
   const bool shows = pays || least_ratio(data, with, without) < ratio;
   if (!shows || (options.refuses && !stands(data, with, with.model.terms.size() - 1))) return {};
   // A law is judged with the noise that shakes it: a run without noise may be far off where the carriage sticks.

@@ -10,14 +10,13 @@
 #include "core/diagnosis/estimate/instrument_noise.hpp"
 #include "core/diagnosis/search/handed_over.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/model/record_file.hpp"
 #include "core/model/recording_file.hpp"
 
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr std::size_t fewest = 8;  // values of an output that is worth a comparison; the start alone is none
 
 std::size_t count(const std::vector<double>& values) {
   return static_cast<std::size_t>(
@@ -28,7 +27,7 @@ std::size_t count(const std::vector<double>& values) {
 Eigen::VectorXd differences(const OtherRun& run, const physics::Outputs& simulated) {
   std::vector<double> all;
   for (std::size_t o = 0; o < simulated.size(); ++o) {
-    if (count(run.measured[o]) < fewest) continue;
+    if (count(run.measured[o]) < thresholds::values_to_compare) continue;
     std::vector<double> values = run.measured[o];
     std::erase_if(values, [](double v) { return !std::isfinite(v); });
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -112,13 +111,14 @@ OtherRun read_other_run(const physics::Model& model, const OtherRunFiles& files)
   for (const auto& output : model.outputs()) {
     auto& values = measured[output];
     values.resize(run.inputs.rows(), std::nan(""));
-    any = any || count(values) >= fewest;
+    any = any || count(values) >= thresholds::values_to_compare;
     run.measured.push_back(std::move(values));
   }
   if (!any)
-    throw InputError{(has_own ? files.outputs : files.inputs).string(),
-                     "has fewer than " + std::to_string(fewest) + " values of each output",
-                     "give a recording with at least one of them"};
+    throw InputError{
+        (has_own ? files.outputs : files.inputs).string(),
+        "has fewer than " + std::to_string(thresholds::values_to_compare) + " values of each output",
+        "give a recording with at least one of them"};
   return run;
 }
 
@@ -179,7 +179,7 @@ std::vector<FitRow> rows_of(const Case& data, const Diagnosis& diagnosis, const 
   std::vector<FitRow> rows;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto n = count(run.measured[o]);
-    if (n < fewest) continue;
+    if (n < thresholds::values_to_compare) continue;
     const auto rms = [&](const physics::Outputs& outputs) {
       double sum = 0.0;
       for (std::size_t i = 0; i < run.measured[o].size(); ++i)
@@ -229,7 +229,7 @@ void check_on(const Case& data, Diagnosis& d, OtherRun run) {
   compare(data, d, run);
   // No fit saw these rows: what errs by more than noise there does not explain the machine.
   const bool leaves_more = std::any_of(run.fit.begin(), run.fit.end(), [](const FitRow& row) {
-    return row.noise_floor > 0.0 && row.after > times_noise * row.noise_floor;
+    return row.noise_floor > 0.0 && row.after > thresholds::times_noise * row.noise_floor;
   });
   if (leaves_more && d.verdict == Verdict::explained) d.verdict = Verdict::partly_explained;
   d.other_runs.push_back(std::move(run));

@@ -12,6 +12,7 @@
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -97,7 +98,7 @@ bool drifts_alone(const Case& data, const Weighing& plain, const Fit& under, con
 /// Does one of them do as well as a pair?
 bool is_done_by_one(const Case& data, const std::vector<Settled>& all, const Settled& pair) {
   return std::any_of(all.begin(), all.end(), [&](const Settled& one) {
-    return lead(data, pair.fit, one.fit) < claim_margin &&
+    return lead(data, pair.fit, one.fit) < thresholds::claim_margin &&
            stands(data, one.fit, one.fit.model.terms.size() - 1);
   });
 }
@@ -143,7 +144,7 @@ bool needs_both(const Case& data, const Settled& best, std::size_t first, Pairs&
   for (const std::size_t dropped : {first, first + 1}) {
     const auto alone = physics::without_term(best.fit.model, dropped);
     const auto single = settle(data, fit(data, best.weighing, alone, data.model, Effort::follow(8)), 3);
-    const bool adds = least_ratio(data, best.fit, single.fit) < 0.8;
+    const bool adds = least_ratio(data, best.fit, single.fit) < thresholds::pair_adds;
     if (!adds) keep(found, single.fit.model);
     needed = needed && adds;
   }
@@ -189,7 +190,7 @@ Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, 
   const auto settled = settled_pairs(data, plain, under, without);
   for (const auto& best : settled) {
     const std::size_t first = best.fit.model.terms.size() - 2;
-    if (rival != nullptr && lead(data, best.fit, *rival) < claim_margin) continue;
+    if (rival != nullptr && lead(data, best.fit, *rival) < thresholds::claim_margin) continue;
     if (first < data.model.terms.size() || !needs_both(data, best, first, found)) continue;
     // Two of the late outputs of a machine are one late input.
     if (rival == nullptr && is_done_by_one(data, singles(data, plain, under, without), best)) return found;

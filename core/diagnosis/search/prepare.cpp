@@ -11,6 +11,7 @@
 #include "core/diagnosis/search/one_name.hpp"
 #include "core/diagnosis/segments/steps.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -19,7 +20,6 @@ namespace {
 /// Does a run stay far from the machine for long, by far more than what comes anew from row to row (second differences: a
 /// motion at a steady rate is none)?
 bool goes_another_way(const Case& data, const Fit& fit) {
-  constexpr double far = 20.0;
   const auto simulated = simulate(data, fit.model);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     std::vector<double> left, anew;
@@ -31,7 +31,7 @@ bool goes_another_way(const Case& data, const Fit& fit) {
       }
     }
     for (auto* all : {&left, &anew}) std::erase_if(*all, [](double e) { return !std::isfinite(e); });
-    if (robust_sigma(left) > far * robust_sigma(anew)) return true;
+    if (robust_sigma(left) > thresholds::goes_another_way * robust_sigma(anew)) return true;
   }
   return false;
 }
@@ -56,7 +56,7 @@ void Search::prepare() {
   if (goes_another_way(data_, d_.retuned))
     if (const auto near = begun_in_windows(data_)) {
       const auto found = fit(data_, d_.weighing, *near, data_.model, Effort::follow(8));
-      if (least_ratio(data_, found, d_.retuned) < 0.5) d_.retuned = found;
+      if (least_ratio(data_, found, d_.retuned) < thresholds::other_valley) d_.retuned = found;
       // What is thrown here and there by the least disturbance has no one run.
       if (auto cut = as_given; goes_another_way(data_, d_.retuned)) {
         cut_into_windows(cut, *near);

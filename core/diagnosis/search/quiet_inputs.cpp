@@ -1,4 +1,5 @@
 #include "core/diagnosis/search/quiet_inputs.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +23,6 @@ std::vector<double> running_median(const std::vector<double>& values, std::size_
 /// Is what the medians take off the inputs noise, which comes anew in each row? A median that is long beside the motion takes
 /// the motion itself.
 bool takes_noise_alone(const Case& data, const Case& quiet) {
-  constexpr double mostly = 0.5;  // of the values that noise from row to row would be worth
   for (const auto& signal : data.model.signals) {
     std::vector<std::vector<double>> taken;
     bool any = false;
@@ -33,7 +33,7 @@ bool takes_noise_alone(const Case& data, const Case& quiet) {
       auto& one = taken.emplace_back(*was);
       for (std::size_t i = 0; i < one.size(); ++i) one[i] -= (*now)[i], any = any || one[i] > 0.0;
     }
-    if (any && independent_share(taken) < mostly) return false;
+    if (any && independent_share(taken) < thresholds::input_noise_anew) return false;
   }
   return true;
 }

@@ -47,7 +47,7 @@ void settle_hold(Case& data) {
   const auto smooth = fit(goes_on, weighing, goes_on.model, goes_on.model, effort);
   // Numbers that are retuned make up for a reference that is off by a part of a row; as they are believed they do not.
   const auto off = [&](const Case& as) { return residual(as, weighing, as.model).squaredNorm(); };
-  if (!(smooth.cost < held.cost - claim_margin) || !(off(goes_on) < off(data))) return;
+  if (!(smooth.cost < held.cost - thresholds::claim_margin) || !(off(goes_on) < off(data))) return;
   data = std::move(goes_on);
   data.doubts.push_back(
       "not every cycle of the controller has its row, and between the rows its reference is taken to go "

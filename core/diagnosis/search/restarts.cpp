@@ -8,6 +8,7 @@
 #include "core/diagnosis/evidence/loop_noise.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/search/one_name.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -43,17 +44,18 @@ void Search::begin_anew(const Diagnosis& begun, int next, Start start, Better be
 
 void Search::try_pairs(const Diagnosis& begun) {
   const bool has_rest = d_.verdict == Verdict::unknown_physics || d_.verdict == Verdict::partly_explained ||
-                        (d_.verdict == Verdict::ambiguous && d_.still_follows > 0.05);
+                        (d_.verdict == Verdict::ambiguous && d_.still_follows > thresholds::little_left);
   if (!has_rest || !options_.refuses || was_stopped("two terms at once")) return;
   begin_anew(
       begun, 2, [&](const Diagnosis& single) { return add_pair(&single.best); },
       [&](const Diagnosis& single) {
-        return d_.findings.size() >= 2 && !d_.is_unnamed && lead(data_, d_.best, single.best) >= claim_margin;
+        return d_.findings.size() >= 2 && !d_.is_unnamed &&
+               lead(data_, d_.best, single.best) >= thresholds::claim_margin;
       });
 }
 
 void Search::try_believed(const Diagnosis& begun) {
-  if (!(d_.parameter_excursion > far_astray) || !options_.refuses ||
+  if (!(d_.parameter_excursion > thresholds::far_astray) || !options_.refuses ||
       was_stopped("a name sought from the numbers that the user believes"))
     return;
   begin_anew(
@@ -65,8 +67,8 @@ void Search::try_believed(const Diagnosis& begun) {
         return true;
       },
       [&](const Diagnosis& astray) {
-        return !d_.findings.empty() && !(d_.parameter_excursion > far_astray) &&
-               lead(data_, d_.best, astray.best) > -claim_margin;
+        return !d_.findings.empty() && !(d_.parameter_excursion > thresholds::far_astray) &&
+               lead(data_, d_.best, astray.best) > -thresholds::claim_margin;
       });
 }
 

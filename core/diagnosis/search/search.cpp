@@ -12,6 +12,7 @@
 #include "core/diagnosis/search/unnamed.hpp"
 #include "core/diagnosis/search/unsure.hpp"
 #include "core/diagnosis/search/verdict.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -47,7 +48,8 @@ void Search::finish() {
     const auto without_rest = d_;
     add_unnamed(data_, d_, *beside_);
     name_friction_beside(data_, d_, options_.without);
-    if (d_.has_rest && !noise_->shows(d_.best.model, without_rest.best.model, 0.9)) d_ = without_rest;
+    if (d_.has_rest && !noise_->shows(d_.best.model, without_rest.best.model, thresholds::seen_beside))
+      d_ = without_rest;
     return true;
   });
   const bool curved = d_.is_unnamed || d_.has_rest;

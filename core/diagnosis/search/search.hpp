@@ -15,6 +15,7 @@
 #include "core/diagnosis/search/not_tried.hpp"
 #include "core/diagnosis/search/one_name.hpp"
 #include "core/diagnosis/search/options.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
 
@@ -59,7 +60,7 @@ class Search {
   /// may look like its own opposite: from there no name is found.
   [[nodiscard]] bool may_lead_astray(const Fit& fit) const {
     return (data_.model.plant == physics::Plant::axis && data_.windows.count > 0) ||
-           (data_.model.plant == physics::Plant::error_map && excursion_of(fit) > 5.0);
+           (data_.model.plant == physics::Plant::error_map && excursion_of(fit) > thresholds::map_astray);
   }
   /// Two terms at once, where neither does anything alone. `rival`: what the search one by one came to.
   bool add_pair(const Fit* rival = nullptr);

@@ -12,6 +12,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/evidence/wander.hpp"
 #include "core/diagnosis/locate/left_over.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -105,7 +106,9 @@ bool takes_over(const Fit& named, const Fit& with_course, std::size_t given) {
 /// Would an engineer see it in the residual, or does it pay when counted in independent rows?
 bool shows(const Case& data, const Fit& with, const Fit& without) {
   const double ratio = least_ratio(data, with, without);
-  return ratio < 0.7 || (ratio < 0.9 && lead(data, with, without) > 2.0 * claim_margin);
+  return ratio < thresholds::half_of_squares ||
+         (ratio < thresholds::seen_beside &&
+          lead(data, with, without) > thresholds::nameless_margins * thresholds::claim_margin);
 }
 
 }  // namespace
@@ -131,7 +134,8 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   // Noise that wanders has a course over time too, but none in proportion to what the machine does.
   const bool may_wander = term.with.empty() && is_over_time(term);
   if (const double counted = lead(data, rough, under_plain);
-      gain < 2.0 * margin && std::min(evidence, counted) > 2.0 * margin && !may_wander) {
+      gain < thresholds::nameless_margins * margin &&
+      std::min(evidence, counted) > thresholds::nameless_margins * margin && !may_wander) {
     if (goes_with_recording(data, rough, under_plain)) gain = std::min(evidence, counted);
   }
   // A course over time that takes little of the residual away must pay when counted in independent rows, and one that hardly
@@ -139,7 +143,9 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   if (may_wander) {
     if (is_within_noise(data, under_plain)) return std::nullopt;
     const double left = least_ratio(data, rough, under_plain);
-    if (left > 0.95 || (left > 0.9 && lead(data, rough, under_plain) < 2.0 * claim_margin))
+    if (left > thresholds::seen_further ||
+        (left > thresholds::seen_beside &&
+         lead(data, rough, under_plain) < thresholds::nameless_margins * thresholds::claim_margin))
       return std::nullopt;
   }
   return Curved{std::move(curved), own, gain};
@@ -148,7 +154,7 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
 /// Does a course beside the names leave plainly less than one in their place? Then it is the names' own rest.
 bool is_needed_beside(const Case& data, const Curved& beside, const Curved& instead, const Diagnosis& d,
                       double margin) {
-  return beside.gain > margin && least_ratio(data, beside.fit, d.best) < seen_beside &&
+  return beside.gain > margin && least_ratio(data, beside.fit, d.best) < thresholds::seen_beside &&
          lead(data, beside.fit, instead.fit) > margin;
 }
 
@@ -157,23 +163,26 @@ bool is_needed_beside(const Case& data, const Curved& beside, const Curved& inst
 Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   Curved best;
   for (const auto& s : looked.courses) {
-    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    if (s.columns.size() == 0 || s.merit < thresholds::claim_margin) break;
     auto one = curved_by(data, base, looked.plain, looked.fit, s);
     // Filters of a residual that is not noise take nearly everything for noise: they judge a curve, but do not choose.
-    if (one && one->gain > claim_margin && (best.gain < claim_margin || lead(data, one->fit, best.fit) > 0.0))
+    if (one && one->gain > thresholds::claim_margin &&
+        (best.gain < thresholds::claim_margin || lead(data, one->fit, best.fit) > 0.0))
       best = std::move(*one);
   }
   // What remembers is a filter of many numbers: it takes a little of nearly any dynamics that are not quite the machine's,
   // and drifts as an instrument does. It must leave far less than without it, and than a curve that remembers nothing.
-  constexpr double far_less = 0.8, plainly_less = 0.9;
   for (const auto& s : looked.memories) {
-    if (s.columns.size() == 0 || s.merit < claim_margin) break;
+    if (s.columns.size() == 0 || s.merit < thresholds::claim_margin) break;
     auto one = curved_by(data, base, looked.plain, looked.fit, s);
-    if (!one || !(one->gain > claim_margin) || least_ratio(data, one->fit, looked.fit) > plainly_less)
+    if (!one || !(one->gain > thresholds::claim_margin) ||
+        least_ratio(data, one->fit, looked.fit) > thresholds::memory_leaves)
       continue;
-    if (best.gain < claim_margin || least_ratio(data, one->fit, best.fit) < far_less) best = std::move(*one);
+    if (best.gain < thresholds::claim_margin ||
+        least_ratio(data, one->fit, best.fit) < thresholds::memory_leaves_beside_curve)
+      best = std::move(*one);
   }
-  if (best.gain > claim_margin) sharpen(data, best);
+  if (best.gain > thresholds::claim_margin) sharpen(data, best);
   return best;
 }
 
@@ -203,35 +212,37 @@ bool takes_far_more(const Case& data, const Diagnosis& d, const Fit& curve) {
   const double all = squares_in_noise(data, d.retuned, d.best),
                by_names = all - squares_in_noise(data, d.best, d.best),
                by_curve = all - squares_in_noise(data, curve, d.best);
-  return by_names < (1.0 - of_form) * by_curve;
+  return by_names < (1.0 - thresholds::of_form) * by_curve;
 }
 
 void name_friction_beside(const Case& data, Diagnosis& d, const std::set<std::string, std::less<>>& without) {
   // An axis is begun anew with two names at once where a course stands alone.
   if (data.model.plant != physics::Plant::equations || !d.is_unnamed || d.findings.size() != 1) return;
-  const auto plain = weigh(data, simulate(data, d.best.model), false);
-  const Fit base = fit(data, plain, d.best.model, data.model, 4, &d.best);
+  const auto plain = weigh(data, simulate(data, d.best.model), Colour::white);
+  const Fit base = fit(data, plain, d.best.model, data.model, Effort::follow(4), &d.best);
   auto starts = named_starts(data, plain, base, without);
   std::erase_if(starts, [&](const Start& start) {
     return !start.term.info->is_friction || !is_course_of(d.findings.front().term, start.term);
   });
   std::optional<Fit> best;
   for (const auto& s : screen(data, plain, base, starts, 0)) {
-    if (s.impossible || s.merit < claim_margin) continue;
-    auto tried = fit_with(data, plain, base, s, 8);
-    if (stands(data, tried, tried.model.terms.size() - 1) && least_ratio(data, tried, base) < seen_beside &&
-        lead(data, tried, base) > plainly * claim_margin && (!best || lead(data, tried, *best) > 0.0))
+    if (s.impossible || s.merit < thresholds::claim_margin) continue;
+    auto tried = fit_with(data, plain, base, s, Effort::follow(8));
+    if (stands(data, tried, tried.model.terms.size() - 1) &&
+        least_ratio(data, tried, base) < thresholds::seen_beside &&
+        lead(data, tried, base) > thresholds::margins_of_a_trifle * thresholds::claim_margin &&
+        (!best || lead(data, tried, *best) > 0.0))
       best = std::move(tried);
   }
   if (!best) return;
   auto& terms = best->model.terms;
   std::swap(terms[terms.size() - 2], terms.back());  // names before their rest
   d.weighing = weigh(data, simulate(data, best->model));
-  d.best = fit(data, d.weighing, best->model, data.model, 5);
+  d.best = fit(data, d.weighing, best->model, data.model, Effort::follow(5));
   d.findings.emplace(d.findings.begin())->term = d.best.model.terms[d.best.model.terms.size() - 2];
   d.findings.back().term = d.best.model.terms.back();
   d.is_unnamed = false, d.has_rest = true;
-  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, 5, &d.retuned);
+  d.retuned = fit(data, d.weighing, d.retuned.model, data.model, Effort::follow(5), &d.retuned);
 }
 
 namespace {
@@ -246,9 +257,10 @@ void put_in_place(const Case& data, Diagnosis& d, const Curved& beside, const Be
     return;
   auto instead = best_curve(data, d.retuned, courses_beside(data, d.retuned, &d.best));
   if (!(instead.gain > margin)) return;
-  const auto named_there = fit(data, instead.weighing, d.best.model, data.model, 4, &d.best);
+  const auto named_there = fit(data, instead.weighing, d.best.model, data.model, Effort::follow(4), &d.best);
   const double lead_of_curve = instead.fit.evidence - named_there.evidence;
-  if (!(lead_of_curve > margin) || !(is_series(d.best.model, given) || lead_of_curve > 0.25 * instead.gain) ||
+  if (!(lead_of_curve > margin) ||
+      !(is_series(d.best.model, given) || lead_of_curve > thresholds::curve_over_name * instead.gain) ||
       !leaves_less(data, instead.fit, d.best) || is_needed_beside(data, beside, instead, d, margin))
     return;
   for (std::size_t t = given; t < d.best.model.terms.size(); ++t)
@@ -265,13 +277,14 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   const std::size_t given = data.model.terms.size();
   if (beside_best.courses.empty() && beside_best.memories.empty()) return;
   const bool named = d.best.model.terms.size() > given;
-  const double margin = 2.0 * claim_margin_of(d.weighing);
+  const double margin = thresholds::nameless_margins * claim_margin_of(d.weighing);
+  const double seen = named ? thresholds::seen_beside : thresholds::seen_alone;
   auto beside = best_curve(data, d.best, beside_best);
   if (named) put_in_place(data, d, beside, beside_best, margin);
   // A rest counts where an engineer would see it.
   if (!d.is_unnamed && beside.gain > margin &&
       !(is_over_time(beside.fit.model.terms.back()) && takes_over(d.best, beside.fit, given)) &&
-      least_ratio(data, beside.fit, d.best) < (named ? seen_beside : seen_alone)) {
+      least_ratio(data, beside.fit, d.best) < seen) {
     d.best = std::move(beside.fit);
     d.weighing = std::move(beside.weighing);
     (named ? d.has_rest : d.is_unnamed) = true;
@@ -290,7 +303,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   // What moves a drop moves it in two directions, and an instrument may stand beside another.
   for (std::size_t more = 1; more < data.outputs.size() && !d.best.model.terms.back().on.empty(); ++more) {
     auto next = best_curve(data, d.best, courses_beside(data, d.best, &d.best));
-    if (next.gain < margin || least_ratio(data, next.fit, d.best) > (named ? seen_beside : seen_alone)) break;
+    if (next.gain < margin || least_ratio(data, next.fit, d.best) > seen) break;
     const auto& terms = next.fit.model.terms;
     if (std::any_of(
             terms.begin() + static_cast<std::ptrdiff_t>(given), terms.end() - 1,

@@ -5,11 +5,9 @@
 #include <string>
 
 #include "core/diagnosis/evidence/other_cause.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
-
-/// An effect without a name must leave less than this share of the residual's RMS, alone or beside names: an engineer sees it.
-inline constexpr double seen_alone = 0.985, seen_beside = 0.9;
 
 struct Curved {
   Fit fit;

@@ -11,6 +11,7 @@
 #include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/evidence/shape.hpp"
 #include "core/diagnosis/search/unnamed.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -21,7 +22,7 @@ namespace {
 /// nothing: it is no cause in place of such a name.
 bool foretells(const Case& data, const Diagnosis& d, std::size_t finding) {
   const auto model = physics::without_term(d.best.model, data.model.terms.size() + finding);
-  return foretold(data, d.best, fit(data, d.weighing, model, data.model, 5)).is_plain();
+  return foretold(data, d.best, fit(data, d.weighing, model, data.model, Effort::follow(5))).is_plain();
 }
 
 /// Does a course over a name's own variable leave plainly more than the two together? Then the course is the name's rest, and
@@ -31,10 +32,11 @@ bool is_needed_beside(const Case& data, const Diagnosis& d, std::size_t finding,
   if (!is_course_of(course, d.best.model.terms[data.model.terms.size() + finding])) return false;
   auto both = d.best.model;
   both.terms.push_back(course);
-  const auto plain = weigh(data, simulate(data, other.fit.model), false);
-  const auto together = fit(data, plain, both, data.model, 8);
-  return is_affordable(data, together) && lead(data, together, other.fit) > plainly * claim_margin &&
-         least_ratio(data, together, other.fit) < seen_beside;
+  const auto plain = weigh(data, simulate(data, other.fit.model), Colour::white);
+  const auto together = fit(data, plain, both, data.model, Effort::follow(8));
+  return is_affordable(data, together) &&
+         lead(data, together, other.fit) > thresholds::margins_of_a_trifle * thresholds::claim_margin &&
+         least_ratio(data, together, other.fit) < thresholds::seen_beside;
 }
 
 }  // namespace
@@ -70,7 +72,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     const auto& finding = d.findings[i];
     const bool is_curve = !finding.term.curve.knots.empty();
-    if (!is_curve && !(finding.other_cause > unlikely_odds)) {
+    if (!is_curve && !(finding.other_cause > thresholds::unlikely_odds)) {
       kept.insert(kept.begin(), finding);
       continue;
     }
@@ -90,7 +92,7 @@ bool set_aside(const Case& data, Diagnosis& d) {
   while (curves < 3 && lead(data, found.fit, d.best) < 0.0) {
     auto next = best_curve(data, found.fit, courses_beside(data, found.fit, &d.best));
     // What another place explains beside them says nothing against the names here.
-    if (next.gain < 2.0 * claim_margin_of(d.weighing) ||
+    if (next.gain < thresholds::nameless_margins * claim_margin_of(d.weighing) ||
         !sites.contains(next.fit.model.terms.back().info->site))
       return false;
     found = std::move(next);
@@ -116,7 +118,7 @@ bool leave_out_unseen(Diagnosis& d) {
                                          [](const Finding& f) { return f.stand_in != nullptr; }))
     return false;
   if (std::any_of(d.heldout.begin(), d.heldout.end(),
-                  [](const FitRow& row) { return row.after < seen_alone * row.retuned; }))
+                  [](const FitRow& row) { return row.after < thresholds::seen_alone * row.retuned; }))
     return false;
   for (const auto& finding : d.findings)
     d.reject(std::string{finding.stand_in->name}, "another cause is likelier, and it hardly shows",
@@ -132,12 +134,12 @@ void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, d
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     auto& finding = d.findings[i];
     // Of the user's own equations a number may be far off: what he left out there is often a part of it.
-    const bool is_astray =
-        d.parameter_excursion > far_astray && finding.term.info->plant != physics::Plant::equations;
-    constexpr double very_far = 10.0;  // times the noise: what is less likely than not is no name for it
-    const double least = is_far && times_the_noise > very_far           ? 0.5
-                         : is_far || is_astray || rests[i] > plain_rest ? 0.3
-                                                                        : 0.1;
+    const bool is_astray = d.parameter_excursion > thresholds::far_astray &&
+                           finding.term.info->plant != physics::Plant::equations;
+    const double least = is_far && times_the_noise > thresholds::very_far_above_noise
+                             ? thresholds::said_very_far
+                         : is_far || is_astray || rests[i] > thresholds::plain_rest ? thresholds::said_far
+                                                                                    : thresholds::said_at_all;
     if (!finding.term.curve.knots.empty() || finding.probability >= least) continue;
     finding.stand_in = finding.term.info;
     finding.term.info = physics::unmodelled(finding.stand_in->plant, finding.stand_in->site);

@@ -11,6 +11,7 @@
 #include "core/diagnosis/locate/left_over.hpp"
 #include "core/diagnosis/search/suspect.hpp"
 #include "core/diagnosis/search/unsure.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -55,7 +56,7 @@ double times_unrelated(const Case& data, const Diagnosis& d) {
 
 /// More than twice what the instruments add is mismatch, whatever its colour.
 void keep_to_noise(const Case& data, Diagnosis& d) {
-  if (!(most_over_noise(d) > times_noise)) return;
+  if (!(most_over_noise(d) > thresholds::times_noise)) return;
   if (d.verdict == Verdict::explained) d.verdict = Verdict::partly_explained;
   if (d.verdict != Verdict::no_mismatch && d.verdict != Verdict::parameters_only) return;
   d.verdict = Verdict::unknown_physics;
@@ -95,7 +96,7 @@ Model without_its_courses(const Case& data, Model model, std::size_t place) {
 /// rest. The freer shape is no rival then, and what is left counts against both together. False: no such course.
 bool is_needed_beside_course(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
   return finding.term.curve.knots.empty() && finding.term.info->depends_on.front() != "history" &&
-         finding.gain > plainly * claim_margin &&
+         finding.gain > thresholds::margins_of_a_trifle * thresholds::claim_margin &&
          without_its_courses(data, best.model, place).terms.size() + 1 < best.model.terms.size();
 }
 
@@ -122,7 +123,7 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
     if (has_course) finding.other_shape = 0.0;
     const double rest = rest_left_by(
         data, d.best,
-        has_course ? fit(data, d.weighing, without_its_courses(data, d.best.model, place), data.model, 5)
+        has_course ? fit(data, d.weighing, without_its_courses(data, d.best.model, place), data.model, Effort::follow(5))
                    : rival,
         excess);
     rests.push_back(rest);
@@ -143,21 +144,20 @@ bool is_ambiguous(const Diagnosis& d) {
 
 /// `follows`: what is left plainly follows what was recorded.
 Verdict verdict_without_findings(const Case& data, const Diagnosis& d, bool follows) {
-  constexpr double moved = 3.0;  // sigmas of the user
   // What follows the recording is no noise, even where no curve and no name describes it.
   if (follows || is_above_noise(data, d.best) || is_louder_in_motion(data, d.best))
     return Verdict::unknown_physics;
-  return d.parameter_excursion > moved ? Verdict::parameters_only : Verdict::no_mismatch;
+  return d.parameter_excursion > thresholds::moved_sigmas ? Verdict::parameters_only : Verdict::no_mismatch;
 }
 
 Verdict verdict_on_findings(const Diagnosis& d, const std::vector<double>& rests) {
-  constexpr double little = 0.05;  // of the mismatch
   const bool nameless = std::all_of(d.findings.begin(), d.findings.end(),
                                     [](const Finding& f) { return f.stand_in != nullptr; });
   if (d.is_unnamed || nameless) return Verdict::unknown_physics;
   if (is_ambiguous(d)) return Verdict::ambiguous;
-  const bool leaves_more = d.has_rest || d.still_follows > little ||
-                           std::any_of(rests.begin(), rests.end(), [](double rest) { return rest > little; });
+  const bool leaves_more =
+      d.has_rest || d.still_follows > thresholds::little_left ||
+      std::any_of(rests.begin(), rests.end(), [](double rest) { return rest > thresholds::little_left; });
   return leaves_more ? Verdict::partly_explained : Verdict::explained;
 }
 
@@ -185,12 +185,12 @@ void conclude(const Case& data, Diagnosis& d) {
   const bool own_equations = data.model.plant == physics::Plant::equations;
   auto followed = followed_share(data, d.best);
   // Beside a name that is right little is left; without one, noise may wander far.
-  const auto far = far_share(data, d.best, d.findings.empty() ? 5.0 : 3.0);
+  const auto far = far_share(
+      data, d.best, d.findings.empty() ? thresholds::wanders_far : thresholds::wanders_far_beside_a_name);
   for (std::size_t o = 0; o < far.size(); ++o) followed[o] = std::max(followed[o], far[o]);
   d.still_follows = share_left(data, d, followed);
   // Where nothing is missing no more than a hundredth did in 150 recordings of machines made by two authors.
-  constexpr double plainly_followed = 0.1;
-  const bool follows = *std::max_element(followed.begin(), followed.end()) > plainly_followed;
+  const bool follows = *std::max_element(followed.begin(), followed.end()) > thresholds::plainly_followed;
   if (follows) d.unexplained_over = {"history"};
   // A user who writes down his equations and his noise has said what a model that is whole leaves.
   const auto excess =
@@ -202,11 +202,9 @@ void conclude(const Case& data, Diagnosis& d) {
   d.mismatch_gain = d.best.evidence - d.nominal.evidence;
   d.unexplained = times_noise_left(d);
   const double beyond_unrelated = times_unrelated(data, d);
-  constexpr double far_above = 0.5;  // of the power of the noise that the user gave
-  constexpr double times_the_noise = 3.0;
   leave_unsaid(d, rests,
-               *std::max_element(excess.begin(), excess.end()) > far_above ||
-                   (own_equations && beyond_unrelated > times_the_noise),
+               *std::max_element(excess.begin(), excess.end()) > thresholds::far_above_given_noise ||
+                   (own_equations && beyond_unrelated > thresholds::far_above_unrelated),
                beyond_unrelated);
   d.verdict = d.findings.empty() ? verdict_without_findings(data, d, follows) : verdict_on_findings(d, rests);
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);

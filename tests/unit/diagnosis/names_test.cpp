@@ -109,7 +109,7 @@ TEST(Names, AnotherPowerGivesAsMuchAtTheSizesThatTheVariableTakes) {
 
 TEST(Names, ASmallShareBesideOthersIsDoubted) {
   EXPECT_LT(odds_of_another_cause(1000.0, 0.0, 0.0, 1.0), 0.1);
-  EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 2e-4), unlikely_odds);
+  EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 2e-4), thresholds::unlikely_odds);
   EXPECT_GT(odds_of_another_cause(20.0, 0.0, 0.0, 1.0), odds_of_another_cause(1000.0, 0.0, 0.0, 1.0));
 }
 
@@ -118,7 +118,7 @@ TEST(Names, WhatLeavesMuchBeyondTheNoiseIsDoubtedWhereItActsItself) {
   EXPECT_DOUBLE_EQ(rest_beside({0.4}, {0.4}), 0.5);
   EXPECT_DOUBLE_EQ(rest_beside({50.0}, {0.0}), 0.0);
   EXPECT_DOUBLE_EQ(rest_beside({50.0, 0.1}, {0.0, 0.9}), 0.0);
-  EXPECT_GT(odds_of_another_cause(50.0, plain_rest, 0.0, 1.0), unlikely_odds);
+  EXPECT_GT(odds_of_another_cause(50.0, thresholds::plain_rest, 0.0, 1.0), thresholds::unlikely_odds);
 }
 
 TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {

@@ -75,7 +75,7 @@ TEST(Verdict, WhatWandersFarAboveTheNoiseIsNeverNothing) {
     auto data = make_case(encoder(), {readings(12.0 * white, seed)});
     const auto d = diagnose(data, [](double, const std::string&) {});
     SCOPED_TRACE(summary(data, d));
-    EXPECT_GT(most_over_noise(d), times_noise);
+    EXPECT_GT(most_over_noise(d), thresholds::times_noise);
     EXPECT_NE(d.verdict, Verdict::no_mismatch);
     EXPECT_NE(d.verdict, Verdict::parameters_only);
     EXPECT_NE(d.verdict, Verdict::explained);
