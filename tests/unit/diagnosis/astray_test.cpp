@@ -79,18 +79,25 @@ Case car_over_a_road(unsigned seed, double lag) {
       {table});
 }
 
-TEST(Astray, ALateRoadIsFoundThoughTheRetunedCarHasNoSpringLeft) {
-  for (const auto& [seed, lag] : {std::pair{3U, 0.1}, {5U, 0.08}}) {
-    auto data = car_over_a_road(seed, lag);
-    const auto d = diagnose(data, [](double, const std::string&) {});
-    ASSERT_EQ(d.findings.size(), 1U) << seed << summary(data, d);
-    EXPECT_EQ(d.findings[0].term.info->name, "lag") << seed;
-    EXPECT_EQ(d.findings[0].term.on, "r") << seed;
-    EXPECT_NEAR(d.findings[0].term.values[0], lag, 0.02 * lag) << seed;
-    EXPECT_LT(d.parameter_excursion, 3.0) << seed;
-    EXPECT_LT(d.retuned.model.value("ks"), 14000.0) << seed;  // astray indeed
-  }
+struct LateRoad {
+  unsigned seed;
+  double lag;  // s
+};
+class AstrayCar : public ::testing::TestWithParam<LateRoad> {};
+
+TEST_P(AstrayCar, ALateRoadIsFoundThoughTheRetunedCarHasNoSpringLeft) {
+  const auto [seed, lag] = GetParam();
+  auto data = car_over_a_road(seed, lag);
+  const auto d = diagnose(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U) << summary(data, d);
+  EXPECT_EQ(d.findings[0].term.info->name, "lag");
+  EXPECT_EQ(d.findings[0].term.on, "r");
+  EXPECT_NEAR(d.findings[0].term.values[0], lag, 0.02 * lag);
+  EXPECT_LT(d.parameter_excursion, 3.0);
+  EXPECT_LT(d.retuned.model.value("ks"), 14000.0);  // astray indeed
 }
+
+INSTANTIATE_TEST_SUITE_P(Lags, AstrayCar, ::testing::Values(LateRoad{3, 0.1}, LateRoad{5, 0.08}));
 
 /// A pendulum that a torque drives which comes late, with dry friction in its bearing; small steps of Verlet's rule.
 Case late_pendulum(unsigned seed, double lag, double dry) {
@@ -130,21 +137,28 @@ Case late_pendulum(unsigned seed, double lag, double dry) {
       {table});
 }
 
+struct LateTorque {
+  double lag, dry;  // s, 1/s2
+};
+class AstrayPendulum : public ::testing::TestWithParam<LateTorque> {};
+
 /// Alone a lag of the speed, with another length and eight times the damping, does better than a late torque.
-TEST(Astray, ALateTorqueBesideFrictionIsFoundFromWhatIsBelieved) {
-  for (const auto& [lag, dry] : {std::pair{0.8, 0.17}, {0.4, 0.4}}) {
-    auto data = late_pendulum(1, lag, dry);
-    const auto d = diagnose(data, [](double, const std::string&) {});
-    EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
-    ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
-    for (const auto& finding : d.findings) {
-      const bool is_lag = finding.term.info->name == "lag";
-      EXPECT_TRUE(is_lag || finding.term.info->name == "dry_friction");
-      EXPECT_NEAR(finding.term.values[0], is_lag ? lag : dry, 0.02 * (is_lag ? lag : dry));
-    }
-    EXPECT_LT(d.parameter_excursion, 3.0);
+TEST_P(AstrayPendulum, ALateTorqueBesideFrictionIsFoundFromWhatIsBelieved) {
+  const auto [lag, dry] = GetParam();
+  auto data = late_pendulum(1, lag, dry);
+  const auto d = diagnose(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::explained) << summary(data, d);
+  ASSERT_EQ(d.findings.size(), 2U) << summary(data, d);
+  for (const auto& finding : d.findings) {
+    const bool is_lag = finding.term.info->name == "lag";
+    EXPECT_TRUE(is_lag || finding.term.info->name == "dry_friction");
+    EXPECT_NEAR(finding.term.values[0], is_lag ? lag : dry, 0.02 * (is_lag ? lag : dry));
   }
+  EXPECT_LT(d.parameter_excursion, 3.0);
 }
+
+INSTANTIATE_TEST_SUITE_P(Lags, AstrayPendulum,
+                         ::testing::Values(LateTorque{0.8, 0.17}, LateTorque{0.4, 0.4}));
 
 TEST(Astray, ANameThatIsUnlikelyIsNotSaidWhereTheNumbersWentFar) {
   const auto told = [](physics::Plant plant, const char* name, double probability, double excursion,

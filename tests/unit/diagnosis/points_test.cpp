@@ -425,8 +425,10 @@ TEST(Wander, IsNotSeenInNoiseWithoutMemory) {
   EXPECT_GE(found, 36);
 }
 
-TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
-  std::mt19937 random{19};
+/// A carriage on two sinusoids under a tachometer that reads `reads(velocity, position)`.
+template <class Reads>
+Case under_tachometer(unsigned seed, Reads reads) {
+  std::mt19937 random{seed};
   std::normal_distribution<double> reading{0.0, 4e-4};
   std::vector<double> time, position, velocity;
   for (int k = 0; k < 6000; ++k) {
@@ -434,13 +436,17 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
     const double v = 0.12 * std::cos(2.3 * t) + 0.05 * std::cos(5.1 * t + 1.0);
     time.push_back(t);
     position.push_back(0.12 / 2.3 * std::sin(2.3 * t) + 0.05 / 5.1 * std::sin(5.1 * t + 1.0));
-    velocity.push_back(v - 8e-4 * std::tanh(v / 0.004) + reading(random));
+    velocity.push_back(reads(v, position.back()) + reading(random));
   }
   recording::Table table;
   table.add("t", "s", time);
   table.add("x", "m", position);
   table.add("v", "m/s", velocity);
-  auto data = make_case(tachometer(), {table});
+  return make_case(tachometer(), {table});
+}
+
+TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
+  auto data = under_tachometer(19, [](double v, double) { return v - 8e-4 * std::tanh(v / 0.004); });
   const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);
@@ -448,21 +454,8 @@ TEST(Instruments, ATachometerThatSticksBesideRestIsLocatedThere) {
 }
 
 TEST(Instruments, ATachometerThatRipplesWithItsSpeedIsDrawnAlongTheWay) {
-  std::mt19937 random{25};
-  std::normal_distribution<double> reading{0.0, 4e-4};
-  std::vector<double> time, position, velocity;
-  for (int k = 0; k < 6000; ++k) {
-    const double t = 1e-3 * k;
-    const double v = 0.12 * std::cos(2.3 * t) + 0.05 * std::cos(5.1 * t + 1.0);
-    time.push_back(t);
-    position.push_back(0.12 / 2.3 * std::sin(2.3 * t) + 0.05 / 5.1 * std::sin(5.1 * t + 1.0));
-    velocity.push_back(v * (1.0 + 5e-3 * std::sin(2.0 * M_PI * position.back() / 0.013)) + reading(random));
-  }
-  recording::Table table;
-  table.add("t", "s", time);
-  table.add("x", "m", position);
-  table.add("v", "m/s", velocity);
-  auto data = make_case(tachometer(), {table});
+  auto data = under_tachometer(
+      25, [](double v, double x) { return v * (1.0 + 5e-3 * std::sin(2.0 * M_PI * x / 0.013)); });
   const auto d = diagnose(data, [](double, const std::string&) {});
   EXPECT_EQ(d.verdict, Verdict::unknown_physics);
   ASSERT_EQ(d.findings.size(), 1U);

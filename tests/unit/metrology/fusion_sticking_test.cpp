@@ -13,16 +13,6 @@ namespace {
 
 using namespace testing;
 
-/// Moves and rests in turn: a sinusoid, then a pause where it turned, then it goes on.
-auto with_rests(double period, double rest) {
-  return [=](double t) {
-    const double half = 0.5 * period, whole = half + rest;
-    const double k = std::floor(t / whole), in = std::min(t - k * whole, half);
-    const double way = 0.05 * (1.0 - std::cos(2.0 * std::numbers::pi * in / period));
-    return t <= 0.0 ? 0.0 : (std::fmod(k, 2.0) == 0.0 ? way : 0.1 - way);
-  };
-}
-
 /// Largest distance between the truth and what the velocity sensor alone, sound and with its gain known, leads to.
 double dead_reckoning(const Rig& rig, const FusionRun& run, Eigen::Index from) {
   double way = run.reference(from), worst = 0.0;
