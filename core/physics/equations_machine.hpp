@@ -7,54 +7,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
-#include <numbers>
+#include <optional>
+#include <vector>
 
+#include "core/physics/compiled_equations.hpp"
 #include "core/physics/curve_memory.hpp"
 #include "core/physics/equations_columns.hpp"
-#include "core/physics/expression.hpp"
-#include "core/physics/model.hpp"
 #include "core/physics/static_plants.hpp"
 
 namespace invar::physics {
-
-/// The formulas of a model, read once: reading them takes a hundred times as long as a step.
-class CompiledEquations {
- public:
-  explicit CompiledEquations(const Model& model) {
-    const auto& equations = model.equations;
-    for (const auto& state : equations.states) names_.push_back(state.name);
-    for (const auto& input : equations.inputs) names_.push_back(input.symbol);
-    names_.emplace_back("t");
-    std::vector<std::string> constants;
-    for (std::size_t i = 0; i < model.parameters.size(); ++i)
-      if (model.parameters[i].name.find('.') == std::string::npos) {
-        parameters.push_back(i);
-        constants.push_back(model.parameters[i].name);
-      }
-    formulas = std::make_unique<Expressions>(names_, constants);
-    for (const auto& state : equations.states)
-      rates.push_back(formulas->add(Expressions::rates, state.derivative, "states." + state.name));
-    for (const auto& output : equations.outputs)
-      outputs.push_back(formulas->add(Expressions::outputs, output.expression, "outputs." + output.name));
-    if (!equations.controlled_input.empty())
-      law = formulas->add(Expressions::law, equations.control_law, "controller.expression");
-  }
-
-  /// The slot of a symbol; variables() where there is none of it.
-  [[nodiscard]] std::size_t place(const std::string& symbol) const {
-    return static_cast<std::size_t>(std::find(names_.begin(), names_.end(), symbol) - names_.begin());
-  }
-  [[nodiscard]] std::size_t variables() const { return names_.size(); }
-
-  std::unique_ptr<Expressions> formulas;
-  std::vector<std::size_t> parameters;      // places in the model
-  std::vector<std::size_t> rates, outputs;  // slots
-  std::size_t law = 0;
-
- private:
-  std::vector<std::string> names_;  // states, inputs, t
-};
 
 /// The equations with the numbers of `lanes` models that have the same terms at the same places.
 template <std::size_t lanes>
@@ -372,217 +333,25 @@ class EquationsMachine {
   }
 
   /// Of the rates of all states here, as far as they do not jump, lane by lane; from steps of `share` of each state.
-  std::array<Matrix, lanes> jacobian(const State& s, double t, double share) {
-    const auto n = static_cast<Eigen::Index>(all_states());
-    std::array<Matrix, lanes> all;
-    for (auto& one : all) one.resize(n, n);
-    for (Eigen::Index j = 0; j < n; ++j) {
-      State up = s, down = s;
-      const auto at = static_cast<std::size_t>(j);
-      Lane by;
-      for (std::size_t l = 0; l < lanes; ++l) {
-        by[l] = share * std::max(1e-3, std::abs(s[at][l]));
-        up[at][l] += by[l], down[at][l] -= by[l];
-      }
-      const State a = free_slope(up, t), b = free_slope(down, t);
-      for (std::size_t l = 0; l < lanes; ++l)
-        for (Eigen::Index i = 0; i < n; ++i)
-          all[l](i, j) =
-              (a[static_cast<std::size_t>(i)][l] - b[static_cast<std::size_t>(i)][l]) / (2.0 * by[l]);
-    }
-    return all;
-  }
-
+  std::array<Matrix, lanes> jacobian(const State& s, double t, double share);
   /// One step of Rosenbrock's rule of second order, L-stable: what is far faster than the step is at its balance after it.
-  State eased(const State& s, double t, double h) {
-    constexpr double gamma = 1.0 - 0.5 * std::numbers::sqrt2;
-    const auto n = static_cast<Eigen::Index>(all_states());
-    const auto column = [n](const State& state, std::size_t l) {
-      Vector one(n);
-      for (Eigen::Index i = 0; i < n; ++i) one(i) = state[static_cast<std::size_t>(i)][l];
-      return one;
-    };
-    const auto rates = jacobian(s, t, 1e-6);
-    const Matrix eye = Matrix::Identity(n, n);
-    std::array<Eigen::PartialPivLU<Matrix>, lanes> matrix;
-    std::array<Vector, lanes> first;
-    const State here = slope(s, t);
-    State next = s;
-    for (std::size_t l = 0; l < lanes; ++l) {
-      matrix[l].compute(eye - gamma * h * rates[l]);
-      first[l] = matrix[l].solve(column(here, l));
-      for (Eigen::Index i = 0; i < n; ++i) next[static_cast<std::size_t>(i)][l] += h * first[l](i);
-    }
-    const State there = slope(next, t + h);
-    next = s;
-    for (std::size_t l = 0; l < lanes; ++l) {
-      const Vector second = matrix[l].solve(column(there, l) - 2.0 * first[l]);
-      for (Eigen::Index i = 0; i < n; ++i)
-        next[static_cast<std::size_t>(i)][l] += h * (1.5 * first[l](i) + 0.5 * second(i));
-    }
-    return next;
-  }
-
+  State eased(const State& s, double t, double h);
   /// One step of the classical Runge-Kutta rule.
-  State moved(const State& s, double t, double h) {
-    if (stiff_) return eased(s, t, h);
-    const std::size_t n = all_states();
-    const auto by = [&](const State& rate, double share) {
-      State next;
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t l = 0; l < lanes; ++l) next[i][l] = s[i][l] + share * rate[i][l];
-      return next;
-    };
-    const State a = slope(s, t), b = slope(by(a, 0.5 * h), t + 0.5 * h),
-                c = slope(by(b, 0.5 * h), t + 0.5 * h), d = slope(by(c, h), t + h);
-    note_turn(s, a, b, c, h);
-    State next;
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t l = 0; l < lanes; ++l)
-        next[i][l] = s[i][l] + h / 6.0 * (a[i][l] + 2.0 * (b[i][l] + c[i][l]) + d[i][l]);
-    return next;
-  }
-
+  State moved(const State& s, double t, double h);
   /// Two slopes at one instant, and how far apart the states are that they were taken at: the rate at which these part.
-  void note_turn(const State& s, const State& a, const State& b, const State& c, double h) {
-    constexpr double trifle =
-        1e-6;  // of the largest that a state was: what moves so little may turn as it will
-    for (std::size_t l = 0; l < lanes; ++l) {
-      double slopes = 0.0, apart = 0.0;
-      for (std::size_t i = 0; i < all_states(); ++i) {
-        double& size = largest_[i][l];
-        size = std::max({size, std::abs(s[i][l]), std::abs(h * a[i][l]), 1e-300});
-        slopes += std::pow((c[i][l] - b[i][l]) / size, 2);
-        apart += std::pow(0.5 * h * (b[i][l] - a[i][l]) / size, 2);
-      }
-      if (apart > trifle * trifle && std::isfinite(slopes))
-        turned_ = std::max(turned_, h * std::sqrt(slopes / apart));
-    }
-  }
+  void note_turn(const State& s, const State& a, const State& b, const State& c, double h);
 
   static double sign_of(double x) { return x > 0.0 ? 1.0 : (x < 0.0 ? -1.0 : 0.0); }
 
   /// Which way each friction acts from here; at rest it holds up to its level. One lane alone.
-  void turn(const State& s, double t) {
-    for (auto& rub : frictions_) {
-      const double speed = s[rub.use.on][0];
-      rub.direction[0] = sign_of(speed);
-      rub.stuck[0] = false;
-      if (speed != 0.0) continue;
-      const double push = slope(s, t)[rub.use.on][0];
-      rub.stuck[0] = std::abs(push) <= rub.use.p[0][0];
-      rub.direction[0] = rub.stuck[0] ? 0.0 : sign_of(push);
-    }
-  }
-
+  void turn(const State& s, double t);
   /// A step under dry friction: reversals are found, so that what comes out is smooth in every number. One lane alone: each
   /// has its reversals at a time of its own.
-  void slide(State& s, double t, double h) {
-    static_assert(lanes >= 1);
-    for (int events = 0; events < 8 && h > 0.0; ++events) {
-      turn(s, t);
-      State next = moved(s, t, h);
-      double taken = h;
-      for (auto& rub : frictions_) {
-        const std::size_t on = rub.use.on;
-        if (rub.stuck[0] || !(next[on][0] * rub.direction[0] < 0.0)) continue;
-        if (s[on][0] == 0.0) {  // would slide back at once: it stays
-          rub.stuck[0] = true;
-          next = moved(s, t, taken);
-          continue;
-        }
-        double low = 0.0, low_speed = s[on][0], high = taken, high_speed = next[on][0];
-        for (int i = 0; i < 6 && std::abs(next[on][0]) > 1e-13 * std::abs(s[on][0]); ++i) {  // regula falsi
-          taken = low + (high - low) * low_speed / (low_speed - high_speed);
-          next = moved(s, t, taken);
-          (next[on][0] * rub.direction[0] > 0.0 ? low : high) = taken;
-          (next[on][0] * rub.direction[0] > 0.0 ? low_speed : high_speed) = next[on][0];
-        }
-        next[on][0] = 0.0;
-      }
-      s = next;
-      t += taken;
-      h -= taken;
-    }
-  }
+  void slide(State& s, double t, double h);
 
-  void add(const Models& models, std::size_t t) {
-    const Term& term = models[0]->terms[t];
-    const auto* kind = equations_kind(*term.info);
-    const std::size_t on = compiled_.place(term.on),
-                      with = std::min(term.with.empty() ? on : compiled_.place(term.with),
-                                      compiled_.variables() - 1);
-    if (on >= states_) {  // at an input or output: the simulation bends those
-      if (is_added(term)) add_to_output(models, t, with);
-      return;
-    }
-    if (!term.curve.knots.empty()) {
-      Course course;
-      course.on = on;
-      course.over = std::min(compiled_.place(term.curve.over), compiled_.variables() - 1);
-      if (!term.with.empty()) course.with = with;
-      for (std::size_t l = 0; l < lanes; ++l) course.curve[l] = &models[l]->terms[t].curve;
-      curves_.push_back(course);
-      return;
-    }
-    Use use{kind, on, with, {}, is_felt_by_others_alone(term)};
-    if (use.by_others_alone && std::find(spared_.begin(), spared_.end(), on) == spared_.end())
-      spared_.push_back(on);
-    for (std::size_t l = 0; l < lanes; ++l) use.p[l] = models[l]->terms[t].values.data();
-    if (kind->rate != nullptr) rate_terms_.push_back(use);
-    switch (kind->memory) {
-      case EquationsMemory::dry_friction:
-        if (sticks(term))
-          sticking_.push_back(use);
-        else
-          frictions_.push_back({use});
-        break;
-      case EquationsMemory::upper_limit:
-        uppers_.push_back(use);
-        break;
-      case EquationsMemory::lower_limit:
-        lowers_.push_back(use);
-        break;
-      case EquationsMemory::overflow:
-        overflows_.push_back(use);
-        break;
-      case EquationsMemory::hidden_state:
-        if (all_states() < most_states) hidden_.push_back(use);
-        break;
-      case EquationsMemory::lag:
-        if (all_states() < most_states) lags_.push_back(use);
-        break;
-      case EquationsMemory::delay:
-        delays_.push_back({use, {}});
-        break;
-      case EquationsMemory::dead_zone:
-        dead_zones_.push_back(use);
-        break;
-      default:
-        break;
-    }
-  }
-
+  void add(const Models& models, std::size_t t);
   /// `with`: the slot of the variable that a term without a curve goes over.
-  void add_to_output(const Models& models, std::size_t t, std::size_t with) {
-    const Term& term = models[0]->terms[t];
-    const auto& equations = models[0]->equations;
-    for (std::size_t o = 0; o < equations.outputs.size(); ++o) {
-      if (place_of_output(equations, equations.outputs[o].name) != term.on) continue;
-      const bool is_curve = !term.curve.knots.empty();
-      Added added{o,
-                  is_curve ? compiled_.place(term.curve.over) : with,
-                  {equations_kind(*term.info), o, with, {}, false},
-                  {}};
-      for (std::size_t l = 0; l < lanes; ++l) {
-        added.use.p[l] = models[l]->terms[t].values.data();
-        added.curve[l] = is_curve ? &models[l]->terms[t].curve : nullptr;
-      }
-      added.over = std::min(added.over, compiled_.variables() - 1);
-      added_.push_back(added);
-      shown_.resize(equations.outputs.size());
-    }
-  }
+  void add_to_output(const Models& models, std::size_t t, std::size_t with);
 
   const CompiledEquations& compiled_;
   std::size_t states_, controlled_;

@@ -6,7 +6,8 @@
 
 #include "core/base/fault.hpp"
 #include "core/physics/equations_columns.hpp"
-#include "core/physics/equations_machine.hpp"
+#include "core/physics/equations_machine_steps.hpp"
+#include "core/physics/equations_machine_terms.hpp"
 #include "core/physics/simulate_plants.hpp"
 
 namespace invar::physics {
