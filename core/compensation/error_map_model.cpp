@@ -125,6 +125,8 @@ std::string_view why_not_corrected(const Term& term) {
   if (name == "abbe_offset")
     return "how far the tool lies beside the scale is no input of it; `invar calibrate geometric` finds the "
            "angle";
+  if (!term.on.empty() && term.on != "temperature")
+    return "a correction reads one temperature, and this goes with another";
   if (!term.curve.knots.empty() && term.curve.over != "position")
     return "a curve over anything but the position tells a correction nothing";
   return {};
@@ -148,7 +150,8 @@ metrology::ThermalError thermal_error_of(const Model& model) {
   out.temperature = model.baseline.temperature.value_or(Range{reference, reference});
   out.heating_rate = {0.0, 0.0};
   for (const auto& term : model.terms)
-    if (physics::error_map_kind(*term.info)->delays_warmth) out.lag = std::max(0.0, term.values[0]);
+    if (is_corrected(term) && physics::error_map_kind(*term.info)->delays_warmth)
+      out.lag = std::max(0.0, term.values[0]);
   if (const auto noise = model.noise.find("error"); noise != model.noise.end()) out.noise = noise->second;
   const auto error = map_of(model);
   const double low = out.temperature.lower, high = out.temperature.upper;

@@ -7,6 +7,7 @@
 #include "core/physics/simulate_plants.hpp"
 #include "core/physics/spline.hpp"
 #include "core/physics/static_plants.hpp"
+#include "core/physics/temperatures.hpp"
 
 namespace invar::physics {
 
@@ -41,8 +42,7 @@ class ErrorMap final : public Simulation {
                                                        : directions_of_approach(position_)},
         pressure_{taken(inputs, "pressure", 1013.25)},
         offset_{taken(inputs, "offset")},
-        has_temperature_{inputs.find("temperature") != nullptr},
-        temperature_{taken(inputs, "temperature")} {
+        temperatures_{taken_temperatures(inputs)} {
     const CubicSpline baseline{model.baseline.positions, model.baseline.errors};
     for (double x : position_) baseline_.push_back(baseline(x));
     first_ = model.baseline.positions.front(), last_ = model.baseline.positions.back();
@@ -56,41 +56,71 @@ class ErrorMap final : public Simulation {
     error = baseline_;
     const double reference = model.value("reference_temperature", 20.0);
     const double expansion = model.value("expansion");
-    std::vector<double> warmth(n, 0.0);
-    if (has_temperature_)
-      for (std::size_t i = 0; i < n; ++i) warmth[i] = temperature_[i] - reference;
-    std::vector<double> late = warmth;
+    const auto warmths = warmths_of(model, reference);
+    const auto& nominal = warmths.at("temperature");
+    for (std::size_t i = 0; i < n; ++i) error[i] += expansion * nominal[i] * position_[i];
     for (const auto& term : model.terms) {
       const auto* kind = error_map_kind(*term.info);
-      if (!kind->delays_warmth || !(term.values[0] > 0.0)) continue;
-      // Exact for a temperature that goes straight from row to row.
-      for (std::size_t i = 1; i < n; ++i) {
-        const double h = time_[i] - time_[i - 1], tau = term.values[0];
-        if (!(h > 0.0)) {
-          late[i] = late[i - 1];
-          continue;
-        }
-        const double behind = tau * (warmth[i] - warmth[i - 1]) / h;
-        late[i] = warmth[i] - behind + (late[i - 1] - warmth[i - 1] + behind) * std::exp(-h / tau);
-      }
-    }
-    for (std::size_t i = 0; i < n; ++i) error[i] += expansion * late[i] * position_[i];
-    for (const auto& term : model.terms) {
-      const auto* kind = error_map_kind(*term.info);
+      const auto& late = found(warmths, temperature_of(term));
       if (kind->error != nullptr)
         for (std::size_t i = 0; i < n; ++i)
           error[i] += kind->error(
               {time_[i], position_[i], direction_[i], late[i], pressure_[i], offset_[i], first_, last_},
               term.values.data());
       if (const auto* over = variables_.find(term.curve.over); !term.curve.knots.empty() && over != nullptr)
-        for (std::size_t i = 0; i < n; ++i) error[i] += term.curve((*over)[i]) * factor(term, i, late[i]);
+        for (std::size_t i = 0; i < n; ++i) error[i] += term.curve((*over)[i]) * factor(term, i, warmths);
     }
   }
 
  private:
+  /// By temperature, of each row above the reference.
+  using Warmths = std::map<std::string, std::vector<double>, std::less<>>;
+
+  /// Those that are recorded; `temperature` always.
+  static Warmths taken_temperatures(const Record& inputs) {
+    Warmths all{{"temperature", {}}};
+    for (const auto& [name, values] : inputs.signals)
+      if (is_temperature(name)) all[name] = bridged(inputs.time, values);
+    return all;
+  }
+
+  static const std::vector<double>& found(const Warmths& all, std::string_view name) {
+    const auto at = all.find(name);
+    return at == all.end() ? all.find("temperature")->second : at->second;
+  }
+
+  /// As the scale feels them.
+  [[nodiscard]] Warmths warmths_of(const Model& model, double reference) const {
+    Warmths all = temperatures_;
+    for (auto& [name, warmth] : all) {
+      if (warmth.empty()) warmth.assign(time_.size(), reference);
+      for (double& one : warmth) one -= reference;
+    }
+    const Warmths warmths = all;
+    for (const auto& term : model.terms) {
+      if (!error_map_kind(*term.info)->delays_warmth || !(term.values[0] > 0.0)) continue;
+      const auto at = all.find(temperature_of(term));
+      if (at != all.end()) follow(found(warmths, temperature_of(term)), term.values[0], at->second);
+    }
+    return all;
+  }
+
+  /// Exact for a temperature that goes straight from row to row.
+  void follow(const std::vector<double>& warmth, double tau, std::vector<double>& late) const {
+    for (std::size_t i = 1; i < late.size(); ++i) {
+      const double h = time_[i] - time_[i - 1];
+      if (!(h > 0.0)) {
+        late[i] = late[i - 1];
+        continue;
+      }
+      const double behind = tau * (warmth[i] - warmth[i - 1]) / h;
+      late[i] = warmth[i] - behind + (late[i - 1] - warmth[i - 1] + behind) * std::exp(-h / tau);
+    }
+  }
+
   /// What a curve is multiplied by: the signal that it names, else the position where a length is measured or warms.
-  [[nodiscard]] double factor(const Term& term, std::size_t row, double warmth) const {
-    if (term.with == "temperature") return warmth;
+  [[nodiscard]] double factor(const Term& term, std::size_t row, const Warmths& warmths) const {
+    if (is_temperature(term.with)) return found(warmths, term.with)[row];
     if (term.with == "direction") return direction_[row];
     if (term.with == "position") return position_[row];
     return term.info->site == "measurement" || term.info->site == "thermal" ? position_[row] : 1.0;
@@ -98,8 +128,8 @@ class ErrorMap final : public Simulation {
 
   Variables variables_;
   std::vector<double> time_, position_, direction_, pressure_, offset_;
-  bool has_temperature_;
-  std::vector<double> temperature_, baseline_;
+  Warmths temperatures_;
+  std::vector<double> baseline_;
   double first_ = 0.0, last_ = 1.0;
 };
 

@@ -7,11 +7,13 @@
 
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/candidates/equation_candidates.hpp"
+#include "core/diagnosis/candidates/further_temperatures.hpp"
 #include "core/diagnosis/candidates/jump.hpp"
 #include "core/diagnosis/candidates/sizes.hpp"
 #include "core/diagnosis/candidates/wave.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
 #include "core/physics/library.hpp"
+#include "core/physics/temperatures.hpp"
 
 namespace invar::diagnosis {
 
@@ -183,7 +185,7 @@ constexpr Choice sensor_curves[] = {
     {"measurement", "time", 8, "velocity"},
 };
 
-std::span<const Choice> choices_of(const physics::Model& model) {
+std::span<const Choice> choices_of_plant(const physics::Model& model) {
   switch (model.plant) {
     case Plant::axis: {
       // Only a loop shows what its encoder reads wrong along the way, the last of the choices.
@@ -203,6 +205,23 @@ std::span<const Choice> choices_of(const physics::Model& model) {
   }
 }
 
+/// Those of the plant, and of an error map the same over each further temperature.
+std::vector<Choice> choices_of(const Case& data) {
+  const auto known = choices_of_plant(data.model);
+  std::vector<Choice> all{known.begin(), known.end()};
+  for (const auto& further : further_temperatures(data)) {
+    const char* name = data.model.signal(further)->name.c_str();
+    for (auto choice : known) {
+      const bool is_over = physics::is_temperature(choice.over),
+                 is_with = physics::is_temperature(choice.with);
+      if (is_over) choice.over = name;
+      if (is_with) choice.with = name;
+      if (is_over || is_with) all.push_back(choice);
+    }
+  }
+  return all;
+}
+
 /// The nodes or outputs at which a curve may lie.
 std::vector<std::string> places_of_curves(const Case& data) {
   if (data.model.plant == Plant::thermal) return data.model.thermal.nodes;
@@ -217,7 +236,7 @@ std::vector<Start> unmodelled_starts(const Case& data, const Fit& fitted) {
   std::vector<Start> starts;
   // Beside a law of friction that was found, a course along the way would only take over what the law does.
   const bool has_law = has_found_friction(data, fitted.model);
-  for (const auto& choice : choices_of(data.model)) {
+  for (const auto& choice : choices_of(data)) {
     const std::string_view with = choice.with;
     if (has_law && (with == "direction" || with == "velocity")) continue;
     for (const auto& place : places_of_curves(data))

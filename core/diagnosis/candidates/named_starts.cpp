@@ -5,6 +5,7 @@
 
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/candidates/equation_candidates.hpp"
+#include "core/diagnosis/candidates/further_temperatures.hpp"
 #include "core/diagnosis/candidates/sizes.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
 #include "core/diagnosis/locate/axis_periods.hpp"
@@ -36,19 +37,21 @@ bool varies(const Case& data, std::string_view name) {
   return high - low > 1e-3 * std::max(std::abs(low), std::abs(high));
 }
 
-/// Does a model have this parameter, or a term that stands for it?
-bool has_in(const physics::Model& model, std::string_view parameter) {
-  return model.value(parameter) != 0.0 ||
+/// Does a model have this parameter, or a term at this place that stands for it?
+bool has_in(const physics::Model& model, std::string_view parameter, const std::string& on) {
+  return (on.empty() && model.value(parameter) != 0.0) ||
          std::any_of(model.terms.begin(), model.terms.end(),
-                     [&](const Term& term) { return term.info->stands_for == parameter; });
+                     [&](const Term& term) { return term.info->stands_for == parameter && term.on == on; });
 }
 
-/// Does anything in the recordings let this term show?
-bool may_show(const Case& data, const physics::Model& model, const TermInfo& info) {
-  if (!info.needs.empty() && !has(data, info.needs)) return false;
+/// Does anything in the recordings let this term show at this place?
+bool may_show(const Case& data, const physics::Model& model, const TermInfo& info, const std::string& on) {
+  const bool is_further =
+      info.plant == Plant::error_map && !on.empty();  // temperature, to which no parameter belongs
+  if (!is_further && !info.needs.empty() && !has(data, info.needs)) return false;
   if (!info.needs_varied.empty() && !varies(data, info.needs_varied)) return false;
-  if (!info.stands_for.empty() && data.model.find(info.stands_for) != nullptr) return false;
-  if (!info.acts_in.empty() && !has_in(model, info.acts_in)) return false;
+  if (!is_further && !info.stands_for.empty() && data.model.find(info.stands_for) != nullptr) return false;
+  if (!info.acts_in.empty() && !has_in(model, info.acts_in, is_further ? on : "")) return false;
   const auto* kind = physics::thermal_kind(info);
   if (kind == nullptr) return true;
   return (!kind->couples || data.model.thermal.nodes.size() > 1) &&
@@ -62,6 +65,12 @@ std::vector<std::string> places(const Case& data, const TermInfo& info) {
       if (physics::thermal_kind(info)->ambient != nullptr)
         return {data.model.thermal.nodes.front()};  // one air for all
       return data.model.thermal.nodes;
+    case Plant::error_map: {
+      std::vector<std::string> on{""};
+      if (info.needs == "temperature")
+        for (auto& name : further_temperatures(data)) on.push_back(std::move(name));
+      return on;
+    }
     case Plant::sensor: {
       using physics::Instrument;
       std::vector<std::string> on;
@@ -351,11 +360,12 @@ std::vector<Start> named_starts(const Case& data, const Weighing& weighing, cons
   if (data.model.plant == Plant::axis) to.periods = axis_periods(data, weighing, fitted);
   const bool has_friction = has_found_friction(data, model);
   for (const auto* info : physics::terms_of(data.model.plant)) {
-    if (without.contains(info->name) || !may_show(data, model, *info)) continue;
+    if (without.contains(info->name)) continue;
     // Two laws of one friction fit what neither is: a course over the velocity says it without a name.
     if (has_friction && info->is_friction) continue;
     for (const auto& on : places(data, *info))
-      if (!is_used_up(model, *info, on)) add_at(to, term_at(data, *info, on));
+      if (may_show(data, model, *info, on) && !is_used_up(model, *info, on))
+        add_at(to, term_at(data, *info, on));
   }
   if (data.model.plant == Plant::axis) take_to_size(data, model, to.starts);
   return to.starts;

@@ -6,6 +6,7 @@
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
+#include "core/physics/temperatures.hpp"
 
 namespace invar::diagnosis {
 
@@ -24,7 +25,7 @@ std::string site_of(const Case& data, const physics::Term& term) {
 std::vector<std::string> dependence(const Case& data, const physics::Term& term) {
   std::vector<std::string> names;
   for (const auto name : term.info->depends_on)
-    if (!name.empty()) names.emplace_back(name);
+    if (!name.empty()) names.emplace_back(name == "temperature" ? physics::temperature_of(term) : name);
   if (!term.curve.over.empty()) {
     names.push_back(term.curve.over);
     if (term.curve.over.rfind("image", 0) == 0) names.emplace_back("image");
@@ -128,7 +129,7 @@ std::string place_of(const Case& data, const physics::Term& term) {
   std::string text = site;
   for (const auto& one : known)
     if (site == one.site) text = one.words;
-  if (!term.on.empty()) text += " of " + term.on;
+  if (!term.on.empty()) text += (data.model.plant == physics::Plant::error_map ? " with " : " of ") + term.on;
   if (!term.with.empty() && data.model.plant == physics::Plant::axis)
     return term.with == "direction"      ? "dry friction of the carriage"
            : term.with == "acceleration" ? "mass of the carriage"
@@ -140,6 +141,7 @@ std::string place_of(const Case& data, const physics::Term& term) {
 bool is_multiplied(const physics::Term& term) {
   if (term.curve.knots.empty() || term.with.empty() || term.with == "command") return false;  // added to that
   if (term.info->plant == physics::Plant::equations) return true;
+  if (term.info->plant == physics::Plant::error_map && physics::is_temperature(term.with)) return true;
   const auto known = physics::multipliers_of(*term.info);
   return std::find(known.begin(), known.end(), term.with) != known.end();
 }
@@ -173,7 +175,7 @@ std::string unit_of_curve(const Case& data, const physics::Term& term) {
              : term.info->site == "storage"                             ? "J/K"
                                                                         : "W";
     case Plant::error_map:
-      if (term.with == "temperature") return "m/K";
+      if (physics::is_temperature(term.with)) return "m/K";
       return term.with == "position" || (term.with.empty() && term.info->site != "kinematic") ? "1" : "m";
     case Plant::droplet:
       return term.with.empty() ? "m" : "1";

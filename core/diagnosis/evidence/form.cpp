@@ -6,6 +6,7 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/thresholds.hpp"
 #include "core/physics/equations_columns.hpp"
+#include "core/physics/temperatures.hpp"
 
 namespace invar::diagnosis {
 
@@ -53,7 +54,9 @@ bool is_course_of(const physics::Term& curve, const physics::Term& term) {
     return curve.on == term.on && variable_of(curve) == variable_of(term);
   const auto site = info.site == "disturbance" ? std::string_view{"force"} : info.site;
   if (curve.info->site != site || (!curve.on.empty() && curve.on != term.on)) return false;
-  return std::find(info.depends_on.begin(), info.depends_on.end(), curve.curve.over) != info.depends_on.end();
+  return std::any_of(info.depends_on.begin(), info.depends_on.end(), [&](std::string_view name) {
+    return curve.curve.over == (name == "temperature" ? physics::temperature_of(term) : name);
+  });
 }
 
 std::optional<OtherForm> other_form(const Case& data, const Weighing& weighing, const Fit& base,

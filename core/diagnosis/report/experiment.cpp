@@ -6,7 +6,9 @@
 
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/report/report.hpp"
+#include "core/physics/temperatures.hpp"
 #include "core/diagnosis/thresholds.hpp"
+#include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
 
@@ -43,6 +45,8 @@ std::string only_in(const std::vector<std::string>& one, const std::vector<std::
 }  // namespace
 
 std::string separating_experiment(const Case& data, const physics::Term& at, const physics::Term& beside) {
+  if (at.info == beside.info && data.model.plant == physics::Plant::error_map)
+    return varied(std::string{physics::temperature_of(at)}) + ", and the other way round";
   if (at.info == beside.info)
     return "record with one instrument more, between the " + place_of(data, at) + " and the " +
            place_of(data, beside) + ": it shows the effect of the one and not that of the other";

@@ -64,6 +64,22 @@ TEST(ErrorMapModel, SaysWhatItCannotCorrect) {
               thermal_error_of(test::model_of(diagnosed)).value({0.07, 22.0, 0.0, {}}), 1e-15);
 }
 
+TEST(ErrorMapModel, LeavesOutWhatGoesWithAnotherTemperature) {
+  std::string text{diagnosed};
+  text.replace(text.find("temperature: T,"), 15, "temperature: T, temperature_spindle: T2,");
+  const auto without = test::model_of(text);
+  const auto other = test::model_of(
+      text +
+      "  - {term: thermal_expansion, on: temperature_spindle, coefficient: {value: 5.0e-6, unit: 1/K}}\n"
+      "  - {term: heating_rate_lag, on: temperature_spindle, time_constant: {value: 900, unit: s}}\n");
+  EXPECT_THAT(std::string{why_not_corrected(other.terms.back())},
+              ::testing::HasSubstr("reads one temperature"));
+  const auto error = thermal_error_of(other);
+  EXPECT_EQ(error.lag, 240.0);
+  EXPECT_NEAR(error.value({0.15, 22.0, 0.0, {}}), thermal_error_of(without).value({0.15, 22.0, 0.0, {}}),
+              1e-15);
+}
+
 TEST(ErrorMapModel, APatchedFileSaysOverWhichTemperaturesItWasFound) {
   const auto yaml = config::Yaml::parse(diagnosed, "model.yaml");
   auto changed = model::read(yaml);
