@@ -180,7 +180,7 @@ Answer sparse_regression(const Machine& machine, const Case& data, const diagnos
   auto screened =
       diagnosis::screen(data, weighing, refit, diagnosis::named_starts(data, weighing, refit, {}), 60);
   std::erase_if(screened, [](const auto& s) { return s.columns.size() == 0; });
-  Eigen::MatrixXd all = diagnosis::whitened(data, weighing, refit.columns);
+  Eigen::MatrixXd all = diagnosis::whitened(data, weighing, refit.columns).dense();
   const auto own = all.cols();
   std::vector<Eigen::Index> begins;
   for (const auto& s : screened) {

@@ -193,7 +193,8 @@ bool leave_out_drift(const Case& data, Diagnosis& d) {
     const auto drift = d.findings[i].term;
     if (drift.info->depends_on.front() != "time" || drift.info->index_of("phase") < physics::most_parameters)
       continue;
-    auto without = fit(data, d.weighing, physics::without_term(d.best.model, given + i), data.model, Effort::follow(10));
+    auto without =
+        fit(data, d.weighing, physics::without_term(d.best.model, given + i), data.model, Effort::follow(10));
     auto with = without;  // the drift last
     with.model.terms.clear();
     for (std::size_t t = 0; t < d.best.model.terms.size(); ++t)
