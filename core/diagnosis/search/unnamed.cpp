@@ -151,10 +151,13 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   return Curved{std::move(curved), own, gain};
 }
 
-/// Does a course beside the names leave plainly less than one in their place? Then it is the names' own rest.
+/// Does a course beside friction leave plainly less than one in its place? Then it is friction's own rest.
 bool is_needed_beside(const Case& data, const Curved& beside, const Curved& instead, const Diagnosis& d,
                       double margin) {
-  return beside.gain > margin && least_ratio(data, beside.fit, d.best) < thresholds::seen_beside &&
+  const auto& terms = d.best.model.terms;
+  return std::any_of(terms.begin() + static_cast<std::ptrdiff_t>(data.model.terms.size()), terms.end(),
+                     [](const physics::Term& term) { return term.info->is_friction; }) &&
+         beside.gain > margin && least_ratio(data, beside.fit, d.best) < thresholds::seen_beside &&
          lead(data, beside.fit, instead.fit) > margin;
 }
 

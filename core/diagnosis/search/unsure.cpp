@@ -29,7 +29,8 @@ bool foretells(const Case& data, const Diagnosis& d, std::size_t finding) {
 /// no cause in its place: it rounds the jump of friction off.
 bool is_needed_beside(const Case& data, const Diagnosis& d, std::size_t finding, const OtherCause& other) {
   const auto& course = other.fit.model.terms.back();
-  if (!is_course_of(course, d.best.model.terms[data.model.terms.size() + finding])) return false;
+  const auto& term = d.best.model.terms[data.model.terms.size() + finding];
+  if (!term.info->is_friction || !is_course_of(course, term)) return false;
   auto both = d.best.model;
   both.terms.push_back(course);
   const auto plain = weigh(data, simulate(data, other.fit.model), Colour::white);
