@@ -18,6 +18,12 @@ namespace invar::diagnosis {
 
 namespace {
 
+/// Do states carry on from row to row? A map or an instrument is read point by point, and what drifts there is a cause.
+bool is_in_motion(const Case& data) {
+  return data.model.plant == physics::Plant::axis || data.model.plant == physics::Plant::thermal ||
+         data.model.plant == physics::Plant::equations;
+}
+
 /// Is most of what a name explains foretold on rows that no fit saw? A course over time takes anything slow and foretells
 /// nothing: it is no cause in place of such a name.
 bool foretells(const Case& data, const Diagnosis& d, std::size_t finding) {
@@ -46,7 +52,8 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside) {
   for (std::size_t i = d.findings.size(); i-- > 0;) {
     if (!beside) beside = courses_beside(data, d.best);
     const auto other = other_cause(data, *beside, data.model.terms.size() + i);
-    if (!other || (is_over_time(other->fit.model.terms.back()) && foretells(data, d, i)) ||
+    if (!other ||
+        (is_in_motion(data) && is_over_time(other->fit.model.terms.back()) && foretells(data, d, i)) ||
         is_needed_beside(data, d, i, *other)) {
       d.findings[i].other_shape = other_shape(data, *beside, data.model.terms.size() + i).share;
       continue;

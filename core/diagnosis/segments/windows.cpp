@@ -27,6 +27,8 @@ using physics::Model;
 /// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
 /// says what it lacks; but each costs a fit as many numbers as there are states.
 constexpr std::size_t fewest_rows = 60, most_starts = 200;
+/// Where windows only lead the numbers near, longer ones tell more of them.
+constexpr std::size_t most_starts_of_a_hint = 100;
 /// A window is at most as long as a disturbance of its first state takes to grow so much.
 constexpr double most_growth = 30.0;
 /// As many windows where a disturbance grows no faster than the sum of a sum does.
@@ -330,7 +332,7 @@ std::optional<Model> begun_in_windows(const Case& data) {
     return std::nullopt;
   std::size_t rows = 0;
   for (const auto& recording : data.recordings) rows = std::max(rows, recording.inputs.rows());
-  const std::size_t window = std::max(fewest_rows, rows * states / most_starts);
+  const std::size_t window = std::max(fewest_rows, rows * states / most_starts_of_a_hint);
   if (rows < 4 * window) return std::nullopt;
   auto cut = in_windows(data, window, Rows(data.recordings.size()));
   estimate_starts(cut);
