@@ -93,7 +93,8 @@ Shortlist shortlisted(const Naming& naming, const Weighing& weighing, const Fit&
   std::size_t from = 0;
   std::map<std::string, int> seen;
   const auto is_better = [&](const Fit& f) { return f.evidence > base.evidence + thresholds::claim_margin; };
-  for (int batch = 0; batch < batches && std::none_of(fits.begin(), fits.end(), is_better); ++batch) {
+  for (int batch = 0; batch < batches; ++batch) {
+    if (batch > 0 && std::any_of(fits.begin(), fits.end(), is_better)) break;
     const auto tried = next_of(list.screened, from, seen);
     if (tried.empty()) break;
     for (auto& f : fits_of(naming, weighing, base, tried)) fits.push_back(std::move(f));
