@@ -115,8 +115,7 @@ bool Search::add_named(double round) {
         sought = std::move(other);
     };
     // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first.
-    if ((is_first || !is_equations()) && data_.is_time_series && !noise_->is_fed_back() &&
-        from == From::coloured)
+    if ((is_first || is_heat()) && data_.is_time_series && !noise_->is_fed_back() && from == From::coloured)
       rather(From::plain);
     if (is_first && is_equations() && excursion_of(sought.best->with) > thresholds::far_astray)
       rather(From::believed);
@@ -235,11 +234,11 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
   return false;
 }
 
-/// A machine with more effects beside one another than this is better looked at in parts.
-constexpr int most_names = 4;
+/// More effects beside one another are better looked at in parts; of heat each node has its exchange, its loss and its sensor.
+constexpr int most_names = 3, most_names_of_heat = 4;
 
 void Search::name(int first_round) {
-  for (int round = first_round; round < most_names; ++round)
+  for (int round = first_round; round < (is_heat() ? most_names_of_heat : most_names); ++round)
     if (!take("further terms of the library", [&] { return add_named(round); }) ||
         !take("further terms of the library", [&] {
           if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size

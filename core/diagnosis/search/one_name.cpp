@@ -55,9 +55,8 @@ std::vector<Fit> fits_of(const Naming& naming, const Weighing& weighing, const F
     go_on(*best);
     const double gained = std::max(1.0, best->evidence - base.evidence);
     std::vector<Fit*> near;
-    // Those that gain are still on their way: from a base far off three steps do not bring them to their end. Equations have
-    // been begun with two terms at once.
-    const bool all_go_on = data.model.plant != physics::Plant::equations;
+    // Of heat those that gain are still on their way: from a base far off three steps do not bring them to their end.
+    const bool all_go_on = data.model.plant == physics::Plant::thermal;
     for (auto& f : fits)
       if (&f != &*best && (f.evidence > best->evidence - std::max(15.0, 0.5 * gained) ||
                            (all_go_on && f.evidence > base.evidence + thresholds::claim_margin)))

@@ -118,6 +118,7 @@ class Search {
     return is_over;
   }
   [[nodiscard]] double margin() const { return options_.refuses ? claim_margin_of(d_.weighing) : 0.0; }
+  [[nodiscard]] bool is_heat() const { return data_.model.plant == physics::Plant::thermal; }
   [[nodiscard]] bool is_equations() const { return data_.model.plant == physics::Plant::equations; }
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
 

@@ -92,10 +92,9 @@ Model without_its_courses(const Case& data, Model model, std::size_t place) {
   return model;
 }
 
-/// A name that is needed beside a free course over its own variable is what that course cannot follow: friction's jump at
-/// rest. The freer shape is no rival then, and what is left counts against both together. False: no such course.
+/// Friction that is needed beside a free course over its own variable is what that course cannot follow: its jump at rest. The freer shape is no rival then, and what is left counts against both together. False: no such course.
 bool is_needed_beside_course(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
-  return finding.term.curve.knots.empty() && finding.term.info->depends_on.front() != "history" &&
+  return finding.term.info->is_friction &&
          finding.gain > thresholds::margins_of_a_trifle * thresholds::claim_margin &&
          without_its_courses(data, best.model, place).terms.size() + 1 < best.model.terms.size();
 }
@@ -121,11 +120,12 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
     finding.gain = std::min(d.best.evidence - rival.evidence, lead(data, d.best, rival));
     const bool has_course = is_needed_beside_course(data, d.best, place, finding);
     if (has_course) finding.other_shape = 0.0;
-    const double rest = rest_left_by(
-        data, d.best,
-        has_course ? fit(data, d.weighing, without_its_courses(data, d.best.model, place), data.model, Effort::follow(5))
-                   : rival,
-        excess);
+    const double rest =
+        rest_left_by(data, d.best,
+                     has_course ? fit(data, d.weighing, without_its_courses(data, d.best.model, place),
+                                      data.model, Effort::follow(5))
+                                : rival,
+                     excess);
     rests.push_back(rest);
     weigh_name(data, d, place, rest, finding);
   }
