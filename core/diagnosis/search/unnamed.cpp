@@ -92,13 +92,13 @@ bool is_series(const Model& model, std::size_t given) {
   });
 }
 
-/// Does a course over time take over what a name explains? It follows anything slow, and the name's number would be wrong.
-bool takes_over(const Fit& named, const Fit& with_course, std::size_t given) {
+/// Does what goes with time take over part of what a name explains? It follows anything slow, and the name's number would be wrong.
+bool takes_over(const Model& named, const Model& with_course, std::size_t given) {
   constexpr double kept = 0.95;  // what a crowd of small effects does to a number
-  for (std::size_t t = given; t < named.model.terms.size(); ++t)
-    for (std::size_t i = 0; i < named.model.terms[t].info->parameter_count(); ++i)
-      if (named.model.terms[t].info->parameters[i].role == physics::Role::amplitude &&
-          std::abs(with_course.model.terms[t].values[i]) < kept * std::abs(named.model.terms[t].values[i]))
+  for (std::size_t t = given; t < named.terms.size(); ++t)
+    for (std::size_t i = 0; i < named.terms[t].info->parameter_count(); ++i)
+      if (named.terms[t].info->parameters[i].role == physics::Role::amplitude &&
+          std::abs(with_course.terms[t].values[i]) < kept * std::abs(named.terms[t].values[i]))
         return true;
   return false;
 }
@@ -110,10 +110,6 @@ bool shows(const Case& data, const Fit& with, const Fit& without) {
          (ratio < thresholds::seen_beside &&
           lead(data, with, without) > thresholds::nameless_margins * thresholds::claim_margin);
 }
-
-}  // namespace
-
-namespace {
 
 /// A screened curve fitted beside the base; nothing where it does not pay.
 std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighing& plain,
@@ -196,14 +192,9 @@ bool leave_out_drift(const Case& data, Diagnosis& d) {
     const auto drift = d.findings[i].term;
     if (drift.info->depends_on.front() != "time" || drift.info->index_of("phase") < physics::most_parameters)
       continue;
-    auto without =
-        fit(data, d.weighing, physics::without_term(d.best.model, given + i), data.model, Effort::follow(10));
-    auto with = without;  // the drift last
-    with.model.terms.clear();
-    for (std::size_t t = 0; t < d.best.model.terms.size(); ++t)
-      if (t != given + i) with.model.terms.push_back(d.best.model.terms[t]);
-    with.model.terms.push_back(d.best.model.terms[given + i]);
-    if (!takes_over(without, with, given)) continue;
+    const auto others = physics::without_term(d.best.model, given + i);
+    auto without = fit(data, d.weighing, others, data.model, Effort::follow(10));
+    if (!takes_over(without.model, others, given)) continue;
     d.reject(std::string{drift.info->name}, "it takes over what the others explain", d.findings[i].gain);
     d.best = std::move(without);
     d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));
@@ -287,7 +278,7 @@ void add_unnamed(const Case& data, Diagnosis& d, const Beside& beside_best) {
   if (named) put_in_place(data, d, beside, beside_best, margin);
   // A rest counts where an engineer would see it.
   if (!d.is_unnamed && beside.gain > margin &&
-      !(is_over_time(beside.fit.model.terms.back()) && takes_over(d.best, beside.fit, given)) &&
+      !(is_over_time(beside.fit.model.terms.back()) && takes_over(d.best.model, beside.fit.model, given)) &&
       least_ratio(data, beside.fit, d.best) < seen) {
     d.best = std::move(beside.fit);
     d.weighing = std::move(beside.weighing);
