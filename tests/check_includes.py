@@ -15,14 +15,16 @@ LIBRARIES = {
     "spdlog/": "spdlog", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
 }
 
+# The rooms of core/metrology know nothing of one another.
+METROLOGY = [f"core/metrology/{subject}" for subject in ("geometric", "thermal", "fusion", "droplet", "camera")]
+
 # A room -> what it may use beside itself. "idl" is everything generated from idl/.
 ROOMS = {
     "core/base": [],
     "core/config": ["core/base", "yaml-cpp"],
     "core/numerics": ["core/base", "Eigen"],
-    "core/metrology": ["core/base", "core/numerics", "Eigen"],
-    "core/machine": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "yaml-cpp", "Eigen"],
-    "core/compensation": ["core/base", "core/config", "core/numerics", "core/metrology", "core/physics", "Eigen", "compression"],
+    "core/machine": ["core/base", "core/config", "core/numerics", *METROLOGY, "core/physics", "yaml-cpp", "Eigen"],
+    "core/compensation": ["core/base", "core/config", "core/numerics", *METROLOGY, "core/physics", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
@@ -32,7 +34,9 @@ ROOMS = {
     "core/recording": ["core/base", "idl", "compression", "nlohmann-json"],
     "tools": None,  # everything
 }
-COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", "core/metrology", "core/machine", "core/compensation",
+for subject in METROLOGY:
+    ROOMS[subject] = ["core/base", "core/numerics", "Eigen"]
+COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", *METROLOGY, "core/machine", "core/compensation",
              "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
 MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "core/recording"],
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
@@ -51,9 +55,9 @@ CIRCLES = [
     {"core/component/component", "core/component/port"},
     {"core/config/yaml", "core/config/yaml_document"},
     {"core/physics/simulation", "core/physics/simulate_plants"},
-    {"core/metrology/thermal_identification", "core/metrology/thermal_regression"},
-    {"core/metrology/displacement_line", "core/metrology/line_fit"},
-    {"core/metrology/droplet_trajectory", "core/metrology/droplet_fit"},
+    {"core/metrology/thermal/thermal_identification", "core/metrology/thermal/thermal_regression"},
+    {"core/metrology/geometric/displacement_line", "core/metrology/geometric/line_fit"},
+    {"core/metrology/droplet/droplet_trajectory", "core/metrology/droplet/droplet_fit"},
     {"core/modbus/map", "core/modbus/codec"},
     {"components/vision/outline", "components/vision/outline_curve"},
     {"core/dds/rtps_message", "core/dds/rtps_parameters", "core/dds/sequence_guard"},
@@ -68,7 +72,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
 def room_of(path: str):
     parts = path.split("/")
-    if parts[:2] == ["core", "diagnosis"] and len(parts) > 3:
+    if parts[:2] in (["core", "diagnosis"], ["core", "metrology"]) and len(parts) > 3:
         return "/".join(parts[:3])
     if parts[0] == "core" and len(parts) > 2:
         return "core/" + parts[1]

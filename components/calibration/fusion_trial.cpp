@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/sure_gain.hpp"
+#include "core/numerics/sure_gain.hpp"
 
 namespace invar::calibration {
 
@@ -251,7 +251,7 @@ Task FusionTrial::run(const FusionJob& job) {
   const std::string fused = "fused position of runs not fitted " + millimetres(before.fused.rms) + " to " +
                             millimetres(after.fused.rms) + " RMS by the laser";
   progress_ = 1.0;
-  if (after.fused.rms >= before.fused.rms || !metrology::surely_less(after.parts, before.parts, 2.0)) {
+  if (after.fused.rms >= before.fused.rms || !numerics::surely_less(after.parts, before.parts, 2.0)) {
     co_await move(job.from, 0.0, nullptr);
     co_await roll_back_model();
     report(job::JOB_DONE, fused + ": no more than chance gives; the fusion is as it was before");

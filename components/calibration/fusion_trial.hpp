@@ -12,7 +12,7 @@
 #include "components/calibration/axis_runner.hpp"
 #include "components/calibration/job_specs.hpp"
 #include "core/component/parameters.hpp"
-#include "core/metrology/fusion_identification.hpp"
+#include "core/metrology/fusion/fusion_identification.hpp"
 
 namespace invar::calibration {
 

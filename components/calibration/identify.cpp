@@ -6,7 +6,7 @@
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/geometric_identification.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
 
 namespace invar::calibration {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/line_errors.hpp"
-#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/geometric/line_errors.hpp"
+#include "core/metrology/thermal/thermal_identification.hpp"
 #include "core/recording/table.hpp"
 
 namespace invar::calibration {

@@ -9,7 +9,7 @@
 #include "core/compensation/error_map_model.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
-#include "core/metrology/components.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
 #include "core/model/model_file.hpp"
 
 namespace invar::compensation {
@@ -162,8 +162,8 @@ void take_thermal(LiveModel& live, const metrology::ThermalError& model, const T
 }
 
 /// Networks are tried at the ends and the middle of the states' ranges.
-std::string refusal_of(metrology::ComponentTables& tables, const ModelLimits& limits) {
-  const metrology::ComponentNetworks& model = tables.model();
+std::string refusal_of(metrology::ErrorMotionTables& tables, const ModelLimits& limits) {
+  const metrology::ErrorMotionNetworks& model = tables.model();
   if (std::string why = refusal_of_machine(model.chain, model.travel, limits); !why.empty()) return why;
   if (tables.bound() > most_compiled)
     return "its networks bend too much for the loop's tables: they would differ by " + in_um(tables.bound());

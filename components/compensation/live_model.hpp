@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/component_tables.hpp"
-#include "core/metrology/machine.hpp"
-#include "core/metrology/thermal_error.hpp"
-#include "core/metrology/volumetric_table.hpp"
+#include "core/metrology/geometric/error_motion_tables.hpp"
+#include "core/metrology/geometric/machine.hpp"
+#include "core/metrology/geometric/volumetric_table.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 
 namespace invar::compensation {
 
@@ -46,8 +46,8 @@ struct LiveModel {
   metrology::GeometricModel expanding;  // what `geometric` was compiled from, for its growth and its reversal
   bool expands = false;
 
-  std::optional<metrology::ComponentTables> components;  // in the place of `geometric`
-  std::vector<State> states;                             // of `components`, in its order
+  std::optional<metrology::ErrorMotionTables> components;  // in the place of `geometric`
+  std::vector<State> states;                               // of `components`, in its order
 
   /// Of the whole machine, not of an axis.
   [[nodiscard]] bool is_volumetric() const noexcept { return geometric || components; }

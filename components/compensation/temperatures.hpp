@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/component/component.hpp"
-#include "core/metrology/heat_trace.hpp"
-#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/thermal/heat_trace.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 #include "idl/thermal.h"
 
 namespace invar::compensation {

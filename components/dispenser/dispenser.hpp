@@ -14,7 +14,7 @@
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/component/staged_model.hpp"
-#include "core/metrology/droplet_trajectory.hpp"
+#include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "idl/dispensing.h"

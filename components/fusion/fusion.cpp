@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/fusion_observer.hpp"
+#include "core/metrology/fusion/fusion_observer.hpp"
 
 namespace invar::fusion {
 

@@ -13,7 +13,7 @@
 #include "core/component/component.hpp"
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
-#include "core/metrology/thermistor.hpp"
+#include "core/metrology/thermal/thermistor.hpp"
 #include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "idl/thermal.h"

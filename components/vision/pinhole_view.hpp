@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "core/metrology/planar_camera.hpp"
+#include "core/metrology/camera/planar_camera.hpp"
 
 namespace invar::vision {
 

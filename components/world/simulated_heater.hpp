@@ -11,7 +11,7 @@
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
-#include "core/metrology/thermistor.hpp"
+#include "core/metrology/thermal/thermistor.hpp"
 #include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
 #include "core/physics/thermal_plant.hpp"

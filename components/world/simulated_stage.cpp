@@ -6,8 +6,8 @@
 
 #include "core/machine/heat_growth.hpp"
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/components.hpp"
-#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 #include "core/model/model_file.hpp"
 
 namespace invar::world {

@@ -12,7 +12,7 @@
 #include "components/world/axis_ends.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/machine.hpp"
 #include "core/physics/axis_plant.hpp"
 #include "idl/index.h"
 #include "idl/sensing.h"

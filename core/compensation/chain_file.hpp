@@ -4,8 +4,8 @@
 #include <array>
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/axis_reversal.hpp"
-#include "core/metrology/volumetric.hpp"
+#include "core/metrology/geometric/axis_reversal.hpp"
+#include "core/metrology/geometric/volumetric.hpp"
 
 namespace invar::compensation {
 

@@ -10,9 +10,9 @@
 
 namespace invar::compensation {
 
-using metrology::component_count;
-using metrology::ComponentNetwork;
-using metrology::ComponentNetworks;
+using metrology::error_motion_count;
+using metrology::ErrorMotionNetwork;
+using metrology::ErrorMotionNetworks;
 using metrology::is_rotation;
 
 namespace {
@@ -23,7 +23,7 @@ constexpr std::size_t most_states = 8;
 
 }  // namespace
 
-void write_components(ModelText& text, const ComponentNetworks& model) {
+void write_components(ModelText& text, const ErrorMotionNetworks& model) {
   text.comment("Error = actual minus commanded position of the tool in the workpiece frame; m, rad.");
   text.comment("Components by ISO 230-1, measured one by one; squareness by ISO sign.");
   write_chain(text, model.chain, model.travel, model.tool);
@@ -39,7 +39,7 @@ void write_components(ModelText& text, const ComponentNetworks& model) {
   text.comment(
       "Gaussian networks, the axis' position [m] first; `sigma` inside the ranges, `slope` an input scale.");
   text.open("components");
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     const auto& component = model.components[index(c)];
     if (!component) continue;
     text.open(std::string{metrology::iso_name(c)});
@@ -53,8 +53,8 @@ void write_components(ModelText& text, const ComponentNetworks& model) {
   text.close();
 }
 
-ComponentNetworks read_components(const config::Node& root) {
-  ComponentNetworks model;
+ErrorMotionNetworks read_components(const config::Node& root) {
+  ErrorMotionNetworks model;
   for (const char* key : {"identified_from", "outside"}) root[key].accept_all();
   read_chain(root, model.chain, model.travel, model.tool);
   read_squareness(root, model.squareness, model.squareness_sigma);
@@ -67,7 +67,7 @@ ComponentNetworks read_components(const config::Node& root) {
   }
   if (model.states.size() > most_states) root["states"].fault("there are more than 8");
   const config::Node components = root.required("components");
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     const config::Node one = components[metrology::iso_name(c)];
     if (!one.exists()) continue;
     if (!model.chain.has(metrology::axis_of(c))) {
@@ -76,7 +76,7 @@ ComponentNetworks read_components(const config::Node& root) {
     }
     const char* unit = is_rotation(c) ? "rad" : "m";
     if (one.text("unit") != unit) one["unit"].fault("a wrong unit", std::string{"it is "} + unit);
-    ComponentNetwork component;
+    ErrorMotionNetwork component;
     for (const double state : one["states"].as_numbers("1")) {
       if (!(state >= 0.0 && state < static_cast<double>(model.states.size())) || state != std::floor(state)) {
         one["states"].fault("names a state that is not there", "calibrate again");
@@ -87,7 +87,7 @@ ComponentNetworks read_components(const config::Node& root) {
     component.sigma = one.number("sigma", unit, Range::not_negative());
     component.slope = one.number("slope", unit, Range::not_negative());
     component.network = read_network(one.required("network"));
-    if (component.states.size() > metrology::most_states_of_a_component ||
+    if (component.states.size() > metrology::most_states_of_an_error_motion ||
         component.network.inputs() != static_cast<Eigen::Index>(1 + component.states.size())) {
       one.fault("the network has another number of inputs than the states", "calibrate again");
       continue;

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "core/metrology/droplet_trajectory.hpp"
+#include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "core/physics/model.hpp"
 
 namespace invar::compensation {

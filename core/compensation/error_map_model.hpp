@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 #include "core/physics/model.hpp"
 
 namespace invar::compensation {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/metrology/fusion_observer.hpp"
+#include "core/metrology/fusion/fusion_observer.hpp"
 
 namespace invar::compensation {
 

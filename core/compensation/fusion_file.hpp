@@ -5,8 +5,8 @@
 #include <string>
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/sensor_fusion.hpp"
-#include "core/metrology/weighted_fusion.hpp"
+#include "core/metrology/fusion/sensor_fusion.hpp"
+#include "core/metrology/fusion/weighted_fusion.hpp"
 
 namespace invar::compensation {
 

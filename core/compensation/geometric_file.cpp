@@ -12,7 +12,7 @@ namespace invar::compensation {
 namespace {
 
 using metrology::axis_of;
-using metrology::component_count;
+using metrology::error_motion_count;
 using metrology::GeometricModel;
 using metrology::is_rotation;
 
@@ -41,7 +41,7 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
   text.comment("Uniform cubic B-splines over `interval` [m] of the moving axis: intervals + 3 coefficients,");
   text.comment("the standard deviation at each knot.");
   text.open("components");
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (model.coefficients[index(c)].size() == 0) continue;
     text.open(std::string{metrology::iso_name(c)});
     text.text("unit", is_rotation(c) ? "rad" : "m");
@@ -83,7 +83,7 @@ GeometricModel read_geometric(const config::Node& root) {
   }
   read_squareness(root, model.squareness, model.squareness_sigma);
   const config::Node components = root.required("components");
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     const config::Node one = components[metrology::iso_name(c)];
     if (!one.exists()) continue;
     const char* unit = is_rotation(c) ? "rad" : "m";

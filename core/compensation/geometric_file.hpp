@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/geometric_model.hpp"
+#include "core/metrology/geometric/geometric_model.hpp"
 
 namespace invar::compensation {
 

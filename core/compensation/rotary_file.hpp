@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/rotary_axis.hpp"
+#include "core/metrology/geometric/rotary_axis.hpp"
 
 namespace invar::compensation {
 

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdio>
 
-#include "core/metrology/components.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
 
 namespace invar::compensation {
 

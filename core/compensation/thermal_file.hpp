@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 
 namespace invar::compensation {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/droplet_trajectory.hpp"
+#include "core/metrology/droplet/droplet_trajectory.hpp"
 
 namespace invar::compensation {
 

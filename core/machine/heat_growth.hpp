@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/machine.hpp"
 
 namespace invar::machine {
 

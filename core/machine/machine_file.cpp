@@ -80,7 +80,7 @@ void read_each_axis(const Node& node, const metrology::Chain& chain, const std::
 
 metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& chain) {
   metrology::MachineErrors errors;
-  for (int i = 0; i < metrology::component_count; ++i) {
+  for (int i = 0; i < metrology::error_motion_count; ++i) {
     const Node child = node[metrology::iso_name(i)];
     if (!child.exists()) continue;
     if (!chain.has(metrology::axis_of(i)))

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "core/config/yaml.hpp"
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/machine.hpp"
 
 namespace invar::machine {
 

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "components/vision/droplets.hpp"
-#include "core/metrology/circle_fit.hpp"
+#include "core/metrology/camera/circle_fit.hpp"
 #include "tests/unit/vision/scenes.hpp"
 
 namespace {

@@ -12,7 +12,7 @@
 #include "components/fusion/fusion.hpp"
 #include "components/world/simulated_sensor.hpp"
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/fusion_identification.hpp"
+#include "core/metrology/fusion/fusion_identification.hpp"
 #include "core/physics/terms/sensor/gain_droop.hpp"
 #include "core/physics/terms/sensor/latency.hpp"
 #include "tests/support/wired_axis.hpp"

@@ -13,8 +13,8 @@
 #include <limits>
 #include <random>
 
-#include "core/metrology/fusion_observer.hpp"
-#include "tests/unit/metrology/fusion_rig.hpp"
+#include "core/metrology/fusion/fusion_observer.hpp"
+#include "tests/unit/metrology/fusion/fusion_rig.hpp"
 
 namespace invar::metrology {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "tests/bench/random_calibration.hpp"
-#include "tests/unit/metrology/left_over.hpp"
+#include "tests/unit/metrology/geometric/left_over.hpp"
 
 namespace invar::metrology {
 namespace {

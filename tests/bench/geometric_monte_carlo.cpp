@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/identifiability.hpp"
-#include "core/metrology/line_plan.hpp"
-#include "core/metrology/line_search.hpp"
-#include "tests/unit/metrology/left_over.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/identifiability.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
+#include "core/metrology/geometric/line_search.hpp"
+#include "tests/unit/metrology/geometric/left_over.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::metrology {
 namespace {

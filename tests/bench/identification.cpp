@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "core/metrology/fusion_observer.hpp"
-#include "core/metrology/thermal_error.hpp"
+#include "core/metrology/fusion/fusion_observer.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 #include "core/numerics/lookup_table.hpp"
 #include "core/numerics/rbf_ridge.hpp"
 

@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/geometric_waves.hpp"
-#include "core/metrology/line_plan.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/geometric_waves.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::metrology::testing {
 
@@ -82,7 +82,7 @@ enum class Kind {
 struct Case {
   std::string lines_name;
   Machine machine;
-  std::array<Family, component_count> families;
+  std::array<Family, error_motion_count> families;
   std::array<Family, 3> reversals;  // of the part that varies
   double squareness = 0.0;
   std::vector<DisplacementLine> lines;
@@ -300,7 +300,7 @@ inline Case random_case(unsigned seed, Kind kind = Kind::any) {
 /// The spline coefficients of a block, least squares, in its gauge: zero at the start, straightness without end-point slope.
 inline Eigen::MatrixXd samples_of(const Case& one, const GeometricBasis& basis,
                                   const GeometricBasis::Block& block, Random& random) {
-  const int axis = axis_of(block.component);
+  const int axis = axis_of(block.motion);
   const auto& spline = basis.splines[static_cast<std::size_t>(axis)];
   const double travel = one.machine.travel[static_cast<std::size_t>(axis)].width();
   const auto places = fine(travel);
@@ -312,14 +312,14 @@ inline Eigen::MatrixXd samples_of(const Case& one, const GeometricBasis& basis,
           w.value[static_cast<std::size_t>(k)] * block.coefficients.row(w.first + k);
   }
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr{rows};
-  Family smooth = one.families[static_cast<std::size_t>(block.component)];
+  Family smooth = one.families[static_cast<std::size_t>(block.motion)];
   smooth.pitch = smooth.second = 0.0;
   constexpr int draws = 400;
   Eigen::MatrixXd sample(block.size(), draws);
   for (int d = 0; d < draws; ++d) {
     auto values = draw(smooth, travel, places, random);
     const double first = values.front();
-    const double slope = is_straightness(block.component) ? (values.back() - first) / travel : 0.0;
+    const double slope = is_straightness(block.motion) ? (values.back() - first) / travel : 0.0;
     for (std::size_t i = 0; i < values.size(); ++i) values[i] -= first + slope * places[i];
     sample.col(d) =
         qr.solve(Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));

@@ -14,7 +14,7 @@
 #include <random>
 #include <vector>
 
-#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/thermal/thermal_identification.hpp"
 
 namespace invar::metrology {
 namespace {

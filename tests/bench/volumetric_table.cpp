@@ -6,11 +6,11 @@
 #include <random>
 #include <vector>
 
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/line_plan.hpp"
-#include "core/metrology/volumetric_table.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
+#include "core/metrology/geometric/volumetric_table.hpp"
 #include "core/numerics/lookup_table.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::metrology {
 namespace {
@@ -76,7 +76,7 @@ void gaussian_sums(benchmark::State& state) {
   const auto directions = axis_directions(model.chain, model.squareness);
   at_points(state, [&](const Eigen::Vector3d& p) {
     ErrorMotions motions;
-    for (int c = 0; c < component_count; ++c) {
+    for (int c = 0; c < error_motion_count; ++c) {
       double sum = 0.0;
       const double q = p[axis_of(c)];
       for (int k = 0; k < 41; ++k) {

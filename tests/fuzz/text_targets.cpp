@@ -177,7 +177,7 @@ std::string geometric_compensation() {
 }
 
 std::string rotary_compensation() {
-  metrology::ComponentReadings readings;
+  metrology::ErrorMotionReadings readings;
   readings.position = Eigen::VectorXd::LinSpaced(40, 0.0, 6.283);
   readings.value = 1e-5 * readings.position.array().sin();
   readings.state.resize(0, 40);

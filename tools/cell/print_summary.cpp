@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "core/compensation/trajectory_file.hpp"
-#include "core/metrology/droplet_trajectory.hpp"
+#include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "core/recording/table.hpp"
 
 namespace invar::tools {

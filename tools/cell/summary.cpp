@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "core/base/shown.hpp"
-#include "core/metrology/line_errors.hpp"
+#include "core/metrology/geometric/line_errors.hpp"
 #include "core/recording/export.hpp"
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/table.hpp"

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "components/vision/camera_file.hpp"
-#include "core/metrology/bad_views.hpp"
-#include "core/metrology/planar_camera.hpp"
+#include "core/metrology/camera/bad_views.hpp"
+#include "core/metrology/camera/planar_camera.hpp"
 #include "core/numerics/robust.hpp"
 #include "core/numerics/significance.hpp"
 #include "core/recording/table.hpp"

@@ -9,7 +9,7 @@
 
 #include "core/compensation/component_file.hpp"
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/geometric_field.hpp"
+#include "core/metrology/geometric/geometric_field.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/geometric/components_file.hpp"
@@ -21,7 +21,7 @@ namespace invar::tools {
 
 namespace {
 
-using metrology::component_count;
+using metrology::error_motion_count;
 using metrology::is_rotation;
 using report::si;
 
@@ -37,8 +37,8 @@ struct Options {
 };
 
 /// The reversal of a positioning goes to the model, and out of the readings that the network is fitted to.
-metrology::ComponentReadings without_reversal(ComponentsResult& result, int component) {
-  const metrology::ComponentReadings& readings = *result.readings[index(component)];
+metrology::ErrorMotionReadings without_reversal(ComponentsResult& result, int component) {
+  const metrology::ErrorMotionReadings& readings = *result.readings[index(component)];
   if (readings.direction.empty() || !metrology::is_positioning(component)) return readings;
   const int axis = metrology::axis_of(component);
   metrology::ReversalCurve& curve = result.model.reversal[index(axis)];
@@ -48,9 +48,9 @@ metrology::ComponentReadings without_reversal(ComponentsResult& result, int comp
 }
 
 /// ISO names of what no reading told: components of the machine's axes, and squareness.
-std::vector<std::string> not_measured(const metrology::ComponentNetworks& model) {
+std::vector<std::string> not_measured(const metrology::ErrorMotionNetworks& model) {
   std::vector<std::string> names;
-  for (int c = 0; c < component_count; ++c)
+  for (int c = 0; c < error_motion_count; ++c)
     if (model.chain.has(metrology::axis_of(c)) && !model.components[index(c)])
       names.emplace_back(metrology::iso_name(c));
   for (int a = 0; a < 3; ++a)
@@ -71,10 +71,10 @@ std::string joined(const std::vector<std::string>& names) {
 void evaluate(ComponentsResult& result) {
   const auto& model = result.model;
   result.unidentified = not_measured(model);
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!model.chain.has(metrology::axis_of(c)) || !result.fits[index(c)]) continue;
     const Range travel = model.travel[index(metrology::axis_of(c))];
-    const Range known = result.fits[index(c)]->component.network.range[0];
+    const Range known = result.fits[index(c)]->motion.network.range[0];
     if (known.width() < 0.9 * travel.width())
       result.notes.push_back(std::string{metrology::iso_name(c)} + " was measured from " +
                              si(known.lower, "m") + " to " + si(known.upper, "m") +
@@ -98,21 +98,21 @@ void drop_unused_states(ComponentsResult& result) {
   std::vector<std::size_t> kept;
   for (std::size_t s = 0; s < result.model.states.size(); ++s)
     if (std::any_of(result.fits.begin(), result.fits.end(), [s](const auto& fit) {
-          return fit && std::find(fit->component.states.begin(), fit->component.states.end(), s) !=
-                            fit->component.states.end();
+          return fit && std::find(fit->motion.states.begin(), fit->motion.states.end(), s) !=
+                            fit->motion.states.end();
         }))
       kept.push_back(s);
   std::vector<metrology::MachineState> states;
   for (const std::size_t s : kept) states.push_back(result.model.states[s]);
   result.model.states = std::move(states);
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     auto& fit = result.fits[index(c)];
     if (!fit) continue;
     Eigen::MatrixXd& readings = result.readings[index(c)]->state;
     readings = Eigen::MatrixXd{readings(kept, Eigen::all)};
-    for (std::size_t& state : fit->component.states)
+    for (std::size_t& state : fit->motion.states)
       state = static_cast<std::size_t>(std::find(kept.begin(), kept.end(), state) - kept.begin());
-    result.model.components[index(c)] = fit->component;
+    result.model.components[index(c)] = fit->motion;
   }
 }
 
@@ -137,9 +137,9 @@ std::optional<PositioningTest> test_of_motion(const ComponentsResult& result, in
 /// Figures by ISO 230-1 and -2 of every motion that depends on its position alone.
 void test_motions(ComponentsResult& result, const Options& options) {
   result.motions = motion_figures(result.readings, result.fits, result.model, options.environment);
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
-    if (!result.fits[index(c)]->component.states.empty()) {
+    if (!result.fits[index(c)]->motion.states.empty()) {
       result.notes.push_back(std::string{metrology::iso_name(c)} + " depends on " + result.depends_on(c) +
                              ": no figures of ISO 230, which are of one state");
       continue;
@@ -162,11 +162,11 @@ nlohmann::json report_of(const ComponentsResult& result) {
   report["positioning"] = positioning_json(result.tests, result.tolerances);
   report["motions"] = motions_json(result.motions, result.tolerances);
   report["components"] = nlohmann::json::array();
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
     const auto& fit = *result.fits[index(c)];
     nlohmann::json depends = nlohmann::json::array();
-    for (const std::size_t state : fit.component.states) depends.push_back(result.model.states[state].name);
+    for (const std::size_t state : fit.motion.states) depends.push_back(result.model.states[state].name);
     if (const auto& curve = result.model.reversal[index(metrology::axis_of(c))];
         metrology::is_positioning(c) && !curve.empty())
       report["reversal"][std::string(1, metrology::axis_letters[index(metrology::axis_of(c))])] = {
@@ -180,7 +180,7 @@ nlohmann::json report_of(const ComponentsResult& result) {
                                     {"rms_all", rms_of_readings(fit, true)},
                                     {"left_out_rms", fit.left_out},
                                     {"left_out_rms_position_alone", fit.over_position},
-                                    {"sigma", fit.component.sigma}});
+                                    {"sigma", fit.motion.sigma}});
   }
   return report;
 }
@@ -197,9 +197,9 @@ void calibrate(const Options& options) {
   read_components_file(options.readings, machine, result);
   {
     const Progress progress{"fitting the error motions"};
-    for (int c = 0; c < component_count; ++c) {
+    for (int c = 0; c < error_motion_count; ++c) {
       if (!result.readings[index(c)]) continue;
-      result.fits[index(c)] = metrology::identify_component(without_reversal(result, c));
+      result.fits[index(c)] = metrology::identify_error_motion(without_reversal(result, c));
     }
     drop_unused_states(result);
   }
@@ -209,7 +209,7 @@ void calibrate(const Options& options) {
   compensation::write_components(text, result.model);
   write_calibration(options.out, text, report_of(result), components_page(result));
 
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
     const auto& fit = *result.fits[index(c)];
     const char* unit = is_rotation(c) ? "rad" : "m";

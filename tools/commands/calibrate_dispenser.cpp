@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "core/compensation/trajectory_file.hpp"
-#include "core/metrology/droplet_trajectory.hpp"
+#include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/fusion_identification.hpp"
+#include "core/metrology/fusion/fusion_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"

@@ -16,7 +16,7 @@
 #include "core/base/new_file.hpp"
 #include "core/config/quotes.hpp"
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/line_search.hpp"
+#include "core/metrology/geometric/line_search.hpp"
 #include "core/recording/table.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"

@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "core/compensation/thermal_file.hpp"
-#include "core/metrology/components.hpp"
-#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
+#include "core/metrology/thermal/thermal_identification.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/thermal/distortion.hpp"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <memory>
 
-#include "core/metrology/thermistor.hpp"
+#include "core/metrology/thermal/thermistor.hpp"
 #include "core/numerics/significance.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibration_result.hpp"

@@ -13,8 +13,8 @@
 
 namespace invar::tools {
 
-using metrology::component_count;
-using metrology::ComponentReadings;
+using metrology::error_motion_count;
+using metrology::ErrorMotionReadings;
 using metrology::is_rotation;
 using report::number;
 
@@ -69,7 +69,7 @@ class Reader {
         component(row, name);
     }
     for (std::size_t s = 0; s < names_.size(); ++s) result.model.states.push_back({names_[s], ranges_[s]});
-    for (int c = 0; c < component_count; ++c)
+    for (int c = 0; c < error_motion_count; ++c)
       if (!rows_[index(c)].position.empty()) result.readings[index(c)] = readings_of(c);
     for (int pair = 0; pair < metrology::squareness_count; ++pair) mean_of(pair, result.model);
   }
@@ -99,7 +99,7 @@ class Reader {
   void squareness(std::size_t row, int pair) { squareness_[index(pair)].push_back(value(row, true)); }
 
   void component(std::size_t row, const std::string& name) {
-    const auto found = metrology::component_named(name);
+    const auto found = metrology::error_motion_named(name);
     if (!found)
       refuse("component", row, "`" + name + "` is no error motion",
              "write ISO 230-1: EXX, EYX .. ECZ, or EC0Y, EB0Z, EA0Z");
@@ -126,7 +126,7 @@ class Reader {
     for (const auto& state : states_) rows.state.back().push_back(state[row]);
   }
 
-  [[nodiscard]] ComponentReadings readings_of(int component) const {
+  [[nodiscard]] ErrorMotionReadings readings_of(int component) const {
     const Rows& rows = rows_[index(component)];
     const std::set<long> places = [&] {
       std::set<long> cells;
@@ -135,14 +135,14 @@ class Reader {
     }();
     const std::string what =
         table_.file.string() + ": component " + std::string{metrology::iso_name(component)};
-    if (rows.position.size() < static_cast<std::size_t>(metrology::least_component_readings))
+    if (rows.position.size() < static_cast<std::size_t>(metrology::least_error_motion_readings))
       throw InputError{what,
                        "has too few readings (" + std::to_string(rows.position.size()) + "; 8 at least)",
                        "measure more points, or leave the component out"};
     if (places.size() < least_places)
       throw InputError{what, "was measured at " + std::to_string(places.size()) + " places (4 at least)",
                        "measure along the travel"};
-    ComponentReadings readings;
+    ErrorMotionReadings readings;
     readings.position = vector_of(rows.position);
     readings.value = vector_of(rows.value);
     readings.direction = rows.direction;
@@ -152,7 +152,7 @@ class Reader {
     return readings;
   }
 
-  void mean_of(int pair, metrology::ComponentNetworks& model) const {
+  void mean_of(int pair, metrology::ErrorMotionNetworks& model) const {
     const auto& angles = squareness_[index(pair)];
     if (angles.empty()) return;
     if (angles.size() < 2)
@@ -173,7 +173,7 @@ class Reader {
   std::vector<std::string> names_;
   std::vector<std::vector<double>> states_;
   std::vector<Range> ranges_;
-  std::array<Rows, component_count> rows_;
+  std::array<Rows, error_motion_count> rows_;
   std::array<std::vector<double>, metrology::squareness_count> squareness_;
 };
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/machine.hpp"
 #include "tools/geometric/components_page.hpp"
 
 namespace invar::tools {

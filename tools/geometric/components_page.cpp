@@ -9,7 +9,7 @@ namespace invar::tools {
 
 namespace {
 
-using metrology::component_count;
+using metrology::error_motion_count;
 using metrology::is_rotation;
 using report::number;
 using report::si;
@@ -22,7 +22,7 @@ const char* unit_of(int component) { return is_rotation(component) ? "rad" : "m"
 report::Plot component_plot(const ComponentsResult& result, int component) {
   const auto& readings = *result.readings[index(component)];
   const auto& fit = *result.fits[index(component)];
-  const auto& network = fit.component;
+  const auto& network = fit.motion;
   report::Plot plot;
   plot.title = std::string{metrology::iso_name(component)} + ", " + metrology::thesis_symbol(component);
   plot.x_label = std::string(1, metrology::axis_letters[index(metrology::axis_of(component))]) + " [mm]";
@@ -71,7 +71,7 @@ report::Plot residual_plot(const ComponentsResult& result) {
 
 }  // namespace
 
-double rms_of_readings(const metrology::ComponentFit& fit, bool all) {
+double rms_of_readings(const metrology::ErrorMotionFit& fit, bool all) {
   std::vector<double> rest;
   for (std::size_t i = 0; i < fit.rest.size(); ++i)
     if (all || fit.kept[i]) rest.push_back(fit.rest[i]);
@@ -83,7 +83,7 @@ report::LeftOut rows_of(const ComponentsResult& result) {
   left_out.given = result.rows;
   left_out.header = {"component", "position", "reading", "from the model"};
   std::size_t rejected = 0;
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
     const auto& fit = *result.fits[index(c)];
     const auto& readings = *result.readings[index(c)];
@@ -103,7 +103,7 @@ report::LeftOut rows_of(const ComponentsResult& result) {
 
 std::string ComponentsResult::depends_on(int component) const {
   std::string text;
-  for (const std::size_t state : fits[index(component)]->component.states)
+  for (const std::size_t state : fits[index(component)]->motion.states)
     text += (text.empty() ? "" : ", ") + model.states[state].name;
   return text.empty() ? "position alone" : text;
 }
@@ -124,14 +124,14 @@ report::Page components_page(const ComponentsResult& result) {
   page.heading("Components");
   std::vector<std::vector<std::string>> rows;
   std::vector<report::Plot> plots;
-  for (int c = 0; c < component_count; ++c) {
+  for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
     const auto& fit = *result.fits[index(c)];
     rows.push_back({std::string{metrology::iso_name(c)}, metrology::thesis_symbol(c), result.depends_on(c),
                     std::to_string(fit.kept.size()) +
                         (fit.rejected > 0 ? ", " + std::to_string(fit.rejected) + " rejected" : ""),
                     si(fit.over_position, unit_of(c)), si(fit.left_out, unit_of(c)),
-                    si(fit.component.sigma, unit_of(c)), si(rms_of_readings(fit, false), unit_of(c)),
+                    si(fit.motion.sigma, unit_of(c)), si(rms_of_readings(fit, false), unit_of(c)),
                     si(rms_of_readings(fit, true), unit_of(c))});
     plots.push_back(component_plot(result, c));
   }

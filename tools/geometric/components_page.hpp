@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/component_identification.hpp"
+#include "core/metrology/geometric/error_motion_identification.hpp"
 #include "tools/geometric/motion_figures.hpp"
 #include "tools/geometric/positioning.hpp"
 #include "tools/report/left_out.hpp"
@@ -18,7 +18,7 @@ namespace invar::tools {
 struct ComponentsResult {
   std::filesystem::path machine_file;
   std::filesystem::path readings_file;
-  metrology::ComponentNetworks model;
+  metrology::ErrorMotionNetworks model;
   MotionReadings readings;
   MotionFits fits;
   std::size_t rows = 0;
@@ -36,7 +36,7 @@ struct ComponentsResult {
 };
 
 /// Reading minus fit, RMS over the readings used or over all of them.
-double rms_of_readings(const metrology::ComponentFit& fit, bool all);
+double rms_of_readings(const metrology::ErrorMotionFit& fit, bool all);
 /// Errors stand with each component: they are lengths of one and angles of another.
 report::LeftOut rows_of(const ComponentsResult& result);
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/geometric_model.hpp"
-#include "core/metrology/rotary_axis.hpp"
+#include "core/metrology/geometric/geometric_model.hpp"
+#include "core/metrology/geometric/rotary_axis.hpp"
 
 namespace invar::tools {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/machine.hpp"
 #include "tools/geometric/positioning.hpp"
 #include "tools/report/page.hpp"
 

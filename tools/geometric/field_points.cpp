@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/base/fault.hpp"
-#include "core/metrology/components.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
 
 namespace invar::tools {
 

@@ -95,7 +95,7 @@ void write_components(report::Page& page, const GeometricResult& result) {
   page.table({"squareness", "thesis's symbol", "ISO [urad]", "[arcsec]", "2 sigma [urad]"}, rows);
   rows.clear();
   std::vector<Plot> plots;
-  for (int c = 0; c < metrology::component_count; ++c) {
+  for (int c = 0; c < metrology::error_motion_count; ++c) {
     if (model.coefficients[index(c)].size() == 0) continue;
     plots.push_back(component_plot(result, c));
     const Range range = model.travel[index(metrology::axis_of(c))];
@@ -104,9 +104,9 @@ void write_components(report::Page& page, const GeometricResult& result) {
     double sigma = 0.0;
     for (int i = 0; i <= 100; ++i) {
       const double q = range.lower + range.width() * i / 100.0;
-      lowest = std::min(lowest, model.component(c, q));
-      highest = std::max(highest, model.component(c, q));
-      sigma = std::max(sigma, model.component_sigma(c, q));
+      lowest = std::min(lowest, model.error_motion(c, q));
+      highest = std::max(highest, model.error_motion(c, q));
+      sigma = std::max(sigma, model.error_motion_sigma(c, q));
     }
     rows.push_back({std::string{metrology::iso_name(c)}, metrology::thesis_symbol(c), micro(lowest),
                     micro(highest), micro(2.0 * sigma), metrology::is_rotation(c) ? "urad" : "um"});

@@ -46,7 +46,7 @@ Series component_data(const GeometricResult& result, int component) {
   for (const Point& point : points) {
     if (std::abs(point.share) < 0.5 * largest || largest < 1e-9) continue;
     data.x.push_back(1e3 * point.q);
-    data.y.push_back(1e6 * (model.component(component, point.q) + point.rest / point.share));
+    data.y.push_back(1e6 * (model.error_motion(component, point.q) + point.rest / point.share));
   }
   return data;
 }
@@ -138,8 +138,8 @@ Plot component_plot(const GeometricResult& result, int component) {
   Series band = series("", Series::Style::band, "#9db9d8");
   for (int i = 0; i <= 120; ++i) {
     const double q = range.lower + range.width() * i / 120.0;
-    const double value = 1e6 * model.component(component, q);
-    const double sigma = 2e6 * model.component_sigma(component, q);
+    const double value = 1e6 * model.error_motion(component, q);
+    const double sigma = 2e6 * model.error_motion_sigma(component, q);
     line.x.push_back(1e3 * q);
     line.y.push_back(value);
     band.x.push_back(1e3 * q);

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/compensation/model_file.hpp"
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/identifiability.hpp"
-#include "core/metrology/line_plan.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/identifiability.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
 #include "tools/geometric/diagonals.hpp"
 #include "tools/geometric/lines_file.hpp"
 #include "tools/geometric/motion_figures.hpp"

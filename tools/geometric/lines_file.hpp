@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/base/range.hpp"
-#include "core/metrology/displacement_line.hpp"
-#include "core/metrology/machine.hpp"
+#include "core/metrology/geometric/displacement_line.hpp"
+#include "core/metrology/geometric/machine.hpp"
 
 namespace invar::tools {
 

@@ -1,7 +1,7 @@
 // Which readings of displacement lines an identification used, and the error with those that it left out.
 #pragma once
 
-#include "core/metrology/geometric_identification.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
 #include "tools/geometric/lines_file.hpp"
 #include "tools/report/left_out.hpp"
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "core/metrology/line_plan.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {

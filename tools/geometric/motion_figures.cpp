@@ -8,13 +8,13 @@
 #include <optional>
 #include <ostream>
 
-#include "core/metrology/iso230_motions.hpp"
+#include "core/metrology/geometric/iso230_motions.hpp"
 
 namespace invar::tools {
 
 namespace {
 
-using metrology::component_count;
+using metrology::error_motion_count;
 using metrology::is_positioning;
 using metrology::is_rotation;
 using metrology::squareness_count;
@@ -61,8 +61,8 @@ MotionFigure figures_of(int motion, const Curve& curve) {
 }
 
 /// Means of the readings used, of both directions alike where both were read.
-std::optional<Curve> means_of(const metrology::ComponentReadings& readings,
-                              const metrology::ComponentFit& fit) {
+std::optional<Curve> means_of(const metrology::ErrorMotionReadings& readings,
+                              const metrology::ErrorMotionFit& fit) {
   struct Place {
     double at = 0.0;
     std::array<double, 2> sum{}, square{}, count{};
@@ -112,7 +112,7 @@ std::optional<Curve> means_of(const metrology::ComponentReadings& readings,
 
 /// A curve of the model with the spread that its unknowns leave it.
 Curve identified(const metrology::Identification& found, const metrology::GeometricBasis::Block& block) {
-  const auto axis = index(metrology::axis_of(block.component));
+  const auto axis = index(metrology::axis_of(block.motion));
   const auto& spline = found.basis.splines[axis];
   const Range travel = found.model.travel[axis];
   Curve curve;
@@ -123,7 +123,7 @@ Curve identified(const metrology::Identification& found, const metrology::Geomet
     const double at =
         travel.lower + travel.width() * static_cast<double>(i) / static_cast<double>(places - 1);
     curve.position[i] = at;
-    curve.value[i] = found.model.component(block.component, at);
+    curve.value[i] = found.model.error_motion(block.motion, at);
     const auto w = spline.at(at);
     for (int k = 0; k < 4; ++k) rows.row(i) += w.value[index(k)] * block.coefficients.row(w.first + k);
   }
@@ -132,7 +132,7 @@ Curve identified(const metrology::Identification& found, const metrology::Geomet
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts{
       told.block(block.first, block.first, block.size(), block.size())};
   curve.factor = rows * parts.eigenvectors() * parts.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  curve.shared = is_rotation(block.component) ? 0.0 : found.misfit;
+  curve.shared = is_rotation(block.motion) ? 0.0 : found.misfit;
   return curve;
 }
 
@@ -185,10 +185,10 @@ std::string words(const MotionFigure& figure, const Tolerance& tolerance) {
 }  // namespace
 
 std::vector<MotionFigure> motion_figures(const MotionReadings& readings, const MotionFits& fits,
-                                         const metrology::ComponentNetworks& model, double environment) {
+                                         const metrology::ErrorMotionNetworks& model, double environment) {
   std::vector<MotionFigure> figures;
-  for (int c = 0; c < component_count; ++c) {
-    if (!fits[index(c)] || is_positioning(c) || !fits[index(c)]->component.states.empty()) continue;
+  for (int c = 0; c < error_motion_count; ++c) {
+    if (!fits[index(c)] || is_positioning(c) || !fits[index(c)]->motion.states.empty()) continue;
     auto curve = means_of(*readings[index(c)], *fits[index(c)]);
     if (!curve) continue;
     if (!is_rotation(c)) curve->shared = environment;
@@ -213,10 +213,9 @@ std::vector<MotionFigure> motion_figures(const metrology::Identification& found,
   std::vector<MotionFigure> figures;
   std::map<int, Curve> curves;
   for (const auto& block : found.basis.blocks) {
-    if (is_positioning(block.component) || !is_known(knowledge, metrology::iso_name(block.component)))
-      continue;
-    const Curve& curve = curves.emplace(block.component, identified(found, block)).first->second;
-    figures.push_back(figures_of(block.component, curve));
+    if (is_positioning(block.motion) || !is_known(knowledge, metrology::iso_name(block.motion))) continue;
+    const Curve& curve = curves.emplace(block.motion, identified(found, block)).first->second;
+    figures.push_back(figures_of(block.motion, curve));
   }
   for (int a = 0; a < 3; ++a)
     for (int b = a + 1; b < 3; ++b) {

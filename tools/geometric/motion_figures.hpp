@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/component_identification.hpp"
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/identifiability.hpp"
+#include "core/metrology/geometric/error_motion_identification.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/identifiability.hpp"
 #include "tools/geometric/positioning.hpp"
 #include "tools/report/page.hpp"
 
@@ -31,10 +31,11 @@ struct MotionFigure {
 
 /// From the means of the readings at each place, those used. A motion that depends on a state of the machine has none.
 /// `environment` [m]: standard uncertainty of what the surroundings move a reading of a length by.
-using MotionReadings = std::array<std::optional<metrology::ComponentReadings>, metrology::component_count>;
-using MotionFits = std::array<std::optional<metrology::ComponentFit>, metrology::component_count>;
+using MotionReadings =
+    std::array<std::optional<metrology::ErrorMotionReadings>, metrology::error_motion_count>;
+using MotionFits = std::array<std::optional<metrology::ErrorMotionFit>, metrology::error_motion_count>;
 std::vector<MotionFigure> motion_figures(const MotionReadings& readings, const MotionFits& fits,
-                                         const metrology::ComponentNetworks& model, double environment);
+                                         const metrology::ErrorMotionNetworks& model, double environment);
 
 /// From the curves that the lines identified: a motion that they leave open by a fifth of its variance has no figure.
 std::vector<MotionFigure> motion_figures(const metrology::Identification& found,

@@ -151,7 +151,7 @@ std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
   return test;
 }
 
-std::vector<TargetReadings> targets_of(const metrology::ComponentReadings& readings) {
+std::vector<TargetReadings> targets_of(const metrology::ErrorMotionReadings& readings) {
   std::map<long, TargetReadings> targets;
   for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
     TargetReadings& one = targets[std::lround(readings.position[i] / cell)];

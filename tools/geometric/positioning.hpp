@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/component_identification.hpp"
-#include "core/metrology/displacement_line.hpp"
-#include "core/metrology/iso230.hpp"
+#include "core/metrology/geometric/displacement_line.hpp"
+#include "core/metrology/geometric/error_motion_identification.hpp"
+#include "core/metrology/geometric/iso230.hpp"
 #include "tools/geometric/tolerance.hpp"
 #include "tools/report/page.hpp"
 
@@ -33,7 +33,7 @@ std::optional<PositioningTest> test_of(const std::string& axis,
                                        std::vector<metrology::TargetReadings> targets,
                                        const metrology::Iso230Conditions& conditions);
 /// Readings by target, ascending; those nearer than 0.1 um or 0.1 urad are of one target.
-std::vector<metrology::TargetReadings> targets_of(const metrology::ComponentReadings& readings);
+std::vector<metrology::TargetReadings> targets_of(const metrology::ErrorMotionReadings& readings);
 
 Verdict verdict_of(const PositioningTest& test, const Tolerance& tolerance);
 /// Those that mean this test.

@@ -17,7 +17,7 @@ namespace invar::tools {
 
 namespace {
 
-using metrology::ComponentReadings;
+using metrology::ErrorMotionReadings;
 using metrology::RotaryFit;
 using report::number;
 
@@ -38,10 +38,10 @@ struct RotaryResult {
 
 std::optional<RotaryFit> fit_of(const RotaryOptions& options, const RotaryReadings& input,
                                 const std::optional<Range>& travel) {
-  ComponentReadings readings = input.readings;
+  ErrorMotionReadings readings = input.readings;
   std::set<long> places;
   for (const double position : readings.position) places.insert(std::lround(position * 1e6));
-  if (readings.position.size() < metrology::least_component_readings || places.size() < least_places)
+  if (readings.position.size() < metrology::least_error_motion_readings || places.size() < least_places)
     return std::nullopt;
   const Range read{readings.position.minCoeff(), readings.position.maxCoeff()};
   if (travel && (read.lower < travel->lower - 0.1 * travel->width() ||
@@ -58,7 +58,7 @@ std::optional<RotaryFit> fit_of(const RotaryOptions& options, const RotaryReadin
 
 report::LeftOut rows_of(const RotaryResult& result) {
   report::LeftOut rows;
-  const ComponentReadings& readings = result.input.readings;
+  const ErrorMotionReadings& readings = result.input.readings;
   const auto used = static_cast<std::size_t>(readings.position.size());
   rows.given = result.input.given;
   rows.used = used;
@@ -85,7 +85,7 @@ report::LeftOut rows_of(const RotaryResult& result) {
 }
 
 report::Plot plot_of(const RotaryResult& result) {
-  const ComponentReadings& readings = result.input.readings;
+  const ErrorMotionReadings& readings = result.input.readings;
   const auto& axis = result.fit->axis;
   report::Plot plot;
   plot.title = result.motion + ": readings and model";

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/metrology/component_identification.hpp"
+#include "core/metrology/geometric/error_motion_identification.hpp"
 
 namespace invar::tools {
 
@@ -17,8 +17,8 @@ std::string rotary_axis(const std::filesystem::path& machine);
 std::optional<Range> rotary_travel(const std::filesystem::path& machine, const std::string& axis);
 
 struct RotaryReadings {
-  metrology::ComponentReadings readings;  // rad; `direction` of each reading
-  std::size_t given = 0;                  // rows, those without a value too
+  metrology::ErrorMotionReadings readings;  // rad; `direction` of each reading
+  std::size_t given = 0;                    // rows, those without a value too
 };
 /// Columns `c [deg]` and `deviation [arcsec]` (or `displacement [deg]`), optional `direction`. Throws InputError.
 RotaryReadings read_rotary_readings(const std::filesystem::path& file, const std::string& axis);

@@ -6,7 +6,7 @@
 
 #include "core/base/fault.hpp"
 #include "core/base/unit.hpp"
-#include "core/metrology/components.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {
@@ -44,7 +44,7 @@ std::optional<metrology::Iso230Figure> figure_named(const std::string& name) {
 std::string unit_of_motion(const std::string& name) {
   for (int pair = 0; pair < metrology::squareness_count; ++pair)
     if (metrology::squareness_iso_name(pair) == name) return "rad";
-  const auto motion = metrology::component_named(name);
+  const auto motion = metrology::error_motion_named(name);
   if (!motion) return "";
   return metrology::is_rotation(*motion) ? "rad" : "m";
 }
@@ -68,7 +68,7 @@ Tolerance read_tolerance(const std::string& text, bool rotary) {
         where, "names no figure of ISO 230-2",
         "write A, E, M, B, R, or one of a direction as R_forward: \"A=10 um\"; of one error motion "
         "\"ECX:A=8 arcsec\""};
-  if (!result.figure && metrology::is_positioning(metrology::component_named(result.motion).value_or(1)))
+  if (!result.figure && metrology::is_positioning(metrology::error_motion_named(result.motion).value_or(1)))
     throw InputError{where, "a positioning has several figures",
                      "write one: \"" + result.motion + ":A=10 um\""};
   const std::string wanted = !told.empty() ? told : (rotary ? "rad" : "");

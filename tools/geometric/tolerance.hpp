@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/iso230.hpp"
+#include "core/metrology/geometric/iso230.hpp"
 
 namespace invar::tools {
 

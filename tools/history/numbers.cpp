@@ -15,8 +15,8 @@
 #include "core/compensation/thermal_file.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/config/yaml.hpp"
-#include "core/metrology/components.hpp"
-#include "core/metrology/thermistor.hpp"
+#include "core/metrology/geometric/error_motions.hpp"
+#include "core/metrology/thermal/thermistor.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/history/calibrations.hpp"
 #include "tools/report/page.hpp"
@@ -98,14 +98,14 @@ std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
   for (const auto& model : models) {
     Numbers numbers;
     add_reversals(model.reversal, travel, numbers);
-    for (int c = 0; c < metrology::component_count; ++c) {
+    for (int c = 0; c < metrology::error_motion_count; ++c) {
       const auto axis = static_cast<std::size_t>(metrology::axis_of(c));
       for (const double q : places(travel[axis], 9)) {
-        const double sigma = model.component_sigma(c, q);
+        const double sigma = model.error_motion_sigma(c, q);
         if (!std::isfinite(sigma)) continue;
         numbers.push_back({std::string{metrology::iso_name(c)},
                            std::string(1, metrology::axis_letters[axis]) + " = " + si(q, "m", 4),
-                           metrology::is_rotation(c) ? "rad" : "m", model.component(c, q), sigma, false});
+                           metrology::is_rotation(c) ? "rad" : "m", model.error_motion(c, q), sigma, false});
       }
     }
     add_squareness(model.squareness, model.squareness_sigma, numbers);
@@ -128,7 +128,7 @@ std::vector<Numbers> geometric(const std::vector<Calibration>& all) {
 
 /// Error motions that were measured one by one, at the states in the middle of the first calibration's.
 std::vector<Numbers> components(const std::vector<Calibration>& all) {
-  std::vector<metrology::ComponentNetworks> models;
+  std::vector<metrology::ErrorMotionNetworks> models;
   for (const auto& one : all) {
     const auto yaml = config::Yaml::load(one.file);
     models.push_back(compensation::read_components(yaml.root()));
@@ -144,7 +144,7 @@ std::vector<Numbers> components(const std::vector<Calibration>& all) {
     add_reversals(model.reversal, travel, numbers);
     std::vector<double> states;
     for (const auto& state : model.states) states.push_back(usual.at(state.name));
-    for (int c = 0; c < metrology::component_count; ++c) {
+    for (int c = 0; c < metrology::error_motion_count; ++c) {
       const auto axis = static_cast<std::size_t>(metrology::axis_of(c));
       const auto& component = model.components[static_cast<std::size_t>(c)];
       if (!component) continue;

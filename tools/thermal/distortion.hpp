@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/thermal/thermal_identification.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {

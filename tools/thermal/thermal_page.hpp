@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "core/metrology/thermal_identification.hpp"
+#include "core/metrology/thermal/thermal_identification.hpp"
 #include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 

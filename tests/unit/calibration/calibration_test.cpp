@@ -11,7 +11,7 @@
 #include <random>
 
 #include "components/compensation/compensation.hpp"
-#include "core/metrology/line_errors.hpp"
+#include "core/metrology/geometric/line_errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace invar::calibration {

@@ -6,10 +6,10 @@
 #include <fstream>
 #include <random>
 
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/line_plan.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::compensation {
 namespace {

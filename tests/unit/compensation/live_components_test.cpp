@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/compensation/component_file.hpp"
-#include "core/metrology/component_identification.hpp"
+#include "core/metrology/geometric/error_motion_identification.hpp"
 #include "tests/unit/compensation/live_cell.hpp"
 
 namespace invar::compensation {
@@ -14,12 +14,12 @@ using ::testing::HasSubstr;
 using testing::LiveCell;
 
 /// X grows by 10 ppm/K about 22 degC, read between 20 and 28 degC, in a state of this name.
-metrology::ComponentNetworks growing(const std::string& state) {
-  metrology::ComponentNetworks model;
+metrology::ErrorMotionNetworks growing(const std::string& state) {
+  metrology::ErrorMotionNetworks model;
   model.chain = {{1, 0, 2}, 2};
   model.travel = {Range{0.0, 0.2}, Range{0.0, 0.2}, Range{0.0, 1.0}};
   model.states = {{state, {20.0, 28.0}}};
-  metrology::ComponentReadings readings;
+  metrology::ErrorMotionReadings readings;
   readings.position.resize(63);
   readings.state.resize(1, 63);
   readings.value.resize(63);
@@ -28,11 +28,11 @@ metrology::ComponentNetworks growing(const std::string& state) {
     readings.state(0, i) = 20.0 + 4.0 * static_cast<double>(i / 21);
     readings.value[i] = 1e-5 * readings.position[i] * (readings.state(0, i) - 22.0);
   }
-  model.components[0] = metrology::identify_component(readings).component;
+  model.components[0] = metrology::identify_error_motion(readings).motion;
   return model;
 }
 
-std::filesystem::path write(const LiveCell& cell, const metrology::ComponentNetworks& model) {
+std::filesystem::path write(const LiveCell& cell, const metrology::ErrorMotionNetworks& model) {
   ModelText text{"components", {}};
   write_components(text, model);
   text.write(cell.folder / "components.yaml");
@@ -100,7 +100,7 @@ TEST(LiveComponents, FollowTheTemperatureAndStandStillWithoutOne) {
 TEST(LiveComponents, WhatTheLoopCannotKnowIsRefused) {
   LiveCell cell;
   cell.bring_up();
-  const auto refused = [&](const metrology::ComponentNetworks& model, const std::string& words) {
+  const auto refused = [&](const metrology::ErrorMotionNetworks& model, const std::string& words) {
     EXPECT_EQ(cell.use(write(cell, model)).state(), MODEL_REFUSED);
     EXPECT_THAT(cell.said(), HasSubstr(words));
   };

@@ -5,7 +5,7 @@
 #include <sstream>
 #include <thread>
 
-#include "core/metrology/heat_trace.hpp"
+#include "core/metrology/thermal/heat_trace.hpp"
 #include "tests/support/real_time_guard.hpp"
 #include "tests/unit/compensation/live_cell.hpp"
 

@@ -22,11 +22,11 @@ constexpr double arcsec = turn / 360.0 / 3600.0;
 double error(double angle) { return arcsec * (3.0 * std::sin(angle) + 1.2 * std::sin(2.0 * angle + 0.4)); }
 double reversal(double angle) { return arcsec * (4.0 + std::cos(angle)); }
 
-metrology::ComponentReadings readings(double step, double end, double noise, bool both, unsigned seed = 4) {
+metrology::ErrorMotionReadings readings(double step, double end, double noise, bool both, unsigned seed = 4) {
   std::mt19937 random{seed};
   std::normal_distribution<double> normal;
   std::vector<double> position, value;
-  metrology::ComponentReadings result;
+  metrology::ErrorMotionReadings result;
   for (int cycle = 0; cycle < 2; ++cycle)
     for (const int way : {1, -1}) {
       if (way < 0 && !both) continue;

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/weight_identification.hpp"
+#include "core/metrology/fusion/weight_identification.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/unit/fusion/fusion_rig.hpp"
 

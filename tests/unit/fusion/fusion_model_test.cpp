@@ -8,7 +8,7 @@
 
 #include "components/fusion/fusion.hpp"
 #include "core/compensation/fusion_file.hpp"
-#include "core/metrology/weight_identification.hpp"
+#include "core/metrology/fusion/weight_identification.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/wired.hpp"
 

@@ -6,9 +6,9 @@
 #include <cstdio>
 
 #include "core/machine/machine_file.hpp"
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/volumetric_table.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/volumetric_table.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::machine {
 namespace {

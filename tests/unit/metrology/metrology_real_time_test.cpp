@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "core/metrology/fusion_observer.hpp"
-#include "core/metrology/thermal_error.hpp"
-#include "core/metrology/weighted_fusion.hpp"
+#include "core/metrology/fusion/fusion_observer.hpp"
+#include "core/metrology/fusion/weighted_fusion.hpp"
+#include "core/metrology/thermal/thermal_error.hpp"
 #include "tests/support/real_time_guard.hpp"
 
 namespace invar::metrology {

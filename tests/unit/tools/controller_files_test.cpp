@@ -6,9 +6,9 @@
 #include <random>
 #include <sstream>
 
-#include "core/metrology/geometric_identification.hpp"
-#include "core/metrology/line_plan.hpp"
-#include "tests/unit/metrology/simulated_machine.hpp"
+#include "core/metrology/geometric/geometric_identification.hpp"
+#include "core/metrology/geometric/line_plan.hpp"
+#include "tests/unit/metrology/geometric/simulated_machine.hpp"
 
 namespace invar::tools {
 namespace {
@@ -31,7 +31,7 @@ TEST(ControllerFiles, TheIsgGridReadsBackAsTheSameField) {
   // Linear interpolation errs by at most h^2/8 max|f''| of every motion, rotations at an arm of at most the diagonal.
   const std::array<double, 3> step{0.2 / 40, 0.15 / 40, 0.1 / 40};
   double bound = 1e-9;
-  for (int c = 0; c < metrology::component_count; ++c) {
+  for (int c = 0; c < metrology::error_motion_count; ++c) {
     const auto k = static_cast<std::size_t>(c);
     const auto axis = static_cast<std::size_t>(metrology::axis_of(c));
     if (model.coefficients[k].size() == 0) continue;

@@ -12,7 +12,7 @@
 
 #include "components/vision/droplets.hpp"
 #include "components/vision/render.hpp"
-#include "core/metrology/circle_fit.hpp"
+#include "core/metrology/camera/circle_fit.hpp"
 
 namespace invar::vision {
 namespace {
