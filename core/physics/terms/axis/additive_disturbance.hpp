@@ -1,4 +1,5 @@
 // Additive disturbance: something adds to the current between controller and motor.
+// Equation: current = u + offset + amplitude sin(2 pi frequency t + phase) from onset on; squareness blends to sign(sin)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Amplifier lag: the current follows its command with a time constant.
+// Equation: d current/dt = (u - current) / time_constant
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Backlash: between carriage and encoder there is lost motion.
+// Equation: the reading stays within position - width/2 .. position + width/2 and moves only at these limits
 #pragma once
 
 #include <cmath>

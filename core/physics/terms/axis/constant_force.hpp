@@ -1,4 +1,5 @@
 // Constant force: tilt, gravity, a weight on a string.
+// Equation: F = force
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Coulomb friction: a force of constant size against the motion.
+// Equation: F = -level sign(v); at standstill up to level against the other forces
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Dead zone: small commands give no current.
+// Equation: current = u - width sign(u) for |u| > width, else 0
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Encoder periodic error: the reading errs with the period of the scale.
+// Equation: reading = position + amplitude sin(2 pi position / pitch + phase)
 #pragma once
 
 #include <cmath>

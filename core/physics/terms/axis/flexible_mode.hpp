@@ -1,4 +1,5 @@
 // Flexible mode: a part on the carriage swings on its mounting.
+// Equation: m2 z'' = -c (z' - x') - k (z - x), m2 = mass_share mass, k = m2 (2 pi frequency)^2, c = 2 damping_ratio sqrt(k m2)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Force ripple: a force that repeats along the way.
+// Equation: F = amplitude sin(2 pi position / pitch + phase)
 #pragma once
 
 #include <cmath>

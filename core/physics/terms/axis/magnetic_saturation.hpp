@@ -1,4 +1,5 @@
 // Magnetic saturation: the force per ampere falls at high current.
+// Equation: F = k_f current (1 - coefficient current^2), the loss at most 0.6
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Measurement delay: the encoder value is old.
+// Equation: reading(t) = position(t - delay)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Motor constant ripple: the force per ampere varies along the magnets.
+// Equation: F = k_f current (1 + amplitude sin(2 pi position / pitch + phase))
 #pragma once
 
 #include <cmath>

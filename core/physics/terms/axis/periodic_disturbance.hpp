@@ -1,4 +1,5 @@
 // Periodic disturbance: a force that repeats in time.
+// Equation: F = amplitude sin(2 pi frequency t + phase) from onset on
 #pragma once
 
 #include <cmath>

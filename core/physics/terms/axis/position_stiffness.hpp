@@ -1,4 +1,5 @@
 // Position stiffness: a spring between carriage and frame.
+// Equation: F = -stiffness (position - center)
 #pragma once
 
 #include <cmath>

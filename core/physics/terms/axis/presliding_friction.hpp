@@ -1,4 +1,5 @@
 // Presliding friction: after a reversal the friction builds up like a spring over micrometres.
+// Equation: F = -(stiffness z + damping v (1 - z sign(v) stiffness / level)), dz/dt = v (1 - z sign(v) stiffness / level)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Quadratic drag: a force against the motion that grows with the square of the speed.
+// Equation: F = -coefficient v |v|
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Slow drift: a force that grows with time.
+// Equation: F = rate t
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Stribeck friction: dry friction that is larger at low speed than at high speed.
+// Equation: F = -(coulomb + (static - coulomb) exp(-(v / velocity)^2)) sign(v)
 #pragma once
 
 #include <cmath>

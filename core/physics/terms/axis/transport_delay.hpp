@@ -1,4 +1,5 @@
 // Transport delay: the motor gets the current late.
+// Equation: current(t) = u(t - delay)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Air drag: still air slows the drop in all directions while gravity goes on.
+// Equation: m dw/dt = m g - 3 pi mu diameter w (1 + 0.15 Re^0.687), w the velocity of the drop
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Camera rotation: the camera is turned against the axes.
+// Equation: shift [px] = angle (-image_y, image_x)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Crosswind: moving air pushes the drop aside.
+// Equation: shift = acceleration (height / speed)^2 / 2
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Lens distortion: the lens stretches or shrinks the corners of the image.
+// Equation: shift [px] = k1 (image_x^2 + image_y^2) (image_x, image_y)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Pressure dependence: more pressure, faster drops.
+// Equation: speed = nominal speed (pressure / reference_pressure)^exponent
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Speed decay: the drops leave the nozzle more slowly as time goes on.
+// Equation: speed = nominal speed exp(-rate t)
 #pragma once
 
 #include <cmath>

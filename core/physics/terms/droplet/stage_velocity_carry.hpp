@@ -1,4 +1,5 @@
 // Stage velocity carry: the drop keeps the velocity of the stage while it falls.
+// Equation: shift = velocity height / speed
 #pragma once
 
 #include <cmath>

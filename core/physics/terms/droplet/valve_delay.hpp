@@ -1,4 +1,5 @@
 // Valve delay: the drop leaves late.
+// Equation: shift = velocity delay
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Constant: a rate that is always there.
+// Equation: ds/dt += value
 #pragma once
 
 #include <cmath>

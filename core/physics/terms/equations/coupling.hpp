@@ -1,4 +1,5 @@
 // Coupling: a rate in proportion to another state or input.
+// Equation: ds/dt += coefficient w, w the variable under `with`
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Cubic: a rate that goes with the third power.
+// Equation: ds/dt += coefficient w^3, w the variable under `with`, or the state
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Dead zone: small inputs, or small values of a state, do nothing.
+// Equation: w - width sign(w) takes the place of w for |w| > width, else 0
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Delay: an input acts, an output shows, or a state is felt, some time later.
+// Equation: w(t - delay) takes the place of w(t)
 #pragma once
 
 #include <cmath>

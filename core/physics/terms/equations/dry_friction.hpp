@@ -1,4 +1,5 @@
 // Dry friction: a rate of constant size against the state, or against the state's own rate.
+// Equation: ds/dt -= level sign(w); at standstill up to level against the other rates
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Hidden state: something behind the state stores and gives back.
+// Equation: coefficient (z - w) is added, dz/dt = (w - z) / time_constant, z(0) = w(0)
 #pragma once
 
 #include <cmath>

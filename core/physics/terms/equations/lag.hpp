@@ -1,4 +1,5 @@
 // Lag: an input acts, an output shows, or a state is felt, with a time constant.
+// Equation: z takes the place of w, dz/dt = (w - z) / time_constant
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Linear: a rate in proportion to the state itself.
+// Equation: ds/dt += coefficient s
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Lower limit: the variable cannot fall below a value.
+// Equation: max(w, limit) takes the place of w
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Overflow: what passes a limit goes elsewhere.
+// Equation: s <= limit; share times the rate beyond it is added to the state under `with`
 #pragma once
 
 #include <cmath>

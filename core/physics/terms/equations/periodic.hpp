@@ -1,4 +1,5 @@
 // Periodic: a rate that repeats along a state or in time.
+// Equation: ds/dt += amplitude sin(2 pi w / period + phase)
 #pragma once
 
 #include <cmath>

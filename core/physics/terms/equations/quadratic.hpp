@@ -1,4 +1,5 @@
 // Quadratic: a rate that goes with the variable times its size.
+// Equation: ds/dt += coefficient w |w|, w the variable under `with`, or the state
 #pragma once
 
 #include <cmath>

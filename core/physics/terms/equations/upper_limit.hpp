@@ -1,4 +1,5 @@
 // Upper limit: the variable cannot rise above a value.
+// Equation: min(w, limit) takes the place of w
 #pragma once
 
 #include <cmath>

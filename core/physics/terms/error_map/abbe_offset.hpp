@@ -1,4 +1,5 @@
 // Abbe offset: the point measured lies beside the scale and the carriage tilts.
+// Equation: error = offset (angle + angle_change (s - 1/2) + angle_bow (4 s (1 - s) - 1) + angle_twist u (5 u^2 - 3) / 2), s the share of the travel, u = 2 s - 1
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Backlash: the error depends on the side from which a point is approached.
+// Equation: error = middle + width direction / 2
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Cosine error: the measuring axis is not parallel to the motion.
+// Equation: error = -position angle^2 / 2
 #pragma once
 
 #include <cmath>

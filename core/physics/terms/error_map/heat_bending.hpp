@@ -1,4 +1,5 @@
 // Heat bending: a slide that is warm on one side bows, and the scale on it with the slide.
+// Equation: error = depth 4 s (1 - s) (T - T_ref), s the share of the travel
 #pragma once
 
 #include <cmath>

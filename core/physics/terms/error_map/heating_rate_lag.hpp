@@ -1,4 +1,5 @@
 // Heating rate lag: the scale follows the thermometer late.
+// Equation: expansion acts with T_scale, dT_scale/dt = (T - T_scale) / time_constant
 #pragma once
 
 #include <cmath>

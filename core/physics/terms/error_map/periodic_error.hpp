@@ -1,4 +1,5 @@
 // Periodic error: the position error repeats along the way.
+// Equation: error = amplitude sin(2 pi position / pitch + phase)
 #pragma once
 
 #include <cmath>

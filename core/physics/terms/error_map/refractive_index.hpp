@@ -1,4 +1,5 @@
 // Refractive index: the laser wavelength goes with air pressure.
+// Equation: error = coefficient (pressure - reference_pressure) position
 #pragma once
 
 #include <cmath>

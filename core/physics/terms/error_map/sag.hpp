@@ -1,4 +1,5 @@
 // Sag: guideway or portal bend smoothly over the travel.
+// Equation: error = -depth 4 s (1 - s), s the share of the travel
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Thermal expansion: scale and machine grow with temperature.
+// Equation: error = coefficient (T - T_ref) position
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Bias: the instrument does not read zero at zero.
+// Equation: reading = x + value
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Gain droop: the instrument reads less at speed.
+// Equation: reading = x (1 - coefficient |velocity|)
 #pragma once
 
 #include <cmath>

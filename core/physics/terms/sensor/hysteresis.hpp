@@ -1,4 +1,5 @@
 // Hysteresis: the reading stands still after a reversal until a gap is crossed.
+// Equation: the reading stays within x - width/2 .. x + width/2 and moves only at these limits
 #pragma once
 
 #include <cmath>

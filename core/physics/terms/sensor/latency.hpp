@@ -1,4 +1,5 @@
 // Latency: the instrument shows an old value.
+// Equation: reading(t) = x(t - delay)
 #pragma once
 
 #include <cmath>

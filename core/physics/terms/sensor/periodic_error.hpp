@@ -1,4 +1,5 @@
 // Periodic error: the reading errs with the period of the scale.
+// Equation: reading = x + amplitude sin(2 pi position / pitch + phase)
 #pragma once
 
 #include <cmath>

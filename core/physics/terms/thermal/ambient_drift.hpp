@@ -1,4 +1,5 @@
 // Ambient drift: the air about the machine warms while nobody measures it.
+// Equation: T_amb += rate over (1 - exp(-settling t)) / (1 - exp(-settling over)); settling 0: T_amb += rate t
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Heater saturation: above some power the heater gives no more.
+// Equation: P = min(P commanded, power)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Hidden node: a second heat store behind a contact.
+// Equation: P = conductance (T2 - T), capacity dT2/dt = conductance (T - T2), T2(0) = T(0)
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Motor heating: the motor current heats the node.
+// Equation: P = resistance motor_current^2
 #pragma once
 
 #include <cmath>

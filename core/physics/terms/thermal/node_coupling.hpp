@@ -1,4 +1,5 @@
 // Node coupling: heat flows through a contact between two nodes.
+// Equation: P = conductance (T_other - T), and -P at the other node
 #pragma once
 
 #include <cmath>

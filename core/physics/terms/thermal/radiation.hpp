@@ -1,4 +1,5 @@
 // Radiation: heat lost with the fourth power of the temperature.
+// Equation: P = -coefficient (T^4 - T_amb^4), T in kelvin
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Sensor lag: the thermometer follows its node late.
+// Equation: dT_sensor/dt = (T - T_sensor) / time_constant
 #pragma once
 
 #include <cmath>

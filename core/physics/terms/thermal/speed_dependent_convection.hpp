@@ -1,4 +1,5 @@
 // Speed-dependent convection: the loss grows while the stage moves.
+// Equation: P = -coefficient |speed| (|speed| / at_speed)^(exponent - 1) (T - T_amb)
 #pragma once
 
 #include <cmath>
