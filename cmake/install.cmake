@@ -23,3 +23,6 @@ write_basic_package_version_file(${CMAKE_BINARY_DIR}/invar-config-version.cmake 
 install(FILES ${CMAKE_BINARY_DIR}/invar-config.cmake ${CMAKE_BINARY_DIR}/invar-config-version.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/invar)
 install(DIRECTORY deployment/ DESTINATION ${CMAKE_INSTALL_DATADIR}/invar/deployment)
+# What a reader needs beside the program: the pages, and the examples that they build.
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/invar/examples)
