@@ -20,7 +20,7 @@ GLOSSARY = ROOT / "docs" / "glossary.md"
 MOST_WORDS = 30
 SOURCES = ("core", "components", "tools")
 # Pages that a program makes: their sentences stand in its sources.
-MADE = re.compile(r"<!-- Made by|This page is made from|This page is made by")
+MADE = re.compile(r"<!-- Made by")
 LEFT_OUT = ("build", "node_modules", "tests/data", ".git")
 
 ABBREVIATIONS = re.compile(r"\b(e\.g|i\.e|etc|vs|eq|fig|sect|ch|no|approx|al|cf)\.", re.I)

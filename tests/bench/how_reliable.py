@@ -1,10 +1,7 @@
 #!/usr/bin/env python3
-"""Makes docs/explanation/how-reliable.md and its diagram from tests/bench/results/*.json, which how_reliable_measure.py writes.
-
-    tests/bench/how_reliable.py            # write the page and the diagram
-    tests/bench/how_reliable.py --check    # exit status 1 where they differ from what the results give
+"""Sections and diagram of docs/explanation/how-reliable.md from the sets of tests/bench/results/*.json that how_reliable_measure.py
+writes; figures.py makes the pages, and called as a program this file does what figures.py does.
 """
-import argparse
 import json
 import math
 import pathlib
@@ -12,11 +9,9 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 RESULTS = ROOT / "tests" / "bench" / "results"
-PAGE = ROOT / "docs" / "explanation" / "how-reliable.md"
-DIAGRAM = ROOT / "docs" / "explanation" / "how-reliable.svg"
 BINS = 10
-SETS = {"dev": "made machines, one effect each",
-        "crowd": "made machines, a crowd of small effects beside the chief one",
+SETS = {"dev": "synthetic machines, one effect each",
+        "crowd": "synthetic machines, a crowd of small effects beside the chief one",
         "second_crowd": "second crowd, drawn by `bench_mismatch`",
         "real": "recordings of real machines",
         "fresh": "fresh public recordings",
@@ -110,7 +105,7 @@ def anchor(which):
     return HEADS[which].lower().replace(" ", "-").replace(",", "")
 
 
-HEADS = {"dev": "Made machines", "crowd": "Crowd", "second_crowd": "Second crowd", "real": "Real machines", "fresh": "Fresh public recordings",
+HEADS = {"dev": "Synthetic machines", "crowd": "Crowd", "second_crowd": "Second crowd", "real": "Real machines", "fresh": "Fresh public recordings",
          "fresh_second": "Fresh public recordings, second batch"}
 
 
@@ -151,7 +146,7 @@ def of_fresh(result):
 INTRO = """# How reliable a diagnosis is
 
 Measured figures of `invar diagnose`. [Diagnosis](diagnosis.md) says how it decides.
-This page is made from `tests/bench/results/*.json` by `tests/bench/how_reliable.py`; a test compares them. Do not edit it by hand.
+This page is made from `tests/bench/results/*.json` by `tests/bench/figures.py`; a test compares them. Do not edit it by hand.
 
 ## Summary
 
@@ -193,21 +188,11 @@ def page(results):
     return "\n".join(parts).rstrip() + "\n", diagram(claims)
 
 
-def main():
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--check", action="store_true")
-    given = ask.parse_args()
-    results = {which: json.loads(path.read_text(encoding="utf-8")) for which in SETS if (path := RESULTS / f"{which}.json").exists()}
-    text, picture = page(results)
-    stale = [path for path, new in ((PAGE, text), (DIAGRAM, picture)) if not path.exists() or path.read_text(encoding="utf-8") != new]
-    if given.check:
-        for path in stale:
-            print(f"{path.relative_to(ROOT)}: differs from tests/bench/results: run tests/bench/how_reliable.py")
-        return 1 if stale else 0
-    PAGE.write_text(text, encoding="utf-8")
-    DIAGRAM.write_text(picture, encoding="utf-8")
-    return 0
+def results():
+    """The results of the sets, by name."""
+    return {which: json.loads(path.read_text(encoding="utf-8")) for which in SETS if (path := RESULTS / f"{which}.json").exists()}
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    import figures
+    sys.exit(figures.main())

@@ -1,5 +1,5 @@
 // Simulated tables in the shape of those of the thesis: what they read before, and what is left when their error is
-// identified from lines and corrected. Prints the figures of tests/bench/README.md.
+// identified from lines and corrected. Prints the figures of tests/bench/results/thesis_tables.json.
 #include <gmock/gmock.h>
 
 #include <cmath>
