@@ -34,7 +34,7 @@ void add_all_components(Registry& registry) {
   registry.add<world::SimulatedPneumatics>(
       "simulated_pneumatics", "reservoir and regulator behind a pressure controller's registers");
   registry.add<world::SimulatedSubstrate>("simulated_substrate",
-                                          "flight and landing of the droplets that a valve lets go");
+                                          "flight and landing of the droplets of a valve");
   registry.add<dispenser::Dispenser>("dispenser", "pressure over Modbus TCP, patterns and where to aim them");
   registry.add<dispenser::Valve>("valve", "jets droplets at the right place, in the loop");
   registry.add<thermal::Thermal>("thermal", "temperature loop with a heater over Modbus TCP");
@@ -48,7 +48,7 @@ void add_all_components(Registry& registry) {
   registry.add<compensation::Compensation>("compensation", "corrects the setpoints of the axes, live");
   registry.add<recorder::Recorder>("recorder", "writes what the cell says to an MCAP file");
   registry.add<vision::FolderCamera>("folder_camera", "pictures of a folder as a camera's frames");
-  registry.add<vision::SimulatedCamera>("simulated_camera", "what a camera over the stage would see");
+  registry.add<vision::SimulatedCamera>("simulated_camera", "frames of a camera over the stage");
   registry.add<vision::Vision>("vision", "droplets in frames, in machine coordinates; the camera's scale");
   registry.add<stage::Stage>("stage", "servo of one axis");
   registry.add<watch::ModelWatch>("model_watch", "says when an axis and its model part, and where");

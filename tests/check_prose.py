@@ -201,7 +201,7 @@ def main():
     if options.self_test:
         return self_test()
     found, allowed = all_faults(), baseline()
-    if options.list:
+    if options.list is not None:
         for name, faults in found.items():
             if name.startswith(options.list):
                 for number, fault in faults:

@@ -28,8 +28,8 @@ struct RippleJob : JobSpec {
     p(model, "model", "model.yaml of the axis without ripple");
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
-    p(velocity, "velocity", "m/s", Range{1e-4, 1.0}, "of the runs to identify from");
-    p(verify_velocity, "verify_velocity", "m/s", Range{1e-4, 1.0}, "of those before and after");
+    p(velocity, "velocity", "m/s", Range{1e-4, 1.0}, "velocity of the runs to identify from");
+    p(verify_velocity, "verify_velocity", "m/s", Range{1e-4, 1.0}, "velocity of the runs before and after");
     p(passes, "passes", 1, 100, "forth and back so often");
   }
 };

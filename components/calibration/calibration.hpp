@@ -47,7 +47,7 @@ class Calibration final : public JobComponent, private JobHost {
       p(axes, "axes", 1, 3, "how many axes the machine has");
       p(settle_timeout, "settle_timeout", "s", Range{0.01, 600.0},
         "the job fails when an axis needs longer to settle");
-      p(velocity, "velocity", "m/s", Range{0.0, 10.0}, "of the moves; 0: the stage's own");
+      p(velocity, "velocity", "m/s", Range{0.0, 10.0}, "velocity of the moves; 0: that of the stage");
       p(jobs, "jobs", "geometric calibrations that can be run");
       p(thermal_jobs, "thermal_jobs", "calibrations over position and temperature");
       p(prints, "prints", "print jobs that can be run");

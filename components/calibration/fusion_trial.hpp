@@ -96,7 +96,7 @@ class FusionTrial final : public AxisRunner {
 };
 
 void FusionTrial::Sensor::describe(auto& p) {
-  p(name, "name", "of the sensor; its port is `sensor_<name>`");
+  p(name, "name", "name of the sensor; its port is `sensor_<name>`");
   p(quantity, "quantity", "position or velocity");
   p(from, "from", "port, or feedback: the drive's own encoder or velocity");
   if constexpr (requires { p.node(); }) {

@@ -20,7 +20,7 @@ struct JobSpec {
   std::string name;
   std::string out = "out";
   void describe(auto& p) {
-    p(name, "name", "what `invar job run` calls it");
+    p(name, "name", "name of the job in `invar job run`");
     p(out, "out", "folder for the files, created; relative to where the cell was started");
   }
 };
@@ -39,7 +39,7 @@ struct LineSpec {
   std::vector<double> from;
   std::vector<double> to;
   void describe(auto& p) {
-    p(name, "name", "of the line, in the files");
+    p(name, "name", "name of the line in the files");
     p(from, "from", "m", "commanded start, one number an axis");
     p(to, "to", "m", "commanded end");
     if constexpr (requires { p.node(); }) {
@@ -145,7 +145,7 @@ struct ThermalJob : JobSpec {
     p(line, "line", "along the axis to calibrate, from where the laser is zeroed");
     p(interval, "interval", "m", Range{1e-4, 1.0}, "between the points of the line");
     p(readings, "readings", 1, 10'000, "averaged at each point");
-    p(room, "room", "degC", Range{-50.0, 150.0}, "of the model that the other is compared with");
+    p(room, "room", "degC", Range{-50.0, 150.0}, "temperature of the model that the other is compared with");
     p(room_passes, "room_passes", 1, 100, "forth and back at that temperature");
     p(trace, "trace", "setpoints while the line is read for the fit");
     p(pause, "pause", "s", Range{0.0, 36000.0}, "between two passes");

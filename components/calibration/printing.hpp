@@ -50,7 +50,7 @@ struct PrintJob : JobSpec {
   void describe(auto& p) {
     JobSpec::describe(p);
     p(first, "first", "a job of `jobs` that is done before");
-    p(pattern, "pattern", "of the dispenser, printed at each height");
+    p(pattern, "pattern", "pattern of the dispenser, printed at each height");
     p(heights, "heights", "m", "from nozzle to substrate, in the order of printing");
     p(ruler, "ruler", "m",
       "[x, y] of the middle of the camera's ruler in the machine; none: the camera is not calibrated");

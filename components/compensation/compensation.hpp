@@ -185,9 +185,9 @@ void Compensation::Parameters::describe(auto& p) {
     "corrected");
   p(thermal_model, "thermal_model", "compensation.yaml of kind thermal, likewise");
   p(state, "state",
-    "folder that keeps the models in use over a restart, created; relative to where the cell was started. "
-    "What it holds wins "
-    "over `model`; none: they are forgotten");
+    "folder that keeps the models in use over a restart, created; relative to where the cell was started; "
+    "kept models win "
+    "over `model`; none: nothing is kept");
   p(zones, "zones", "further temperatures: each makes a port temperature_<zone>");
   p(bound, "bound", "m", Range{0.0, 0.1}, "a model that corrects more anywhere in the travels is refused");
   p(rate_limit, "rate_limit", "m/s", Range{1e-9, 1.0},

@@ -29,17 +29,17 @@ const modbus::RegisterContract& Dispenser::registers() {
   using enum modbus::RegisterNeed::Need;
   static const modbus::RegisterContract contract{
       {"pressure", "Pa", write, needed, "setpoint of the reservoir over ambient"},
-      {"actual_pressure", "Pa", read, needed, "of the reservoir over ambient"},
+      {"actual_pressure", "Pa", read, needed, "pressure of the reservoir over ambient"},
       {"enable", "flag", write, optional, "opens the supply; without it pressure 0 shuts it"},
       {"purge_pressure", "Pa", write, optional, "setpoint of the purge line; without it none is purged"},
       {"purge", "flag", write, optional, "opens the purge valve; without it purge pressure 0 shuts it"},
-      {"actual_purge_pressure", "Pa", read, optional, "of the purge line"},
+      {"actual_purge_pressure", "Pa", read, optional, "pressure of the purge line"},
       {"band", "Pa", write, optional, "half width of the band around the setpoint"},
       {"in_band", "flag", read, optional, "enabled, and the reservoir within `band` of the setpoint"},
       {"supply_low", "flag", read, optional, "supply below what the setpoint needs"},
-      {"over_pressure", "flag", read, optional, "it has latched: both lines are let go"},
-      {"sensor_fault", "flag", read, optional, "a pressure sensor is broken: both lines are let go"},
-      {"comm_lost", "flag", read, optional, "the device's watchdog has shut it"},
+      {"over_pressure", "flag", read, optional, "it has latched: both lines are off"},
+      {"sensor_fault", "flag", read, optional, "a pressure sensor is broken: both lines are off"},
+      {"comm_lost", "flag", read, optional, "the watchdog of the device has shut it"},
       {"reset_alarms", "flag", write, optional, "set to 1 to clear its latches"}};
   return contract;
 }

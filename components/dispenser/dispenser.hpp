@@ -42,7 +42,8 @@ class Dispenser final : public Component {
     void describe(auto& p) {
       p(modbus, "modbus", "the pneumatic controller");
       p(pressure, "pressure", "Pa", Range{0.0, 7e5}, "over ambient; a command changes it");
-      p(purge_pressure, "purge_pressure", "Pa", Range{0.0, 7e5}, "of the purge line; a command changes it");
+      p(purge_pressure, "purge_pressure", "Pa", Range{0.0, 7e5},
+        "pressure of the purge line; a command changes it");
       p(band, "band", "Pa", Range{10.0, 5e4}, "in band: pressure no farther from its setpoint");
       p(pressurise, "pressurise", "from the start; otherwise by command");
       p(model, "model",

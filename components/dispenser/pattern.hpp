@@ -28,8 +28,8 @@ struct Pattern {
     p(to, "to", "m", "[x, y] of the last droplet of a line");
     p(pitch, "pitch", "m", "[along x, along y] between the droplets of a grid");
     p(columns, "columns", 1, 4096, "droplets in a row of a grid");
-    p(rows, "rows", 1, 4096, "of a grid");
-    p(droplets, "droplets", 2, 4096, "of a line");
+    p(rows, "rows", 1, 4096, "rows of a grid");
+    p(droplets, "droplets", 2, 4096, "droplets of a line");
     p(file, "file", "CSV with target_x [m], target_y [m], in the order of printing");
     if constexpr (requires { p.node(); }) {
       const auto need = [&](bool good, const char* what, const char* mend) {

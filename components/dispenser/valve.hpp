@@ -52,7 +52,7 @@ class Valve final : public Component {
       p(ahead, "ahead", "s", Range{0.0, 0.1}, "pulses are given to the driver at least this long before");
       p(beside, "beside", "m", Range{1e-7, 1e-2}, "a point is passed when the path leads by it no farther");
       p(margin, "margin", "m", Range{0.0, 0.1}, "around the pattern's targets, for a droplet by command");
-      p(velocity, "velocity", "m/s", "of the stage, in which droplets are jetted");
+      p(velocity, "velocity", "m/s", "velocities of the stage at which droplets are jetted");
       p(temperature, "temperature", "degC", "in which droplets are jetted, where `temperature` is connected");
       p(pressure_timeout, "pressure_timeout", "s", Range{1e-3, 60.0}, "older pressure: nothing is jetted");
       p(stage_timeout, "stage_timeout", "s", Range{1e-4, 1.0}, "older stage state: nothing is jetted");

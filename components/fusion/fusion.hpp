@@ -73,7 +73,7 @@ class Fusion final : public Component {
     void describe(auto& p) {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(model, "model", "compensation.yaml of kind fusion; none: the parameters below");
-      p(sensors, "sensors", "of the axis; none: encoder and velocity of `feedback`");
+      p(sensors, "sensors", "sensors of the axis; none: encoder and velocity of `feedback`");
       p(resolution, "resolution", "m", Range{0.0, 0.01}, "one count of the encoder; 0: continuous");
       p(velocity_gain, "velocity_gain", "1", Range{1e-3, 1e3}, "reading of the velocity sensor per velocity");
       p(largest_velocity, "largest_velocity", "m/s", Range{1e-6, 100.0},
@@ -82,7 +82,7 @@ class Fusion final : public Component {
       p(selector, "selector", "1", Range{-1e9, 1e9}, "further attribute, where the model's weights have one",
         while_running);
       p(rest, "rest", "sensors that add little are switched off");
-      p(learning, "learning", "of a model's weights, while an instrument reads on `reference`");
+      p(learning, "learning", "adaptation of a model's weights while an instrument reads on `reference`");
     }
   };
   explicit Fusion(const Parameters& parameters);
@@ -121,7 +121,7 @@ class Fusion final : public Component {
 };
 
 void Fusion::Sensor::describe(auto& p) {
-  p(name, "name", "of the sensor; its port is `sensor_<name>`");
+  p(name, "name", "name of the sensor; its port is `sensor_<name>`");
   p(quantity, "quantity", "position or velocity");
   p(from, "from", "port, or feedback: the drive's own encoder or velocity");
   p(resolution, "resolution", "m", Range{0.0, 0.01}, "one count of a position sensor; 0: continuous");

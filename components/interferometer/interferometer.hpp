@@ -22,7 +22,7 @@ class Interferometer final : public Component {
     void describe(auto& p) {
       p(noise, "noise", "m", Range{0.0, 1e-4}, "1 sigma of a reading");
       p(resolution, "resolution", "m", Range{0.0, 1e-5}, "one count; 0: none");
-      p(seed, "seed", 0, 1'000'000'000, "of the noise");
+      p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
     }
   };
   explicit Interferometer(const Parameters& parameters) : parameters_{parameters} {}

@@ -38,7 +38,7 @@ class Recorder final : public Component {
     std::int64_t reserve_mb = 64;  // some thirty black boxes of a loop at 1 kHz
     void describe(auto& p) {
       p(out, "out", "folder for the file, created; relative to where the cell was started");
-      p(name, "name", "of the file");
+      p(name, "name", "name of the file");
       p(topics, "topics", "only topics that contain one of these texts; none: all of the cell");
       p(reserve_mb, "reserve_mb", 0, 1'000'000,
         "free space [MB] at which recording ends, left on the disk for black boxes");

@@ -88,7 +88,7 @@ class Stage final : public Component {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(travel, "travel", "m", "soft limits");
       p(control, "control", "control law");
-      p(limits, "limits", "of the trajectories");
+      p(limits, "limits", "limits of the trajectories");
       p(model, "model",
         "model.yaml of plant axis: its forces are fed forward in place of feedforward_velocity and "
         "_acceleration");
@@ -102,7 +102,7 @@ class Stage final : public Component {
       p(feedback_timeout, "feedback_timeout", "s", Range{1e-4, 1.0},
         "older feedback, or two periods of a slower fused position or correction: controlled stop");
       p(on_lost_input, "on_lost_input",
-        "then off (the drive lets go) or hold (on, standing; goes on where the input comes back)");
+        "then off (the drive is disabled) or hold (on, standing; goes on where the input comes back)");
       if constexpr (requires { p.node(); })
         if (on_lost_input != "off" && on_lost_input != "hold")
           p.node()["on_lost_input"].fault("`" + on_lost_input + "` is neither", "use off or hold");

@@ -35,7 +35,8 @@ struct HomingParameters {
     p(current, "current", "A", Range{0.0, 1e3}, "against a hard stop at most; 0: a quarter of control.limit");
     p(stall_time, "stall_time", "s", Range{1e-3, 10.0},
       "a hard stop is where the axis stands for so long at this current or beyond `following_error`");
-    p(position, "position", "m", Range{-100.0, 100.0}, "of the home; none: the end of `travel` on that side");
+    p(position, "position", "m", Range{-100.0, 100.0},
+      "position of the home; none: the end of `travel` on that side");
     if constexpr (requires { p.node(); }) {
       if (method != "home_switch" && method != "limit_switch" && method != "index_pulse" &&
           method != "hard_stop")

@@ -31,11 +31,12 @@ const modbus::RegisterContract& Thermal::registers() {
   static const modbus::RegisterContract contract{
       {"power", "W or %", write, needed, "setpoint of the pad's power; % of the parameter `rated_power`"},
       {"slide_resistance", "ohm", read, either, "thermistor of the slide"},
-      {"slide_temperature", "degC", read, either, "of the slide; used where there is no `slide_resistance`"},
+      {"slide_temperature", "degC", read, either,
+       "temperature of the slide; used where there is no `slide_resistance`"},
       {"enable", "flag", write, optional, "lets the pad heat; without it power 0 is off"},
-      {"delivered_power", "W or %", read, optional, "that flows in fact: tells a relay that sticks"},
+      {"delivered_power", "W or %", read, optional, "power that flows in fact: shows a relay that sticks"},
       {"comm_lost", "flag", read, optional, "the device's watchdog has switched it off"},
-      {"sensor_fault", "flag", read, optional, "a sensor is open or short: the heater is let go"},
+      {"sensor_fault", "flag", read, optional, "a sensor is open or short: the heater is off"},
       {"over_temperature", "flag", read, optional, "the device has latched at its own limit"},
       {"reset_alarms", "flag", write, optional, "set to 1 to clear its latches"}};
   return contract;
@@ -47,7 +48,7 @@ modbus::RegisterContract registers_of_zone(const std::string& zone) {
   using enum modbus::RegisterNeed::Access;
   using enum modbus::RegisterNeed::Need;
   return {{zone + "_resistance", "ohm", read, either, "thermistor of the zone"},
-          {zone + "_temperature", "degC", read, either, "of the zone"}};
+          {zone + "_temperature", "degC", read, either, "temperature of the zone"}};
 }
 
 bool is_relative(const modbus::Register& reg) { return conversion(reg.unit, "1").has_value(); }

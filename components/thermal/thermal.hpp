@@ -64,7 +64,7 @@ class Thermal final : public Component {
       p(rise, "rise", "K", Range{1e-3, 50.0}, "by which the slide must warm at full power ...",
         while_running);
       p(within, "within", "s", Range{1.0, 1e5},
-        "... in this time; the latch lets go when as much heat, however interrupted, did not warm it so",
+        "... in this time; the latch switches off when as much heat, however interrupted, did not warm it so",
         while_running);
       p(hold, "hold", "1", Range{0.0, 0.9},
         "largest share of power_limit that holding a temperature takes: heat below it need not warm the "
@@ -80,7 +80,7 @@ class Thermal final : public Component {
     Thermistor thermistor;
     void describe(auto& p) {
       p(name, "name", "makes the port temperature_<name>");
-      p(thermistor, "thermistor", "of this zone");
+      p(thermistor, "thermistor", "thermistor of this zone");
     }
   };
   struct Parameters {
@@ -98,16 +98,16 @@ class Thermal final : public Component {
     void describe(auto& p) {
       p(modbus, "modbus", "the heater's controller");
       p(pid, "pid", "control law");
-      p(thermistor, "thermistor", "of the slide");
+      p(thermistor, "thermistor", "thermistor of the slide");
       p(zones, "zones", "further thermistors, read and published but not controlled");
       p(setpoint, "setpoint", "degC", setpoints, "wanted at the start; a command changes it", while_running);
       p(power_limit, "power_limit", "W", Range{0.0, 1e4}, "highest power");
       p(rated_power, "rated_power", "W", Range{0.0, 1e5},
         "at 100 %, for a map whose `power` is in %; 0: not known");
       p(over_temperature, "over_temperature", "degC", Range{0.0, 200.0},
-        "the latch lets go of the heater above it");
-      p(response, "response", "of the thermistor to full power");
-      p(measurable, "measurable", "degC", "what the thermistors may show; beyond it one is open or short");
+        "the latch switches the heater off above it");
+      p(response, "response", "time of response of the thermistor to full power");
+      p(measurable, "measurable", "degC", "range of the thermistors; beyond it one is open or short");
       if constexpr (requires { p.node(); })
         if (setpoint >= over_temperature)
           p.node()["setpoint"].fault("is not below `over_temperature`", "lower it, or raise the latch");

@@ -17,7 +17,7 @@ class FolderCamera final : public FrameCamera {
     bool again = false;
     void describe(auto& p) {
       camera.describe(p);
-      p(folder, "folder", "of the pictures");
+      p(folder, "folder", "folder of the pictures");
       p(again, "again", "begin anew after the last picture");
     }
   };

@@ -20,7 +20,7 @@ struct CameraParameters {
   double exposure = 1e-3;
   std::int64_t axes = 2;
   void describe(auto& p) {
-    p(rate, "rate", "Hz", Range{0.0, 1000.0}, "of frames; 0: only on request");
+    p(rate, "rate", "Hz", Range{0.0, 1000.0}, "rate of frames; 0: only on request");
     p(exposure, "exposure", "s", Range{1e-7, 10.0}, "time of exposure");
     p(axes, "axes", 1, 3, "how many axes of the stage it looks at: inputs state_x, state_y, state_z");
   }

@@ -28,9 +28,9 @@ struct CameraMount {
   }
 
   void describe(auto& p) {
-    p(offset.x(), "x", "m", {-1.0, 1.0}, "of the image's centre from the tool");
-    p(offset.y(), "y", "m", {-1.0, 1.0}, "of the image's centre from the tool");
-    p(rotation, "rotation", "rad", {-7.0, 7.0}, "of the image's x about the machine's");
+    p(offset.x(), "x", "m", {-1.0, 1.0}, "offset of the image's centre from the tool");
+    p(offset.y(), "y", "m", {-1.0, 1.0}, "offset of the image's centre from the tool");
+    p(rotation, "rotation", "rad", {-7.0, 7.0}, "rotation of the image's x about the machine's");
   }
 };
 

@@ -23,7 +23,7 @@ class SimulatedCamera final : public FrameCamera {
     std::vector<double> position{0.0, 0.0};
     void describe(auto& p) {
       p(file, "file", "ruler.yaml, each circle with `at`");
-      p(position, "position", "m", "of the ruler's zero, in machine coordinates");
+      p(position, "position", "m", "position of the ruler's zero, in machine coordinates");
     }
   };
   struct Parameters {
@@ -51,7 +51,7 @@ class SimulatedCamera final : public FrameCamera {
       p(look.distortion, "distortion", "1", Range{-0.2, 0.2}, "radial, at the corner");
       p(dust, "dust", 0, 10'000, "specks in a frame");
       p(ruler, "ruler", "on the table");
-      p(seed, "seed", 0, 1'000'000'000, "of noise and dust");
+      p(seed, "seed", 0, 1'000'000'000, "seed of noise and dust");
     }
     std::int64_t dust = 0;
   };

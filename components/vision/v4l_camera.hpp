@@ -22,7 +22,7 @@ class V4lCamera final : public FrameCamera {
     double latency = 0.0;
     void describe(auto& p) {
       camera.describe(p);
-      p(device, "device", "of Video4Linux; or a video file that OpenCV reads, shown at its own rate");
+      p(device, "device", "device of Video4Linux, or a video file that OpenCV reads, shown at its own rate");
       p(width, "width", 0, 4096, "px; 0: what the device has");
       p(height, "height", 0, 4096, "px; 0: what the device has");
       p(latency, "latency", "s", Range{0.0, 1.0},

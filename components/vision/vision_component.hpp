@@ -33,7 +33,7 @@ class Vision final : public Component {
     void describe(auto& p) {
       p(camera, "camera", "camera.yaml; without it the camera is calibrated by a ruler first");
       p(distance, "distance", "m", Range{0.0, 1000.0},
-        "of the substrate straight below a pinhole camera; 0: camera.yaml knows the plane");
+        "distance of the substrate straight below a pinhole camera; 0: camera.yaml has the plane");
       p(mount, "mount", "where the camera hangs");
       p(ruler, "ruler", "ruler.yaml: radii of the ruler's circles");
       p(out, "out", "folder for the camera.yaml of a calibration; relative to where the cell was started");

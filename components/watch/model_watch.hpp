@@ -36,7 +36,7 @@ class ModelWatch final : public Component {
       p(slowest, "slowest", "m/s", Range{1e-6, 1.0},
         "slower is no motion: dry friction may be anything there");
       p(noise, "noise", "N", Range{1e-6, 1e6}, "1 sigma of a stretch's balance where all is right");
-      p(time, "time", "s", Range{0.1, 10.0}, "of motion that is judged", while_running);
+      p(time, "time", "s", Range{0.1, 10.0}, "time of motion that is judged", while_running);
       p(parts, "parts", "1", Range{1.0, 1e3},
         "parted: force over its sigma, RMS over `time`, above it for `time`", while_running);
       p(agrees, "agrees", "1", Range{0.1, 1e3}, "agreeing again: below it ...", while_running);

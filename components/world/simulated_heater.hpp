@@ -40,10 +40,10 @@ class SimulatedHeater final : public Component {
     std::int64_t seed = 3;
     void describe(auto& p) {
       modbus.describe(p);
-      p(ambient, "ambient", "degC", Range{-50.0, 100.0}, "of the room", while_running);
+      p(ambient, "ambient", "degC", Range{-50.0, 100.0}, "temperature of the room", while_running);
       p(pad_capacity, "pad_capacity", "J/K", Range{0.1, 1e6}, "heat capacity of the pad");
-      p(slide_capacity, "slide_capacity", "J/K", Range{0.1, 1e6}, "of the slide");
-      p(base_capacity, "base_capacity", "J/K", Range{0.1, 1e7}, "of the base");
+      p(slide_capacity, "slide_capacity", "J/K", Range{0.1, 1e6}, "heat capacity of the slide");
+      p(base_capacity, "base_capacity", "J/K", Range{0.1, 1e7}, "heat capacity of the base");
       p(pad_slide, "pad_slide", "W/K", Range{0.0, 1e4}, "conductance pad to slide");
       p(slide_base, "slide_base", "W/K", Range{0.0, 1e4}, "conductance slide to base");
       p(slide_loss, "slide_loss", "W/K", Range{0.0, 1e4}, "slide to the air");
@@ -51,8 +51,8 @@ class SimulatedHeater final : public Component {
       p(noise, "noise", "K", Range{0.0, 1.0}, "1 sigma of the thermistors");
       p(rated_power, "rated_power", "W", Range{0.0, 1e5}, "at 100 %, for a map whose power is in %");
       p(over_temperature_limit, "over_temperature_limit", "degC", Range{0.0, 1000.0},
-        "of the pad, for a map without a register for it");
-      p(seed, "seed", 0, 1'000'000'000, "of the noise");
+        "rated power of the pad, for a map without a register for it");
+      p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
     }
   };
   /// What its map must and may hold.

@@ -35,13 +35,13 @@ class SimulatedPneumatics final : public Component {
       p(supply, "supply", "Pa", Range{0.0, 1.6e6}, "compressed air before the regulator", while_running);
       p(lag, "lag", "s", Range{1e-3, 60.0}, "time constant of reservoir and purge line");
       p(over_pressure, "over_pressure", "Pa", Range{1e3, 1.6e6},
-        "of the reservoir, above which it latches and vents");
+        "pressure of the reservoir above which it latches and vents");
       p(noise, "noise", "Pa", Range{0.0, 1e4}, "1 sigma of the pressure sensors");
-      p(leak_through, "leak_through", "Pa", Range{0.0, 1.6e6}, "what a worn regulator adds to its setpoint",
-        while_running);
+      p(leak_through, "leak_through", "Pa", Range{0.0, 1.6e6},
+        "error of a worn regulator, added to its setpoint", while_running);
       p(sensor_fault, "sensor_fault", "a pressure sensor says that it is broken");
-      p(band, "band", "Pa", Range{0.0, 1e5}, "of `in_band`, for a map without a register `band`");
-      p(seed, "seed", 0, 1'000'000'000, "of the noise");
+      p(band, "band", "Pa", Range{0.0, 1e5}, "half width for `in_band`, for a map without a register `band`");
+      p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
     }
   };
   /// What its map must and may hold.

@@ -77,7 +77,7 @@ void SimulatedSensor::Fault::describe(auto& p) {
   p(at, "at", "s", Range{0.0, 1e9}, "since the start");
   p(duration, "duration", "s", Range{0.0, 1e9}, "how long");
   p(size, "size", "1", Range{-1e3, 1e3},
-    "of a jump [unit of the sensor]; age of late and lagging samples [s]");
+    "size of a jump [unit of the sensor]; age of late and lagging samples [s]");
   if constexpr (requires { p.node(); })
     if (kind != "dead" && kind != "stuck" && kind != "missing" && kind != "jump" && kind != "late" &&
         kind != "lagging")
@@ -99,7 +99,7 @@ void SimulatedSensor::Parameters::describe(auto& p) {
     while_running);
   p(largest, "largest", "1", Range{1e-9, 100.0}, "reading to which the noise level refers [m or m/s]");
   p(interval, "interval", "s", Range{0.0, 10.0}, "between its readings; 0: every period");
-  p(seed, "seed", 0, 1'000'000'000, "of the noise");
+  p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
   p(faults, "faults", "when it fails, and how");
   if constexpr (requires { p.node(); })
     if (quantity != "position" && quantity != "velocity")

@@ -98,10 +98,10 @@ void SimulatedStage::Parameters::describe(auto& p) {
   p(x, "x", "the X axis");
   p(y, "y", "the Y axis");
   p(z, "z", "the Z axis");
-  p(watchdog, "watchdog", "s", Range{1e-3, 10.0}, "the drive lets go when its command is older");
+  p(watchdog, "watchdog", "s", Range{1e-3, 10.0}, "the drive switches off when its command is older");
   p(temperature, "temperature", "degC", Range{-50.0, 150.0},
-    "of the machine, where `slide` and `base` are not connected", while_running);
-  p(seed, "seed", 0, 1'000'000'000, "of the noise");
+    "temperature of the machine, where `slide` and `base` are not connected", while_running);
+  p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
 }
 
 }  // namespace invar::world

@@ -42,13 +42,16 @@ class SimulatedSubstrate final : public Component {
     std::int64_t seed = 6;
     void describe(auto& p) {
       p(placement, "placement", "m", "[x, y] of the landing from below the nozzle");
-      p(tilt, "tilt", "rad", Range{0.0, 0.5}, "of the valve from vertical");
+      p(tilt, "tilt", "rad", Range{0.0, 0.5}, "tilt of the valve from vertical");
       p(azimuth, "azimuth", "rad", Range{-3.15, 3.15}, "towards which it is tilted, from x");
-      p(speed, "speed", "m/s", Range{0.05, 50.0}, "of the droplet at the nozzle, at the nominal pressure");
+      p(speed, "speed", "m/s", Range{0.05, 50.0},
+        "speed of the droplet at the nozzle, at the nominal pressure");
       p(delay, "delay", "s", Range{0.0, 0.2}, "from pulse to droplet");
       p(speed_decay, "speed_decay", "1/s", Range{0.0, 1.0}, "relative loss of speed per second");
-      p(pressure_exponent, "pressure_exponent", "1", Range{0.0, 3.0}, "of the pressure in the speed");
-      p(drag_diameter, "drag_diameter", "m", Range{0.0, 5e-3}, "of the droplet in the air; 0: no drag");
+      p(pressure_exponent, "pressure_exponent", "1", Range{0.0, 3.0},
+        "exponent of the pressure in the speed");
+      p(drag_diameter, "drag_diameter", "m", Range{0.0, 5e-3},
+        "diameter of the droplet in the air; 0: no drag");
       p(crosswind, "crosswind", "m/s2", "[x, y] push by moving air");
       p(scatter, "scatter", "m", Range{0.0, 1e-2}, "1 sigma of a landing in x and y, at the nozzle");
       p(scatter_per_height, "scatter_per_height", "1", Range{0.0, 0.1},
@@ -58,9 +61,9 @@ class SimulatedSubstrate final : public Component {
       p(diameter_scatter, "diameter_scatter", "m", Range{0.0, 1e-3}, "1 sigma");
       p(nominal_pressure, "nominal_pressure", "Pa", Range{1.0, 1e6}, "at which speed and diameter hold");
       p(nominal_pulse, "nominal_pulse", "s", Range{1e-5, 1e-2}, "at which the diameter holds");
-      p(dead_time, "dead_time", "s", Range{0.0, 1e-2}, "of a pulse, in which the valve only opens");
+      p(dead_time, "dead_time", "s", Range{0.0, 1e-2}, "dead time of a pulse, in which the valve only opens");
       p(least_pressure, "least_pressure", "Pa", Range{0.0, 1e6}, "below which nothing leaves the nozzle");
-      p(seed, "seed", 0, 1'000'000'000, "of scatter and satellites");
+      p(seed, "seed", 0, 1'000'000'000, "seed of scatter and satellites");
       if constexpr (requires { p.node(); }) {
         if (placement.size() != 2) p.node()["placement"].fault("needs two numbers", "write [x, y]");
         if (crosswind.size() != 2) p.node()["crosswind"].fault("needs two numbers", "write [x, y]");

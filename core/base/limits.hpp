@@ -1,4 +1,4 @@
-// What is read from outside has an upper bound: each with its reason. docs/faults.md has the same table for users.
+// Upper bounds on everything that is read from outside, each with its reason. docs/faults.md has the same table for users.
 #pragma once
 
 #include <cstddef>
@@ -36,9 +36,9 @@ constexpr std::uint64_t mcap_definitions = 64 * mib;  // all schemas, channels a
 constexpr std::size_t mcap_damage = 20;               // sentences about damaged chunks; the rest is counted
 
 // --- IDL schemas and their messages
-constexpr std::size_t idl_text = 1 * mib;  // the largest of ours has 6 KiB
-constexpr std::size_t idl_depth = 64;      // types within types: whoever walks over them does so by recursion
-constexpr std::size_t idl_name = 1024;     // a name with its modules
+constexpr std::size_t idl_text = 1 * mib;      // the largest of ours has 6 KiB
+constexpr std::size_t idl_depth = 64;          // types within types: readers walk over them by recursion
+constexpr std::size_t idl_name = 1024;         // a name with its modules
 constexpr std::uint64_t idl_values = 1 << 20;  // values of fixed length in one type, arrays multiplied out
 constexpr std::size_t message_values = 1
                                        << 20;  // values in one message, octets aside: about 150 MiB as a tree

@@ -11,10 +11,10 @@ namespace invar {
 constexpr std::size_t longest_identifier = 31;
 /// A title, a column header, a line's name: what stands in a table cell or a plot's key and is still read.
 constexpr std::size_t longest_label = 200;
-/// A topic of whoever recorded it; DDS has no bound.
+/// A topic in a foreign recording; DDS has no bound.
 constexpr std::size_t longest_topic = 1024;
 
-/// What is wrong with a name: "has the control character 0x1B at byte 3".
+/// The flaw of a name: "has the control character 0x1B at byte 3".
 struct NameFlaw {
   std::string what;
   std::string mend;

@@ -7,8 +7,8 @@
 
 namespace invar {
 
-/// Of every file that Invar makes, less what the umask takes: its owner writes, its group reads, for recordings, models and
-/// reports tell of a plant.
+/// Mode of every file that Invar makes, less the umask: the owner writes, the group reads. Recordings, models and reports tell
+/// of a plant.
 inline constexpr unsigned new_file_mode = 0640;
 
 /// A stream that writes `file` anew, made with `new_file_mode` where it is not there yet. Look at the stream before use.

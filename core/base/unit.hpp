@@ -9,7 +9,7 @@
 
 namespace invar {
 
-/// What a unit measures and how it maps to SI: si = factor * value + offset. Temperatures count in degC ("K"
+/// Quantity of a unit and its map to SI: si = factor * value + offset. Temperatures count in degC ("K"
 /// as a unit of its own means kelvin above absolute zero; inside a product it is a difference, as in W/K).
 struct Unit {
   /// Exponents of m, kg, s, A, K, rad, px, count; real numbers, since V^0.5/s is a unit of a tank's outflow.

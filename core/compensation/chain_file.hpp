@@ -1,4 +1,4 @@
-// What every model of a whole machine says of it first: chain, travels, tool, squareness.
+// Head of every model of a whole machine: chain, travels, tool, squareness.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@ void write_squareness(ModelText& text, const metrology::Squareness& squareness,
 void read_squareness(const config::Node& root, metrology::Squareness& squareness,
                      metrology::Squareness& sigma);
 
-/// A reversal over position, as a map below `key`. Of one that is damaged the fault goes to the document's list.
+/// A reversal over position, as a map below `key`. The fault of a damaged one goes to the document's list.
 void write_curve(ModelText& text, const std::string& key, const metrology::ReversalCurve& curve);
 metrology::ReversalCurve read_curve(const config::Node& node, const char* unit, double largest);
 

@@ -31,7 +31,8 @@ void write_components(ModelText& text, const ErrorMotionNetworks& model) {
   write_squareness(text, model.squareness, model.squareness_sigma);
   write_reversal(text, model.reversal);
   if (!model.states.empty()) {
-    text.comment("What components depend on beside the position, from 0 on: degC, a heating rate in K/s.");
+    text.comment(
+        "States: inputs of error motions beside the position, counted from 0; degC, heating rates in K/s.");
     text.open_list("states");
     for (const auto& state : model.states) text.item().text("name", state.name).range("range", state.range);
     text.close();

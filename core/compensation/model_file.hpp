@@ -1,4 +1,4 @@
-// compensation.yaml: how every compensation model is written, sealed by a checksum, and checked on reading.
+// compensation.yaml: how every compensation model is written, with a checksum, and checked on reading.
 #pragma once
 
 #include <Eigen/Core>

@@ -16,7 +16,7 @@ void write_trajectory(ModelText& text, const metrology::DropletTrajectory& traje
       .numbers("slope", Eigen::VectorXd{trajectory.slope})
       .number("slowness", trajectory.slowness)
       .number("delay", trajectory.delay)
-      .comment("of (placement, slope) in one direction: xx, xy, yy")
+      .comment("covariance of (placement, slope) in one direction: xx, xy, yy")
       .numbers("covariance", Eigen::VectorXd{covariance});
   if (std::isfinite(trajectory.slowness_sigma)) text.number("slowness_sigma", trajectory.slowness_sigma);
   if (std::isfinite(trajectory.delay_sigma)) text.number("delay_sigma", trajectory.delay_sigma);
@@ -29,7 +29,7 @@ void write_trajectory(ModelText& text, const metrology::DropletTrajectory& traje
     text.open("field")
         .numbers("matrix", Eigen::VectorXd{field})
         .numbers("centre", Eigen::VectorXd{trajectory.field_centre})
-        .comment("of a row of the matrix: xx, xy, yy")
+        .comment("covariance of a row of the matrix: xx, xy, yy")
         .numbers("covariance", Eigen::VectorXd{field_covariance})
         .close();
   }

@@ -9,8 +9,8 @@
 
 namespace invar {
 
-/// The latest value: one writer thread, one reader thread, both wait-free. Three slots: the writer fills its
-/// own, swaps it with the middle one; the reader swaps the middle one with its own when it is newer.
+/// The latest value: one writer thread, one reader thread, both wait-free. There are three slots. The writer fills its own and swaps
+/// it with the middle one. The reader swaps the middle one with its own when it is newer.
 /// *Real-time* where copying a T is.
 template <class T>
 class Latest {

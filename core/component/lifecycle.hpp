@@ -12,7 +12,7 @@
 
 namespace invar {
 
-/// What a supervisor may ask of a component.
+/// The transitions that a supervisor may ask of a component.
 ///
 ///     unconfigured --configure--> inactive --activate--> active
 ///     unconfigured <--cleanup---- inactive <-deactivate- active     error --reset--> unconfigured
@@ -26,7 +26,7 @@ enum class Transition : std::uint8_t { configure, activate, deactivate, cleanup,
 [[nodiscard]] std::string_view to_text(Transition transition);
 [[nodiscard]] std::optional<Transition> parse_transition(std::string_view text);
 
-/// What a request means in a state.
+/// The meaning of a request in a state.
 struct Decision {
   enum class Kind : std::uint8_t {
     go,       // carry it out; then the state is `target`
@@ -61,7 +61,7 @@ class RequestLog {
  public:
   explicit RequestLog(std::size_t capacity = 256) : capacity_{capacity} {}
 
-  /// What was answered to this id; refused when the id belonged to another request. Id 0 is never remembered:
+  /// The answer that this id got; refused when the id belonged to another request. Id 0 is never remembered:
   /// its sender does not repeat.
   [[nodiscard]] std::optional<Outcome> find(std::uint64_t id, std::string_view component,
                                             Transition transition) const;

@@ -179,8 +179,8 @@ class ParameterLister {
   std::string prefix_;
 };
 
-/// What the checks between parameters in `describe` have against these numbers, which stand beside the list of infos (those
-/// that may not change are not looked at); empty: nothing. Any thread.
+/// Objection of the checks between parameters in `describe` to these numbers; empty: none. The numbers stand beside the list
+/// of infos; those that may not change are not read. Any thread.
 using ParameterCheck = std::function<std::string(std::span<const double> numbers)>;
 
 /// The same for parameters as they were read from the file.

@@ -12,8 +12,8 @@
 #define INVAR_DEBUG_CONTAINERS 0
 #endif
 
-/// Lies in a section of its own, which the program reads out of the file before the library is loaded: nothing of a library
-/// that was built against other headers ever runs. `key=value` pairs, in this order.
+/// Lies in a section of its own, which the program reads from the file before it loads the library. Code of a library
+/// that was built against other headers never runs. `key=value` pairs, in this order.
 #define INVAR_PLUGIN_STAMP                                                  \
   "invar=" INVAR_ABI_VERSION " headers=" INVAR_ABI_HEADERS                  \
   " compiler-abi=" INVAR_TEXT(__GXX_ABI_VERSION) " string-abi=" INVAR_TEXT( \

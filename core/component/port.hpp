@@ -18,7 +18,7 @@ namespace invar {
 
 class Component;
 
-/// What every port has. A port is a member of its component and registers itself there. Set-up only, except
+/// Base of every port. A port is a member of its component and registers itself there. Set-up only, except
 /// where said.
 class Port {
  public:
@@ -61,7 +61,7 @@ struct InputOptions {
   std::string_view profile = "realtime";
 };
 
-/// What an executor and a transport need of an input, whatever its type.
+/// The part of an input that an executor and a transport need, whatever its type.
 class InputPort : public Port {
  public:
   InputPort(Component& owner, std::string_view name, Direction direction, std::type_index type,
@@ -84,7 +84,7 @@ class InputPort : public Port {
   /// The outputs of this process that feed it. Set-up only.
   [[nodiscard]] const std::vector<const Port*>& sources() const { return sources_; }
   void add_source(const Port& output) { sources_.push_back(&output); }
-  /// Lets go of what waits in an inbox: a component that becomes active does not obey what it was told before. Real-time.
+  /// Discards the waiting commands of an inbox: a component that becomes active does not obey earlier ones. Real-time.
   virtual void discard() noexcept {}
   /// A sample came that is not taken: its writer does not own the topic, it is too old, of another key, or no number.
   /// Any thread.
@@ -112,7 +112,7 @@ class InputPort : public Port {
   std::atomic<std::uint64_t> refused_{0};
 };
 
-/// What takes the samples of an output: an input of this process, or a transport. Called on the writer's
+/// Receiver of the samples of an output: an input of this process, or a transport. Called on the writer's
 /// thread; must be real-time when the writer is.
 template <class T>
 using Sink = std::function<void(const T& sample, Instant now)>;
@@ -183,7 +183,7 @@ class Inbox final : public InputPort {
   std::vector<std::unique_ptr<Ring<T>>> lanes_;
 };
 
-/// What an executor needs of an output, whatever its type.
+/// The part of an output that an executor needs, whatever its type.
 class OutputPort : public Port {
  public:
   OutputPort(Component& owner, std::string_view name, std::type_index type, std::string_view qos)

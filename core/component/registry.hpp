@@ -28,9 +28,9 @@ struct RegisterInfo {
 
 class Registry {
  public:
-  /// `Type` has a described `Type::Parameters` and a constructor from `const Parameters&` without side
-  /// effects: devices and files are opened in `configure`, so that `invar check` can make a component to look
-  /// at its ports. A `Type` that keeps or plays a Modbus device declares its registers: `static ... registers()`.
+  /// `Type` has a described `Type::Parameters` and a constructor from `const Parameters&` without side effects. Devices and
+  /// files are opened in `configure`, so that `invar check` can make a component and look at its ports.
+  /// A `Type` that keeps or plays a Modbus device declares its registers: `static ... registers()`.
   template <class Type>
   void add(const std::string& name, const std::string& description) {
     types_[name] = {description,
@@ -62,7 +62,7 @@ class Registry {
   [[nodiscard]] bool has(const std::string& type) const { return types_.contains(type); }
   [[nodiscard]] std::vector<std::string> names() const;
   [[nodiscard]] const std::string& description(const std::string& type) const;
-  /// What a register map must and may hold for it; nothing for a type that has no device.
+  /// Registers that its map must and may hold; empty for a type that has no device.
   [[nodiscard]] const std::vector<RegisterInfo>& registers(const std::string& type) const;
   /// Reads the parameters from `node`; faults go to its document, so make the component only when there are
   /// none. A type that describes a parameter in what is no unit is a fault of its own, and nothing is prepared.

@@ -60,7 +60,7 @@ class StagedModel {
 
   /// Takes commands; true when another model, or none, is active from now on. Real-time.
   bool update() noexcept {
-    // Said a step later, when the component too has let go of what was before.
+    // Said a step later, when the component too no longer uses the earlier model.
     if (std::exchange(handles_models_, false)) loader_.use({active_, staged_, previous_});
     bool changed = false;
     if (std::exchange(begins_, false))

@@ -28,7 +28,7 @@ struct CellComponent {
   Node node;                                  // for its parameters and for faults
 };
 
-/// What a process asks of the system for its loop.
+/// The loop that a process asks the system for.
 struct RealtimeRequest {
   int priority = 0;          // SCHED_FIFO, 1..99; 0: none
   std::optional<int> cpu;    // pin to it
@@ -38,7 +38,7 @@ struct RealtimeRequest {
 };
 
 enum class OverrunPolicy { skip, degrade, safe_stop };
-/// What happens when a declared latency is not kept; the status always says so.
+/// The answer to a declared latency that is not kept; the status always says so.
 enum class LatePolicy { mark, event, safe_stop };
 
 struct CellProcess {

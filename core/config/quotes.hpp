@@ -7,7 +7,7 @@
 
 namespace invar::config {
 
-/// What stands in quotes from `begin`, the place of the opening quote, on.
+/// The quoted text from `begin`, the place of the opening quote, on.
 struct Quoted {
   bool closed = false;
   bool swallows_keys = false;  // a line within it begins like `key: value`

@@ -114,7 +114,7 @@ class Yaml {
 
   [[nodiscard]] Node root() const;
   [[nodiscard]] const std::filesystem::path& file() const;
-  /// What was read, byte for byte.
+  /// The text that was read, byte for byte.
   [[nodiscard]] const std::string& text() const;
   /// Adds "unknown key" faults for everything nobody asked for; throws InputError when there is any fault.
   void finish() const;

@@ -55,7 +55,7 @@ inline bool read_bundle(std::span<const std::uint8_t> bytes, const BundleVisitor
   return true;
 }
 
-/// What a process says of itself when it joins: the topics that it writes, and those that it wants.
+/// Announcement of a process that joins: the topics that it writes, and those that it wants.
 struct Membership {
   std::string process;
   std::vector<BundleTopic> written;

@@ -38,8 +38,8 @@ class CellClient {
   [[nodiscard]] std::vector<event::Notice> take_notices();
   /// How far the clock of this PC is ahead of that of a process, at most, by its statuses; nothing: none came.
   [[nodiscard]] std::optional<Duration> clock_ahead(const std::string& process) const;
-  /// That the clock of this PC and that of a process are so far apart that commands may be taken for old ones; empty: they
-  /// are not, as far as its status says.
+  /// Warning that the clocks of this PC and of a process are so far apart that commands may be taken for old ones. Empty:
+  /// they are not, as far as its status says.
   [[nodiscard]] std::string clocks_apart(const std::string& process) const;
   /// The process in which a component runs; empty: not heard of.
   [[nodiscard]] std::string process_of(const std::string& component) const;

@@ -1,4 +1,4 @@
-// CommandGate: which samples of a topic are taken; whoever sends another is told so.
+// CommandGate: selects the samples of a topic that are taken, and tells every refused sender.
 #pragma once
 
 #include <atomic>
@@ -14,9 +14,9 @@
 
 namespace invar::dds {
 
-/// Between a reader and what takes its samples. Beside ownership it holds the lifespan, by the stamps of the middleware:
-/// Fast DDS would drop what is too old in silence, and all commands of a PC whose clock is behind. A sender whose clock is
-/// ahead is obeyed, and its late samples are known by the earliest one that came. Any thread.
+/// Between a reader and the receiver of its samples. Beside ownership it holds the lifespan, by the stamps of the middleware:
+/// Fast DDS would drop old samples in silence, and all commands of a PC whose clock is behind. A sender whose clock is
+/// ahead is obeyed; its late samples are known by the earliest one that came. Any thread.
 class CommandGate {
  public:
   /// `refused` is called for every sample that is not taken. The discovery must outlive it.

@@ -7,9 +7,9 @@
 
 namespace invar::dds {
 
-/// Of UDP over IPv4 on the interfaces that carry `addresses` (empty: on all that are up) [bytes]. A datagram above it travels
-/// as IP fragments; where one of them is lost the receiving kernel keeps the others for half a minute, and soon takes none.
-/// Loopback counts only where it is alone: it carries 64 KiB whole.
+/// Largest datagram of UDP over IPv4 [bytes] on the interfaces that carry `addresses` (empty: on all that are up). A larger
+/// datagram travels as IP fragments. Where one fragment is lost, the receiving kernel keeps the others for half a minute, and
+/// soon takes none. Loopback counts only where it is alone: it carries 64 KiB whole.
 [[nodiscard]] std::uint32_t largest_datagram(const std::vector<std::string>& addresses);
 
 /// The same for an interface of this MTU [bytes].

@@ -23,10 +23,10 @@ struct DomainPorts {
   [[nodiscard]] std::string text() const;
 };
 
-/// Ports follow from this number. Left alone, Fast DDS takes the lowest free one, so that a process that was killed and
-/// started again has the ports it had before: others then go on writing into the shared memory of the dead one, and are not
-/// heard. So it is one that left no trace and whose ports nobody on this network uses (a container may share the network and
-/// not the memory); where another process takes it in the same moment, the library shifts the ports. Throws InputError when
+/// Ports follow from this number. By default Fast DDS takes the lowest free one, so that a killed and restarted process
+/// has its earlier ports. Other processes then go on writing into the shared memory of the dead one, and are not heard.
+/// The number chosen here left no trace, and nobody on this network uses its ports: a container may share the network and
+/// not the memory. Where another process takes it in the same moment, the library shifts the ports. Throws InputError when
 /// all are taken. Set-up only.
 [[nodiscard]] std::int32_t free_participant_number(std::uint32_t domain);
 

@@ -8,7 +8,7 @@
 
 namespace invar::dds {
 
-/// Of a GUID: its participant's prefix, "|", its entity.
+/// Text of a GUID: its participant's prefix, "|", its entity.
 template <class Id>
 std::string guid_text(const Id& id) {
   std::ostringstream text;

@@ -9,7 +9,7 @@
 
 namespace invar::dds {
 
-/// Of one participant.
+/// Sizes of one participant.
 struct MemorySizes {
   std::uint32_t segment = 0;                    // messages on their way [bytes]
   std::uint32_t message = 0;                    // the largest [bytes]
@@ -30,9 +30,9 @@ struct MemoryPlan {
       shortage;  // how much is there, how much is wanted, what is done, and the mend; empty: there is room
 };
 
-/// As wanted, or with a segment a half, a quarter and so on as large, or none. `processes` share the folder: each takes at
-/// most its part of the whole, so that those that start last are not left without. What a sample needs in flight at once must
-/// fit the segment: a smaller one costs messages where large samples (frames of a camera) come close together.
+/// As wanted, or with a segment a half, a quarter and so on as large, or none. `processes` share the folder. Each takes at
+/// most its part of the whole, so that the last to start are not left without. All samples in flight must fit the segment:
+/// a smaller one costs messages where large samples (frames of a camera) come close together.
 [[nodiscard]] MemoryPlan plan_memory(Traffic traffic, std::uint32_t general_segment,
                                      std::size_t processes = 1,
                                      const std::filesystem::path& folder = "/dev/shm");

@@ -10,8 +10,8 @@
 
 namespace invar::dds {
 
-/// Fast DDS looks for the sender by its class, does not know it behind a chained transport, and opens one more for each
-/// remote locator: every message then leaves as often. `open` opens, since the transport notes the locator there.
+/// Fast DDS looks for the sender by its class and does not know it behind a chained transport. It opens one more for each
+/// remote locator, and every message then leaves as often. `open` opens, since the transport notes the locator there.
 template <class Open>
 bool open_one_sender(eprosima::fastdds::rtps::SendResourceList& senders, std::int32_t kind, Open open) {
   const auto before = static_cast<std::ptrdiff_t>(senders.size());

@@ -19,7 +19,7 @@ struct Claimant {
 /// The rules of DDS, made definite, and for the thing that is commanded, whatever key a sample carries:
 /// - the greatest strength commands; a weaker one only when every stronger one has ended;
 /// - of equals the one who came first, until it ends or has commanded nothing for the lease (DDS leaves equals open);
-/// - whoever ended is out at once: `release` when it took its leave, otherwise `is_gone` is asked where it stands in the way;
+/// - a writer that ended is out at once: `release` when it took its leave, otherwise `is_gone` is asked where it would win;
 /// - writers of one process are one master.
 class Ownership {
  public:

@@ -14,7 +14,7 @@ namespace invar::dds {
 [[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(const Profile& profile);
 [[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(const Profile& profile);
 
-/// What an endpoint said of itself in discovery.
+/// QoS that an endpoint stated in discovery.
 [[nodiscard]] Profile described(const eprosima::fastdds::dds::WriterQos& qos);
 [[nodiscard]] Profile described(const eprosima::fastdds::dds::ReaderQos& qos);
 

@@ -10,7 +10,8 @@
 
 namespace invar::dds {
 
-/// Who may exchange messages by shared memory: processes of one boot of one PC, with the same /dev/shm, as one user.
+/// Identity of processes that may exchange messages by shared memory: of one boot of one PC, with the same /dev/shm, as one
+/// user.
 struct MemoryIdentity {
   std::int32_t process = 0;
   std::uint32_t user = 0;
@@ -19,7 +20,7 @@ struct MemoryIdentity {
   bool operator==(const MemoryIdentity&) const = default;
 };
 
-/// Of this process; its folder is 0 where there is no /dev/shm.
+/// Identity of this process; its folder is 0 where there is no /dev/shm.
 [[nodiscard]] MemoryIdentity own_memory_identity();
 
 /// The user data of our participants, by which peers know each other's process and memory.
@@ -29,15 +30,15 @@ struct MemoryIdentity {
 
 /// Whether both share a PC's memory, so that the process id of one means something to the other.
 [[nodiscard]] bool is_reachable(const MemoryIdentity& one, const MemoryIdentity& other);
-/// Why two processes of one PC that both would use shared memory cannot, and the mend; empty where they can, or where one of
-/// them is on another PC or does without shared memory.
+/// Why two processes of one PC that both would use shared memory cannot, and the mend. Empty where they can, where one of
+/// them is on another PC, or where one does without shared memory.
 [[nodiscard]] std::string why_unreachable(const MemoryIdentity& own, const MemoryIdentity& peer);
 
 /// Fast DDS 2.9 takes every participant whose PC has the same 16-bit number for one that it reaches by shared memory. Where
-/// the port's file cannot be opened nothing arrives, in silence; where the receiver cannot open the sender's segment its
-/// thread spins for ever. So our locators of shared memory carry the identity above, and a number of the PC that is not its
-/// own: another program of Fast DDS does not use them and talks to us by UDP. We take only a locator with our own identity.
-/// The type is the one that Fast DDS looks for to know that a participant has shared memory: a transport chained around this
+/// the port's file cannot be opened nothing arrives, in silence. Where the receiver cannot open the sender's segment its
+/// thread spins for ever. So our locators of shared memory carry the identity above, and another number than that of the PC.
+/// Another program of Fast DDS does not use them and talks to us by UDP. We take only a locator with our own identity.
+/// The type is the one by which Fast DDS knows that a participant has shared memory. A transport chained around this
 /// one needs a descriptor derived from SharedMemTransportDescriptor too.
 struct ReachableMemory : eprosima::fastdds::rtps::SharedMemTransportDescriptor {
   [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* create_transport() const override;

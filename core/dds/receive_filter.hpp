@@ -15,7 +15,7 @@
 
 namespace invar::dds {
 
-/// What the filters of one participant share: their limits, what they know of writers, what they dropped. Any thread.
+/// State that the filters of one participant share: limits, known writers, counts of dropped messages. Any thread.
 class Reception {
  public:
   explicit Reception(const RtpsLimits& limits) : limits_{limits} {}

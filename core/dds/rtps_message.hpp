@@ -35,10 +35,10 @@ enum BuiltinWriter : std::uint32_t {
   subscription_writer = 0x000004c2,
 };
 
-/// What the library loops over or allocates, and what only a sender's history can justify.
+/// Bounds on counts over which the library loops or for which it allocates, and which only a sender's history can justify.
 class SequenceGuard;
 
-/// What this participant can take.
+/// Limits of this participant.
 struct RtpsLimits {
   /// A sample that arrives in fragments [bytes].
   std::uint32_t largest_sample = 8U << 20U;
@@ -47,7 +47,7 @@ struct RtpsLimits {
   std::uint32_t last_port = UINT32_MAX;
 };
 
-/// What else the parser found in a message that is sound.
+/// Further content of a sound message that the parser found.
 struct RtpsContent {
   /// Up to here the middleware reads: a trailing statistics submessage of Fast DDS is not handed on.
   std::size_t size = 0;

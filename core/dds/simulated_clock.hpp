@@ -1,11 +1,15 @@
 // Simulated time over several processes, in lock-step and repeatable bit for bit.
 //
-// A master grants windows of time. In each, every process first delivers to its ports what all wrote in the window
-// before - process by process in one fixed order, each in the order written - then runs its cycles, then hands all
-// that it wrote in one bundle to the master, whose next grant carries the bundles of all: two messages a process and
-// window, however many take part. So what a component sees depends on nothing but its inputs: neither on scheduling
-// nor on how long a message took. A sample written in window k is seen elsewhere in window k + 1; inside a process as
-// always.
+// A master grants windows of time. In each window, every process does three things:
+//
+// 1. It delivers to its ports all samples of the window before, process by process in one fixed order, each in the
+//    order written.
+// 2. It runs its cycles.
+// 3. It hands all its samples in one bundle to the master, whose next grant carries the bundles of all.
+//
+// That makes two messages a process and window, however many take part. A component sees nothing but its inputs: neither
+// scheduling nor the time that a message took. A sample written in window k is seen elsewhere in window k + 1; inside a
+// process as always.
 #pragma once
 
 #include <atomic>
@@ -113,14 +117,14 @@ class SimulatedClockClient {
   /// The node's process name is this process's.
   explicit SimulatedClockClient(Node& node);
 
-  /// Set-up, before `run`. What this output writes goes into the bundles, and on its topic of DDS for whoever
-  /// watches from outside, reliable and complete whatever its profile, so that fast simulated time loses nothing.
+  /// Set-up, before `run`. Samples of this output go into the bundles. They also go on its topic of DDS for observers from
+  /// outside, reliable and complete whatever its profile, so that fast simulated time loses nothing.
   /// `separation`: the least simulated time between two samples; those between are left out. Zero: every sample.
   void bind(OutputPort& port, Duration separation = {});
   /// Several may be bound to one topic.
   void bind(InputPort& port);
   /// Set-up, after the ports are bound: inboxes also hear writers that belong to no process of the cell, such as
-  /// `invar job apply`. What they say arrives with the window after it came, so such a run repeats only as they do.
+  /// `invar job apply`. Their samples arrive with the window after they came, so such a run repeats only as they do.
   void listen_outside();
   /// Set-up. Sees every sample of every process, this one included, in one fixed order.
   void tap(std::function<void(const LockstepSample&)> sink);

@@ -109,7 +109,7 @@ class DirectOutlet final : public Outlet {
   std::atomic<std::uint64_t> refused_{0};
 };
 
-/// What a sink is told beside a sample.
+/// The time that a sink gets beside a sample.
 enum class SinkTime { arrival, sending };
 
 /// Several threads of the middleware (one a transport) may call; the port wants one at a time.

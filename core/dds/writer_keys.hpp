@@ -13,16 +13,16 @@
 
 namespace invar::dds {
 
-/// Left alone, Fast DDS 2.9 drops a sample of whoever does not own its instance without a word, and takes a writer that is
-/// gone for the owner, for ten seconds: it does not understand how Cyclone DDS takes its leave (a serialized key without a
-/// key hash), and anybody's sign of life renews the lease of all writers. Between equals the lower GUID wins, so that a
+/// By default Fast DDS 2.9 drops a sample of a writer that does not own its instance without a word. For ten seconds it takes
+/// a writer that is gone for the owner: it does not understand how Cyclone DDS takes its leave (a serialized key without a
+/// key hash), and any sign of life renews the lease of all writers. Between equals the lower GUID wins, so that a
 /// successor is heard or not by chance. Writers that send a key hash with every sample keep that arbitration.
 ///
 /// A part of a type support. The history of a reader computes keys in an object that it has the type create; that object
 /// is how such a reader is known here.
 class WriterKeys {
  public:
-  /// `by_writer`: each writer's instances are its own. `folded`: any number of keys makes `most_folded` instances: Fast DDS
+  /// `by_writer`: each writer's instances are its own. `folded`: any number of keys makes `most_folded` instances. Fast DDS
   /// keeps an instance as long as its writer lives, and refuses every key beyond the limit of the reader, also the right one.
   enum class Kind { as_they_are, by_writer, folded };
   static constexpr std::uint8_t most_folded = 32;

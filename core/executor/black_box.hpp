@@ -27,7 +27,7 @@ struct CycleRecord {
   std::array<LifecycleState, 32> states{};  // of the first 32 components, in file order
 };
 
-/// What a trip leaves: oldest cycle first; `samples` has one row a cycle, one column a signal.
+/// The record of a trip: oldest cycle first; `samples` has one row a cycle, one column a signal.
 struct BlackBoxRecord {
   struct Signal {
     std::string name;

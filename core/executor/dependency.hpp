@@ -8,8 +8,8 @@
 
 namespace invar {
 
-/// Indices of `components`, upstream (who feeds) before downstream (who is fed); the given order decides
-/// where nothing else does and where the graph runs in a circle, as every control loop does. One feeds
+/// Indices of `components`, upstream (writers) before downstream (readers). The given order decides
+/// where nothing else does, and where the graph is a circle, as in every control loop. A component feeds
 /// another when an output is connected to an input, or both carry the same topic.
 [[nodiscard]] std::vector<std::size_t> upstream_first(const std::vector<const Component*>& components);
 

@@ -48,7 +48,7 @@ struct InputAge {
   Percentiles age;
 };
 
-/// What the loop counted, of one moment.
+/// Counters of the loop at one moment.
 struct LoopCounters {
   std::uint64_t cycle = 0;     // of the newest one; skipped ones count
   Instant now;                 // its nominal start, on the executor's clock
@@ -60,7 +60,7 @@ struct LoopCounters {
   bool tripped = false;        // stopped safely; see trip_reason()
 };
 
-/// One change of state, for whoever publishes events.
+/// One change of state, for the publisher of events.
 struct StateChange {
   Instant at;
   std::uint32_t component = 0;  // index
@@ -104,7 +104,7 @@ class Executor {
   /// The same, without waiting: a signal handler may call it.
   void request_stop() noexcept { stop_requested_.store(true, std::memory_order_release); }
   [[nodiscard]] bool is_running() const noexcept { return running_.load(std::memory_order_acquire); }
-  /// What the system granted, once started.
+  /// The rights that the system granted, once started.
   [[nodiscard]] const std::vector<Grant>& grants() const { return grants_; }
 
   // --- running in simulated time (options.simulated == true)
@@ -129,7 +129,7 @@ class Executor {
 
   /// Carries out one transition of one component and waits for it. Two callers take turns.
   Outcome transition(std::size_t index, Transition transition);
-  /// Asks all active components to come to rest; whoever deactivates them next waits the less. Waits for the loop's answer
+  /// Asks all active components for a controlled stop, so that a later deactivation waits less. Waits for the loop's answer
   /// only.
   void wind_down_all();
   /// Since then: nothing moves any more, or the time for it is over.
@@ -142,15 +142,15 @@ class Executor {
   [[nodiscard]] std::optional<double> parameter(std::size_t index, std::string_view path) const;
 
   /// Stops safely: at the next cycle all active components are deactivated, downstream first, their outputs
-  /// get their safe values, and the black box freezes. Who moves brakes before, and keeps what it reads alive so long; who
-  /// does not come to rest in time is let go of, and the state's change and another black box say so. Nothing is activated
-  /// until clear_trip(). Does not wait.
+  /// get their safe values, and the black box freezes. A moving component first makes a controlled stop; the components that
+  /// it reads stay active meanwhile. A component that does not reach standstill in time is deactivated all the same; its change
+  /// of state and a second black box say so. Nothing is activated until clear_trip(). Does not wait.
   void trip(std::string_view reason);
   void clear_trip();
   /// Freezes the black box without stopping anything. Does not wait.
   void freeze_black_box() noexcept { freeze_requested_.store(true, std::memory_order_release); }
 
-  /// Of the clock that stamps carry: UTC (core/base/clock.hpp), or simulated time.
+  /// Time by the clock that stamps carry: UTC (core/base/clock.hpp), or simulated time.
   [[nodiscard]] Instant now() const noexcept;
   [[nodiscard]] LifecycleState state(std::size_t index) const;
   [[nodiscard]] std::string failure(std::size_t index) const;
@@ -161,7 +161,7 @@ class Executor {
   [[nodiscard]] HistogramCopy compute(std::size_t index) const;
   /// From when a cycle was due to the end of its work.
   [[nodiscard]] HistogramCopy latency() const noexcept { return latency_.copy(); }
-  /// Of the inputs whose latency is declared.
+  /// Ages of the inputs whose latency is declared.
   [[nodiscard]] std::vector<InputAge> ages(std::size_t index) const;
   /// Empties the histograms (the counters go on). Waits for the loop.
   void clear_histograms();
@@ -248,7 +248,8 @@ class Executor {
 
   std::mutex manager_;  // callers take turns; never taken by the loop while it runs
   std::mutex trip_turn_;
-  std::mutex stepping_;  // held by whoever may step: the loop for its whole life, advance_to for its call
+  std::mutex
+      stepping_;  // held by the thread that may step: the loop for its whole life, advance_to for its call
   std::atomic<bool> running_{false};
   std::thread thread_;
 };

@@ -51,7 +51,7 @@ struct HistogramCopy {
   /// The value below which the share `fraction` (0..1) of all values lies, interpolated inside its bucket.
   [[nodiscard]] Duration quantile(double fraction) const;
   [[nodiscard]] Percentiles percentiles() const;
-  /// What was counted since an earlier copy; `max` stays that of the whole.
+  /// The counts since an earlier copy; `max` stays that of the whole.
   [[nodiscard]] HistogramCopy since(const HistogramCopy& earlier) const;
   void add(Duration value);
   void add(const HistogramCopy& other);

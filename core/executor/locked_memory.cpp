@@ -126,7 +126,7 @@ std::string MemoryKeeper::look() {
   const int error = lock_memory();
   if (error == 0) return "";
   told_ = true;
-  return std::string{"what came into memory since the start is not locked ("} + std::strerror(error) +
+  return std::string{"memory that was mapped since the start is not locked ("} + std::strerror(error) +
          "); raise `memlock` in /etc/security/limits.conf (LimitMEMLOCK in systemd)";
 }
 

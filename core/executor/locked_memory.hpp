@@ -14,9 +14,9 @@ namespace invar {
 /// Blocks above 256 KiB, a loaded table for one, go back to the system when they are freed.
 void keep_memory_small() noexcept;
 
-/// Locks the program, the C and C++ libraries, the heap, rings of samples and the calling thread's stack, all of it present from
-/// now on; of other libraries what was touched. Left out: stacks of other threads and the middleware's shared memory, where the loop
-/// never goes. Again now and then, for what has come since. 0, or the error of the system. Not on a running loop.
+/// Locks the program, the C and C++ libraries, the heap, rings of samples and the calling thread's stack, all present from
+/// now on. Other libraries: the touched part. Left out: stacks of other threads and the middleware's shared memory, where the
+/// loop never goes. Call again now and then for later memory. 0, or the error of the system. Not on a running loop.
 [[nodiscard]] int lock_memory();
 
 /// Locks what came since the start, a model that was loaded for one, once a second.

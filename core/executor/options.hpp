@@ -11,16 +11,16 @@
 
 namespace invar {
 
-/// What happens when a cycle is not finished when the next one is due. In every case the cycle number keeps to
+/// The answer to a cycle that is not finished when the next one is due. In every case the cycle number keeps to
 /// the clock: whole periods that went by are left out and counted.
 ///   skip       carry on at the next period
 ///   degrade    halve the rate (down to an eighth) until there is room again; steps are told their longer period
 ///   safe_stop  deactivate all components, downstream first, outputs to their safe values
 using config::OverrunPolicy;
-/// What happens when a cycle ends later than `latency`, or an input's sample is older than it may be: always counted and
-/// shown by the status; `event` says so besides, `safe_stop` stops as an overrun may.
+/// The answer to a cycle that ends later than `latency`, or to a sample of an input that is older than it may be.
+/// Always counted and shown by the status; `event` also gives a notice, `safe_stop` stops as an overrun may.
 using config::LatePolicy;
-/// What a process asks of the operating system.
+/// The rights that a process asks the operating system for.
 using RealTimeRequest = config::RealtimeRequest;
 
 [[nodiscard]] std::string_view to_text(OverrunPolicy policy);

@@ -57,10 +57,10 @@ class ProcessControl {
   [[nodiscard]] ProcessStatus status() const;
   [[nodiscard]] ComponentStatus component(std::size_t index) const;
 
-  /// Carries out a transition of one component, or of all when `component` is empty or "all", and waits for
-  /// it. All: configure and activate go upstream first and stop at the first that fails; deactivate, cleanup
-  /// and shutdown go downstream first and carry on; components that the request does not concern (configure:
-  /// those already active; reset: those not in error) count as being there. Reset of all also clears a trip.
+  /// Carries out a transition of one component, or of all when `component` is empty or "all", and waits for it.
+  /// Configure and activate of all go upstream first and stop at the first failure. Deactivate, cleanup
+  /// and shutdown go downstream first and carry on. Components that the request does not concern count as being
+  /// there (configure: those already active; reset: those not in error). Reset of all also clears a trip.
   ///
   /// The same id gives the same outcome without doing anything again; id 0: never repeated.
   Outcome request(std::string_view component, Transition transition, std::uint64_t id = 0);

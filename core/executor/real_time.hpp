@@ -1,4 +1,4 @@
-// What the operating system grants a loop: scheduling, core, locked memory, timer slack, touched stack.
+// Rights that the operating system grants a loop: scheduling, core, locked memory, timer slack, touched stack.
 #pragma once
 
 #include <array>

@@ -1,4 +1,4 @@
-// What heat adds to the error of a simulated machine: the physics terms of error maps, with the machine file's numbers.
+// Thermal error of a simulated machine: the physics terms of error maps, with the machine file's numbers.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,8 +7,8 @@
 
 namespace invar::machine {
 
-/// Displacement along each axis [m] at `position` [m] when the scale is at `scale_temperature` and the base at
-/// `base_temperature` [degC]: expansion and bending of the scale, expansion of the base; zero for a machine without
+/// Displacement along each axis [m] at `position` [m], for a scale at `scale_temperature` and a base at `base_temperature`
+/// [degC]. It is the expansion and bending of the scale plus the expansion of the base; zero for a machine without
 /// errors. Real-time.
 Eigen::Vector3d heat_growth(const metrology::Machine& machine, const Eigen::Vector3d& position,
                             double scale_temperature, double base_temperature) noexcept;

@@ -1,7 +1,7 @@
 // machine.yaml: chain, travel, tool and resolution of a machine; for a simulated one its hidden errors too.
 //
-// This room stands between config and metrology (metrology knows neither YAML nor files, config knows no
-// machine), so that tools and the component `world` read the same file with the same words.
+// This room stands between config and metrology: metrology knows neither YAML nor files, config knows no
+// machine. Tools and the component `world` read the same file with the same words.
 #pragma once
 
 #include <filesystem>
@@ -29,9 +29,9 @@ namespace invar::machine {
 ///       scale_lag: 300                                       # s, of the scale behind the slide's thermometer
 ///       reference_temperature: 20                            # degC
 ///
-/// Functions take q in m and give m or rad: sum of the polynomial's c_k q^k, of amplitude sin(2 pi q/period +
-/// phase), and of the table (cubic, end values held). A single stage has one axis, where the reader allows it. Faults go to the document's list; the caller ends with
-/// `Yaml::finish()`.
+/// A function of q [m] in m or rad is a sum: c_k q^k, amplitude sin(2 pi q / period + phase), and the table
+/// (cubic, end values held). A single stage has one axis, where the reader allows it. Faults go to the document's list; the
+/// caller ends with `Yaml::finish()`.
 metrology::Machine read_machine(const config::Node& root, int least_axes = 2);
 
 /// Loads a file that holds a machine and nothing else. Throws InputError with every fault.

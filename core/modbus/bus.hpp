@@ -10,8 +10,8 @@
 //   generous `answer_timeout`): with a simulated device that
 //   swaps its image in its own step (server.hpp), every step sees the same values in every run.
 //
-// Reconnecting: a connection that cannot be made, and a device that does not answer, are each left alone for
-// `first_retry`, then twice as long, up to `longest_retry`; a silent unit behind a gateway does not hold up
+// Reconnecting: a failed connection and a silent device are each left alone for `first_retry`, then twice as long, up to
+// `longest_retry`. A silent unit behind a gateway does not hold up
 // its neighbours. link.hpp says which failures close the connection.
 #pragma once
 
@@ -51,7 +51,7 @@ class Bus {
 
   /// A device on this bus; lives as long as the bus, or until it is removed. Waits for a round that is under way.
   Device& add(RegisterMap map);
-  /// Sends what is still queued for it if the connection stands, then lets go of it. Precondition: it is of this bus.
+  /// Sends the queued writes of the device if the connection stands, then forgets it. Precondition: it is of this bus.
   void remove(Device& device);
 
   /// Starts the I/O thread. Precondition: `exchange` was never called.

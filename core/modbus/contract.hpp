@@ -1,5 +1,5 @@
-// What a component needs of its device's register map: declared once as a table, from which `invar check`, `invar types` and
-// the component itself follow.
+// Registers that a component needs of its device, declared once as a table. `invar check`, `invar types` and the component
+// itself follow from it.
 #pragma once
 
 #include <string>

@@ -14,8 +14,8 @@
 //
 // A write is sent once. It is repeated only where the device said that it has not carried it out: it was busy (exception
 // 6), or has no function for one value (exception 1, then by function 15 or 16). When an answer is lost nobody knows
-// whether the device did it: the write is `uncertain` until the read-back shows what came of it. What to do then
-// is the owner's decision.
+// whether the device did it: the write is `uncertain` until the read-back shows the value. The owner decides
+// what to do then.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ struct Reading {
   bool stale = true;   // older than the map allows, or never read
   bool out_of_range =
       false;  // outside the register's range: an open sensor, a wrong word order, another device
-  /// To be acted on. Whoever drives something lets go of it where this is false.
+  /// True where the reading may be acted on. The owner of an actuator switches it off where this is false.
   [[nodiscard]] bool is_sound() const { return !stale && !out_of_range; }
 };
 
@@ -57,7 +57,7 @@ enum class WriteState {
 };
 [[nodiscard]] std::string_view name_of(WriteState state);
 
-/// What became of the latest write to one register.
+/// The fate of the latest write to one register.
 struct WriteReport {
   std::uint64_t number = 0;  // counts the device's writes from 1
   WriteState state = WriteState::none;
@@ -69,7 +69,7 @@ enum class WriteRefusal {
   out_of_range,  // outside the register's range, or no number
 };
 
-/// What happened with one device since the start, by cause.
+/// Events of one device since the start, by cause.
 struct DeviceCounters {
   std::uint64_t requests = 0;
   std::uint64_t answers = 0;

@@ -25,7 +25,7 @@ class DeviceIo {
   /// When to look again if nobody asks for anything.
   [[nodiscard]] Instant next_due(Instant now) const;
 
-  /// What went wrong: nothing, only exception answers, or the device cannot be reached (the link may be closed).
+  /// The outcome: no fault, only exception answers, or the device cannot be reached (the link may be closed).
   enum class Done { all, refused, failed };
   enum class Reads { none, if_due, now };
   /// Heartbeat if due, queued writes, then the reads. Precondition: the link was open once.

@@ -70,7 +70,7 @@ class Client {
   [[nodiscard]] bool is_open() const { return bus_ != nullptr; }
   /// Precondition: open.
   [[nodiscard]] Device& device() const { return *device_; }
-  /// Of a register that the map may lack: then nothing.
+  /// Reading of a register that the map may lack; empty there.
   [[nodiscard]] std::optional<Reading> reading(std::optional<std::size_t> reg) const;
   /// A flag that is shown, fresh and not 0.
   [[nodiscard]] bool flag(std::optional<std::size_t> reg) const;
@@ -81,7 +81,7 @@ class Client {
   /// Once a cycle, after `receive`: what its owner should say of the device now. Sets the device's watchdog, too, where that shows
   /// another time than the map wants, or the device came back. Precondition: open.
   [[nodiscard]] std::vector<HealthChange> look(Instant now);
-  /// The device refused a write lately: let go of it, and let its watchdog do the same.
+  /// The device refused a write lately: switch its actuator off, and let its watchdog do the same.
   [[nodiscard]] bool refuses() const { return health_.refuses(); }
 
  private:

@@ -1,7 +1,7 @@
 // Modbus TCP frames as a client sees them: requests as bytes, and whether bytes are the answer to one.
 //
-// Every field of an answer is checked: transaction, protocol, length, unit, function, byte count, and the echo of
-// what was written (Modbus Messaging on TCP/IP V1.0b, 3.1.3; application protocol V1.1b3, 6). Pure functions.
+// Every field of an answer is checked: transaction, protocol, length, unit, function, byte count, and the echo of a write.
+// Sources: Modbus Messaging on TCP/IP V1.0b, 3.1.3; application protocol V1.1b3, 6. Pure functions.
 #pragma once
 
 #include <array>

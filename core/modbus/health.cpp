@@ -166,7 +166,7 @@ void Health::look_at_writes(const Device& device, Instant now) {
              << meaning_of_exception(report.exception);
       else
         text << "it acknowledges the write and shows another value";
-      text << "; what it drives is let go, and tried again later";
+      text << "; its actuator is off, and the device is tried again later";
       say(Level::fault, text.str());
     }
   } else if (told_refusal_ && !lost_.told && now >= hold_until_ + proof) {

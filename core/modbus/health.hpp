@@ -1,4 +1,4 @@
-// What the owner of a device should say of it: that it is lost, shows nonsense or refuses writes, and that it is well again.
+// Notices about a device for its owner: it is lost, shows nonsense, refuses writes, or is well again.
 #pragma once
 
 #include <array>
@@ -26,8 +26,8 @@ class Health {
 
   /// To be called once a cycle, after the readings came.
   [[nodiscard]] std::vector<HealthChange> look(const Device& device, const LinkCounters& link, Instant now);
-  /// A write was refused, or acknowledged and not followed, lately: for 1 s after the last one, and for twice as long, up to
-  /// 1 min, whenever the first try after that fails again.
+  /// A write was refused, or acknowledged and not followed, lately: for 1 s after the last one. The time doubles, up to
+  /// 1 min, whenever the first try after it fails again.
   [[nodiscard]] bool refuses() const { return refuses_; }
 
  private:

@@ -20,7 +20,7 @@ struct _modbus_mapping_t;
 
 namespace invar::modbus {
 
-/// What a request wants, as far as our functions go.
+/// A request, as far as our functions go.
 struct Request {
   Kind kind = Kind::holding;
   bool is_write = false;
@@ -45,7 +45,7 @@ class Image {
   std::size_t answer(std::span<const std::uint8_t> request, Reply& reply, std::vector<std::size_t>& written);
   /// An exception answer to the request, which is not carried out.
   std::size_t answer_exception(std::span<const std::uint8_t> request, std::uint8_t code, Reply& reply);
-  /// What the request wants; count 0 when the function is none of ours or the frame is cut.
+  /// The meaning of the request; count 0 when the function is none of ours or the frame is cut.
   [[nodiscard]] static Request parse(std::span<const std::uint8_t> request);
   [[nodiscard]] bool touches(const Request& request, std::size_t reg) const;
 

@@ -1,7 +1,7 @@
 // One TCP connection to a Modbus device or gateway: bounded in time, and every failure by its cause.
 //
 // The frames are built and checked by frame.hpp. An answer that comes after its time-out is told by its transaction and
-// dropped, so the connection outlives a late answer; it is closed after an answer that is cut or malformed, and
+// dropped, so the connection outlives a late answer. It is closed after an answer that is cut or malformed, and
 // after two time-outs in a row without a byte (a cable that was pulled). A device that closed the connection while
 // nothing was asked gets a new one before the next request: no request is lost, no write is repeated.
 #pragma once
@@ -40,7 +40,7 @@ struct Failure {
 /// Nothing, or why it failed.
 using Outcome = std::optional<Failure>;
 
-/// What happened with the connection since the start, by cause.
+/// Events of the connection since the start, by cause.
 struct LinkCounters {
   std::uint64_t connects = 0;
   std::uint64_t refused = 0;
@@ -66,7 +66,7 @@ class Link {
   Outcome open(Duration timeout);
   void close();
 
-  /// Whom the next requests are for, and how long an answer may take to begin and may pause; a whole answer takes at most that
+  /// Unit of the next requests, and the time that an answer may take to begin and may pause. A whole answer takes at most that
   /// and 20 ms a byte more (a serial line of 600 baud behind a gateway takes 18.3).
   void address(std::uint8_t unit, Duration answer_timeout);
   /// Reads `words.size()` registers, or bits as 0/1; at most 125 or 2000.
@@ -83,7 +83,7 @@ class Link {
   Outcome ready();
   Outcome exchange(const Question& question, std::span<std::uint16_t> words);
   Outcome send(const Question& question, Instant until);
-  /// What the bytes so far say: nothing yet, or the outcome.
+  /// Meaning of the bytes so far: nothing yet, or the outcome.
   std::optional<Outcome> look(const Question& question, std::span<std::uint16_t> words);
   Outcome lost(Cause cause, Flaw flaw = Flaw::none);
   bool drop_strays();

@@ -18,7 +18,7 @@
 
 namespace invar::modbus {
 
-/// What to do about a request.
+/// The answer to a request.
 struct Verdict {
   Image::Reply reply{};
   std::size_t size = 0;  // of the reply; 0: none is sent

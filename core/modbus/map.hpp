@@ -20,7 +20,7 @@
 
 namespace invar::modbus {
 
-/// What one request may ask for (Modbus application protocol V1.1b3, 6.1 and 6.3).
+/// Bounds of one request (Modbus application protocol V1.1b3, 6.1 and 6.3).
 inline constexpr unsigned largest_word_read = 125;
 inline constexpr unsigned largest_bit_read = 2000;
 
@@ -74,8 +74,8 @@ struct Heartbeat {
   std::optional<std::size_t> timeout_setting;  // the register that holds `timeout`, if the device has one
 };
 
-/// What the device does of itself when the heartbeat stands still, or before the first one. An actuator is then off (a
-/// temperature has no off); one that is safe when on, as a vent that lets the pressure out, says why beside its value:
+/// Action of the device when the heartbeat stands still, or before the first one. An actuator is then off (a
+/// temperature has no off). One that is safe when on, as a vent that lets the pressure out, says why beside its value:
 /// `set: {vent: {value: 1, because: open it lets the pressure out}}`.
 struct CommLoss {
   struct Set {

@@ -14,7 +14,7 @@
 // in turn gives the same values in every run, and a real-time one never sees half a step. A master's own
 // writes are read back at once, by it and by others.
 //
-// The map's watchdog runs in the device's own clock, the `now` of `exchange`: before the first heartbeat, and
+// The map's watchdog runs in the device's own clock, the `now` of `exchange`. Before the first heartbeat, and
 // when none has come for `timeout`, the comm-loss action of the map is in force (again at every exchange) and
 // its flag set. Only a changed heartbeat counts. A register that both sides write keeps the later write.
 //
@@ -67,7 +67,7 @@ class Server {
   [[nodiscard]] std::size_t index(std::string_view name) const;
 
   // The device's side: one thread.
-  /// The register as of the last exchange, in SI. What the device itself `set` shows after the next exchange.
+  /// The register as of the last exchange, in SI. A value that the device itself `set` shows after the next exchange.
   [[nodiscard]] double value(std::size_t reg) const;
   [[nodiscard]] double value(std::string_view name) const { return value(index(name)); }
   /// A master wrote it between the last two exchanges.

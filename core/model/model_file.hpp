@@ -16,7 +16,7 @@ physics::Model load(const std::filesystem::path& file);
 physics::Model read(const config::Yaml& yaml);
 
 /// The text of the file with the numbers of `changed`: parameters that differ from the file's and all its
-/// terms. What else the user wrote stays as it is. A parameter's sigma is replaced where its value is.
+/// terms. All other text stays as it is. A parameter's sigma is replaced where its value is.
 std::string patched(const config::Yaml& original, const physics::Model& changed);
 
 }  // namespace invar::model

@@ -1,4 +1,4 @@
-// What a model in the user's own equations may call its numbers, and what its expressions may hold.
+// Names and expressions that a model in the user's own equations may hold.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace invar::model {
 
-/// Faults at the lines where a name is none, stands for two things or for a function, where an expression assigns or is
-/// two, and where a loop has no input to close or follows itself.
+/// Faults at their lines: a word that is no name, a name that stands for two things or for a function, an expression that
+/// assigns or is two, a loop without an input to close or that follows itself.
 void check_own_expressions(const config::Node& root, const physics::Model& model);
 
 /// Where numbers that go together in an expression count in different units.

@@ -175,7 +175,7 @@ class Reader {
     if (damaged_chunks_ > 0)
       throw InputError{file_,
                        "is damaged, " + std::to_string(damaged_chunks_) +
-                           " of its chunks cannot be read; of the rest: " + what,
+                           " of its chunks cannot be read; the rest: " + what,
                        "copy the file again"};
     if (!recording_.complete() && !recording_.damage().empty())
       throw InputError{file_, recording_.damage().front() + "; there: " + what,

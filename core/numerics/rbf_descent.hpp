@@ -24,8 +24,8 @@ struct DescentResult {
   bool diverged = false;   // not finite, or a centre more than ten ranges away
 };
 
-/// Thesis (2.11)-(2.14), corrected (docs/references.md#e4): error E = target - output, one pass over all samples an
-/// epoch, w += eta_w E phi(r), mu += eta_mu E w phi(r) (x - mu) / s^2; as many centres as samples, starting on them.
+/// Thesis (2.11)-(2.14), corrected (docs/references.md#e4): error E = target - output, one pass over all samples an epoch,
+/// `w += eta_w E phi(r)`, `mu += eta_mu E w phi(r) (x - mu) / s^2`. There are as many centres as samples, starting on them.
 /// The input is scaled to [0, 1] over its range, the output by `output_scale` (um in the thesis: 1e-6 m).
 ///
 /// It only works as early stopping: the centre update carries w / s^2 = 400 w, and centres run away.

@@ -38,8 +38,8 @@ struct RidgeFit {
 
 /// `x`: D x N in input units; `y`: N. Needs at least D + 2 readings, all finite.
 ///
-/// The constant and slopes are eliminated first, the rest is diagonalised once, after which each candidate
-/// ridge costs O(N^2): GCV(l) = N |r|^2 / (N - tr S)^2 and leave-one-out residuals r_i / (1 - S_ii)
+/// The constant and slopes are eliminated first, and the rest is diagonalised once. Each candidate ridge then costs
+/// O(N^2): `GCV(l) = N |r|^2 / (N - tr S)^2` and leave-one-out residuals `r_i / (1 - S_ii)`
 /// (Golub, Heath, Wahba 1979).
 RidgeFit fit_ridge(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<const Eigen::VectorXd>& y,
                    const RidgeOptions& options = {});

@@ -7,9 +7,9 @@
 
 namespace invar::numerics {
 
-/// True where the mean of than[i] - errors[i] (of the same run or part of one: squared errors, or their
-/// logarithms where a few large ones must not decide) exceeds `times` its standard
-/// error. False for fewer than three pairs, which tell nothing of chance. The pairs' differences must be independent: parts of
+/// True where the mean of than[i] - errors[i] exceeds `times` its standard error. The errors are of the same run or part of
+/// one: squared errors, or their logarithms where a few large ones must not decide.
+/// False for fewer than three pairs, which tell nothing of chance. The pairs' differences must be independent: parts of
 /// a run longer than its errors are correlated.
 inline bool surely_less(const std::vector<double>& errors, const std::vector<double>& than,
                         double times = 1.0) {

@@ -57,8 +57,8 @@ class Columns {
   Node root_;
 };
 
-/// As CSV and JSON write it: the shortest digits that read back as the same number; a text with a comma, quote or line
-/// break in it within quotes; nothing for nothing and for NaN.
+/// As CSV and JSON write it: the shortest digits that read back as the same number, and nothing for an empty cell and NaN.
+/// A text with a comma, quote or line break in it stands within quotes.
 void append_cell(std::string& line, const Cell& cell);
 
 }  // namespace invar::recording

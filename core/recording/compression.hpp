@@ -38,7 +38,7 @@ class Packer {
   std::unique_ptr<Contexts> contexts_;
 };
 
-/// Unpacks one frame that holds `size` bytes. What comes back is shorter than `size` when the frame is cut
+/// Unpacks one frame that holds `size` bytes. The result is shorter than `size` when the frame is cut
 /// off or damaged: everything before that point is still there. Never more than `size` bytes.
 Bytes unpack(Compression compression, ByteView packed, std::uint64_t size);
 

@@ -30,12 +30,12 @@ struct ExportReport {
   std::size_t damaged_chunks = 0;
 };
 
-/// Writes into `folder` (made where it is missing). A CSV begins with `time [s]`, when the sample was made by its stamp `at`
-/// (where its type has none, or nobody filled it: when it was sent), and `received [s]`, when the recorder took it, both
-/// since the recording's first message (stamps of simulated time that was recorded from outside: since the start of the
-/// cell); then `log_time [ns]` and `publish_time [ns]` in full, `sequence`, then the fields (see Columns). A name of those five that
-/// a field has too gets `recording.` before it. Files are complete or absent. Throws InputError when the folder cannot
-/// be written or the selection names a topic that is not in the recording.
+/// Writes into `folder` (made where it is missing). A CSV begins with `time [s]`: the stamp `at` of the sample, or the time of
+/// sending where its type has none or nobody filled it. `received [s]` is the time of arrival at the recorder. Both count from
+/// the recording's first message (stamps of simulated time that was recorded from outside: from the start of the
+/// cell). Then come `log_time [ns]` and `publish_time [ns]` in full, `sequence`, and the fields (see Columns). A name of those
+/// five that a field has too gets `recording.` before it. Files are complete or absent. Throws InputError when the folder
+/// cannot be written or the selection names a topic that is not in the recording.
 ExportReport export_recording(const Recording& recording, const std::filesystem::path& folder,
                               const ExportOptions& options = {});
 

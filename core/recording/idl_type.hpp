@@ -1,4 +1,4 @@
-// What an OMG IDL text describes: the types of messages, as a tree that decoding follows.
+// Types of messages that an OMG IDL text describes, as a tree that decoding follows.
 #pragma once
 
 #include <cstdint>
@@ -66,9 +66,9 @@ struct IdlSchema {
 };
 
 /// Reads modules, structures, enumerations, typedefs, integer constants, arrays, sequences and strings, primitive
-/// types, and the annotations @key and @unit (others that do not change the bytes are passed over; lines that begin with
-/// '#' too). Set-up only. Throws InputError with `name:line` for a fault in the text, and for what our CDR cannot carry:
-/// unions, maps, bit sets, wide characters, inheritance, @mutable, @optional, @bit_bound.
+/// types, and the annotations @key and @unit. Other annotations that do not change the bytes are passed over, as are lines
+/// that begin with '#'. Set-up only. Throws InputError with `name:line` for a fault in the text, and for types that our CDR
+/// cannot carry: unions, maps, bit sets, wide characters, inheritance, @mutable, @optional, @bit_bound.
 IdlSchema parse_idl(std::string_view text, const std::string& name);
 
 }  // namespace invar::recording

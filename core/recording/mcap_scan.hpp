@@ -1,4 +1,4 @@
-// What an MCAP file holds, found by its summary or, where there is none, by walking over it up to the cut.
+// Content of an MCAP file, found by its summary or, where there is none, by walking over it up to the cut.
 #pragma once
 
 #include <filesystem>

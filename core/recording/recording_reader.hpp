@@ -16,7 +16,7 @@
 
 namespace invar::recording {
 
-/// What to read: log times from `from` (included) to `to` (excluded); all topics when `topics` is empty.
+/// Messages to read: log times from `from` (included) to `to` (excluded); all topics when `topics` is empty.
 struct Selection {
   std::optional<Instant> from{}, to{};
   std::set<std::string> topics{};
@@ -56,7 +56,7 @@ class Recording {
 
   /// True when the file was closed properly: summary and footer are there.
   [[nodiscard]] bool complete() const;
-  /// What is wrong with the file, one sentence each: where it is cut, which chunks fail their CRC.
+  /// Damage of the file, one sentence each: where it is cut, which chunks fail their CRC.
   [[nodiscard]] const std::vector<std::string>& damage() const;
   [[nodiscard]] std::uint64_t bytes() const;
 

@@ -1,5 +1,5 @@
-// Records messages from any thread: callers hand over bytes by a bounded queue, an own thread packs and
-// writes them, and what does not fit is counted in the loss ledger.
+// Records messages from any thread: callers hand over bytes by a bounded queue, and an own thread packs and
+// writes them. Messages that do not fit are counted in the loss ledger.
 #pragma once
 
 #include <condition_variable>
@@ -17,7 +17,7 @@
 
 namespace invar::recording {
 
-/// An earlier file of that name, of a run before or of a recorder that was killed, is never overwritten: it is called
+/// An earlier file of that name is never overwritten, be it of a run before or of a killed recorder. It is called
 /// `name-1.mcap`, or the next free number, from now on. Returns that name; empty: there was none, or it is a device or a pipe.
 std::filesystem::path keep_earlier(const std::filesystem::path& file);
 
@@ -48,8 +48,8 @@ struct RecordingStatus {
   bool at_reserve = false;  // the disk has its reserve left and no more; everything since counts as lost
 };
 
-/// Thread-safe. write() copies under a short lock and neither allocates nor touches the disk; not for the
-/// real-time loop, which never locks: its samples are handed over by the thread that publishes them.
+/// Thread-safe. write() copies under a short lock and neither allocates nor touches the disk. It is not for the
+/// real-time loop, which never locks: the publishing thread hands over its samples.
 class RecordingWriter {
  public:
   /// Throws InputError when the file cannot be created.

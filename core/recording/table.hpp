@@ -20,16 +20,16 @@ struct Column {
   std::string header = {};  // the whole cell of the header, `T (C)`; empty where none was read
 };
 
-/// A header `name [unit]` or `name (unit)` a column, then one row a sample. All columns have the same length.
-/// Cells may be parted by commas, semicolons, tabs, bars or blanks, numbers have a decimal point or a decimal comma; lines
-/// that begin with #, % or // are comments, and the last one before rows of numbers alone is their header where it has as
+/// A header `name [unit]` or `name (unit)` a column, then one row a sample. All columns have the same length. Commas,
+/// semicolons, tabs, bars or blanks part the cells; numbers have a decimal point or a decimal comma. Lines that begin with
+/// #, % or // are comments. The last comment before rows of numbers alone is their header where it has as
 /// many cells. Without a header the columns have numbers, from 1. A column of times (2024-03-01T09:00:02.4) counts the
 /// seconds since its first.
 class Table {
  public:
-  /// Throws InputError (file, row, column, what is wrong, how to mend it) when the file cannot be read, has
-  /// no rows, a row has another number of cells, a name stands twice, or a cell
-  /// of a number column is no number. Columns named in `text_columns` may hold texts; any other may not.
+  /// Throws InputError with file, row, column, fault and mend. Faults: the file cannot be read, has no rows, a row has another
+  /// number of cells, a name stands twice, or a cell of a number column is no number. Columns named in `text_columns` may
+  /// hold texts; any other may not.
   static Table read(const std::filesystem::path& file, const std::vector<std::string>& text_columns = {});
   /// The same where lines of any kind may stand in front of the header: it is the first line that names one of `known`.
   static Table read_behind_preamble(const std::filesystem::path& file,

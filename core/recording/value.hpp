@@ -15,8 +15,8 @@ namespace invar::recording {
 
 /// One value. The type belongs to the IdlSchema (or TypePointer) it was decoded with, which must live as long.
 struct Value {
-  /// By kind: boolean bool; character a text of one byte; int8..int64 and enumeration int64; octet, uint16..uint64
-  /// uint64; float32, float64 double; string a text; arrays and sequences of octets Bytes, others a list; structure a list
+  /// By kind: boolean bool; character a text of one byte; int8..int64 and enumeration int64; octet, uint16..uint64 uint64;
+  /// float32, float64 double; string a text. Arrays and sequences of octets are Bytes, others a list; a structure is a list
   /// of its members in order.
   using Content =
       std::variant<bool, std::int64_t, std::uint64_t, double, std::string, Bytes, std::vector<Value>>;

@@ -25,7 +25,8 @@ ComponentFaults::Sign ComponentFaults::sign_of(const thermal::NodeTemperature& n
 ComponentFaults::Sign ComponentFaults::sign_of(const dispensing::PressureState& state) {
   if (state.over_pressure()) return {"the pressure is latched off: mend the cause, then reset the alarms"};
   if (state.sensor_fault()) return {"the pressure sensor is at fault"};
-  if (state.comm_lost()) return {"the pressure controller missed its heartbeat and let go", answer_patience};
+  if (state.comm_lost())
+    return {"the pressure controller missed its heartbeat and switched off", answer_patience};
   if (state.stale()) return {"the pressure controller does not answer", answer_patience};
   return {};
 }

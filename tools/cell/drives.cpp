@@ -119,7 +119,7 @@ std::vector<Fault> unchecked(const LoadedCell& loaded) {
         notes.push_back(
             {(node.has("control") ? node["control"] : node).where(),
              "whether `" + member.file->name +
-                 "` swings up with its gains was not checked: mass and motor constant are not known",
+                 "` is unstable with its gains was not checked: mass and motor constant are not known",
              "give control.feedforward_acceleration (mass over motor constant), or `model`"});
       }
   return notes;

@@ -184,8 +184,8 @@ void add_calibrate_camera(CLI::App& group) {
       "Examples: invar calibrate camera --image ruler.png --ruler ruler.yaml --out result\n"
       "          invar calibrate camera --target target.csv --view view1.csv --view view2.csv ... --out "
       "result\n"
-      "target.csv has x and y on the flat target, each view the same points as u [px], v [px]; the lens is "
-      "chosen by held-out views.");
+      "target.csv has x and y on the flat target. Each view has the same points as u [px], v [px].\n"
+      "Views that are held out choose the lens.");
   auto options = std::make_shared<CameraOptions>();
   command->add_option("--image", options->image, "picture of circles of known radius");
   command->add_option("--ruler", options->ruler,

@@ -110,12 +110,14 @@ void add_calibrate_controller(CLI::App& group) {
                                        "Write a geometric model in the forms that machine controllers read");
   command->footer(
       "Example: invar calibrate controller --model result/compensation.yaml --out controller\n"
-      "Writes a grid for ISG and TwinCAT CNC (ISG_CSV): the mean of both directions and, where a reversal "
+      "Writes a grid for ISG and TwinCAT CNC (ISG_CSV): the mean of both directions. Where a reversal "
       "was\n"
-      "measured, one for all axes moving forward and one for backward; one COMP_FILE an axis for LinuxCNC\n"
-      "(COMP_FILE_TYPE = 0) with both directions; and the squareness as numbers for skew parameters. What no "
-      "line told is left out,\n"
-      "never zero. Of a rotary axis: its COMP_FILE in degrees.");
+      "measured, also one for all axes moving forward and one for backward. One COMP_FILE an axis for "
+      "LinuxCNC\n"
+      "(COMP_FILE_TYPE = 0) with both directions, and the squareness as numbers for skew parameters. A "
+      "function that no "
+      "line shows is left out,\n"
+      "never zero. A rotary axis gives its COMP_FILE in degrees.");
   auto options = std::make_shared<Options>();
   command->add_option("--model", options->model, "compensation.yaml of kind geometric or rotary")->required();
   command->add_option("--out", options->out, "folder to write to")->required();

@@ -183,7 +183,7 @@ report::LeftOut rows_of(const Recordings& all, const FusionFit& fit, metrology::
   rows.given = every.size();
   rows.used = used.size();
   rows.reasons = {{rows.given - rows.used,
-                   "of the weights, since a sensor is missing there; they are fused all the same"}};
+                   "left out of the weights, since a sensor is missing there; they are fused all the same"}};
   if (!used.empty()) rows.rms_used = report::rms_of(used);
   rows.rms_all = report::rms_of(every);
   rows.unexplained.push_back(

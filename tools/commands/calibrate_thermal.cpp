@@ -116,7 +116,7 @@ compensation::ThermalPlace place_of(const Options& options) {
   const auto below = config::Yaml::load(options.above);
   place.above = compensation::check_seal(below);
   if (place.above == 0 || below.root().text("kind") != "geometric")
-    throw InputError{options.above.string(), "is no sealed geometric model",
+    throw InputError{options.above.string(), "is no geometric model with a valid checksum",
                      "name the compensation.yaml that was active while the recording was made"};
   return place;
 }

@@ -200,8 +200,9 @@ void add_diagnose(CLI::App& program) {
       "  columns: {time: stage_x.state.at, reference: stage_x.state.setpoint_position + correction,\n"
       "            position: stage_x.state.position, current: stage_x.state.current, feedforward: "
       "remainder}\n"
-      "where `remainder` is what of the current the controller's law does not account for.\n"
-      "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C: the report holds what "
+      "where `remainder` is the part of the current that the law of the controller does not explain.\n"
+      "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C. The report then holds "
+      "what "
       "was known by then and says so (none where nothing can be said ten seconds later)");
   auto options = std::make_shared<Options>();
   command
@@ -231,8 +232,9 @@ void add_diagnose(CLI::App& program) {
       ->capture_default_str();
   command->add_option(
       "--check", options->checks,
-      "another recording, which no fit sees: the model as it is, retuned and patched run over it (one that "
-      "integrates over windows); where patched is worse, summary, page, worse_on of report.json and the "
+      "another recording, which no fit sees. The given, the retuned and the patched model run over it; a "
+      "model "
+      "that integrates, over windows. Where patched is worse, summary, page, worse_on of report.json and the "
       "head of patched.yaml say so; may be repeated");
   command->add_option("--check-outputs", options->check_outputs,
                       "the outputs of each --check, where they lie in a file of their own");

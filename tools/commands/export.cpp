@@ -57,10 +57,10 @@ void add_export(CLI::App& program) {
   auto* command = program.add_subcommand("export", "Write a recording's topics as CSV tables with units");
   command->footer(
       "Example: invar export run.mcap --out tables --topic stage.state --from 10 --to 20\n"
-      "Column `time` is when the sample was made, by its own stamp `at` (without one: when it was sent), "
-      "`received` when\n"
-      "the recorder took it, both in s since the recording's first message; --from and --to go by the "
-      "latter\n"
+      "Column `time` is the stamp `at` of the sample, or the time of sending where it has none. Column "
+      "`received` is\n"
+      "the time of arrival at the recorder; --from and --to go by it. Both are in s since the recording's "
+      "first message.\n"
       "Exit status: 0 everything was written, 1 some messages could not be read, 2 a fault of the call");
   auto options = std::make_shared<Options>();
   command->add_option("recording", options->recording, "the recording (.mcap)")->required();

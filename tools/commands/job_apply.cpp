@@ -297,12 +297,11 @@ void add_job_apply(CLI::App& job) {
       "         invar job apply deployment/cell.yaml stage_x --rollback\n"
       "         invar job apply deployment/cell.yaml compensation --none\n"
       "A stage feeds forward the forces of an axis's model.yaml, and refuses one that leaves too little "
-      "current for its servo;\n"
-      "a dispenser aims by a model.yaml of plant droplet, compensation corrects an axis by one of plant\n"
-      "error_map; compensation, dispenser and fusion take a compensation.yaml of their kind. With a folder "
-      "`state`, what a compensation was "
-      "given here - also\n"
-      "none - is what it starts with next time.\n"
+      "current for its servo.\n"
+      "A dispenser aims by a model.yaml of plant droplet. Compensation corrects an axis by one of plant\n"
+      "error_map. Compensation, dispenser and fusion take a compensation.yaml of their kind. With a folder "
+      "`state`, a\n"
+      "compensation starts next time with what it was given here, also with none.\n"
       "Exit status: 0 done; 1 refused or no answer; 2 a fault of the call or a file");
   auto options =
       std::make_shared<Options>(*command, std::vector<Word>{{"COMPONENT", "that takes it, such as stage_x"}});

@@ -138,7 +138,7 @@ void add_job_compare(CLI::App& job) {
   command->footer(
       "Example: invar job compare --recording recording.csv.gz --machine model.yaml --out out/compare");
   auto options = std::make_shared<Options>();
-  command->add_option("--recording", options->recording, "what the machine did, .csv, .csv.gz or .mcap")
+  command->add_option("--recording", options->recording, "recording of the machine, .csv, .csv.gz or .mcap")
       ->required();
   command->add_option("--machine", options->machine, "model.yaml: parameters and controller of the machine")
       ->required();

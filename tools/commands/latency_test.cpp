@@ -109,7 +109,8 @@ void add_latency_test(CLI::App& program) {
       "will have.\n"
       "Exit status: 0 measured, whatever came out; 1 not measured; 2 a fault of the call");
   auto options = std::make_shared<Options>();
-  command->add_option("--rate", options->rate, "of the loop [Hz] (1000)")->check(CLI::Range(1.0, 50'000.0));
+  command->add_option("--rate", options->rate, "rate of the loop [Hz] (1000)")
+      ->check(CLI::Range(1.0, 50'000.0));
   command->add_option("--duration", options->duration, "[s] (10)")->check(CLI::Range(0.01, 1e6));
   command->add_option("--priority", options->priority, "SCHED_FIFO, 1 to 99; 0 for none (80)")
       ->check(CLI::Range(0, 99));

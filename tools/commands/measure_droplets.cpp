@@ -103,9 +103,9 @@ void add_measure(CLI::App& program) {
       ->expected(-1);
   command->add_option("--camera", options->camera, "camera.yaml: adds positions and diameters in m");
   command
-      ->add_option(
-          "--distance", options->distance,
-          "of the substrate straight below a pinhole camera [m]; not needed where camera.yaml has its plane")
+      ->add_option("--distance", options->distance,
+                   "distance of the substrate straight below a pinhole camera [m]; not needed where "
+                   "camera.yaml has its plane")
       ->check(CLI::PositiveNumber);
   command->add_option("--output", options->output, "table to write, .csv or .csv.gz")->required();
   command->add_option("--report", options->report, "page to write: annotated images, sizes (.html)");

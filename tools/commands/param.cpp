@@ -122,11 +122,11 @@ void add_param(CLI::App& program) {
              {{"COMPONENT", "only of this one", false}}, lifecycle::PARAMETER_LIST,
              "invar param list deployment/xy-table.yaml thermal");
   add_action(*group, "get", "Print one parameter's value",
-             {{"COMPONENT", "whose"}, {"PATH", "of the parameter, such as pid.kp"}}, lifecycle::PARAMETER_GET,
-             "invar param get deployment/xy-table.yaml thermal setpoint");
+             {{"COMPONENT", "whose"}, {"PATH", "name of the parameter, such as pid.kp"}},
+             lifecycle::PARAMETER_GET, "invar param get deployment/xy-table.yaml thermal setpoint");
   add_action(*group, "set", "Change a parameter while the component runs",
              {{"COMPONENT", "whose"},
-              {"PATH", "of the parameter, such as pid.kp"},
+              {"PATH", "name of the parameter, such as pid.kp"},
               {"VALUE", "the new value, with a unit where it is not the parameter's own"}},
              lifecycle::PARAMETER_SET, "invar param set deployment/xy-table.yaml thermal setpoint 32");
 }

@@ -48,7 +48,7 @@ void add_predict(CLI::App& program) {
   auto* command = program.add_subcommand("predict", "Evaluate a compensation model on a table of inputs");
   command->footer(
       "Example: invar predict --model result/compensation.yaml --inputs points.csv --output predicted.csv\n"
-      "What a table needs and what comes of it, by the kind of the model:\n"
+      "Columns that a table needs and columns that are written, by the kind of the model:\n"
       "  geometric, components  x, y, z [m] of the machine's axes -> error_x, error_y, error_z and their "
       "sigma_x ...\n"
       "  rotary                 a, b or c [rad, deg] -> error_c, sigma_c [rad]\n"

@@ -196,9 +196,9 @@ void add_replay(CLI::App& program) {
       "         invar replay --domain 71 run.mcap --fast\n"
       "         invar replay deployment/xy-table.yaml out/xy-table/recording.mcap --into motion\n"
       "Ctrl-C ends it. Topics that somebody writes now are refused, unless --beside is given.\n"
-      "--into runs a process's components again in simulated time, without DDS, on what they were fed, and "
-      "compares\n"
-      "what they write with what was recorded; the recording must be one of simulated time.\n"
+      "--into runs the components of a process again in simulated time, without DDS, on their recorded "
+      "inputs.\n"
+      "It compares their outputs with the recorded ones. The recording must be one of simulated time.\n"
       "Exit status: 0; 1 a topic is written already, samples were refused, or outputs differ; 2 a fault of "
       "the call or the "
       "file");

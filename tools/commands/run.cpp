@@ -123,14 +123,12 @@ void add_run(CLI::App& program) {
       "Example: invar run deployment/xy-table.yaml --job calibrate-geometry\n"
       "The progress of a job goes to the error output: one line kept current on a terminal, else one at each "
       "change.\n"
-      "Ctrl-C stops the cell: all that moves comes to rest first, then process by process in the order of "
-      "the "
+      "Ctrl-C stops the cell: every axis makes a controlled stop, then the processes end in the order of the "
       "file.\n"
       "Notices of the cell, from warning up, go to the error output, a line each.\n"
-      "Exit status: 0 all was well at the end; 1 it was not: a job failed, a process ended by itself, an "
-      "axis "
-      "was in\n"
-      "fault, a heater latched, a device silent, a model refused, a recording cut; 2 the file has faults");
+      "Exit status: 0 all was well at the end; 2 the file has faults; 1 otherwise: a job failed, a process "
+      "ended by\n"
+      "itself, an axis was in fault, a heater latched, a device silent, a model refused, or a recording cut");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");

@@ -358,7 +358,7 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
 }
 
 void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
-  page.heading("What was considered and why it is not claimed");
+  page.heading("Considered and not claimed");
   if (!d.not_tried.empty()) page.paragraph(why_ended(d) + " before all was tried. " + not_tried(d) + ".");
   Names considered;
   for (const auto& finding : d.findings)
@@ -467,7 +467,7 @@ std::string page_text(const Case& data, const Diagnosis& d, const std::string& s
         "believed could pass for. Twice as much is seen.");
   }
   add_assumed(page, data, d);
-  page.heading("What remains, and what to do next");
+  page.heading("Remaining mismatch and next steps");
   std::string with;
   for (const auto& one : d.unexplained_over) with += (with.empty() ? ", and goes with " : ", ") + one;
   page.paragraph("After all that, the residual on held-out data is " + number(d.unexplained, 3) +

@@ -206,7 +206,7 @@ report::Page report_page(const GeometricResult& result) {
   report::show(page, left_out);
   page.heading("Machine");
   write_machine(page, result);
-  page.heading("What the lines tell and what they leave open");
+  page.heading("Identified and unidentified error motions");
   write_knowledge(page, result);
   page.heading("Lines");
   write_lines(page, result);

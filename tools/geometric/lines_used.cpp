@@ -108,7 +108,7 @@ report::LeftOut lines_used(const metrology::Identification& found, const LinesFi
                       {count(input.far_off), "a hundredth of the line off, not in the error over all"},
                       {sums.outliers, "outliers"},
                       {sums.in_bad_points, "at points that do not fit their neighbours"},
-                      {elsewhere, "of lines that were left out, or between the intervals"}};
+                      {elsewhere, "on lines that were left out, or between the intervals"}};
   left_out.rms_used = report::rms_of(sums.used);
   left_out.rms_all = report::rms_of(sums.all);
   if (found.misfit > found.noise)

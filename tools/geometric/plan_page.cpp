@@ -99,7 +99,7 @@ void write_instructions(report::Page& page, const MeasuringPlan& plan) {
       "Positions are commanded ones in the machine's frame, without compensation. The reflector stands at " +
       place(tool) + " mm from the reference point of the tool.");
   page.paragraph(
-      "Lay the beam along the way from the first to the last commanded point. What it runs off sideways over "
+      "Lay the beam along the way from the first to the last commanded point. Its sideways offset over "
       "the line shortens the reading: to stay below " +
       si(bearable, "m") + ", at most " + si(std::sqrt(2.0 * length_of(shortest) * bearable), "m") +
       " on the shortest line (" + shortest.name + ") and " +
@@ -141,8 +141,9 @@ void write_expectation(report::Page& page, const MeasuringPlan& plan) {
   std::sort(checks.begin(), checks.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (checks.empty()) return;
   page.paragraph(
-      "Check the result on a line that was not used. Of the usual ones these are the least certain; after "
-      "compensation they should read, from start to end, about this (RMS over the line, beside the noise):");
+      "Check the result on a line that was not used. These of the usual ones are the least certain. "
+      "From start to end they should read about this after compensation (RMS over the line, beside the "
+      "noise):");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < std::min<std::size_t>(3, checks.size()); ++i)
     rows.push_back({checks[i].second->name, place(checks[i].second->from), place(checks[i].second->to),

@@ -83,7 +83,7 @@ void add_kind(report::Page& page, const KindHistory& kind) {
   page.table({"what", "where", "first", "last", "moved", "sigma", "times sigma", "moved, RMS over its places",
               "verdict"},
              rows);
-  page.plots(std::move(plots), "What moved most, less its first value.");
+  page.plots(std::move(plots), "The value that moved most, less its first value.");
 }
 
 }  // namespace

@@ -15,7 +15,12 @@ struct AmplifierLag {
       .plant = Plant::axis,
       .site = "actuator",
       .depends_on = {"current", "frequency", "acceleration", "history"},
-      .parameters = {{{"time_constant", "s", {0.0, 0.1}, Role::amplitude, {2e-4}, "of the current loop"}}},
+      .parameters = {{{"time_constant",
+                       "s",
+                       {0.0, 0.1},
+                       Role::amplitude,
+                       {2e-4},
+                       "time constant of the current loop"}}},
       .description =
           "The current loop has a bandwidth: the motor current follows its command like a first-order lag.",
       .source = "di/dt = (u - i) / time_constant",

@@ -15,8 +15,7 @@ struct DeadZone {
       .plant = Plant::axis,
       .site = "actuator",
       .depends_on = {"current"},
-      .parameters =
-          {{{"width", "A", {0.0, 5.0}, Role::amplitude, {0.01}, "what is lost on each side of zero"}}},
+      .parameters = {{{"width", "A", {0.0, 5.0}, Role::amplitude, {0.01}, "loss on each side of zero"}}},
       .description =
           "Cross-over of the output stage: commands smaller than the width give nothing, larger ones lose "
           "it.",

@@ -23,7 +23,7 @@ struct FlexibleMode {
              Role::shape,
              {60.0, 25.0, 120.0, 220.0},
              "natural frequency of the part on a carriage held fast"},
-            {"damping_ratio", "1", {1e-4, 0.9}, Role::shape, {0.03}, "of that mode"}}},
+            {"damping_ratio", "1", {1e-4, 0.9}, Role::shape, {0.03}, "damping ratio of that mode"}}},
       .description =
           "A part of the moved mass hangs on the carriage by a spring (mounting, cable carrier, tall "
           "structure): it follows late and rings.",

@@ -22,8 +22,8 @@ struct TransportDelay {
       .source = "u(t - delay)",
       .lateness = Lateness::delay,
       .told_apart = {{{"measurement_delay",
-                       "record the position with a second, direct instrument and diagnose with its column, "
-                       "`current` as an input and no controller: a late motor is found again, a late encoder "
+                       "record the position with a second, direct instrument. Diagnose with its column, "
+                       "`current` as an input and no controller. A late motor is found again, a late encoder "
                        "is not"},
                       {"amplifier_lag", experiments::quick}}}};
   static constexpr AxisTermKind kind{.info = &info, .memory = AxisMemory::transport_delay};

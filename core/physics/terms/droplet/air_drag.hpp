@@ -14,8 +14,12 @@ struct AirDrag {
       .plant = Plant::droplet,
       .site = "flight",
       .depends_on = {"height", "velocity"},
-      .parameters =
-          {{{"diameter", "m", {5e-6, 5e-3}, Role::shape, {1e-4, 5e-5, 2e-4}, "of the drop (water)"}}},
+      .parameters = {{{"diameter",
+                       "m",
+                       {5e-6, 5e-3},
+                       Role::shape,
+                       {1e-4, 5e-5, 2e-4},
+                       "diameter of the drop (water)"}}},
       .description =
           "Small drops are braked by the air: they fly longer, and what they carry sideways fades.",
       .source = "Schiller and Naumann 1933: Stokes drag times 1 + 0.15 Re^0.687"};

@@ -14,7 +14,7 @@ struct StageVelocityCarry {
       .plant = Plant::droplet,
       .site = "flight",
       .depends_on = {"velocity", "height"},
-      .parameters = {{{"speed", "m/s", {0.05, 50.0}, Role::shape, {3.0}, "of the drop at the nozzle"}}},
+      .parameters = {{{"speed", "m/s", {0.05, 50.0}, Role::shape, {3.0}, "speed of the drop at the nozzle"}}},
       .description =
           "Printing on the fly, the drop flies on with the stage: it lands velocity times flight time ahead.",
       .source = "shift = velocity height / speed",

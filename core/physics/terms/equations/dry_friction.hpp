@@ -18,8 +18,8 @@ struct DryFriction {
       .parameters = {{{"level", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "size of the rate"}}},
       .description = "Coulomb friction: constant size, against the motion, and it holds at rest.",
       .source =
-          "-level sign(s), or -level sign(ds/dt) with the state itself; at rest whatever holds it, up to the "
-          "level; at an output +level sign(s) of the variable that it goes with",
+          "-level sign(s), or -level sign(ds/dt) with the state itself. At standstill it holds up to the "
+          "level. An output gets +level sign(s) of the variable under `with`",
       .is_friction = true};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::dry_friction};
 };

@@ -16,7 +16,12 @@ struct HiddenState {
       .site = "state",
       .depends_on = {"history"},
       .parameters = {{{"coefficient", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "rate per difference"},
-                      {"time_constant", "*", {1e-9, 1e12}, Role::shape, {1.0, 0.1, 10.0}, "of the store"}}},
+                      {"time_constant",
+                       "*",
+                       {1e-9, 1e12},
+                       Role::shape,
+                       {1.0, 0.1, 10.0},
+                       "time constant of the store"}}},
       .description = "A second store behind the state or on the way of a signal that nobody measures.",
       .source =
           "adds coefficient (z - s), of a state to its rate, of an input or output to itself (then a share); "

@@ -21,7 +21,7 @@ struct Overflow {
                        {0.0, 1e6},
                        Role::shape,
                        {0.5},
-                       "of what runs over that arrives at the other state"}}},
+                       "share of the surplus that arrives at the other state"}}},
       .description = "A full vessel runs over; part of that arrives in the next one.",
       .source = "state held at the limit; share times the surplus rate is added to the other state"};
   static constexpr EquationsTermKind kind{.info = &info, .memory = EquationsMemory::overflow};

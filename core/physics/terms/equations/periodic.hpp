@@ -16,7 +16,7 @@ struct Periodic {
       .site = "state",
       .depends_on = {},
       .parameters = {{{"amplitude", "*", {0.0, 1e300}, Role::amplitude, {0.01}, "size"},
-                      {"period", "*", {1e-9, 1e12}, Role::shape, {1.0}, "of the variable"},
+                      {"period", "*", {1e-9, 1e12}, Role::shape, {1.0}, "period in the variable"},
                       {"phase", "rad", {-7.0, 7.0}, Role::phase, {0.0}, "at zero"}}},
       .description = "Something repeats: teeth, magnets, a pump, the day.",
       .source = "amplitude sin(2 pi s / period + phase)",

@@ -20,7 +20,7 @@ struct HeatingRateLag {
                        {0.0, 1e6},
                        Role::amplitude,
                        {300.0, 30.0, 3000.0},
-                       "of the scale behind the sensor"}}},
+                       "time constant of the scale behind the sensor"}}},
       .description =
           "The thermometer sits elsewhere than the scale: while the machine warms, the expansion that the "
           "thermometer foretells comes later.",

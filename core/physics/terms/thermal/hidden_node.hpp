@@ -14,13 +14,14 @@ struct HiddenNode {
       .plant = Plant::thermal,
       .site = "storage",
       .depends_on = {"history", "temperature", "power", "frequency"},
-      .parameters = {{{"conductance", "W/K", {0.0, 1e4}, Role::amplitude, {0.3}, "of the contact"},
-                      {"capacity",
-                       "J/K",
-                       {0.05, 1e8},
-                       Role::shape,
-                       {1000.0, 200.0, 5000.0, 30.0},
-                       "of the hidden store"}}},
+      .parameters =
+          {{{"conductance", "W/K", {0.0, 1e4}, Role::amplitude, {0.3}, "conductance of the contact"},
+            {"capacity",
+             "J/K",
+             {0.05, 1e8},
+             Role::shape,
+             {1000.0, 200.0, 5000.0, 30.0},
+             "heat capacity of the hidden store"}}},
       .description =
           "A part behind a contact takes up heat while the node warms and gives it back later; nobody "
           "measures it.",

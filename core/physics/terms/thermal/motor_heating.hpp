@@ -19,7 +19,7 @@ struct MotorHeating {
                        {0.0, 1e3},
                        Role::amplitude,
                        {0.2},
-                       "of the winding, as far as its heat comes here"}}},
+                       "resistance of the winding, as far as its heat comes here"}}},
       .description = "The winding turns current into heat, part of which arrives at this node.",
       .source = "Joule: P = resistance I^2",
       .needs = "motor_current"};

@@ -14,8 +14,12 @@ struct SensorLag {
       .plant = Plant::thermal,
       .site = "measurement",
       .depends_on = {"history", "temperature", "power", "frequency"},
-      .parameters =
-          {{{"time_constant", "s", {0.0, 1e4}, Role::amplitude, {2.0}, "of the sensor on its place"}}},
+      .parameters = {{{"time_constant",
+                       "s",
+                       {0.0, 1e4},
+                       Role::amplitude,
+                       {2.0},
+                       "time constant of the sensor on its place"}}},
       .description =
           "The sensor has a heat capacity and sits behind glue or paste: it shows where the node was.",
       .source = "dT_sensor/dt = (T - T_sensor) / time_constant",

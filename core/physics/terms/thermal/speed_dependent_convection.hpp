@@ -16,13 +16,14 @@ struct SpeedDependentConvection {
       .depends_on = {"speed"},
       .parameters =
           {{{"coefficient", "W s/(K m)", {0.0, 1e4}, Role::amplitude, {0.3}, "loss added per speed"},
-            {"exponent", "1", {0.3, 2.0}, Role::shape, {1.0}, "of the speed"},
+            {"exponent", "1", {0.3, 2.0}, Role::shape, {1.0}, "exponent of the speed"},
             {"at_speed", "m/s", {0.0, 1e4}, Role::reference, {0.0}, "at which the coefficient is meant"}}},
       .description = "The moving stage drives air along its surfaces, which carries more heat away.",
       .source =
-          "forced convection: P = coefficient |speed| (|speed| / at_speed)^(exponent - 1) (T - T_amb); the "
+          "forced convection: P = coefficient |speed| (|speed| / at_speed)^(exponent - 1) (T - T_amb). The "
           "exponent is 0.5 in "
-          "laminar and 0.8 in turbulent flow (Incropera, Fundamentals of Heat and Mass Transfer, 7.2), and 1 "
+          "laminar and 0.8 in turbulent flow (Incropera, Fundamentals of Heat and Mass Transfer, 7.2). It is "
+          "1 "
           "over a small range",
       .needs = "speed"};
   static double heat(const ThermalPoint& at, const double* p) {
