@@ -20,7 +20,7 @@ constexpr double settle = 0.5;  // s, at rest before something is measured
 struct Size {
   double rms = 0.0, largest = 0.0;
 };
-/// Of what is left of values when their mean is taken out.
+/// Size of values after their mean is taken out.
 Size size_of(const std::vector<double>& values);
 /// With its unit, for what a job says.
 std::string micrometres(double value);
@@ -30,7 +30,7 @@ std::string micrometres(double value);
 class AxisRunner : public JobComponent {
  protected:
   explicit AxisRunner(const std::int64_t& axis) : axis_{axis} {}
-  /// What a step adds to the record of a motion.
+  /// Adds the row of a step to the record of a motion.
   virtual void take_down(recording::Table& record) = 0;
 
   Task enable();

@@ -31,8 +31,8 @@
 
 namespace invar::calibration {
 
-/// A job is a transaction on the compensation: what it measures, fits and validates is put to use on trial, watched, and kept
-/// only if it makes the error smaller; a job that fails, is cancelled or dies leaves the models as they were.
+/// A job is a transaction on the compensation. Its model is put to use on trial, watched, and kept
+/// only if it makes the error smaller. A job that fails, is cancelled or dies leaves the models as they were.
 class Calibration final : public JobComponent, private JobHost {
  public:
   struct Parameters {

@@ -36,10 +36,10 @@ struct FusionJob : JobSpec {
   }
 };
 
-/// One axis; `model` is its fusion's, `fused` what that says, and each sensor of the fusion has a port `sensor_<name>`, or is the
-/// position or velocity of `feedback`. A model is taken back unless it lessens the error of the runs that were not fitted by more
-/// than chance: by two standard errors over the parts of these runs. Where the observer finds the sensors out by itself while it
-/// runs, a model brings no more than that.
+/// One axis; `model` is the model of its fusion, `fused` the fused position. Each sensor of the fusion has a port
+/// `sensor_<name>`, or is the position or velocity of `feedback`. A model is taken back unless it lessens the error of the runs
+/// that were not fitted by more than chance: by two standard errors over the parts of these runs. Where the observer
+/// identifies the sensors while it runs, a model brings no more than that.
 class FusionTrial final : public AxisRunner {
  public:
   struct Sensor {
@@ -70,7 +70,7 @@ class FusionTrial final : public AxisRunner {
 
  private:
   struct Source;
-  /// What was read at one instant; NaN where nothing was.
+  /// Readings of one instant; NaN where there was none.
   struct Row;
   using Rows = std::map<std::int64_t, Row>;  // by the stamp [ns]
 
@@ -78,7 +78,7 @@ class FusionTrial final : public AxisRunner {
   void take_down(recording::Table& record) override;
   Task run(const FusionJob& job);
   Task swing(const FusionJob& job, double period);
-  /// What sinusoids that are not fitted showed.
+  /// Results of sinusoids that were not fitted.
   struct Verified {
     Size fused, tracked;  // errors by the laser: of the fused position, and of the axis that follows it
     std::vector<double>

@@ -23,7 +23,7 @@ class JobHost {
   virtual Task enable_axes() = 0;
   /// Straight to `target`, where the axes take the pace, and settled there, or std::runtime_error.
   virtual Task move_to(Eigen::Vector3d target, Pace pace) = 0;
-  /// What the job does now; its share of the whole.
+  /// Reports the present activity of the job and its share of the whole.
   virtual void tell(const std::string& text, double progress) = 0;
   /// A number for a command, never given before.
   virtual std::uint64_t next_id() = 0;

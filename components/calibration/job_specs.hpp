@@ -1,4 +1,4 @@
-// What the jobs of a calibration measure, as the cell file says it.
+// Measurements of the jobs of a calibration, as the cell file states them.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,7 +15,7 @@
 
 namespace invar::calibration {
 
-/// What every job says.
+/// Parameters of every job.
 struct JobSpec {
   std::string name;
   std::string out = "out";
@@ -124,8 +124,8 @@ struct TraceSpec {
   }
 };
 
-/// The error of one axis over position and temperature as a transaction: a line is read at room temperature and again and
-/// again while the heater follows a trace; the model is then compared with that of room temperature at points and
+/// The error of one axis over position and temperature as a transaction. A line is read at room temperature, and repeatedly
+/// while the heater follows a trace. The model is then compared with that of room temperature at points and
 /// temperatures that were not fitted.
 struct ThermalJob : JobSpec {
   LineSpec line;

@@ -18,7 +18,7 @@ class LoopWatch {
   void take(const stage::AxisState& state);
   /// Why the motion is worth nothing, with the figure; nothing: it is sound.
   [[nodiscard]] std::optional<std::string> fault() const;
-  /// What to add to the news that it tripped or does not settle: "; <figures>", or "".
+  /// Addition to the notice that the loop tripped or does not settle: "; <figures>", or "".
   [[nodiscard]] std::string figures() const;
 
  private:

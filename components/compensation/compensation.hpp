@@ -21,16 +21,22 @@
 
 namespace invar::compensation {
 
-/// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers: the geometric model, grown to the slide's
-/// temperature where its calibration found an expansion (or error motions measured one by one, which may depend on
-/// temperatures), with half the reversal of each axis to the side that it last moved from, and for each axis a model over position and temperature of what the geometric one leaves.
+/// correction = -e(P - e(P)) at the axes' setpoints P; e is the sum of the layers:
+///
+/// - the geometric model, expanded to the slide's temperature where its calibration found an expansion, or error motions
+///   measured one by one, which may depend on temperatures; with half the reversal of each axis to the side that it last
+///   moved from;
+/// - for each axis a model over position and temperature of the error that the geometric one leaves.
 ///
 /// A model is staged (loaded, checked and compiled by a thread of its own, never by the loop), activated and rolled back by
-/// command. What a change would make the correction jump is eased in at `rate_limit`. Changes made in a transaction are
+/// command. A change of models is blended in at `rate_limit`. Changes made in a transaction are
 /// taken back when their owner falls silent. A model that is corrupt, of another machine or beyond the bounds is refused and
-/// the last good one holds. What is in use outside a transaction is kept in the folder `state` and used again at the next start,
-/// before the models that the cell file names; a kept model that is corrupt or of another machine is refused. Temperatures outside what was calibrated hold the end value; when they are stale the last one
-/// holds, and after `temperature_hold` the layer is taken out. All of it shows in the status and as notices. Real-time.
+/// the last good one holds.
+///
+/// Models in use outside a transaction are kept in the folder `state` and used again at the next start, before the models that
+/// the cell file names. A kept model that is corrupt or of another machine is refused. Temperatures outside the calibrated
+/// range hold the end value. When they are stale the last one holds, and after `temperature_hold` the layer is taken out. The
+/// status and notices say so. Real-time.
 class Compensation final : public Component {
  public:
   struct Parameters {
@@ -123,7 +129,7 @@ class Compensation final : public Component {
   [[nodiscard]] bool is_used(const LiveModel* thermal) const noexcept {
     return thermal != nullptr && (!thermal->by_temperature || has_temperature());
   }
-  /// Changes what the layers give without a step in the correction: the difference is eased in.
+  /// Changes the layers without a step in the correction: the difference is blended in.
   template <class Change>
   void ease(Change change) noexcept {
     const Eigen::Vector3d was = wanted(setpoint_).sum();

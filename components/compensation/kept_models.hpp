@@ -12,8 +12,8 @@
 
 namespace invar::compensation {
 
-/// The folder holds a copy of each model, its checksum in its name, and `models.yaml`, sealed, which lists those in use. That
-/// list is renamed into place after the copies, so a cut of power leaves either the old models or the new ones. Writing
+/// The folder holds a copy of each model, its checksum in its name, and `models.yaml`, with a checksum, which lists those in use.
+/// That list is renamed into place after the copies, so a cut of power leaves either the old models or the new ones. Writing
 /// is left to a thread of the owner's, never done in the loop (in simulated time at once, so that runs repeat).
 class KeptModels {
  public:
@@ -38,7 +38,7 @@ class KeptModels {
   void open(const std::filesystem::path& folder) { folder_ = folder; }
   /// Real-time where time is real.
   void keep(const Selection& models) noexcept;
-  /// What the loop left to be kept, if anything. On one thread, while the models stand. Not real-time.
+  /// Keeps the models that the loop left, if any. On one thread, while the models stand. Not real-time.
   void write_waiting() noexcept;
   /// True once after models could not be written. Real-time.
   [[nodiscard]] bool failed() noexcept { return failed_.exchange(false); }

@@ -15,7 +15,7 @@
 
 namespace invar::compensation {
 
-/// What a model must keep to, to be allowed to move the machine.
+/// Limits of a model that may move the machine.
 struct ModelLimits {
   int axes = 2;
   std::optional<metrology::Machine>
@@ -29,7 +29,7 @@ struct ModelLimits {
 /// Kept until the component is cleaned up, so that the loop may hold a plain pointer. `refusal` says why the loop must not
 /// use it; empty: it is sound, and one of `geometric`, `components` and `thermal` is there.
 struct LiveModel {
-  /// Of the temperatures that the loop knows, or their rate.
+  /// Source of a state: a temperature that the loop knows, or its rate.
   enum class Source { temperature, heating_rate, zone };
   struct State {
     Source source = Source::temperature;
@@ -49,13 +49,13 @@ struct LiveModel {
   std::optional<metrology::ErrorMotionTables> components;  // in the place of `geometric`
   std::vector<State> states;                               // of `components`, in its order
 
-  /// Of the whole machine, not of an axis.
+  /// True for a model of the whole machine, not of an axis.
   [[nodiscard]] bool is_volumetric() const noexcept { return geometric || components; }
   /// [m], of a volumetric model, without its expansion. Real-time, as the others.
   [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position) const noexcept {
     return components ? components->error(position) : geometric->error(position);
   }
-  /// What the sense of each axis' last motion adds to it: `moving` +1, -1, or 0 for the mean.
+  /// Error by the direction of each axis' last motion: `moving` +1, -1, or 0 for the mean.
   [[nodiscard]] Eigen::Vector3d reversal(const Eigen::Vector3d& position,
                                          const Eigen::Vector3d& moving) const noexcept {
     return components ? components->model().reversal_at(position, moving)

@@ -22,11 +22,11 @@
 namespace invar::dispenser {
 
 /// The slow half of a dispenser, for a worker; `valve` in the motion loop is the fast one. Keeps pressure and purge pressure at
-/// their setpoints, lets go of both on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
-/// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use
-/// (compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet; a StagedModel as the stage's is). Not
-/// real-time (Modbus). It lets go, too, while the pressure that the controller shows cannot be (outside the range of its register)
-/// and while the controller refuses writes, and says so in notices.
+/// their setpoints, switches both off on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
+/// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use:
+/// compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet, as a StagedModel. It also switches off
+/// while the pressure that the controller shows is impossible (outside the range of its register) and while the controller
+/// refuses writes, and says so in notices. Not real-time (Modbus).
 class Dispenser final : public Component {
  public:
   struct Parameters {
@@ -56,7 +56,7 @@ class Dispenser final : public Component {
     }
   };
 
-  /// What its device's map must and may hold.
+  /// Registers that its device's map must and may hold.
   static const modbus::RegisterContract& registers();
   explicit Dispenser(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
@@ -81,7 +81,7 @@ class Dispenser final : public Component {
   void drive(const Line& line, double setpoint, bool open) noexcept;
   [[nodiscard]] bool is_open(const Line& line, bool told) const;
   void publish() noexcept;
-  /// What a command or parameter may ask for [Pa].
+  /// Range of setpoints by command or parameter [Pa].
   static constexpr Range settable{1.0, 7e5};
 
   const Parameters& parameters_;

@@ -15,10 +15,10 @@
 
 namespace invar::dispenser {
 
-/// Holds a pattern and, while armed, gives the valve's driver a pulse for every point that the nozzle passes, at the time of
-/// its passage interpolated inside the cycle and earlier by what the stage's velocity carries a droplet on. Positions are
-/// those of the machine: encoder minus the compensation's correction. Each point is jetted once or refused once; everything
-/// happens only in state active, with a fresh pressure in band, a stage that is ready, and inside the windows below. Runs in the
+/// Holds a pattern and, while armed, commands a valve pulse for every point that the nozzle passes. The time of passage is
+/// interpolated inside the cycle. The pulse comes earlier by the droplet's lead (velocity carry and delay). Positions are
+/// those of the machine: encoder minus the compensation's correction. Each point is jetted once or refused once. Pulses are
+/// given only in state active, with a fresh pressure in band, a stage that is ready, and inside the windows below. Runs in the
 /// motion loop. Real-time.
 class Valve final : public Component {
  public:

@@ -19,10 +19,11 @@
 
 namespace invar::fusion {
 
-/// Runs the estimator of a model that `invar calibrate fusion` made, also one that it is given while it runs; without a model
-/// the structured observer of the sensors as they are described here. Each sensor has a port `sensor_<name>`, or is the position or velocity of `feedback`. A
-/// sensor may have a rate of its own. One that is missing or late is left out after `patience`, one that jumps at once, one
-/// that dies or sticks as FusionObserver says; the fused position makes no step meanwhile. Real-time.
+/// Runs the estimator of a model that `invar calibrate fusion` made, also one that it is given while it runs. Without a model
+/// it runs the structured observer of the sensors as they are described here. Each sensor has a port `sensor_<name>`, or is
+/// the position or velocity of `feedback`. A sensor may have a rate of its own. One that is missing or late is left out after
+/// `patience`, one that jumps at once, one that dies or sticks as FusionObserver says. The fused position makes no step
+/// meanwhile. Real-time.
 class Fusion final : public Component {
  public:
   struct Sensor {

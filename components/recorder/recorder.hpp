@@ -26,9 +26,9 @@ struct Source {
 };
 
 /// Writes samples as they travel, in CDR. The process that runs it knows the cell's topics and hands the samples over:
-/// `is_wanted` says which, `record` takes one. A disk that takes no more is an error of the component, and so is
-/// one whose free space falls to the reserve: the recording ends whole, and black boxes still find room. What is lost because it
-/// is slower than the cell is said in a notice, at most every ten seconds. Not real-time.
+/// `is_wanted` selects topics, `record` takes a sample. A full disk is an error of the component, and so is
+/// one whose free space falls to the reserve: the recording ends whole, and black boxes still find room. A notice, at most every
+/// ten seconds, says how many samples are lost because the recorder is slower than the cell. Not real-time.
 class Recorder final : public Component {
  public:
   struct Parameters {

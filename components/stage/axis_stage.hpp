@@ -25,12 +25,14 @@ namespace invar::stage {
 
 /// Reads feedback, follows the trajectory of the last command with a PID or cascade law and feedforward, and writes the
 /// motor's current. The servo works on the corrected setpoint (setpoint plus the compensation's correction). A model.yaml of
-/// the axis, as `invar diagnose` writes it, may be loaded, also while running: then its forces, those of its terms included,
-/// are what is fed forward, and what its encoder terms know is taken out of the reading.
-/// Safe value: motor not enabled. Feedback or a fused position that is stale or no number: it brakes on feedforward; a correction
-/// that stays away: it brakes; then it lets go or holds (`on_lost_input`). A limit switch that closes brakes it, and only moves
-/// away from it are taken. Following error and a fault of the drive trip it at once. A notice says why. To be disabled or
-/// deactivated, it brakes first; deactivated while it still moves it says in a notice how fast.
+/// the axis, as `invar diagnose` writes it, may be loaded, also while running. Then its forces, with those of its terms, are
+/// fed forward, and the errors of its encoder terms are taken out of the reading.
+///
+/// Safe value: motor not enabled. If feedback or a fused position is stale or no number, the axis brakes on feedforward. If a
+/// correction stays away, it brakes. Then the drive is disabled or the axis holds (`on_lost_input`). A limit switch that closes
+/// brakes the axis, and only moves away from the switch are taken. Following error and a fault of the drive trip it at once. A
+/// notice gives the reason. Before it is disabled or deactivated the axis brakes; if it still moves then, a notice states its
+/// speed.
 class Stage final : public Component {
  public:
   struct Control {
@@ -111,7 +113,7 @@ class Stage final : public Component {
 
   explicit Stage(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;
-  /// A loop that swings up at this rate, by the inertia that it is fed forward or that its model tells.
+  /// A loop that is unstable at this rate, by the inertia that it is fed forward or that its model states.
   [[nodiscard]] std::optional<Unfit> unfit(double period) const override;
   /// False where nobody says what the motor moves, so that `unfit` cannot know. Set-up.
   [[nodiscard]] bool gains_can_be_checked() const { return inertia().has_value(); }
@@ -192,7 +194,7 @@ class Stage final : public Component {
   bool in_vain_ = false;             // the stop under way ends the command as refused
   double standing_current_ = 0.0;    // of the controller, while it holds
   bool leaving_ = false;             // to be deactivated: it brakes and takes no commands
-  bool disabling_ = false;           // told to let go of the motor: it brakes first
+  bool disabling_ = false;           // told to disable the drive: it brakes first
   std::optional<Instant> seen_;      // when feedback that is usable came last
   double offset_ = 0.0;              // what homing adds to the encoder's reading
   double position_ = 0.0;

@@ -48,9 +48,10 @@ struct HomingParameters {
   }
 };
 
-/// Decides, once a period, what an axis that seeks its home does next. It finds the switch, leaves it by `margin`, over which it
-/// must be open (first of all where it is closed at the start), and takes its edge twice at `creep` from there; the two must agree. A limit that closes, a way longer than travel
-/// and margin, a switch, pulse or stop that does not do what it must: each ends it with a reason. Real-time.
+/// Decides, once a period, the next motion of an axis that seeks its home. It finds the switch and leaves it by `margin`, over
+/// which the switch must be open (first of all where it is closed at the start). From there it takes the edge twice at
+/// `creep`; the two must agree. A limit that closes, a way longer than travel and margin, or a switch, pulse or stop that
+/// does not work ends the homing with a reason. Real-time.
 class Homing {
  public:
   struct Settings {

@@ -19,7 +19,7 @@ class InputWatch {
     since_ = 0;
     return false;
   }
-  /// What came before says nothing of what comes from now on.
+  /// Forgets the past: earlier samples say nothing of later ones.
   void reset(std::uint64_t received) noexcept {
     *this = {};
     received_ = received;

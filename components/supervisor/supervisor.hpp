@@ -13,7 +13,7 @@
 
 namespace invar::supervisor {
 
-/// What the supervisor sees of the cell, and what it may do; the process that runs it connects it to the middleware.
+/// The supervisor's view of the cell and its means; the process that runs it connects it to the middleware.
 struct CellView {
   struct Seen {
     std::string failure;  // of a component in error; empty otherwise
@@ -30,7 +30,7 @@ struct CellView {
   std::map<std::string, std::vector<std::string>> dependents;  // component -> those that need its outputs
 };
 
-/// A process that is not heard of for `timeout`, or a component in error: everything that needs its outputs, directly
+/// On a process that is not heard of for `timeout`, or a component in error, everything that needs its outputs, directly
 /// or through others, is deactivated, downstream first, and notices say so. The devices' own watchdogs and the
 /// components' deadlines have acted long before; this keeps the rest of the cell from going on as if nothing were.
 /// A step that comes later than half of `timeout` after the one before begins all waiting anew.

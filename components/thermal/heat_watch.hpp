@@ -8,9 +8,9 @@
 namespace invar::thermal {
 
 /// Balances the heat given [J] against the warming read [K], through power below full, link drops and changes of setpoint.
-/// Three doubts: heat beyond what holding may take has not warmed the reading by `rise`; the reading is bit for bit the same
-/// while as much heat was given as `rise` needs at the most; the reading leapt as no slide does. The first two come before the
-/// heat exceeds that of full power for `within`, counted from the last proof that the thermistor follows. Real-time.
+/// There are three doubts. Heat beyond the need of holding has not warmed the reading by `rise`. The reading is bit for bit the
+/// same while as much heat was given as `rise` needs at the most. The reading leapt as no slide does. The first two come before
+/// the heat exceeds that of full power for `within`, counted from the last proof that the thermistor follows. Real-time.
 class HeatWatch {
  public:
   struct Settings {

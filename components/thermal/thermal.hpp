@@ -20,13 +20,19 @@
 
 namespace invar::thermal {
 
-/// PID with anti-windup from the slide's thermistor to the pad's power. The heater is let go when readings are stale or outside
-/// the range of their register or of `measurable`, when the device reports a faulty sensor (register `sensor_fault`, where its map has
-/// one) or refuses writes - its own watchdog then switches it off too - and when the latch trips: at `over_temperature`, or when
-/// the device latches at a limit of its own (register `over_temperature`), or when the heat given does not show in the temperature
-/// (`response`: a thermistor that came off or froze, a pad that is dead or too weak), however interrupted. It holds until a command resets it, and the device
-/// with it (register `reset_alarms`). A controller that delivers power though it was told to be off is said, too. Each of these is said once in a notice, and once when it is over. A command whose setpoint is
-/// no number, outside the parameter's range or not below `over_temperature` can only switch off. Not real-time (Modbus).
+/// PID with anti-windup from the slide's thermistor to the pad's power. The heater is switched off in these cases:
+///
+/// - readings are stale, or outside the range of their register or of `measurable`;
+/// - the device reports a faulty sensor (register `sensor_fault`, where its map has one) or refuses writes: its own watchdog
+///   then switches it off too;
+/// - the latch trips: at `over_temperature`, or when the device latches at a limit of its own (register `over_temperature`);
+/// - the latch trips when the heat given, however interrupted, does not show in the temperature (`response`): a thermistor
+///   that came off or froze, a pad that is dead or too weak.
+///
+/// The latch holds until a command resets it, and the device with it (register `reset_alarms`). A notice also names a
+/// controller that delivers power though it was told to be off. Each of these is said once in a notice, and once when it is
+/// over. A command whose setpoint is no number, outside the parameter's range or not below `over_temperature` can only switch
+/// off. Not real-time (Modbus).
 class Thermal final : public Component {
  public:
   struct Pid {
@@ -114,7 +120,7 @@ class Thermal final : public Component {
     }
   };
 
-  /// What its device's map must and may hold; of a zone `slide` is the zone's name.
+  /// Registers that its device's map must and may hold; those of a zone have the zone's name for `slide`.
   static const modbus::RegisterContract& registers();
   explicit Thermal(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override;

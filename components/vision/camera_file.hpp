@@ -9,7 +9,7 @@
 
 namespace invar::vision {
 
-/// Throws InputError for what is missing or wrong, and where the file's checksum does not fit its text. Of model `scale` only
+/// Throws InputError for a missing or wrong key, and where the file's checksum does not fit its text. Of model `scale` only
 /// `scale` is required. A pinhole camera needs the plane that it looks at: its file's, or one straight below it at `distance`
 /// [m] (0: none is given).
 CameraModel read_camera(const std::filesystem::path& file, double distance = 0.0);

@@ -40,7 +40,7 @@ struct Droplets {
 /// 8-bit grey from any image that OpenCV reads: colour by its luminance, 16 bits scaled to the image's range.
 cv::Mat gray(const cv::Mat& image);
 
-/// What is known beforehand; all of it is found out otherwise.
+/// Facts known beforehand; all of them are found out otherwise.
 struct MeasureOptions {
   int polarity = 0;           // +1 light drops, -1 dark ones; 0: not known
   double least_radius = 0.0;  // px; smaller drops are satellites, also below 0.55 of the typical radius

@@ -38,7 +38,7 @@ class FrameCamera : public Component {
     Pixels pixels;
     Instant at;  // middle of the exposure
   };
-  /// A picture that is wanted now; false: there is none. What it throws takes the component to error.
+  /// Takes a picture that is wanted now; false: there is none. An exception takes the component to error.
   virtual bool take_picture(const Tick& tick, std::uint64_t number, Picture& picture) = 0;
   /// Every step: takes what came.
   virtual void watch() {}

@@ -13,7 +13,7 @@ struct ImageHeader {
   [[nodiscard]] std::uint64_t bytes() const { return width * height * pixel_bytes; }
 };
 
-/// Of PNG, JPEG, TIFF, BMP and PGM (and its kin PBM, PPM). Nothing where it is none of them, or its head is cut or says no size.
+/// Header of PNG, JPEG, TIFF, BMP and PGM (also PBM, PPM). Empty for another format, or a header that is cut or states no size.
 std::optional<ImageHeader> image_header(std::span<const unsigned char> file);
 
 }  // namespace invar::vision

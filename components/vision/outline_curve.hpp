@@ -21,7 +21,7 @@ const Directions& directions(int count);
 
 double radius_at(const Shape& shape, const Directions& directions, std::size_t ray);
 
-/// Of the first `count` values, which are reordered; of every other one where there are many.
+/// Median of the first `count` values, which are reordered; of every other one where there are many.
 double median_of(Values& values, int count);
 
 /// The largest size among the first `count` values (a multiple of 16).

@@ -1,4 +1,4 @@
-// What the image shows along rays, eight of them side by side, and their products with an edge filter: the inner loops of
+// Samples of the image along rays, eight of them side by side, and their products with an edge filter: the inner loops of
 // every outline.
 #pragma once
 
@@ -50,7 +50,7 @@ struct RayProducts {
   Lanes square;
 };
 
-/// What a drop's rays have in common, and where each has its edge.
+/// Properties common to the rays of a drop, and the edge of each.
 struct EdgeRule {
   std::array<float, 3> inside, outside;  // slopes [1/px]: constant, cosine, sine
   float polarity, least, most;           // what the height of a sound edge lies between, times polarity

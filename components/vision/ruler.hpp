@@ -32,14 +32,14 @@ struct RulerFit {
   std::vector<RulerCircle> circles;  // in the order of the radii that were given
 };
 
-/// What was found instead, where the picture does not show what the ruler says.
+/// Findings where the picture does not show the circles of the ruler.
 struct RulerFailure {
   std::string what;
 };
 
-/// `radii`: of every circle [m], any order of size. Circles are matched by their size. All edges are fitted at once:
-/// scale, radial distortion about the middle of the image, aspect and an offset common to all outlines are free together
-/// with every circle's centre; each of the three effects stays in only where it is beyond 3.5 standard deviations.
+/// `radii`: of every circle [m], any order of size. Circles are matched by their size. All edges are fitted at once. Free
+/// together are scale, radial distortion about the middle of the image, aspect, an offset common to all outlines, and every
+/// circle's centre. Each of the three effects stays in only where it is beyond 3.5 standard deviations.
 /// `image`: CV_8UC1.
 std::optional<RulerFit> calibrate_ruler(const cv::Mat& image, const std::vector<double>& radii,
                                         RulerFailure& failure);

@@ -1,4 +1,4 @@
-// What a rendered picture shows: drops, scratches, light, lens, noise.
+// Content of a rendered picture: drops, scratches, light, lens, noise.
 #pragma once
 
 #include <cstdint>

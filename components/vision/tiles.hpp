@@ -53,7 +53,7 @@ struct TileRows {
 /// The sum of the pixels of each tile.
 void sum_tiles(const TileRows& rows, float* sums);
 
-/// Of each tile, the sum and the count of the pixels beyond the threshold along the tile's middle: above it, or below.
+/// Sum and count of the pixels of each tile beyond the threshold along the tile's middle: above it, or below.
 enum class Beyond { above, below };
 void sum_beyond(const TileRows& rows, const std::uint8_t* threshold, Beyond side, float* sums, float* counts);
 

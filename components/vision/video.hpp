@@ -13,7 +13,7 @@ class Video {
   virtual ~Video() = default;
   /// Waits for the next picture, grey of 8 bits. False: there is none any more.
   virtual bool read(Pixels& pixels) = 0;
-  /// Of a file [Hz].
+  /// Rate of a file [Hz].
   [[nodiscard]] virtual double rate() const = 0;
 };
 

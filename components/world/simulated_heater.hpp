@@ -55,7 +55,7 @@ class SimulatedHeater final : public Component {
       p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
     }
   };
-  /// What its map must and may hold.
+  /// Registers that its map must and may hold.
   static const modbus::RegisterContract& registers();
   explicit SimulatedHeater(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override {
@@ -70,7 +70,7 @@ class SimulatedHeater final : public Component {
  private:
   enum Node : std::size_t { pad, slide, base };
   void publish(Output<thermal::NodeTemperature>& output, Node node) noexcept;
-  /// What masters wrote to the register, or `otherwise` where the map has none.
+  /// Value that masters wrote to the register, or `otherwise` where the map has none.
   [[nodiscard]] double written(const char* reg, double otherwise) const;
   void show(const char* reg, double value);
   [[nodiscard]] double power_scale(const char* reg) const;

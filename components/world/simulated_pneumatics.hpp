@@ -16,7 +16,7 @@
 namespace invar::world {
 
 /// Serves the register map on a TCP port of its own. The regulator follows its setpoint with a lag, as far as the supply
-/// reaches, and vents when it is not enabled: by its owner, by the device's own watchdog when the owner is gone, or by the
+/// reaches. It vents when it is not enabled: by its owner, by the device's own watchdog when the owner is gone, or by the
 /// latched over-pressure alarm. The reservoir's true pressure is the port `actual`. Registers that the map lacks are not played.
 class SimulatedPneumatics final : public Component {
  public:
@@ -44,7 +44,7 @@ class SimulatedPneumatics final : public Component {
       p(seed, "seed", 0, 1'000'000'000, "seed of the noise");
     }
   };
-  /// What its map must and may hold.
+  /// Registers that its map must and may hold.
   static const modbus::RegisterContract& registers();
   explicit SimulatedPneumatics(const Parameters& parameters);
   [[nodiscard]] std::vector<Claim> claims() const override {
@@ -57,7 +57,7 @@ class SimulatedPneumatics final : public Component {
   void step(const Tick& tick) noexcept override;
 
  private:
-  /// What masters wrote to the register, or `otherwise` where the map has none.
+  /// Value that masters wrote to the register, or `otherwise` where the map has none.
   [[nodiscard]] double written(const char* reg, double otherwise) const;
   void show(const char* reg, double value);
 

@@ -14,8 +14,8 @@
 
 namespace invar::world {
 
-/// Reads the true motion of an axis through the physics terms of instruments (latency, loss of gain at speed, play, pitch
-/// error, bias), adds uniform noise in parts of its largest reading, as the thesis does, rounds to its resolution, and
+/// Reads the true motion of an axis through the physics terms of instruments: latency, gain compression, play, pitch error,
+/// bias. Adds uniform noise in parts of its largest reading, as the thesis does, rounds to its resolution, and
 /// fails when it is told to. A sensor with an interval of its own is silent between its readings. Real-time.
 class SimulatedSensor final : public Component {
  public:

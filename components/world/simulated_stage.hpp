@@ -21,10 +21,10 @@
 
 namespace invar::world {
 
-/// Integrates one physics::AxisPlant an axis of the machine file's chain, and carries the carriages' positions to the tool by
-/// the machine's hidden geometric errors (exact transforms) and by what the heat of slide and base does to it. Every axis `a`
+/// Integrates one physics::AxisPlant for each axis of the machine file's chain. The machine's hidden geometric errors (exact
+/// transforms) and the heat of slide and base carry the carriages' positions to the tool. Every axis `a`
 /// has the ports `motor_a`, `feedback_a` and `index_a`, and `truth_a` for simulated sensors. Its carriage ends at hard stops.
-/// The drive lets go of the motor when its command is older than the watchdog, as real drives do.
+/// The drive is disabled when its command is older than the watchdog, as real drives do.
 class SimulatedStage final : public Component {
  public:
   struct Axis {

@@ -15,9 +15,9 @@
 namespace invar::world {
 
 /// Each pulse of the valve becomes a droplet that leaves the true tool position of its instant and lands by the terms of
-/// core/physics (valve delay, carry by the stage, pressure, slow loss of speed, air drag, crosswind), with the head's tilt,
-/// placement error, scatter and satellites. Its volume grows with the on-time beyond what the valve needs to open, and with
-/// the root of the pressure: 0.619 mm at 180 us and 9.75 psi, 0.664 mm at 200 us and 10 psi (thesis, table 5.1).
+/// core/physics: valve delay, carry by the stage, pressure, slow loss of speed, air drag, crosswind. The head adds tilt,
+/// placement error, scatter and satellites. The volume grows with the on-time beyond the time that the valve needs to open, and
+/// with the root of the pressure: 0.619 mm at 180 us and 9.75 psi, 0.664 mm at 200 us and 10 psi (thesis, table 5.1).
 class SimulatedSubstrate final : public Component {
  public:
   struct Parameters {

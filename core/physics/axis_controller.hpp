@@ -17,9 +17,10 @@ struct AxisControllerSettings {
   double limit = 0.0;  // [A], of the output; not positive: none
 };
 
-/// pid: e = r - y; d[k] = d[k-1] + a ((e[k]-e[k-1]) rate - d[k-1]), a = 1 - exp(-2 pi f / rate);
-/// u = clamp(kp e + ki sum(e)/rate + kd d), the sum with e[k], which is not added where u clamps.
-/// cascade: u = clamp(kv (kp e - v)), v the same filtered backward difference of y. At rest e[-1] = e[0].
+/// pid: e = r - y, `d[k] = d[k-1] + a ((e[k]-e[k-1]) rate - d[k-1])`, `a = 1 - exp(-2 pi f / rate)`,
+/// `u = clamp(kp e + ki sum(e)/rate + kd d)`. The sum includes e[k], which is not added where u clamps.
+///
+/// cascade: `u = clamp(kv (kp e - v))`, v the same filtered backward difference of y. At rest e[-1] = e[0].
 /// Real-time.
 class AxisController {
  public:

@@ -36,7 +36,7 @@ class AxisFeedforward {
     return plant_.force(at, direction);
   }
   void follow(double position) noexcept { plant_.follow(position); }
-  /// What the encoder shows too much at this reading [m].
+  /// Excess of the encoder at this reading [m].
   [[nodiscard]] double reading_error(double reading) const noexcept;
   /// By how much earlier the motor wants its current [s]: its delay and lag.
   [[nodiscard]] double lead() const noexcept { return lead_; }

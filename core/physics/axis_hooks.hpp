@@ -1,5 +1,4 @@
-// What a term may do to an axis: push it, change its motor, its command, its friction, its reading, or its
-// state.
+// Actions of a term on an axis: on its force, its motor, its command, its friction, its reading, or its state.
 #pragma once
 
 #include "core/physics/term.hpp"

@@ -15,8 +15,8 @@ struct AxisParameters {
   double viscous_damping = 0.0;  // [N s/m]
 };
 
-/// What the curve of an `unmodelled` force is: a force [N], dry friction [N] against the motion, damping [N s/m], or moved
-/// mass [kg] that comes and goes; of an `unmodelled` actuator: a current [A] that is added to the command.
+/// Meaning of the curve of an `unmodelled` force: a force [N], dry friction [N] against the motion, damping [N s/m], or moved
+/// mass [kg] that comes and goes. The curve of an `unmodelled` actuator is a current [A] that is added to the command.
 enum class CurveActs { as_force, as_friction, as_damping, as_mass, as_current };
 
 /// A term with its numbers, in the order of its info.
@@ -27,12 +27,13 @@ struct AxisTerm {
   CurveActs acts = CurveActs::as_force;
 };
 
-/// The truth side of an axis: `world` steps one at the loop's rate, `simulate` one for each recording. The
-/// order of things from command to reading: additive disturbance and dead zone, transport delay, amplifier
-/// lag, motor (saturation, ripple), carriage (forces, dry friction, flexible mode), then backlash,
-/// measurement delay and encoder error. Integration: classical Runge-Kutta in short sub-steps between
-/// switching events; standstill, breakaway and reversal are found as events, delay and lag are exact,
-/// bristles follow the way travelled and so are never stiff. Repeatable bit for bit.
+/// The truth side of an axis: `world` steps one at the loop's rate, `simulate` one for each recording. The order from command
+/// to reading: additive disturbance and dead zone, transport delay, amplifier lag, motor (saturation, ripple), carriage
+/// (forces, dry friction, flexible mode), backlash, measurement delay, encoder error.
+///
+/// Integration: classical Runge-Kutta in short sub-steps between switching events. Standstill, breakaway and reversal are
+/// found as events, delay and lag are exact, and bristles follow the way travelled and so are never stiff. Repeatable bit for
+/// bit.
 class AxisPlant {
  public:
   /// `longest_step` is the largest dt that `step` will be asked for; it sizes the history of delays. Set-up
@@ -65,7 +66,7 @@ class AxisPlant {
   /// Real-time.
   [[nodiscard]] double applied(double command, double dt) const noexcept;
 
-  /// What the encoder shows now [m], without noise and resolution. Real-time. Backlash and measurement delay
+  /// Reading of the encoder now [m], without noise and resolution. Real-time. Backlash and measurement delay
   /// have memory: call it as often as you like between steps, the answer is the same.
   [[nodiscard]] double reading() const noexcept;
   [[nodiscard]] double time() const noexcept { return time_; }
@@ -76,7 +77,7 @@ class AxisPlant {
   }
   /// For feedforward: goes to a position in no time; bristles bend on the way. Real-time.
   void follow(double position) noexcept;
-  /// What the encoder shows too much where the carriage stands at `position` [m], delays and backlash aside.
+  /// Excess of the encoder where the carriage stands at `position` [m], delays and backlash aside.
   [[nodiscard]] double reading_error(double position) const noexcept;
   [[nodiscard]] double position() const noexcept { return position_; }  // of the carriage, the truth
   [[nodiscard]] double velocity() const noexcept { return velocity_; }

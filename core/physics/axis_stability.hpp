@@ -5,10 +5,10 @@
 
 namespace invar::physics {
 
-/// The largest magnitude of the closed loop's poles (spectral radius of its transition over one period): 1 or more, and it
-/// swings up until it clamps. A rigid carriage, m x'' = k_f u - c x', its reading taken and the current set at the tick and
-/// held over the period (zero-order hold; Franklin, Powell and Workman, Digital Control of Dynamic Systems, section 4.3); the
-/// clamp left out. `inertia` = m / k_f [A s2/m], positive; `damping` = c / k_f [A s/m], not negative.
+/// The largest magnitude of the closed loop's poles: spectral radius of its transition over one period. From 1 on the loop is
+/// unstable. The carriage is rigid, m x'' = k_f u - c x'. Its reading is taken and the current set at the tick and held over
+/// the period: zero-order hold (Franklin, Powell and Workman, Digital Control of Dynamic Systems, section 4.3). The
+/// clamp is left out. `inertia` = m / k_f [A s2/m], positive; `damping` = c / k_f [A s/m], not negative.
 [[nodiscard]] double spectral_radius(const AxisControllerSettings& controller, double inertia,
                                      double damping);
 

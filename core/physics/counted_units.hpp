@@ -21,7 +21,7 @@ std::string counted_unit(const Model& model, std::string_view unit);
 std::string unit_of_parameter(const Model& model, const Term& term, std::size_t parameter);
 /// From where to where it may go in this model.
 Range bounds_of_parameter(const Model& model, const Term& term, std::size_t parameter);
-/// What the first heater of a node is commanded in: "W", "%", "V"; "W" where there is none.
+/// Unit of the command of the first heater of a node: "W", "%", "V"; "W" where there is none.
 std::string heater_unit(const Model& model, std::string_view node);
 
 }  // namespace invar::physics

@@ -1,4 +1,4 @@
-// What a term may do to one droplet between valve and camera.
+// Actions of a term on one droplet between valve and camera.
 #pragma once
 
 #include "core/physics/term.hpp"

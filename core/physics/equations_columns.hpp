@@ -1,4 +1,4 @@
-// What terms at the inputs and outputs of a model in the user's own equations do to their values.
+// Terms at the inputs and outputs of a model in the user's own equations, applied to their values.
 #pragma once
 
 #include <string>
@@ -12,14 +12,14 @@ namespace invar::physics {
 /// What a term at an output is `on`: its name, or `output.NAME` where a state has that name too.
 std::string place_of_output(const Equations& equations, const std::string& output);
 
-/// Dry friction that names its own state under `with` acts against the rate of it, not against its sign: what is no speed
-/// sticks until its rate would pass the level, as a valve does, and then goes by so much slower.
+/// Dry friction that names its own state under `with` acts against the rate of it, not against its sign. A state that is no
+/// speed sticks until its rate would pass the level, as a valve does, and then moves so much slower.
 bool sticks(const Term& term);
 
 /// A delay, a lag or a dead zone: what others feel of a signal is no longer what it is.
 bool is_felt_otherwise(const Term& term);
-/// A delay, lag or dead zone of a state that names `others` under `with`: what it gives off arrives so at the rates of the
-/// other states, its own feels it as it is. A store whose outflow takes its time to the next is one.
+/// True for a delay, lag or dead zone with `with: others`. The derivatives of the other states see the transformed value, the
+/// state's own derivative sees the true one. Example: transport delay in the pipe between two tanks.
 bool is_felt_by_others_alone(const Term& term);
 /// Is it added to what it acts on: to a state's rate, or at an output to its value by what goes with another variable? Nothing
 /// of a signal's own past or size bends it.
@@ -27,11 +27,11 @@ bool is_added(const Term& term);
 /// The variable that a term without a curve goes over: what it names under `with`, or what it acts on.
 const std::string& goes_over(const Term& term);
 
-/// What passes a limit of one column goes, in part, to another. `names` are those of the columns.
+/// The surplus of one column beyond a limit goes, in part, to another. `names` are those of the columns.
 void run_over(const Model& model, const std::vector<std::string>& names,
               std::vector<std::vector<double>>& columns);
 
-/// What an input does from its row on, until the next: `value` + `rate` t + `fading` exp(-t / `time_constant`).
+/// Course of an input from its row to the next: `value` + `rate` t + `fading` exp(-t / `time_constant`).
 struct InputCourse {
   double value = 0.0, rate = 0.0, fading = 0.0, time_constant = 1.0;
 };
@@ -42,8 +42,8 @@ class Bending {
   /// `held`: from row to row, as an input is. `has_changes`: there is a row at every instant at which what is held changes
   /// late; without them what comes late by a part of a step counts with the mean over it.
   Bending(const Term& term, bool held, bool has_changes);
-  /// What becomes of the value at `now` [s]; `step` [s] from the row before or, where it is held, to the next. `arch`: by how
-  /// much what is not held lies, halfway from the row before, above the straight line.
+  /// Transformed value at `now` [s]; `step` [s] from the row before or, where it is held, to the next. `arch`: height of a value
+  /// that is not held, halfway from the row before, above the straight line.
   double operator()(double now, double step, double value, double arch = 0.0);
 
   /// Does it ask for what was between the rows?

@@ -1,4 +1,4 @@
-// What a term may do to a model in the user's own equations: change a state's rate, bound it, or bend a signal.
+// Actions of a term on a model in the user's own equations: on a state's rate, its bound, or a signal.
 #pragma once
 
 #include "core/physics/term.hpp"

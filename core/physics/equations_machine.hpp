@@ -127,7 +127,7 @@ class EquationsMachine {
     for (auto& course : curves_) course.memory = course.before, course.at = course.at_before;
   }
 
-  /// Of all outputs of what was shown.
+  /// Works out all outputs of the shown states.
   void work_out_outputs() {
     compiled_.formulas->template run<lanes>(Expressions::outputs, slots_.data());
     for (std::size_t i = 0; i < shown_.size(); ++i)
@@ -154,8 +154,8 @@ class EquationsMachine {
     /// [1/s], with what dies away counted half: what swings carries its error on, what is damped forgets it.
     double swing = 0.0;
   };
-  /// Of all states, or of the user's own alone, here. A jump (the sign of a speed that is zero) has no rate of change: it
-  /// would only make steps short.
+  /// Fastest rates of all states, or of the user's own alone, here. A jump (the sign of a speed that is zero) has no rate of
+  /// change: it would only make steps short.
   Rates fastest(const State& s, double t, bool own) {
     if (all_states() == 0) return {};
     auto fine = jacobian(s, t, 1e-6);
@@ -189,7 +189,7 @@ class EquationsMachine {
       for (std::size_t l = 0; l < lanes && course.remembers(); ++l)
         course.memory[l].go_on_from(s[course.over][l]), course.at = t;
   }
-  /// Of what the model does not say it starts with: stores in balance, nothing bent.
+  /// Initial values that the model does not state: stores in balance, nothing bent.
   void balance_hidden(State& s, double t) {
     for (auto& course : curves_)
       for (std::size_t l = 0; l < lanes && course.remembers(); ++l)
@@ -244,7 +244,7 @@ class EquationsMachine {
     std::size_t before = 0;                     // as many before the last advance
   };
 
-  /// What fades within a step counts, at the few places where the rule of the step looks, with its mean over the step.
+  /// An input that decays within one integration step is replaced, at the nodes of the rule, by its exact mean over the step.
   [[nodiscard]] double value_of(const InputCourse& course, double since) const {
     const double straight = course.value + course.rate * since;
     if (course.fading == 0.0) return straight;
@@ -300,7 +300,7 @@ class EquationsMachine {
     return d;
   }
 
-  /// What the rates see of a state behind a dead zone, a lag or a delay; outputs show the state itself. `own`: the state whose
+  /// Values of states behind a dead zone, a lag or a delay, for the rates; outputs show the state itself. `own`: the state whose
   /// rate is asked for, where some are felt by the others alone.
   void bend_states(const State& s, double t, std::size_t own) {
     const auto is_as_it_is = [own](const Use& use) { return use.by_others_alone && use.on == own; };
@@ -332,7 +332,7 @@ class EquationsMachine {
       }
   }
 
-  /// Of the rates of all states here, as far as they do not jump, lane by lane; from steps of `share` of each state.
+  /// Jacobian of the rates of all states here, as far as they do not jump, lane by lane; from steps of `share` of each state.
   std::array<Matrix, lanes> jacobian(const State& s, double t, double share);
   /// One step of Rosenbrock's rule of second order, L-stable: what is far faster than the step is at its balance after it.
   State eased(const State& s, double t, double h);

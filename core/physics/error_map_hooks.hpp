@@ -1,4 +1,4 @@
-// What a term may add to the position error of an axis.
+// Actions of a term on the position error of an axis.
 #pragma once
 
 #include "core/physics/term.hpp"

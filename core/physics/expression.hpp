@@ -66,7 +66,7 @@ class Expressions {
     least,
     most
   };
-  /// What is written to slot `to`; what an operation does not need repeats `a`.
+  /// Writes to slot `to`; an unused operand repeats `a`.
   struct Instruction {
     Operation operation;
     std::size_t to, a, b, c;
@@ -85,7 +85,7 @@ class Expressions {
   std::vector<Instruction> code_[sections];
 };
 
-/// What means something in a formula by itself, and so names no state, input or parameter.
+/// Words with a meaning of their own in a formula; they name no state, input or parameter.
 const std::vector<std::string_view>& expression_words();
 
 }  // namespace invar::physics

@@ -18,7 +18,7 @@ struct NamedUnit {
 /// By name; one without a unit may count in any.
 using UnitsOfNames = std::map<std::string, NamedUnit, std::less<>>;
 
-/// What in a formula does not go together.
+/// Parts of a formula whose units do not go together.
 struct UnitClash {
   std::string what;      // a clause
   bool is_size = false;  // one kind of quantity, counted in units of two sizes; false: two kinds

@@ -26,7 +26,7 @@ struct MissingForce {
 
 /// The change of momentum over a stretch of motion less the impulse of all the forces that the model knows, over its
 /// duration: no second derivative of a reading is taken. Stretches with standstill or reversal in them tell nothing, since
-/// dry friction at rest may be anything. What the model's own sigmas allow counts as agreement. Real-time.
+/// dry friction at rest may be anything. A difference within the model's own sigmas counts as agreement. Real-time.
 class ForceBalance {
  public:
   struct Settings {
@@ -60,7 +60,7 @@ class ForceBalance {
   MissingForce sum_, missing_;  // the sum of motor_force is one of currents
 };
 
-/// What a missing force goes with; `site` and `depends_on` as `invar diagnose` names them.
+/// Site and variable of a missing force; `site` and `depends_on` as `invar diagnose` names them.
 struct Whereabouts {
   std::string_view site, depends_on;
   double share = 0.0;     // of the missing force's square that goes with it

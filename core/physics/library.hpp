@@ -23,7 +23,7 @@ std::vector<std::string_view> multipliers_of(const TermInfo& unmodelled);
 /// The plant by the name that model.yaml writes; false where there is none.
 bool plant_by_name(std::string_view name, Plant& plant);
 
-/// What the term does in its plant; nullptr for a term of another plant.
+/// Functions of the term in its plant; nullptr for a term of another plant.
 const AxisTermKind* axis_kind(const TermInfo& info);
 const ThermalTermKind* thermal_kind(const TermInfo& info);
 

@@ -110,7 +110,7 @@ struct Model {
   [[nodiscard]] std::vector<std::string> outputs() const;
 };
 
-/// What a run of the model may begin anew with: the states of own equations; position [m] and velocity [m/s] of an axis
+/// States from which a run of the model may restart: the states of own equations; position [m] and velocity [m/s] of an axis
 /// without controller. Empty for all others.
 std::vector<std::string> states_of(const Model& model);
 

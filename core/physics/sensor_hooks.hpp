@@ -1,4 +1,4 @@
-// What a term may do to an instrument's reading.
+// Actions of a term on an instrument's reading.
 #pragma once
 
 #include "core/physics/term.hpp"

@@ -15,7 +15,7 @@ enum class Plant { axis, thermal, error_map, droplet, sensor, equations };
 /// "axis", "thermal", ... as model.yaml writes it.
 std::string_view name_of(Plant plant);
 
-/// What a parameter does to its term.
+/// Role of a parameter in its term.
 enum class Role {
   amplitude,  // the term vanishes where all its amplitudes are zero
   shape,      // where, how fast, how often; means nothing while the amplitude is zero

@@ -1,4 +1,4 @@
-// What a term may do to a thermal node: give it heat, change the air or the heater, store heat, read late.
+// Actions of a term on a thermal node: heat, air or heater, storage, late reading.
 #pragma once
 
 #include "core/physics/term.hpp"

@@ -35,7 +35,7 @@ struct ThermalTerm {
   bool by_power = false;  // the curve is of what its node's heaters give [W/W]
 };
 
-/// What drives the nodes during one step.
+/// Inputs of the nodes during one step.
 struct ThermalInputs {
   std::span<const double> powers;  // [W] a heater
   double ambient = 20.0;           // [degC]
@@ -65,7 +65,7 @@ class ThermalPlant {
   [[nodiscard]] std::size_t nodes() const noexcept { return nodes_.size(); }
   [[nodiscard]] double time() const noexcept { return time_; }
   [[nodiscard]] double temperature(std::size_t node) const noexcept { return state_[node]; }  // the truth
-  /// What the node's sensor shows, without noise.
+  /// Reading of the node's sensor, without noise.
   [[nodiscard]] double reading(std::size_t node) const noexcept {
     return has_lag_[node] ? sensor_[node] : state_[node];
   }
