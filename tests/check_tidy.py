@@ -84,7 +84,7 @@ def faults_of(build, sources, lines, jobs):
 
 
 def self_test():
-    diff = "+++ b/core/base/unit.cpp\n@@ -3,0 +4,2 @@\n+++ b/docs/a.md\n@@ -1 +1 @@\n+++ b/core/base/unit.hpp\n@@ -7 +7 @@\n@@ -9,2 +8,0 @@\n"
+    diff = "+++ b/core/base/unit.cpp\n@@ -3,0 +4,2 @@\n+++ b/other.md\n@@ -1 +1 @@\n+++ b/core/base/unit.hpp\n@@ -7 +7 @@\n@@ -9,2 +8,0 @@\n"
     assert changed_lines(diff) == {"core/base/unit.cpp": [[4, 5]], "core/base/unit.hpp": [[7, 7]]}, changed_lines(diff)
     assert sources_for(["core/base/unit.hpp"], {"core/base/unit.cpp"}) == ["core/base/unit.cpp"]
     with tempfile.TemporaryDirectory() as folder:
