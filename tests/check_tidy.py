@@ -5,6 +5,7 @@ base, and fails where it has something to say. It needs clang-tidy 14 and a buil
     tests/check_tidy.py                        # against main; on main itself against the commit before
     tests/check_tidy.py --base HEAD~5          # against another commit
     tests/check_tidy.py --whole core/base      # all lines of the sources of a folder
+    tests/check_tidy.py --most 8               # the eight sources with most changed lines, as the test does
     tests/check_tidy.py --self-test            # a fault is found, and only on a changed line
 
 A changed header is checked through the source of its module; a header without one through a source that includes it.
@@ -52,17 +53,19 @@ def changed_lines(diff):
     return found
 
 
-def sources_for(names, compiled):
-    """The sources to run on, so that each of `names` is looked at."""
-    wanted = set()
-    for name in names:
+def sources_for(lines, compiled):
+    """The sources to run on, so that each file of `lines` is looked at; those of the most changed lines first."""
+    wanted = {}
+    size = {name: sum(last - first + 1 for first, last in where) for name, where in lines.items()}
+    for name in lines:
         own = name if name.endswith(".cpp") else name[:-4] + ".cpp"
         if own in compiled:
-            wanted.add(own)
+            wanted[own] = wanted.get(own, 0) + size[name]
         elif name.endswith(".hpp"):
             quoted = f'#include "{name}"'
-            wanted.update(sorted(c for c in compiled if c.startswith(ROOMS) and quoted in (ROOT / c).read_text(errors="replace"))[:1])
-    return sorted(wanted)
+            for user in sorted(c for c in compiled if c.startswith(ROOMS) and quoted in (ROOT / c).read_text(errors="replace"))[:1]:
+                wanted[user] = wanted.get(user, 0) + size[name]
+    return sorted(wanted, key=lambda source: (-wanted[source], source))
 
 
 def run(build, source, lines):
@@ -86,7 +89,7 @@ def faults_of(build, sources, lines, jobs):
 def self_test():
     diff = "+++ b/core/base/unit.cpp\n@@ -3,0 +4,2 @@\n+++ b/other.md\n@@ -1 +1 @@\n+++ b/core/base/unit.hpp\n@@ -7 +7 @@\n@@ -9,2 +8,0 @@\n"
     assert changed_lines(diff) == {"core/base/unit.cpp": [[4, 5]], "core/base/unit.hpp": [[7, 7]]}, changed_lines(diff)
-    assert sources_for(["core/base/unit.hpp"], {"core/base/unit.cpp"}) == ["core/base/unit.cpp"]
+    assert sources_for({"core/base/unit.hpp": [[7, 7]]}, {"core/base/unit.cpp"}) == ["core/base/unit.cpp"]
     with tempfile.TemporaryDirectory() as folder:
         place = pathlib.Path(folder)
         source = place / "share.cpp"
@@ -104,6 +107,7 @@ def main():
     ask.add_argument("--base", help="a commit")
     ask.add_argument("--build", type=pathlib.Path, default=ROOT / "build", help="folder with compile_commands.json")
     ask.add_argument("--whole", metavar="FOLDER")
+    ask.add_argument("--most", type=int, default=1_000_000, help="sources at most")
     ask.add_argument("--jobs", type=int, default=os.cpu_count())
     ask.add_argument("--self-test", action="store_true")
     given = ask.parse_args()
@@ -114,13 +118,22 @@ def main():
     commands = given.build / "compile_commands.json"
     if not commands.exists():
         sys.exit(f"{commands}: does not exist; configure with cmake -S . -B build")
-    compiled = {os.path.relpath(entry["file"], ROOT) for entry in json.loads(commands.read_text())}
+    compiled = {os.path.relpath(entry["file"], ROOT) for entry in json.loads(commands.read_text()) if pathlib.Path(entry["file"]).exists()}
     if given.whole:
         names = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / given.whole).rglob("*.[ch]pp"))
         lines = {name: [[1, 1_000_000]] for name in names}
     else:
-        lines = changed_lines(git("diff", "-U0", "--no-color", given.base or default_base(), "--", "*.cpp", "*.hpp"))
+        try:
+            lines = changed_lines(git("diff", "-U0", "--no-color", given.base or default_base(), "--", "*.cpp", "*.hpp"))
+        except (subprocess.CalledProcessError, FileNotFoundError):
+            if given.base:
+                sys.exit(f"--base: `{given.base}` is no commit here; name another")
+            print("clang-tidy: no earlier commit to compare with, so no line changed", file=sys.stderr)
+            return 0
     sources = sources_for(lines, compiled)
+    if len(sources) > given.most:
+        print(f"clang-tidy: {len(sources) - given.most} further changed sources are left to a run without --most", file=sys.stderr)
+        sources = sources[:given.most]
     found = faults_of(given.build, sources, lines, given.jobs)
     for fault in found:
         print(fault)
