@@ -8,6 +8,7 @@ import json
 import math
 import pathlib
 import re
+import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 RESULTS = ROOT / "tests" / "bench" / "results"
@@ -29,10 +30,14 @@ def table(head, rows):
 def summary(results):
     """One line a result: its headline, with the cells that it quotes, and a link to its section."""
     rows = []
-    for _, result in results:
-        cell = lambda m: result["tables"][int(m[1])]["rows"][int(m[2])][int(m[3])]
+    for name, result in results:
+        def cell(found):
+            try:
+                return result["tables"][int(found[1])]["rows"][int(found[2])][int(found[3])]
+            except IndexError:
+                sys.exit(f"tests/bench/results/{name}.json: headline: no table has the cell {found[0]}; mend the headline")
         anchor = re.sub(r"[^\w\- ]", "", result["title"].lower()).replace(" ", "-")
-        rows.append([f"[{result['title']}](#{anchor})", re.sub(r"\{(\d+):(\d+):(\d+)\}", cell, result["headline"])])
+        rows.append([f"[{result['title']}](#{anchor})", re.sub(r"\{(\d+):(\d+):(\d+)\}", cell, result.get("headline", ""))])
     return table(["subject", "in short"], rows)
 
 
