@@ -33,8 +33,10 @@ void check_file(const Node& node, const std::filesystem::path& path) {
 }
 
 CellHost read_host(const Node& node) {
-  CellHost host{node.key(), node.text("address")};
+  CellHost host{node.key(), "", ""};
   in_addr address{};
+  if (node.has("interface")) host.interface = node.text("interface");
+  if (node.has("address") || !node.has("interface")) host.address = node.text("address");
   if (node.has("address") && inet_pton(AF_INET, host.address.c_str(), &address) != 1)
     node["address"].fault("`" + clipped(host.address) + "` is no IPv4 address", "write it as 10.0.0.11");
   check_name(node, host.name, In::files);
@@ -162,8 +164,8 @@ Cell read_cell(const Yaml& yaml) {
   cell.simulated_time = root.choice("time", {"real", "simulated"}, "real") == "simulated";
   cell.window = Duration::seconds(root.number("window", "s", Range{1e-3, 1.0}, 0.02));
   cell.shared_memory = root.flag("shared_memory", true);
-  cell.address_wait =
-      Duration::seconds(root.number("address_wait", "s", Range{0.0, 1e9}, 60.0));  // 1e9: for ever
+  if (root.has("address_wait"))
+    cell.address_wait = Duration::seconds(root.number("address_wait", "s", Range{0.0, 1e9}, 0.0));
   const auto beside = [&](const Node& node) {
     std::filesystem::path path = node.as_text();
     if (path.is_relative()) path = cell.file.parent_path() / path;

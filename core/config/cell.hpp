@@ -55,7 +55,8 @@ struct CellProcess {
 
 struct CellHost {
   std::string name;
-  std::string address;  // IPv4
+  std::string address;    // IPv4; empty: that of `interface`, which others learn from its announcements
+  std::string interface;  // "eth0"; empty: the one that has `address`
 };
 
 struct Cell {
@@ -66,7 +67,8 @@ struct Cell {
   bool simulated_time = false;
   Duration window = Duration::milliseconds(20);  // of simulated time: how late another process sees a sample
   bool shared_memory = true;
-  Duration address_wait = Duration::seconds(60.0);  // how long a process waits for its host's address
+  /// How long a process waits for its host's address, and then ends. None: it works alone until the address is there.
+  std::optional<Duration> address_wait;
   std::filesystem::path profiles;
   std::vector<std::filesystem::path>
       models;  // folders from which a command may load a model, beside the usual

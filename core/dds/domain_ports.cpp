@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cerrno>
 #include <filesystem>
+#include <utility>
 
 #include "core/base/fault.hpp"
 
@@ -47,7 +48,13 @@ std::string DomainPorts::text() const {
   return std::to_string(multicast()) + ", " + std::to_string(discovery(0)) + "-" + std::to_string(last());
 }
 
-std::int32_t free_participant_number(std::uint32_t domain) {
+std::int32_t called_numbers(std::uint32_t domain, std::size_t processes) {
+  constexpr std::int32_t each = 4, beside = 12;
+  const auto most = static_cast<std::size_t>(DomainPorts{domain}.participants());
+  return static_cast<std::int32_t>(std::min(most, each * processes + beside));
+}
+
+std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window) {
   static std::atomic<std::int32_t> made{0};
   const DomainPorts ports{domain};
   const std::int32_t numbers = ports.participants();
@@ -55,12 +62,17 @@ std::int32_t free_participant_number(std::uint32_t domain) {
   const auto is_taken = [](std::uint32_t port, bool memory_counts) {
     return is_bound(port) || (memory_counts && has_memory(port));
   };
-  for (const bool memory_counts : {true, false})
-    for (std::int32_t tried = 0; tried < numbers; ++tried) {
-      const std::int32_t number = (first + tried) % numbers;
+  const auto find = [&](std::int32_t below, bool memory_counts) {
+    for (std::int32_t tried = 0; tried < below; ++tried) {
+      const std::int32_t number = (first + tried) % below;
       if (!is_taken(ports.discovery(number), memory_counts) && !is_taken(ports.data(number), memory_counts))
         return number;
     }
+    return -1;
+  };
+  for (const auto& [below, memory_counts] :
+       {std::pair{std::min(window, numbers), true}, std::pair{numbers, true}, std::pair{numbers, false}})
+    if (const std::int32_t number = find(below, memory_counts); number >= 0) return number;
   throw InputError{"domain " + std::to_string(domain),
                    numbers == 0 ? "has no ports below 65536"
                                 : "all " + std::to_string(numbers) + " participants of this PC are taken",

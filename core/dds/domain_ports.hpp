@@ -27,7 +27,11 @@ struct DomainPorts {
 /// has its earlier ports. Other processes then go on writing into the shared memory of the dead one, and are not heard.
 /// The number chosen here left no trace, and nobody on this network uses its ports: a container may share the network and
 /// not the memory. Where another process takes it in the same moment, the library shifts the ports. Throws InputError when
-/// all are taken. Set-up only.
-[[nodiscard]] std::int32_t free_participant_number(std::uint32_t domain);
+/// all are taken. A free number below `window` comes first: others call those without multicast. Set-up only.
+[[nodiscard]] std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window = 0);
+
+/// How many participant numbers are called on a PC with so many processes of the cell. A process has two participants, or
+/// three with a recorder. The rest is for the launcher and for numbers that killed processes still hold.
+[[nodiscard]] std::int32_t called_numbers(std::uint32_t domain, std::size_t processes);
 
 }  // namespace invar::dds

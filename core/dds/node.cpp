@@ -11,6 +11,7 @@
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/local_exchange.hpp"
 #include "core/dds/middleware_log.hpp"
+#include "core/dds/promised_address.hpp"
 #include "core/dds/publishing.hpp"
 #include "core/dds/raw_type.hpp"
 #include "core/dds/shared_memory.hpp"
@@ -205,6 +206,13 @@ std::uint64_t Node::lost() const {
   for (const auto& output : parts_->outputs) sum += output.outlet->lost();
   for (const auto& input : parts_->inputs) sum += input->lost();
   return sum;
+}
+
+void Node::network_is_back() {
+  renew_promises();
+  const std::lock_guard lock{parts_->mutex};
+  for (const auto* participant : {&parts_->general, &parts_->realtime, &parts_->raw})
+    if (*participant) (*participant)->call_peers();
 }
 
 std::unique_ptr<Connection> Node::make_writer(const std::string& topic, std::type_index type,

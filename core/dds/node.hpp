@@ -20,12 +20,23 @@
 
 namespace invar::dds {
 
+/// A PC on which processes of the cell run: where its participants are looked for, one by one, without multicast.
+struct PeerHost {
+  std::string address;
+  std::size_t processes = 0;  // of the cell, on that PC
+  bool operator==(const PeerHost&) const = default;
+};
+
 struct NodeOptions {
   std::string cell;
   std::string process;  // name of this process or tool; participants are "invar/<cell>/<process>"
   std::uint32_t domain = 0;
-  /// Addresses of this host that may carry the cell's traffic; empty: all of its interfaces.
+  /// Addresses of this host that may carry the cell's traffic, beside its loopback; empty: all of its interfaces.
   std::vector<std::string> addresses;
+  /// They need not be there yet: the node works within this PC until they come.
+  bool may_come_later = false;
+  /// The hosts of the cell, this one among them. Multicast finds others in addition, where the network lets it through.
+  std::vector<PeerHost> peers;
   bool shared_memory = true;
   /// Of the cell on this PC; they share /dev/shm.
   std::size_t processes = 1;
@@ -165,6 +176,8 @@ class Node {
   [[nodiscard]] Discovery& discovery();
   /// Samples lost by all ports of this node. Any thread.
   [[nodiscard]] std::uint64_t lost() const;
+  /// The network is there again: groups are joined and peers are called at once, not at the next regular announcement.
+  void network_is_back();
 
  private:
   std::unique_ptr<Connection> make_writer(const std::string& topic, std::type_index type,

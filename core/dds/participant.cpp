@@ -25,6 +25,7 @@
 #include "core/dds/memory_plan.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
+#include "core/dds/promised_address.hpp"
 #include "core/dds/qos.hpp"
 #include "core/dds/raw_type.hpp"
 #include "core/dds/reachable_memory.hpp"
@@ -102,6 +103,43 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
+/// Processes of one PC hear each other also while its network is away.
+std::vector<std::string> with_loopback(std::vector<std::string> addresses) {
+  constexpr const char* loopback = "127.0.0.1";
+  if (!addresses.empty() && std::find(addresses.begin(), addresses.end(), loopback) == addresses.end())
+    addresses.emplace_back(loopback);
+  return addresses;
+}
+
+/// Of the numbers that others call on this PC; 0: they call none.
+std::int32_t called_numbers_here(const NodeOptions& options) {
+  for (const PeerHost& peer : options.peers)
+    if (std::find(options.addresses.begin(), options.addresses.end(), peer.address) !=
+        options.addresses.end())
+      return called_numbers(options.domain, peer.processes);
+  return 0;
+}
+
+rtps::Locator_t udp_locator(const std::string& address, std::uint32_t port) {
+  rtps::Locator_t locator;
+  rtps::IPLocator::createLocator(LOCATOR_KIND_UDPv4, address, port, locator);
+  return locator;
+}
+
+/// Where a participant announces itself: each place on each host of the cell where one may listen, and the groups. Empty: the
+/// groups alone, as Fast DDS has it.
+rtps::LocatorList_t called_peers(const NodeOptions& options, const MemorySizes& memory) {
+  rtps::LocatorList_t list;
+  if (options.peers.empty()) return list;
+  const DomainPorts ports{options.domain};
+  for (const PeerHost& peer : options.peers)
+    for (std::int32_t n = 0; n < called_numbers(options.domain, peer.processes); ++n)
+      list.push_back(udp_locator(peer.address, ports.discovery(n)));
+  list.push_back(udp_locator("239.255.0.1", ports.multicast()));
+  if (memory.any()) list.push_back(ReachableMemory{}.discovery_group(ports.multicast()));
+  return list;
+}
+
 fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std::string& name,
                                            Traffic traffic, const Profiles& profiles,
                                            const std::shared_ptr<Reception>& reception,
@@ -111,7 +149,8 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   qos.name(name);
   qos.user_data().data_vec(to_user_data(identity));
   qos.transport().use_builtin_transports = false;
-  qos.wire_protocol().participant_id = free_participant_number(options.domain);
+  qos.wire_protocol().participant_id =
+      free_participant_number(options.domain, called_numbers_here(options));
   const bool realtime = traffic == Traffic::realtime;
   if (memory.any()) {
     auto shm = std::make_shared<Filtered<ReachableMemory>>();
@@ -124,7 +163,8 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   auto udp = std::make_shared<Filtered<transport::UDPv4TransportDescriptor>>();
   udp->reception = reception;
   udp->largest_sent = largest_datagram(options.addresses);
-  udp->interfaceWhiteList = options.addresses;
+  udp->interfaceWhiteList = with_loopback(options.addresses);
+  udp->parts_loopback = udp->interfaceWhiteList.size() > options.addresses.size();
   udp->non_blocking_send = realtime;
   udp->sendBufferSize = udp->receiveBufferSize = realtime ? 1U << 20U : 8U << 20U;
   qos.transport().user_transports.push_back(udp);
@@ -137,6 +177,7 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   discovery.leaseDuration_announcementperiod = {1, 500'000'000};
   discovery.initial_announcements.count = 10;
   discovery.initial_announcements.period = {0, 50'000'000};
+  qos.wire_protocol().builtin.initialPeersList = called_peers(options, memory);
   // Nobody asks for types over the wire: the IDL is the contract.
   qos.wire_protocol().builtin.typelookup_config.use_client = false;
   qos.wire_protocol().builtin.typelookup_config.use_server = false;
@@ -166,7 +207,9 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   if (!memory.shortage.empty()) discovery_.raise({"shared memory", memory.shortage, false});
   if (traffic == Traffic::realtime) name_ += "/realtime";
   keep_middleware_log();
-  if (!options.addresses.empty() &&
+  if (options.may_come_later) {
+    for (const auto& address : options.addresses) promise_address(address);
+  } else if (!options.addresses.empty() &&
       std::none_of(options.addresses.begin(), options.addresses.end(), has_address))
     throw InputError{
         name_, "no running interface of this PC has " + joined(options.addresses),
@@ -200,6 +243,14 @@ Participant::~Participant() {
   participant_->set_listener(nullptr);
   participant_->delete_contained_entities();
   fdds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+void Participant::call_peers() {
+  // Other user data is what makes Fast DDS announce a participant anew.
+  fdds::DomainParticipantQos qos = participant_->get_qos();
+  qos.user_data().data_vec(to_user_data(identity_, ++calls_));
+  if (participant_->set_qos(qos) != ReturnCode_t::RETCODE_OK)
+    discovery_.raise({"network", "the peers of this process could not be called anew", false});
 }
 
 fdds::Topic* Participant::topic(const std::string& name, fdds::TopicDataType* type) {

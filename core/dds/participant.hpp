@@ -43,6 +43,8 @@ class Participant final : private fdds::DomainParticipantListener {
                                   fdds::DataReaderListener* listener);
   void remove(fdds::DataWriter& writer);
   void remove(fdds::DataReader& reader);
+  /// Announces itself at once to all peers. Any thread.
+  void call_peers();
   [[nodiscard]] const eprosima::fastrtps::rtps::GUID_t& id() const { return participant_->guid(); }
   /// A process of this PC that takes part in the cell ended without taking leave (it was killed, or crashed), and its lease
   /// has not run out yet. Any thread.
@@ -66,6 +68,7 @@ class Participant final : private fdds::DomainParticipantListener {
   std::string name_;
   std::shared_ptr<Reception> reception_;
   MemoryIdentity identity_;
+  std::uint8_t calls_ = 0;
   fdds::DomainParticipant* participant_ = nullptr;
   std::mutex mutex_;
   mutable std::mutex peers_mutex_;

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <string_view>
 
 namespace invar::dds {
@@ -146,9 +147,16 @@ transport::TransportInterface* ReachableMemory::create_transport() const {
   return chain.create_transport();
 }
 
+rtps::LocatorList_t ReachableMemory::discovery_group(std::uint32_t port) const {
+  rtps::LocatorList_t group;
+  const std::unique_ptr<transport::TransportInterface> one{create_transport()};
+  (void)one->getDefaultMetatrafficMulticastLocators(group, port);
+  return group;
+}
+
 MemoryIdentity own_memory_identity() { return {getpid(), geteuid(), boot_identity(), folder_identity()}; }
 
-std::vector<std::uint8_t> to_user_data(const MemoryIdentity& identity) {
+std::vector<std::uint8_t> to_user_data(const MemoryIdentity& identity, std::uint8_t calls) {
   std::vector<std::uint8_t> data{mark.begin(), mark.end()};
   const auto add = [&data](const auto& value) {
     const auto* bytes = reinterpret_cast<const std::uint8_t*>(&value);
@@ -158,13 +166,14 @@ std::vector<std::uint8_t> to_user_data(const MemoryIdentity& identity) {
   add(identity.user);
   add(identity.boot);
   add(identity.folder);
+  add(calls);
   return data;
 }
 
 std::optional<MemoryIdentity> memory_identity_from(const std::vector<std::uint8_t>& data) {
   MemoryIdentity out;
   const std::size_t size =
-      mark.size() + sizeof out.process + sizeof out.user + sizeof out.boot + sizeof out.folder;
+      mark.size() + sizeof out.process + sizeof out.user + sizeof out.boot + sizeof out.folder + 1;
   if (data.size() != size || !std::equal(mark.begin(), mark.end(), data.begin())) return std::nullopt;
   const std::uint8_t* next = data.data() + mark.size();
   const auto take = [&next](auto& value) {

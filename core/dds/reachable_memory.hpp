@@ -1,6 +1,7 @@
 // ReachableMemory: the shared-memory transport of Fast DDS, used only between processes that can open each other's memory.
 #pragma once
 
+#include <fastdds/rtps/common/Locator.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 
 #include <cstdint>
@@ -23,8 +24,8 @@ struct MemoryIdentity {
 /// Identity of this process; its folder is 0 where there is no /dev/shm.
 [[nodiscard]] MemoryIdentity own_memory_identity();
 
-/// The user data of our participants, by which peers know each other's process and memory.
-[[nodiscard]] std::vector<std::uint8_t> to_user_data(const MemoryIdentity& identity);
+/// The user data of our participants, by which peers know each other's process and memory; and how often they were called anew.
+[[nodiscard]] std::vector<std::uint8_t> to_user_data(const MemoryIdentity& identity, std::uint8_t calls = 0);
 /// Empty where the participant is not one of Invar.
 [[nodiscard]] std::optional<MemoryIdentity> memory_identity_from(const std::vector<std::uint8_t>& user_data);
 
@@ -42,6 +43,8 @@ struct MemoryIdentity {
 /// one needs a descriptor derived from SharedMemTransportDescriptor too.
 struct ReachableMemory : eprosima::fastdds::rtps::SharedMemTransportDescriptor {
   [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* create_transport() const override;
+  /// Where participants of this PC hear discovery by shared memory.
+  [[nodiscard]] eprosima::fastrtps::rtps::LocatorList_t discovery_group(std::uint32_t port) const;
 };
 
 }  // namespace invar::dds

@@ -1,10 +1,14 @@
 #include "core/dds/receive_filter.hpp"
 
+#include <fastdds/rtps/common/LocatorsIterator.hpp>
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastrtps/utils/IPLocator.h>
 
+#include <array>
+#include <atomic>
 #include <chrono>
 #include <cstring>
+#include <mutex>
 #include <span>
 #include <thread>
 
@@ -50,10 +54,83 @@ void note_fragments(std::span<const std::byte> message, SequenceGuard& guard) {
   }
 }
 
+bool is_loopback(const rtps::Locator_t& locator) {
+  return locator.kind == LOCATOR_KIND_UDPv4 && rtps::IPLocator::getIPv4(locator)[0] == 127;
+}
+
+/// Those of a row of locators that a sender reaches: the loopback's, or the others'; groups are reached by both.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"  // of Fast DDS; this one lives on the stack
+class Reached final : public rtps::LocatorsIterator {
+ public:
+  Reached(rtps::LocatorsIterator& all, rtps::LocatorsIterator& end, bool loopback)
+      : all_{all}, end_{end}, loopback_{loopback} {
+    pass();
+  }
+  rtps::LocatorsIterator& operator++() override {
+    ++all_;
+    pass();
+    return *this;
+  }
+  bool operator==(const rtps::LocatorsIterator&) const override { return all_ == end_; }
+  bool operator!=(const rtps::LocatorsIterator&) const override { return all_ != end_; }
+  const rtps::Locator_t& operator*() const override { return *all_; }
+
+ private:
+  void pass() {
+    while (all_ != end_ && !rtps::IPLocator::isMulticast(*all_) && is_loopback(*all_) != loopback_) ++all_;
+  }
+
+  rtps::LocatorsIterator& all_;
+  rtps::LocatorsIterator& end_;
+  bool loopback_;
+};
+#pragma GCC diagnostic pop
+
+/// Which senders leave by the loopback; each is asked once, when it sends first. Any thread.
+class Senders {
+ public:
+  bool is_loopback(rtps::SenderResource& sender) {
+    for (const Known& known : known_) {
+      const auto* its = known.sender.load(std::memory_order_acquire);
+      if (its == &sender) return known.loopback;
+      if (its == nullptr) break;
+    }
+    return ask(sender);
+  }
+
+ private:
+  struct Known {
+    std::atomic<const rtps::SenderResource*> sender{nullptr};
+    bool loopback = false;
+  };
+
+  bool ask(rtps::SenderResource& sender) {
+    rtps::LocatorList_t own;
+    sender.add_locators_to_list(own);
+    const bool loopback = own.size() > 0 && invar::dds::is_loopback(*own.begin());
+    const std::lock_guard lock{mutex_};
+    for (Known& known : known_)
+      if (known.sender.load(std::memory_order_relaxed) == nullptr) {
+        known.loopback = loopback;
+        known.sender.store(&sender, std::memory_order_release);
+        break;
+      }
+    return loopback;
+  }
+
+  std::mutex mutex_;
+  std::array<Known, 8> known_;  // one an address of the PC that carries the cell's traffic
+};
+
 class Filter final : public transport::ChainingTransport {
  public:
-  Filter(const transport::ChainingTransportDescriptor& chain, std::shared_ptr<Reception> reception)
-      : ChainingTransport{chain}, below_{chain.low_level_descriptor}, reception_{std::move(reception)} {}
+  Filter(const transport::ChainingTransportDescriptor& chain, std::shared_ptr<Reception> reception,
+         bool parts_loopback)
+      : ChainingTransport{chain},
+        below_{chain.low_level_descriptor},
+        reception_{std::move(reception)},
+        parts_loopback_{parts_loopback} {}
 
   transport::TransportDescriptorInterface* get_configuration() override { return below_.get(); }
 
@@ -67,7 +144,9 @@ class Filter final : public transport::ChainingTransport {
             rtps::LocatorsIterator* begin, rtps::LocatorsIterator* end,
             const std::chrono::steady_clock::time_point& timeout) override {
     note_fragments(std::as_bytes(std::span{data, size}), reception_->guard());
-    return below->send(data, size, begin, end, timeout);
+    if (!parts_loopback_) return below->send(data, size, begin, end, timeout);
+    Reached reached{*begin, *end, senders_.is_loopback(*below)};
+    return below->send(data, size, &reached, end, timeout);
   }
 
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* data, std::uint32_t size,
@@ -93,6 +172,8 @@ class Filter final : public transport::ChainingTransport {
  private:
   std::shared_ptr<transport::TransportDescriptorInterface> below_;
   std::shared_ptr<Reception> reception_;
+  bool parts_loopback_;
+  Senders senders_;
 };
 
 /// What the constructor of a chaining transport asks for.
@@ -120,8 +201,8 @@ std::string sender_text(std::uint64_t sender) {
 }  // namespace
 
 transport::TransportInterface* make_filter(std::shared_ptr<transport::TransportDescriptorInterface> below,
-                                           std::shared_ptr<Reception> reception) {
-  return new Filter{Chain{std::move(below)}, std::move(reception)};
+                                           std::shared_ptr<Reception> reception, bool parts_loopback) {
+  return new Filter{Chain{std::move(below)}, std::move(reception), parts_loopback};
 }
 
 void Reception::know_participant(const GuidPrefix& prefix) {

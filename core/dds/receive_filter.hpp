@@ -52,7 +52,7 @@ class Reception {
 /// The transport that `below` describes, behind a filter.
 [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* make_filter(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below,
-    std::shared_ptr<Reception> reception);
+    std::shared_ptr<Reception> reception, bool parts_loopback = false);
 
 /// A transport behind a filter. Fast DDS looks at the type of a descriptor to know that a participant has shared memory: so it
 /// is derived from that of the transport.
@@ -62,9 +62,12 @@ struct Filtered final : Below {
   /// The largest message to send [bytes]; zero: as large as one that is received. A participant writes for all of its
   /// transports at once and keeps to the smallest.
   std::uint32_t largest_sent = 0;
+  /// There is a socket on the loopback and one on the network. Fast DDS would send each message to a peer by both: only the
+  /// one that reaches the peer shall.
+  bool parts_loopback = false;
 
   [[nodiscard]] eprosima::fastdds::rtps::TransportInterface* create_transport() const override {
-    return make_filter(std::make_shared<Below>(*this), reception);
+    return make_filter(std::make_shared<Below>(*this), reception, parts_loopback);
   }
   using Below::max_message_size;
   [[nodiscard]] std::uint32_t max_message_size() const override {

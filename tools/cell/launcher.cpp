@@ -215,23 +215,10 @@ bool any_runs(std::vector<Child>& children) {
   return runs;
 }
 
-dds::NodeOptions node_options(const config::Cell& cell) {
-  dds::NodeOptions options;
-  options.cell = cell.name;
-  options.process = "launcher";
-  options.domain = static_cast<std::uint32_t>(cell.domain);
-  options.shared_memory = cell.shared_memory;
-  for (const auto& host : cell.hosts) options.addresses.push_back(host.address);
-  std::sort(options.addresses.begin(), options.addresses.end());
-  options.addresses.erase(std::unique(options.addresses.begin(), options.addresses.end()),
-                          options.addresses.end());
-  return options;
-}
-
 std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell,
                                 std::vector<Child>& children, const std::atomic<bool>& stop,
                                 Clock::time_point begin, JobNews& news, LaunchOutcome& outcome) {
-  dds::Node node{node_options(cell), dds::load_profiles(cell.profiles)};
+  dds::Node node{node_on(cell, "launcher", cell.processes.front().host), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const auto& process : cell.processes) names.push_back(process.name);
   dds::SimulatedClockMaster master{node, names, cell.window};

@@ -5,9 +5,11 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "core/base/time.hpp"
 #include "core/config/cell.hpp"
+#include "core/dds/node.hpp"
 
 namespace invar::tools {
 
@@ -15,25 +17,43 @@ namespace invar::tools {
 /// Throws InputError when `host` is none of the cell, or this PC has none of the addresses.
 [[nodiscard]] std::set<std::string> own_hosts(const config::Cell& cell, const std::string& host);
 
-/// Waits until this PC has the address of a host, as long as the file's `address_wait`, and says so. Throws
-/// std::runtime_error at the end of patience: whoever started the process may try again. False when `stop` came first.
+/// The address of a host: that of the file, or the one that its interface has on this PC now; empty: it has none.
+[[nodiscard]] std::string address_of(const config::CellHost& host);
+
+/// The hosts of the cell as a node calls them.
+[[nodiscard]] std::vector<dds::PeerHost> peers_of(const config::Cell& cell);
+
+/// How a program takes part in the cell as `process`, on a host of the file that this PC is. Its address may come later.
+[[nodiscard]] dds::NodeOptions node_on(const config::Cell& cell, const std::string& process,
+                                       const std::string& host);
+
+/// Whether this PC has the address of a host. Where it does not, says that the host works alone until it comes; with an
+/// `address_wait` in the file, and for an interface without an address, waits instead. Throws std::runtime_error at the end
+/// of patience: whoever started the process may try again. False when `stop` came first.
 bool wait_for_address(const config::Cell& cell, const std::string& host, const std::atomic<bool>& stop);
 
-/// Whether an address stays. Not for the loop.
+/// Whether an address stays, as the kernel tells (netlink). Not for the loop.
 class AddressWatch {
  public:
-  explicit AddressWatch(std::string address) : address_{std::move(address)} {}
+  explicit AddressWatch(std::string address);
+  ~AddressWatch();
+  AddressWatch(const AddressWatch&) = delete;
+  AddressWatch& operator=(const AddressWatch&) = delete;
   struct News {
     bool is_back = false;
     std::string text;
   };
-  /// Looks once a second at most; says when the address went or came back.
+  /// Says when the address went or came back. Looks where the kernel has told of a change, and once a second.
   [[nodiscard]] std::optional<News> look();
 
  private:
+  [[nodiscard]] bool kernel_told() const;
+
   std::string address_;
-  bool is_there_ = true;
-  int gone_ = 0;  // each time is news: the log must not take it for a repetition
+  int netlink_;
+  bool is_there_;
+  bool was_there_;  // at any time
+  int gone_ = 0;    // each time is news: the log must not take it for a repetition
   Instant looked_{INT64_MIN / 2};
 };
 

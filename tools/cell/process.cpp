@@ -51,16 +51,10 @@ std::vector<std::type_index> outputs_of(const LoadedProcess& process) {
 
 dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of, bool simulated) {
   const config::CellProcess& process = *of.file;
-  dds::NodeOptions options;
-  options.cell = loaded.cell->name;
-  options.process = process.name;
-  options.domain = static_cast<std::uint32_t>(loaded.cell->domain);
-  options.shared_memory = loaded.cell->shared_memory;
+  dds::NodeOptions options = node_on(*loaded.cell, process.name, process.host);
   options.processes =
       static_cast<std::size_t>(std::count_if(loaded.cell->processes.begin(), loaded.cell->processes.end(),
                                              [&](const auto& other) { return other.host == process.host; }));
-  for (const auto& host : loaded.cell->hosts)
-    if (host.name == process.host) options.addresses = {host.address};
   if (process.realtime) {
     options.realtime_priority = std::max(0, process.realtime->priority - 10);
     options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps
@@ -405,7 +399,10 @@ class RunningProcess {
   void watch_address() {
     const auto news = address_.look();
     if (!news) return;
-    if (news->is_back) spdlog::warn("{}: {}", file_.name, news->text);  // the log leaves notes out
+    if (news->is_back) {
+      node_.network_is_back();
+      spdlog::warn("{}: {}", file_.name, news->text);  // the log leaves notes out
+    }
     service_->publish(news->is_back ? event::SEVERITY_NOTE : event::SEVERITY_FAULT, file_.name, news->text);
   }
 

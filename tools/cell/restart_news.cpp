@@ -11,19 +11,15 @@
 #include "core/dds/simulated_clock.hpp"
 #include "idl/event.h"
 #include "idl/lifecycle.h"
+#include "tools/cell/own_host.hpp"
 
 namespace invar::tools {
 
 namespace {
 
 dds::NodeOptions node_options(const config::Cell& cell, const config::CellProcess& process) {
-  dds::NodeOptions options;
-  options.cell = cell.name;
-  options.process = "launcher";
-  options.domain = static_cast<std::uint32_t>(cell.domain);
+  dds::NodeOptions options = node_on(cell, "launcher", process.host);
   options.shared_memory = false;  // a few samples an hour
-  for (const auto& host : cell.hosts)
-    if (host.name == process.host) options.addresses = {host.address};
   return options;
 }
 

@@ -8,6 +8,7 @@
 #include "core/dds/domain_ports.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
+#include "tools/cell/own_host.hpp"
 #include "tools/live/interrupt.hpp"
 
 namespace invar::tools {
@@ -15,6 +16,7 @@ namespace invar::tools {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+constexpr std::size_t most_processes = 64;  // of a cell: on a peer of which no file tells how many it has
 constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
 constexpr Duration look = Duration::milliseconds(5);
 constexpr auto quiet =
@@ -85,6 +87,8 @@ CellCall::CellCall(CLI::App& app, std::vector<Word> words)
   app.add_option("--cell", cell, "its name, where several cells share the domain");
   app.add_option("--address", addresses, "look only on this address of this PC, with --domain")
       ->allow_extra_args(false);
+  app.add_option("--peer", peers, "address of a PC of the cell, with --domain, where multicast does not pass")
+      ->allow_extra_args(false);
   app.add_option("--wait", patience, "how long to wait for the cell [s] (5)")->check(CLI::Range(0.1, 3600.0));
 }
 
@@ -120,12 +124,14 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
     if (options.addresses.empty()) {
       // None where this PC is no host of the cell: it looks on all of its networks then.
       const auto add = [&](const std::string& address) {
-        if (dds::has_address(address) &&
+        if (dds::is_own_address(address) &&
             std::find(options.addresses.begin(), options.addresses.end(), address) == options.addresses.end())
           options.addresses.push_back(address);
       };
       for (const auto& host : cell_->hosts) add(host.address);
+      options.may_come_later = true;  // a host that was cut off can look at itself
     }
+    options.peers = peers_of(*cell_);
     profiles = dds::load_profiles(cell_->profiles);
     for (const char* needed : {"state", "event", "request", "command"})
       if (!profiles.contains(needed))
@@ -133,6 +139,7 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
                          "processes are watched by it: take it from the profiles that ship with Invar"};
   } else {
     options.domain = static_cast<std::uint32_t>(call.domain);
+    for (const auto& peer : call.peers) options.peers.push_back({peer, most_processes});
   }
   where_ = "domain " + std::to_string(options.domain);
   ports_ = dds::DomainPorts{options.domain}.text();

@@ -42,6 +42,7 @@ class CellCall {
   int domain = -1;             // with a file: that of the file unless given
   std::string cell;            // its name, where several share the domain
   std::vector<std::string> addresses;
+  std::vector<std::string> peers;
   double patience = 5.0;  // s
 
  private:
