@@ -149,8 +149,7 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   qos.name(name);
   qos.user_data().data_vec(to_user_data(identity));
   qos.transport().use_builtin_transports = false;
-  qos.wire_protocol().participant_id =
-      free_participant_number(options.domain, called_numbers_here(options));
+  qos.wire_protocol().participant_id = free_participant_number(options.domain, called_numbers_here(options));
   const bool realtime = traffic == Traffic::realtime;
   if (memory.any()) {
     auto shm = std::make_shared<Filtered<ReachableMemory>>();
@@ -210,7 +209,7 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   if (options.may_come_later) {
     for (const auto& address : options.addresses) promise_address(address);
   } else if (!options.addresses.empty() &&
-      std::none_of(options.addresses.begin(), options.addresses.end(), has_address))
+             std::none_of(options.addresses.begin(), options.addresses.end(), has_address))
     throw InputError{
         name_, "no running interface of this PC has " + joined(options.addresses),
         "it has " + own_addresses_text() + "; look for the cable, or mend the address in the file"};

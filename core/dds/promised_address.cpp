@@ -162,8 +162,8 @@ int getifaddrs(ifaddrs** list) noexcept {
   for (const in_addr address : all.addresses) {
     bool is_there = false;
     for (const ifaddrs* entry = *list; entry != nullptr; entry = entry->ifa_next)
-      is_there = is_there || (is_ipv4(*entry) && (entry->ifa_flags & runs) == runs &&
-                              same(address_of(*entry), address));
+      is_there = is_there ||
+                 (is_ipv4(*entry) && (entry->ifa_flags & runs) == runs && same(address_of(*entry), address));
     if (is_there) continue;
     auto* ours = new (std::nothrow) Entry;
     if (ours == nullptr) break;

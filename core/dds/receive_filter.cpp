@@ -1,8 +1,8 @@
 #include "core/dds/receive_filter.hpp"
 
-#include <fastdds/rtps/common/LocatorsIterator.hpp>
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastrtps/utils/IPLocator.h>
+#include <fastdds/rtps/common/LocatorsIterator.hpp>
 
 #include <array>
 #include <atomic>

@@ -31,8 +31,8 @@ std::set<std::string> own_hosts(const config::Cell& cell, const std::string& hos
   std::string list;
   for (const auto& each : cell.hosts) {
     if (dds::is_own_address(each.address)) own.insert(each.name);
-    list += (list.empty() ? "" : ", ") + each.name + " " +
-            (each.address.empty() ? each.interface : each.address);
+    list +=
+        (list.empty() ? "" : ", ") + each.name + " " + (each.address.empty() ? each.interface : each.address);
   }
   if (own.empty())
     throw InputError{

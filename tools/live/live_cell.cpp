@@ -16,7 +16,7 @@ namespace invar::tools {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::size_t most_processes = 64;  // of a cell: on a peer of which no file tells how many it has
+constexpr std::size_t most_processes = 64;   // of a cell: on a peer of which no file tells how many it has
 constexpr const char* tools_name = "tools";  // stands where a cell's name would in participants of commands
 constexpr Duration look = Duration::milliseconds(5);
 constexpr auto quiet =
