@@ -32,6 +32,7 @@ void Supervisor::activate() {
   last_heard_.clear();
   lost_.clear();
   failed_.clear();
+  put_down_.clear();
   began_ = last_step_ = now();
 }
 
@@ -41,6 +42,7 @@ void Supervisor::step(const Tick& tick) noexcept {
     forgive_own_gap(tick);
     watch_processes(tick);
     watch_components();
+    bring_back();
   } catch (const std::exception&) {
     fail("the supervisor lost its view of the cell");
   }
@@ -101,11 +103,53 @@ void Supervisor::make_safe(const std::set<std::string>& failed) {
     if (home == view_.process_of.end() || lost_.contains(home->second)) continue;
     acted_ = true;
     const std::string refusal = view_.deactivate(component);
+    if (refusal.empty() && std::find(put_down_.begin(), put_down_.end(), component) == put_down_.end())
+      put_down_.push_back(component);
     view_.notify(!refusal.empty(), component,
                  refusal.empty()
                      ? "component `" + component +
                            "` was deactivated: it needs what was lost; when that is back, activate it"
                      : "component `" + component + "` cannot be deactivated: " + refusal);
+  }
+}
+
+bool Supervisor::has_all_it_needs(const std::string& component,
+                                  const std::map<std::string, CellView::Seen>& seen) const {
+  const auto lives = [&](const std::string& one) {
+    const auto home = view_.process_of.find(one);
+    return home == view_.process_of.end() || !lost_.contains(home->second);
+  };
+  return lives(component) &&
+         std::all_of(view_.dependents.begin(), view_.dependents.end(), [&](const auto& source) {
+           const auto& [writer, readers] = source;
+           if (std::find(readers.begin(), readers.end(), component) == readers.end()) return true;
+           const auto found = seen.find(writer);
+           return lives(writer) && found != seen.end() && found->second.active;
+         });
+}
+
+/// What was deactivated here for want of others, when those are back: upstream first. One that acts on a device by being
+/// active is left to a person, who is told.
+void Supervisor::bring_back() {
+  if (put_down_.empty() || !view_.activate) return;
+  const auto seen = view_.components();
+  for (std::size_t i = put_down_.size(); i-- > 0;) {
+    const std::string component = put_down_[i];
+    const auto found = seen.find(component);
+    if (found == seen.end() || !has_all_it_needs(component, seen)) continue;
+    put_down_.erase(put_down_.begin() + static_cast<std::ptrdiff_t>(i));
+    if (found->second.active) continue;  // a person was quicker
+    const std::string mend = "`invar lifecycle CELL " + component + " activate`";
+    if (view_.held.contains(component)) {
+      view_.notify(false, component, "what component `" + component + "` needs is back: " + mend);
+      continue;
+    }
+    acted_ = true;
+    const std::string refusal = view_.activate(component);
+    view_.notify(!refusal.empty(), component,
+                 refusal.empty()
+                     ? "component `" + component + "` is active again: what it needs is back"
+                     : "component `" + component + "` cannot be activated (" + refusal + "): " + mend);
   }
 }
 

@@ -18,12 +18,17 @@ struct CellView {
   struct Seen {
     std::string failure;  // of a component in error; empty otherwise
     bool in_error = false;
+    bool active = false;
   };
   /// Processes heard of since the last call, by name.
   std::function<std::set<std::string>()> heard;
   std::function<std::map<std::string, Seen>()> components;
   /// Deactivates a component; an empty text when that was done.
   std::function<std::string(const std::string& component)> deactivate;
+  /// Activates a component; an empty text when that was done.
+  std::function<std::string(const std::string& component)> activate;
+  /// Components that act on a device as soon as they are active: a person activates them again.
+  std::set<std::string> held;
   std::function<void(bool is_fault, const std::string& source, const std::string& text)> notify;
   std::vector<std::string> processes;                          // all that should be there
   std::map<std::string, std::string> process_of;               // component -> process
@@ -60,6 +65,9 @@ class Supervisor final : public Component {
   void watch_processes(const Tick& tick);
   void watch_components();
   void make_safe(const std::set<std::string>& failed);
+  void bring_back();
+  [[nodiscard]] bool has_all_it_needs(const std::string& component,
+                                      const std::map<std::string, CellView::Seen>& seen) const;
 
   const Parameters& parameters_;
   CellView view_;
@@ -68,6 +76,7 @@ class Supervisor final : public Component {
   std::map<std::string, Instant> last_heard_;  // only those that were
   std::set<std::string> lost_;
   std::set<std::string> failed_;
+  std::vector<std::string> put_down_;  // deactivated here, downstream first
 };
 
 /// Everything downstream of `failed` in `dependents`, those furthest downstream first, `failed` itself left out.

@@ -4,12 +4,9 @@
 #include <string>
 #include <vector>
 
-namespace invar::dds {
+#include "core/dds/promised_address.hpp"
 
-struct OwnAddress {
-  std::string address;    // dotted
-  std::string interface;  // "eth0"
-};
+namespace invar::dds {
 
 /// Those of interfaces that are up and have a carrier, which Fast DDS asks for too: on others it makes no socket.
 [[nodiscard]] std::vector<OwnAddress> own_addresses();

@@ -4,9 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "core/dds/own_address.hpp"
-
 namespace invar::dds {
+
+struct OwnAddress {
+  std::string address;    // dotted
+  std::string interface;  // "eth0"
+};
 
 /// Fast DDS 2.9 reads the addresses of a PC once, and makes no socket on one that is missing: a process that started without its
 /// cable is deaf for ever. So the calls of the C library that Fast DDS makes are ours (as in shared_memory_calls.hpp):

@@ -80,6 +80,7 @@ for ((i = 0; i < runs; i++)); do
   cut 0
   sleep 4
   says_not_well 1 'does not answer|lost'
+  says_not_well 2 'trial: is inactive; `invar lifecycle CELL trial activate`'
   mend 0
   within "all active after a cut of 4 s" "$(milliseconds well_on 1)" 10000
   for n in 0 1 2; do stop $n; done

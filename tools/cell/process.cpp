@@ -375,7 +375,8 @@ class RunningProcess {
       std::map<std::string, supervisor::CellView::Seen> seen;
       for (const auto& status : client_->components())
         seen[status.component_name().c_str()] = {status.failure().c_str(),
-                                                 status.state() == lifecycle::STATE_ERROR};
+                                                 status.state() == lifecycle::STATE_ERROR,
+                                                 status.state() == lifecycle::STATE_ACTIVE};
       return seen;
     };
     view.deactivate = [this](const std::string& component) -> std::string {
@@ -384,6 +385,17 @@ class RunningProcess {
       if (!reply) return "its process does not answer";
       return reply->done() ? "" : reply->text().c_str();
     };
+    view.activate = [this](const std::string& component) -> std::string {
+      const auto reply = client_->request(client_->process_of(component), component,
+                                          lifecycle::TRANSITION_ACTIVATE, Duration::seconds(5.0));
+      if (!reply) return "its process does not answer";
+      return reply->done() ? "" : reply->text().c_str();
+    };
+    for (const LoadedProcess& process : loaded_.processes)
+      for (const LoadedComponent& member : process.components)
+        if (member.component && !member.component->claims().empty()) view.held.insert(member.file->name);
+    for (std::size_t i = 0; i < executor_.size(); ++i)
+      if (!executor_.component(i).claims().empty()) view.held.insert(executor_.component(i).name);
     view.notify = [this](bool is_fault, const std::string& from, const std::string& text) {
       service_->publish(is_fault ? event::SEVERITY_FAULT : event::SEVERITY_NOTE, from, text);
     };

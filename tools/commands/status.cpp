@@ -65,7 +65,7 @@ void add_status(CLI::App& program) {
   command->footer(
       "Example: invar status deployment/xy-table.yaml\n"
       "         invar status --domain 71 --json\n"
-      "Exit status: 0 all is well; 1 a process does not answer or has tripped, or a component is in error; 2 "
+      "Exit status: 0 all is well; 1 a process does not answer or has tripped, or a component is in error or not active; 2 "
       "a "
       "fault of the call or the file");
   auto options = std::make_shared<Options>(*command);

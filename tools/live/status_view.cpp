@@ -74,6 +74,15 @@ void print_times(const CellStatus& status, std::ostream& out) {
 
 }  // namespace
 
+/// Each component of the file is wanted active as long as its process lives.
+bool CellStatus::is_wanted_but_not_active(const lifecycle::ComponentStatus& component) const {
+  if (component.state() != lifecycle::STATE_UNCONFIGURED && component.state() != lifecycle::STATE_INACTIVE)
+    return false;
+  return std::any_of(processes.begin(), processes.end(), [&](const auto& p) {
+    return p.process_name() == component.process_name() && p.pid() != 0;
+  });
+}
+
 std::vector<std::string> CellStatus::faults() const {
   std::vector<std::string> lines;
   for (const auto& name : missing) lines.push_back(name + ": does not answer");
@@ -86,6 +95,10 @@ std::vector<std::string> CellStatus::faults() const {
   for (const auto& c : components) {
     const std::string name = c.component_name().c_str();
     if (c.state() == lifecycle::STATE_ERROR) lines.push_back(name + ": in error: " + c.failure().c_str());
+    if (is_wanted_but_not_active(c))
+      lines.push_back(
+          name + ": is " + state_text(c.state()) + "; `invar lifecycle CELL " + name + " " +
+          (c.state() == lifecycle::STATE_UNCONFIGURED ? "configure`, then `activate`" : "activate`"));
     if (!c.fault().to_string().empty()) lines.push_back(name + ": " + c.fault().c_str());
   }
   return lines;

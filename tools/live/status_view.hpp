@@ -23,6 +23,7 @@ struct CellStatus {
   [[nodiscard]] std::vector<std::string> faults() const;
   /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;
+  [[nodiscard]] bool is_wanted_but_not_active(const lifecycle::ComponentStatus& component) const;
 };
 
 void print(const CellStatus& status, std::ostream& out);

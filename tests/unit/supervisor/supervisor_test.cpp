@@ -18,8 +18,9 @@ struct Cell {
   std::vector<std::string> deactivated, told;
   std::int64_t cycle = 0;
 
+  CellView view;
+
   Cell() {
-    CellView view;
     view.processes = {"motion", "jobs", "heat"};
     view.process_of = {
         {"world", "motion"}, {"stage", "motion"}, {"calibration", "jobs"}, {"thermal", "heat"}};
@@ -33,7 +34,7 @@ struct Cell {
     view.notify = [this](bool is_fault, const std::string&, const std::string& text) {
       told.push_back((is_fault ? "! " : "") + text);
     };
-    supervisor.connect(std::move(view));
+    supervisor.connect(view);
     step_once([this](const Tick&) { supervisor.activate(); });
   }
   template <class Do>
@@ -111,6 +112,41 @@ TEST(Supervisor, AComponentInErrorTakesDownWhatNeedsItFurthestFirst) {
   cell.run(1.0);
   EXPECT_THAT(cell.deactivated, ElementsAre("calibration", "stage"));
   EXPECT_THAT(cell.told.front(), HasSubstr("! component `world` is in error: no such machine"));
+}
+
+TEST(Supervisor, WhatItDeactivatedIsActiveAgainWhenAllThatItNeedsIsBack) {
+  for (const bool held : {false, true}) {
+    Cell cell;
+    std::vector<std::string> activated;
+    CellView view = cell.view;
+    view.activate = [&](const std::string& component) {
+      activated.push_back(component);
+      return std::string{};
+    };
+    if (held) view.held = {"calibration"};
+    cell.supervisor.connect(view);
+    cell.components = {{"stage", {"", false, true}}, {"calibration", {"", false, true}}};
+    cell.alive = {"motion", "jobs", "heat"};
+    cell.run(5.0);
+    cell.alive.erase("motion");
+    cell.run(5.0);
+    ASSERT_THAT(cell.deactivated, ElementsAre("calibration"));
+    cell.components["calibration"].active = false;
+    EXPECT_THAT(activated, IsEmpty());
+    cell.components["stage"].active = false;  // it starts
+    cell.alive.insert("motion");
+    cell.run(1.0);
+    EXPECT_THAT(activated, IsEmpty()) << "its stage is not active yet";
+    cell.components["stage"].active = true;
+    cell.run(1.0);
+    if (held) {
+      EXPECT_THAT(activated, IsEmpty());
+      EXPECT_THAT(cell.told.back(), HasSubstr("`invar lifecycle CELL calibration activate`"));
+    } else {
+      EXPECT_THAT(activated, ElementsAre("calibration"));
+      EXPECT_THAT(cell.told.back(), HasSubstr("is active again"));
+    }
+  }
 }
 
 }  // namespace
