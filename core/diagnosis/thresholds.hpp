@@ -245,6 +245,12 @@ inline constexpr double moved_column_leaves = 0.25;
 inline constexpr double seen_alone = 0.985;
 /// The same beside names. Judgement: a tenth.
 inline constexpr double seen_beside = 0.9;
+/// Share of the mismatch, against that of the chief effect, below which rivals of a finding leave the verdict as it is.
+/// Judgement: a tenth.
+inline constexpr double small_beside_chief = 0.1;
+/// Share of an RMS that a fit with all rows alike leaves of one under filters, below which the filters lead away. Judgement: a
+/// tenth.
+inline constexpr double leads_away = 0.9;
 /// Share of an RMS that a curve with memory may leave: it takes a little of nearly any dynamics. Judgement.
 inline constexpr double memory_leaves = 0.9;
 /// The same beside the best curve without memory. Judgement.

@@ -47,7 +47,7 @@ std::optional<std::pair<Fit, Weighing>> nearest(const Case& data, const Fit& bas
     // Filters that follow the colour of what is still missing may lead away.
     auto coloured = weigh(data, simulate(data, fitted.model));
     if (auto near = fit(data, coloured, fitted.model, data.model, Effort::follow(8), &fitted);
-        least_ratio(data, fitted, near) > 0.9)
+        least_ratio(data, fitted, near) > thresholds::leads_away)
       fitted = std::move(near), weighing = std::move(coloured);
     if (!best || least_ratio(data, fitted, best->first) < 1.0) best.emplace(fitted, weighing);
   }

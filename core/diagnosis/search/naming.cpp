@@ -109,16 +109,19 @@ bool Search::add_named(double round) {
                   "what it explains is no more than chance would", f.evidence - sought.base.evidence);
       continue;
     }
-    const auto rather = [&](From other_base) {
-      if (auto other = seek(other_base, share); other.best && other.best->gain >= margin() &&
-                                                lead(data_, other.best->with, sought.best->with) > 0.0)
+    const auto rather = [&](From other_base, double leaves) {
+      if (auto other = seek(other_base, share);
+          other.best && other.best->gain >= margin() &&
+          lead(data_, other.best->with, sought.best->with) > 0.0 &&
+          least_ratio(data_, other.best->with, sought.best->with) < leaves)
         sought = std::move(other);
     };
-    // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first.
-    if ((is_first || is_heat()) && data_.is_time_series && !noise_->is_fed_back() && from == From::coloured)
-      rather(From::plain);
+    // What is steady or slow is not seen through filters that hold it for noise; what is swift is, and comes first. The noise
+    // that a loop feeds back is slow too: there a name must take half of what the swift one leaves.
+    if ((is_first || is_heat()) && data_.is_time_series && from == From::coloured)
+      rather(From::plain, noise_->is_fed_back() ? thresholds::half_of_squares : 1.0);
     if (is_first && is_equations() && excursion_of(sought.best->with) > thresholds::far_astray)
-      rather(From::believed);
+      rather(From::believed, 1.0);
     const auto& best = *sought.best;
     if (is_first && is_equations() && leads_out(best)) return add_named(round);
     if (const auto why = why_not(best)) {
@@ -190,8 +193,13 @@ bool Search::take_shaken(const Fit& base, Fit* otherwise) {
 double Search::quieten() {
   if (!options_.refuses || data_.model.plant != physics::Plant::axis) return 0.0;
   const double untold = noise_->take_off(d_.best.model);
-  d_.weighing = weigh(data_, simulate(data_, d_.best.model));
-  d_.best = fit(data_, d_.weighing, d_.best.model, data_.model, Effort::follow(4), &d_.best);
+  const auto near = fit(data_, weigh(data_, simulate(data_, d_.best.model), Colour::white), d_.best.model,
+                        data_.model, Effort::follow(4), &d_.best);
+  d_.weighing = weigh(data_, simulate(data_, near.model));
+  d_.best = fit(data_, d_.weighing, near.model, data_.model, Effort::follow(4), &near);
+  // Weights that follow the colour of what is still missing may lead away.
+  if (least_ratio(data_, near, d_.best) < thresholds::leads_away)
+    d_.best = fit(data_, d_.weighing, near.model, data_.model, Effort::evaluate(), &near);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(4), &d_.retuned);
   return untold;
 }

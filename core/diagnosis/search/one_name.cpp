@@ -131,7 +131,7 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
   Weighing own = weigh(data, simulate(data, settled.model));
   auto with = fit(data, own, settled.model, data.model, Effort::follow(6), &settled);
   // Weights that follow the colour of what is still missing may lead away.
-  if (least_ratio(data, settled, with) < 0.9)
+  if (least_ratio(data, settled, with) < thresholds::leads_away)
     with = fit(data, own, settled.model, data.model, Effort::evaluate(), &settled);
   auto without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
   double evidence = advantage(data, own, with, without);

@@ -194,6 +194,8 @@ bool leave_out_drift(const Case& data, Diagnosis& d) {
       continue;
     const auto others = physics::without_term(d.best.model, given + i);
     auto without = fit(data, d.weighing, others, data.model, Effort::follow(10));
+    // The chief effect is no drift beside others.
+    if (least_ratio(data, d.best, without) < thresholds::half_of_squares) continue;
     if (!takes_over(without.model, others, given)) continue;
     d.reject(std::string{drift.info->name}, "it takes over what the others explain", d.findings[i].gain);
     d.best = std::move(without);

@@ -132,14 +132,18 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
   return rests;
 }
 
-/// Does another cause at the same place explain as well as one of the findings?
+/// Does another cause at the same place explain as well as one of the findings? A small one beside the chief effect has
+/// its rivals in the list, and leaves the verdict on the chief effect as it is.
 bool is_ambiguous(const Diagnosis& d) {
-  bool ambiguous = false;
-  for (const auto& finding : d.findings)
-    for (const auto& a : finding.alternatives)
-      ambiguous = ambiguous || (a.explains_as_well() && is_another_cause(finding, a) &&
-                                !is_elsewhere(finding.term, a.term));
-  return ambiguous;
+  double chief = 0.0;
+  for (const auto& finding : d.findings) chief = std::max(chief, finding.share_of_rest);
+  return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
+    return finding.share_of_rest >= thresholds::small_beside_chief * chief &&
+           std::any_of(finding.alternatives.begin(), finding.alternatives.end(), [&](const Alternative& a) {
+             return a.explains_as_well() && is_another_cause(finding, a) &&
+                    !is_elsewhere(finding.term, a.term);
+           });
+  });
 }
 
 /// `follows`: what is left plainly follows what was recorded.
