@@ -12,9 +12,9 @@ struct OwnAddress {
 };
 
 /// Fast DDS 2.9 reads the addresses of a PC once, and makes no socket on one that is missing: a process that started without its
-/// cable is deaf for ever. So the calls of the C library that Fast DDS makes are ours (as in shared_memory_calls.hpp):
-/// getifaddrs shows a promised address, bind takes it before it is there (IP_FREEBIND), and what the kernel refuses of multicast
-/// until then is kept for `renew_promises`. Any thread.
+/// cable is deaf for ever. So the calls of the C library that Fast DDS makes are ours (as in shared_memory_calls.hpp).
+/// Our getifaddrs shows a promised address, and bind takes it before it is there (IP_FREEBIND). Multicast groups that the kernel
+/// refuses until then are kept for `renew_promises`. Any thread.
 void promise_address(const std::string& address);
 /// After a promised address came or came back: joins the multicast groups on it.
 void renew_promises();
