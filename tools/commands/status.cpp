@@ -16,8 +16,9 @@ namespace invar::tools {
 namespace {
 
 struct Options {
-  explicit Options(CLI::App& command) : call{command, {}} {}
+  explicit Options(CLI::App& app) : call{app, {}}, command{app} {}
   CellCall call;
+  CLI::App& command;
   bool json = false;
 };
 
@@ -47,6 +48,7 @@ int status(Options& options) {
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
     status.notices = hear_notices(cell);
+    if (options.command.count("--wait") > 0) cell.wait_for_components();
     status.processes = cell.client().processes();
     status.components = cell.client().components();
   }
@@ -65,7 +67,8 @@ void add_status(CLI::App& program) {
   command->footer(
       "Example: invar status deployment/xy-table.yaml\n"
       "         invar status --domain 71 --json\n"
-      "Exit status: 0 all is well; 1 a process does not answer or has tripped, or a component is in error or not active; 2 "
+      "Exit status: 0 all is well; 1 a process does not answer or has tripped, or a component is in error or "
+      "not active; 2 "
       "a "
       "fault of the call or the file");
   auto options = std::make_shared<Options>(*command);

@@ -241,6 +241,15 @@ std::string LiveCell::topic(const std::string& text) const {
   return dds::topic_name(name_, text.substr(0, dot), text.substr(dot + 1));
 }
 
+void LiveCell::wait_for_components() {
+  wait_until(patience_, [&] {
+    const auto components = client_->components();
+    return std::none_of(components.begin(), components.end(), [](const auto& c) {
+      return c.state() == lifecycle::STATE_UNCONFIGURED || c.state() == lifecycle::STATE_INACTIVE;
+    });
+  });
+}
+
 std::vector<dds::Endpoint> LiveCell::wait_for_writers(const std::string& text) {
   const std::string wanted = topic(text);
   std::vector<dds::Endpoint> writers;

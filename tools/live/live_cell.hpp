@@ -73,6 +73,9 @@ class LiveCell {
   /// Waits until every process of the file has said how it is; without a file, every one that takes part in the domain.
   /// Returns the processes that did not.
   std::vector<std::string> wait_for_processes();
+  /// A cell that was just started activates its components one after the other: waits until all are active or in error, or
+  /// the end of patience.
+  void wait_for_components();
   /// Waits until all writers and readers of the cell's processes have been discovered; where others take part, whom nobody
   /// can ask how many they have, until nothing new has been for 3 s: a participant
   /// that missed the first announcements hears the next after 1.5 s.
