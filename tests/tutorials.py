@@ -324,8 +324,8 @@ def main(words):
     elif command == "complete" and rest:
         source = pathlib.Path(rest[0]).resolve()
         there, named = {str(page.relative_to(source)) for page in pages_of(source)}, set(rest[1:])
-        faults = [f"{page}: is not among the pages of tests/CMakeLists.txt" for page in sorted(there - named)]
-        faults += [f"{page}: is named in tests/CMakeLists.txt, but does not exist" for page in sorted(named - there)]
+        faults = [f"{page}: is not among the pages of tests/pages.cmake" for page in sorted(there - named)]
+        faults += [f"{page}: is named in tests/pages.cmake, but does not exist" for page in sorted(named - there)]
     else:
         print(__doc__)
         return 2

@@ -251,6 +251,8 @@ inline constexpr double small_beside_chief = 0.1;
 /// Share of an RMS that a fit with all rows alike leaves of one under filters, below which the filters lead away. Judgement: a
 /// tenth.
 inline constexpr double leads_away = 0.9;
+/// The same of a curve without a name, which follows more easily. Judgement.
+inline constexpr double leads_a_curve_away = 0.97;
 /// Share of an RMS that a curve with memory may leave: it takes a little of nearly any dynamics. Judgement.
 inline constexpr double memory_leaves = 0.9;
 /// The same beside the best curve without memory. Judgement.

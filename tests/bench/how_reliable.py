@@ -4,11 +4,10 @@ writes; figures.py makes the pages, and called as a program this file does what 
 """
 import json
 import math
-import pathlib
 import sys
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-RESULTS = ROOT / "tests" / "bench" / "results"
+from result_tables import RESULTS, table
+
 BINS = 10
 SETS = {"dev": "synthetic machines, one effect each",
         "crowd": "synthetic machines, a crowd of small effects beside the chief one",
@@ -29,10 +28,6 @@ def number(value, digits=3):
     if isinstance(value, int):
         return str(value)
     return f"{value:.{digits}f}".rstrip("0").rstrip(".") if abs(value) < 1 else f"{value:.4g}"
-
-
-def table(head, rows):
-    return "\n".join(["| " + " | ".join(head) + " |", "| " + " | ".join(["---"] * len(head)) + " |"] + ["| " + " | ".join(r) + " |" for r in rows])
 
 
 def made_by(result):

@@ -4,7 +4,8 @@
 source "$(dirname "${BASH_SOURCE[0]}")/two_namespaces.sh"
 three_namespaces() {
   pc=(invar-0-$$ invar-1-$$ invar-2-$$) switch=invar-switch-$$ folder=$(mktemp -d)
-  trap leave_three EXIT
+  spaces=("${pc[@]}" "$switch")
+  trap leave_namespaces EXIT
   ip netns add "$switch"
   ip -n "$switch" link add name bridge type bridge mcast_snooping 0
   ip -n "$switch" link set bridge up
@@ -27,16 +28,9 @@ mend() { ip netns exec "$switch" nft delete table bridge "cut$1"; }
 no_multicast() { local i; for i in 0 1 2; do on "$i" nft 'table inet group { chain out { type filter hook output priority 0; ip daddr 224.0.0.0/4 drop; }; }'; done; }
 with_multicast() { local i; for i in 0 1 2; do on "$i" nft delete table inet group; done; }
 
-leave_three() {
-  for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
-  wait
-  local space
-  for space in "${pc[@]}" "$switch"; do ip netns del "$space" 2>/dev/null || true; done
-  rm -rf "$folder"
-}
 # milliseconds COMMAND...: until it succeeds, at most 30 s.
 milliseconds() {
-  local begin=${EPOCHREALTIME/./} 
+  local begin=${EPOCHREALTIME/./}
   until "$@" >/dev/null 2>&1; do
     (((${EPOCHREALTIME/./} - begin) / 1000 < 30000)) || { echo 30000; return; }
     sleep 0.02

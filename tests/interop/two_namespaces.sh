@@ -4,6 +4,7 @@
 pids=()
 two_namespaces() {
   a=invar-a-$$ b=invar-b-$$ folder=$(mktemp -d)
+  spaces=("$a" "$b")
   trap leave_namespaces EXIT
   ip netns add "$a"; ip netns add "$b"
   ip -n "$a" link add cable type veth peer name cable netns "$b"
@@ -19,11 +20,12 @@ two_namespaces() {
   done
 }
 
+# Ends ${pids[@]}, and removes ${spaces[@]} and $folder.
 leave_namespaces() {
   for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
   wait
-  ip netns del "$a" 2>/dev/null || true
-  ip netns del "$b" 2>/dev/null || true
+  local space
+  for space in "${spaces[@]}"; do ip netns del "$space" 2>/dev/null || true; done
   rm -rf "$folder"
 }
 

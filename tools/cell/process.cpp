@@ -379,18 +379,16 @@ class RunningProcess {
                                                  status.state() == lifecycle::STATE_ACTIVE};
       return seen;
     };
-    view.deactivate = [this](const std::string& component) -> std::string {
-      const auto reply = client_->request(client_->process_of(component), component,
-                                          lifecycle::TRANSITION_DEACTIVATE, Duration::seconds(5.0));
-      if (!reply) return "its process does not answer";
-      return reply->done() ? "" : reply->text().c_str();
+    const auto requests = [this](lifecycle::Transition transition) {
+      return [this, transition](const std::string& component) -> std::string {
+        const auto reply =
+            client_->request(client_->process_of(component), component, transition, Duration::seconds(5.0));
+        if (!reply) return "its process does not answer";
+        return reply->done() ? "" : reply->text().c_str();
+      };
     };
-    view.activate = [this](const std::string& component) -> std::string {
-      const auto reply = client_->request(client_->process_of(component), component,
-                                          lifecycle::TRANSITION_ACTIVATE, Duration::seconds(5.0));
-      if (!reply) return "its process does not answer";
-      return reply->done() ? "" : reply->text().c_str();
-    };
+    view.deactivate = requests(lifecycle::TRANSITION_DEACTIVATE);
+    view.activate = requests(lifecycle::TRANSITION_ACTIVATE);
     for (const LoadedProcess& process : loaded_.processes)
       for (const LoadedComponent& member : process.components)
         if (member.component && !member.component->claims().empty()) view.held.insert(member.file->name);

@@ -10,6 +10,7 @@
 #include "core/dds/own_address.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/live/interrupt.hpp"
+#include "tools/live/status_view.hpp"
 
 namespace invar::tools {
 
@@ -244,9 +245,8 @@ std::string LiveCell::topic(const std::string& text) const {
 void LiveCell::wait_for_components() {
   wait_until(patience_, [&] {
     const auto components = client_->components();
-    return std::none_of(components.begin(), components.end(), [](const auto& c) {
-      return c.state() == lifecycle::STATE_UNCONFIGURED || c.state() == lifecycle::STATE_INACTIVE;
-    });
+    return std::none_of(components.begin(), components.end(),
+                        [](const auto& c) { return is_inactive(c.state()); });
   });
 }
 

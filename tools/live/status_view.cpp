@@ -72,16 +72,15 @@ void print_times(const CellStatus& status, std::ostream& out) {
   table.print(out);
 }
 
-}  // namespace
-
 /// Each component of the file is wanted active as long as its process lives.
-bool CellStatus::is_wanted_but_not_active(const lifecycle::ComponentStatus& component) const {
-  if (component.state() != lifecycle::STATE_UNCONFIGURED && component.state() != lifecycle::STATE_INACTIVE)
-    return false;
-  return std::any_of(processes.begin(), processes.end(), [&](const auto& p) {
-    return p.process_name() == component.process_name() && p.pid() != 0;
-  });
+bool is_wanted_but_not_active(const CellStatus& status, const lifecycle::ComponentStatus& component) {
+  return is_inactive(component.state()) &&
+         std::any_of(status.processes.begin(), status.processes.end(), [&](const auto& p) {
+           return p.process_name() == component.process_name() && p.pid() != 0;
+         });
 }
+
+}  // namespace
 
 std::vector<std::string> CellStatus::faults() const {
   std::vector<std::string> lines;
@@ -95,7 +94,7 @@ std::vector<std::string> CellStatus::faults() const {
   for (const auto& c : components) {
     const std::string name = c.component_name().c_str();
     if (c.state() == lifecycle::STATE_ERROR) lines.push_back(name + ": in error: " + c.failure().c_str());
-    if (is_wanted_but_not_active(c))
+    if (is_wanted_but_not_active(*this, c))
       lines.push_back(
           name + ": is " + state_text(c.state()) + "; `invar lifecycle CELL " + name + " " +
           (c.state() == lifecycle::STATE_UNCONFIGURED ? "configure`, then `activate`" : "activate`"));
@@ -105,6 +104,10 @@ std::vector<std::string> CellStatus::faults() const {
 }
 
 bool CellStatus::healthy() const { return !processes.empty() && faults().empty(); }
+
+bool is_inactive(lifecycle::ComponentState state) {
+  return state == lifecycle::STATE_UNCONFIGURED || state == lifecycle::STATE_INACTIVE;
+}
 
 std::string state_text(lifecycle::ComponentState state) {
   constexpr std::array words{"unconfigured", "inactive", "active", "finalized", "error"};

@@ -23,7 +23,6 @@ struct CellStatus {
   [[nodiscard]] std::vector<std::string> faults() const;
   /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;
-  [[nodiscard]] bool is_wanted_but_not_active(const lifecycle::ComponentStatus& component) const;
 };
 
 void print(const CellStatus& status, std::ostream& out);
@@ -31,6 +30,8 @@ void print(const CellStatus& status, std::ostream& out);
 /// The one shape of a process and of a component (docs/reference-json.md).
 [[nodiscard]] nlohmann::ordered_json json_of(const lifecycle::ProcessStatus& process, bool silent);
 [[nodiscard]] nlohmann::ordered_json json_of(const lifecycle::ComponentStatus& component);
+/// Not active, and not in error: so it is until it was activated, and after it was deactivated.
+[[nodiscard]] bool is_inactive(lifecycle::ComponentState state);
 /// "active"
 [[nodiscard]] std::string state_text(lifecycle::ComponentState state);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/diagnosis/dataset/starts.hpp"
 
@@ -45,6 +46,13 @@ double least_ratio(const Case& data, const Fit& a, const Fit& b) {
   for (std::size_t o = 0; o < sums_b.size(); ++o)
     if (sums_b[o] > 0.0) least = std::min(least, std::sqrt(sums_a[o] / sums_b[o]));
   return least;
+}
+
+Fit fit_near(const Case& data, const Weighing& filters, const Fit& near, Effort effort, double leads_away) {
+  auto followed = fit(data, filters, near.model, data.model, effort, &near);
+  return least_ratio(data, near, followed) < leads_away
+             ? fit(data, filters, near.model, data.model, Effort::evaluate(), &near)
+             : std::move(followed);
 }
 
 double excursion_of(const Fit& fit) {

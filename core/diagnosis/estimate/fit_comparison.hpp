@@ -23,5 +23,8 @@ std::vector<double> squares_left(const Case& data, const physics::Model& model);
 double excursion_of(const Fit& fit);
 /// The smallest ratio of residual RMS of any output, a over b.
 double least_ratio(const Case& data, const Fit& a, const Fit& b);
+/// `near`, followed under the filters of its own residual. Filters that hold what is still missing for noise may lead the
+/// numbers away. Where `near` leaves less than the share `leads_away` of an output's RMS, its numbers stay.
+Fit fit_near(const Case& data, const Weighing& filters, const Fit& near, Effort effort, double leads_away);
 
 }  // namespace invar::diagnosis

@@ -196,10 +196,7 @@ double Search::quieten() {
   const auto near = fit(data_, weigh(data_, simulate(data_, d_.best.model), Colour::white), d_.best.model,
                         data_.model, Effort::follow(4), &d_.best);
   d_.weighing = weigh(data_, simulate(data_, near.model));
-  d_.best = fit(data_, d_.weighing, near.model, data_.model, Effort::follow(4), &near);
-  // Weights that follow the colour of what is still missing may lead away.
-  if (least_ratio(data_, near, d_.best) < thresholds::leads_away)
-    d_.best = fit(data_, d_.weighing, near.model, data_.model, Effort::evaluate(), &near);
+  d_.best = fit_near(data_, d_.weighing, near, Effort::follow(4), thresholds::leads_away);
   d_.retuned = fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::follow(4), &d_.retuned);
   return untold;
 }

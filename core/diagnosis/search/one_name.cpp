@@ -129,10 +129,7 @@ Followed follow(const Naming& naming, const Fit& base, const Fit& start, bool ha
     if (arrived) break;
   }
   Weighing own = weigh(data, simulate(data, settled.model));
-  auto with = fit(data, own, settled.model, data.model, Effort::follow(6), &settled);
-  // Weights that follow the colour of what is still missing may lead away.
-  if (least_ratio(data, settled, with) < thresholds::leads_away)
-    with = fit(data, own, settled.model, data.model, Effort::evaluate(), &settled);
+  auto with = fit_near(data, own, settled, Effort::follow(6), thresholds::leads_away);
   auto without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
   double evidence = advantage(data, own, with, without);
   // Half of the squares are no noise, whatever their colour: where the filters see less in that than its independent rows

@@ -48,9 +48,7 @@ void sharpen(const Case& data, Curved& found) {
   }
   auto rough = fit(data, weighing, model, data.model, Effort::follow(4));
   const Weighing own = weigh(data, simulate(data, rough.model));
-  auto sharp = fit(data, own, rough.model, data.model, Effort::follow(4), &rough);
-  if (least_ratio(data, rough, sharp) < 0.97)
-    sharp = fit(data, own, rough.model, data.model, Effort::evaluate(), &rough);
+  auto sharp = fit_near(data, own, rough, Effort::follow(4), thresholds::leads_a_curve_away);
   const auto blunt = fit(data, own, curved.model, data.model, Effort::polish(3), &curved);
   if (sharp.evidence < blunt.evidence || least_ratio(data, curved, sharp) < 0.97) return;
   found.gain += sharp.evidence - blunt.evidence;
@@ -119,10 +117,8 @@ std::optional<Curved> curved_by(const Case& data, const Fit& base, const Weighin
   if (data.model.plant == physics::Plant::equations && !is_affordable(data, near)) return std::nullopt;
   auto rough = load_or_motor(data, plain, fit(data, plain, near.model, data.model, Effort::polish(2), &near));
   const Weighing own = weigh(data, simulate(data, rough.model));
-  auto curved = fit(data, own, rough.model, data.model, Effort::polish(3), &rough);
   // Weights that take the slow part of what is left for noise judge a curve, but do not draw it.
-  if (least_ratio(data, rough, curved) < 0.97)
-    curved = fit(data, own, rough.model, data.model, Effort::evaluate(), &rough);
+  auto curved = fit_near(data, own, rough, Effort::polish(3), thresholds::leads_a_curve_away);
   const auto without = fit(data, own, base.model, data.model, Effort::follow(4), &base);
   const double evidence = curved.evidence - without.evidence;
   double gain = std::min(evidence, advantage_over_wander(data, own, curved, without));
@@ -189,11 +185,12 @@ namespace {
 
 /// Is a finding the chief effect? Without it more is left than without any other; `without`: the fit that lacks it.
 bool is_chief(const Case& data, const Diagnosis& d, const Fit& without, std::size_t finding) {
+  const double ratio = least_ratio(data, d.best, without);
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     if (i == finding) continue;
     const auto model = physics::without_term(d.best.model, data.model.terms.size() + i);
     const auto other = fit(data, d.weighing, model, data.model, Effort::follow(10));
-    if (least_ratio(data, d.best, other) < least_ratio(data, d.best, without)) return false;
+    if (least_ratio(data, d.best, other) < ratio) return false;
   }
   return true;
 }
