@@ -26,6 +26,7 @@ for words in 'job +calibrate-geometry: done' 'error before +rms [0-9.]+ um' 'err
   'from 20 mm +[0-9.]+ um before, [0-9.]+ um after'; do
   grep -Eq "$words" summary || { echo "the summary lacks: $words"; exit 1; }
 done
+"$source/tests/readme.py" figures summary checkout/out/xy-table  # README.md shows what this run shows
 for what in report recording; do
   file=$(sed -n "s/^$what  *//p" summary | head -n 1)
   [[ $file == "$folder"/checkout/out/* && -s $file ]] || { echo "the $what that is named does not exist: $file"; exit 1; }
