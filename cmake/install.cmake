@@ -2,9 +2,9 @@
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
-# What a component needs: the API, the types; and for programs the diagnosis with what it stands on. Tools and devices stay
-# inside.
-set(INVAR_PACKAGE invar_base invar_config invar_component invar_idl
+# What a component needs: the API, the types, Modbus for a driver; and for programs the diagnosis with what it stands on. Tools and
+# devices stay inside.
+set(INVAR_PACKAGE invar_base invar_config invar_component invar_idl invar_modbus
   invar_diagnosis invar_model invar_physics invar_recording invar_idl_texts invar_numerics)
 install(TARGETS ${INVAR_PACKAGE} EXPORT invar
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}

@@ -20,7 +20,14 @@ set(pages
   docs/how-to/troubleshooting.md
   docs/how-to/use-a-camera.md
   docs/how-to/watch-a-cell.md
-  docs/how-to/write-a-component.md)
+  docs/how-to/write-a-component.md
+  examples/cyclone/README.md
+  examples/diagnose/README.md
+  examples/low_pass/README.md
+  examples/modbus_sensor/README.md
+  examples/one_axis/README.md
+  examples/own_term/README.md
+  examples/pad_heater/README.md)
 set(tutorials ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/tutorials.py)
 add_test(NAME Pages.FaultsAreFound COMMAND ${tutorials} self-test)
 add_test(NAME Pages.EachIsRunOrSaysWhyNot COMMAND ${tutorials} complete ${PROJECT_SOURCE_DIR} ${pages})
@@ -31,6 +38,9 @@ foreach(page IN LISTS pages)
   add_test(NAME Pages.Run/${page} COMMAND ${tutorials} run ${CMAKE_BINARY_DIR} ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/${page})
   set_tests_properties(Pages.Run/${page} PROPERTIES FIXTURES_REQUIRED installed_pages TIMEOUT 150 PROCESSORS 2)  # most run a cell of five processes
 endforeach()
+add_test(NAME New.WritesWhatBuildsAndRunsAndOverwritesNothing
+  COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/cell/new_test.py ${CMAKE_BINARY_DIR}/pages ${PROJECT_SOURCE_DIR})
+set_tests_properties(New.WritesWhatBuildsAndRunsAndOverwritesNothing PROPERTIES FIXTURES_REQUIRED installed_pages TIMEOUT 200 PROCESSORS 2)
 add_test(NAME Pages.TheMessagesOfTroubleshootingAreTheProgramsOwn
   COMMAND ${Python3_EXECUTABLE} ${CMAKE_CURRENT_SOURCE_DIR}/check_troubleshooting.py)
 add_test(NAME Pages.AMessageThatWentIsSeen

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Runs the commands of a page of docs/tutorials or docs/how-to in a fresh folder, as a reader would type them.
+"""Runs the commands of a page of docs/tutorials or docs/how-to, or of an example's README.md, in a fresh folder, as a reader would
+type them.
 
   tutorials.py install BUILD SOURCE          installs the build for the pages, into BUILD/pages
   tutorials.py run BUILD SOURCE PAGE.md      runs one page; status 1 where a command fails or prints something else
   tutorials.py show BUILD SOURCE PAGE.md     the same, and shows the true output of each block, for who writes a page
   tutorials.py list SOURCE                   the blocks that are not run, each with its reason
-  tutorials.py complete SOURCE PAGE.md...    fails where a page of the two folders is not among the arguments
+  tutorials.py complete SOURCE PAGE.md...    fails where such a page is not among the arguments
   tutorials.py self-test                     faults of a page are seen
 
 A page's blocks are run in order by one shell, so a folder or a variable of one block holds in the next. A comment on the line before a
@@ -265,7 +266,7 @@ def run(build, source, page, show=False):
 
 
 def pages_of(source):
-    return [page for folder in FOLDERS for page in sorted((source / folder).glob("*.md"))]
+    return [page for folder in FOLDERS for page in sorted((source / folder).glob("*.md"))] + sorted(source.glob("examples/*/README.md"))
 
 
 def install(build):

@@ -1,40 +1,6 @@
-// Smooths one position signal with a first-order low-pass: the smallest component, outside the tree.
+// The library: makes LowPass known by the name that a cell file uses.
+#include "low_pass.hpp"
+
 #include "core/component/plugin.hpp"
-
-#include <cmath>
-#include <numbers>
-
-#include "idl/stage.h"
-
-class LowPass final : public invar::Component {
- public:
-  struct Parameters {
-    double cutoff = 100.0;
-    void describe(auto& p) {
-      p(cutoff, "cutoff", "Hz", invar::Range{0.1, 450.0}, "-3 dB corner", invar::while_running);
-    }
-  };
-  explicit LowPass(const Parameters& parameters) : parameters_{parameters} {}  // may allocate, may throw
-  void activate() override { primed_ = false; }
-
-  // Real-time. Exact for an input held over the period: y' = rate (u - y).
-  void step(const invar::Tick& tick) noexcept override {
-    const auto* u = raw_.latest();
-    if (u == nullptr) return;  // nothing arrived yet
-    if (!primed_) y_ = u->position();
-    primed_ = true;
-    y_ -= std::expm1(-2.0 * std::numbers::pi * parameters_.cutoff * tick.period) * (u->position() - y_);
-    auto out = *u;  // keeps axis and stamp
-    out.position(y_);
-    smooth_.write(out);
-  }
-
- private:
-  const Parameters& parameters_;
-  invar::Input<invar::stage::AxisFeedback> raw_{*this, "raw"};
-  invar::Output<invar::stage::AxisFeedback> smooth_{*this, "smooth"};
-  double y_ = 0.0;
-  bool primed_ = false;
-};
 
 INVAR_PLUGIN(registry) { registry.add<LowPass>("low_pass", "first-order low-pass of a position"); }

@@ -18,6 +18,11 @@ struct Options {
   bool json = false;
 };
 
+/// "1 process", "3 processes".
+std::string counted(std::size_t number, const std::string& one, const std::string& several) {
+  return std::to_string(number) + " " + (number == 1 ? one : several);
+}
+
 int check(const Options& options) {
   std::vector<Fault> faults, notes;
   std::size_t components = 0;
@@ -42,8 +47,8 @@ int check(const Options& options) {
   } else {
     for (const Fault& fault : faults) std::cerr << printable(fault.line()) << '\n';
     if (faults.empty())
-      std::cout << options.file.string() << ": sound (" << components << " components in " << processes
-                << " processes)\n";
+      std::cout << options.file.string() << ": sound (" << counted(components, "component", "components")
+                << " in " << counted(processes, "process", "processes") << ")\n";
     for (const Fault& note : notes) std::cout << printable(note.line()) << '\n';
   }
   return faults.empty() ? 0 : 2;
