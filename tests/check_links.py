@@ -1,6 +1,10 @@
 #!/usr/bin/env python3
 """Citations and links exist: each documentation file that a comment names (docs/PAGE.md#section), and each relative link of a
-*.md file. An anchor is a heading in GitHub's spelling, or <a id="...">. `check_links.py --self-test` shows that faults are seen."""
+*.md file. An anchor is a heading in GitHub's spelling, or <a id="...">. `check_links.py --self-test` shows that faults are seen.
+
+A page of docs/ is read in three places: in the tree, as share/doc/invar, and in the site of tools/docs. It therefore links to pages of
+docs/ alone, a README of examples/ to its own folder. Other files of the tree stand in a code span (`core/base`), and exist too.
+mkdocs.yml has each page of docs/ in `nav` once, and a linked section has the same anchor in the site as on GitHub."""
 import pathlib
 import re
 import sys
@@ -19,6 +23,8 @@ NAMED_ALONE = re.compile(r"(?<![\w./-])([\w-]+\.md)(#[\w-]+)?")
 COMMENT = re.compile(r"(?://|#|--) .*")
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 FENCE = re.compile(r"^(```|~~~)")
+SPAN = re.compile(r"`((?:core|components|deployment|docs|examples|idl|tests|tools)/[\w./-]*)`")
+NAV = re.compile(r"^ +- (?:[^:]+: )?([\w./-]+\.md)$|^  - [^:]+: ([\w./-]+\.md)$", re.M)
 
 
 def without_code(text):
@@ -39,6 +45,29 @@ def slug(heading):
     return re.sub(r"[^\w\- ]", "", heading).replace(" ", "-")
 
 
+def site_slug(heading):
+    """mkdocs's anchor of the heading: as GitHub's, but blanks and hyphens in a row give one hyphen."""
+    return re.sub(r"[-\s]+", "-", slug(heading))
+
+
+def home_of(name):
+    """The folder that a page's links must not leave; nothing for a page that stands in the tree alone."""
+    if name.startswith("docs/"):
+        return "docs"
+    return "/".join(name.split("/")[:2]) if re.match(r"examples/[^/]+/", name) else ""
+
+
+def check_nav(root):
+    """Each page of docs/ stands in the navigation of the site once."""
+    if not (root / "mkdocs.yml").exists():
+        return ["mkdocs.yml does not exist"]
+    listed = [one or other for one, other in NAV.findall((root / "mkdocs.yml").read_text(encoding="utf-8"))]
+    there = {path.relative_to(root / "docs").as_posix() for path in (root / "docs").rglob("*.md")}
+    return ([f"mkdocs.yml: nav lacks {page}" for page in sorted(there - set(listed))] +
+            [f"mkdocs.yml: nav has {page}, which docs/ has not" for page in sorted(set(listed) - there)] +
+            [f"mkdocs.yml: nav has {page} more than once" for page in sorted({page for page in listed if listed.count(page) > 1})])
+
+
 def anchors(page):
     """All anchors of a page; a heading that stands twice counts on (-1, -2)."""
     found, seen, fenced = set(), {}, False
@@ -49,6 +78,8 @@ def anchors(page):
         if heading and not fenced:
             name = slug(heading.group(1))
             found.add(name if name not in seen else f"{name}-{seen[name]}")
+            if name not in seen and site_slug(heading.group(1)) != name:
+                found.add("\0" + name)  # spelled otherwise in the site
             seen[name] = seen.get(name, 0) + 1
         found.update(re.findall(r'<a id="([^"]+)">', line))
     return found
@@ -71,23 +102,32 @@ def check_target(target, anchor, where, root, known):
             known[target] = anchors(target)
         if anchor not in known[target]:
             return [f"{where}: {target.relative_to(root)} has no section #{anchor}"]
+        if "\0" + anchor in known[target] and target.is_relative_to(root / "docs"):
+            return [f"{where}: #{anchor} of {target.relative_to(root)} is spelled otherwise in the site; write the heading without marks between blanks"]
     return []
 
 
 def check(root):
-    faults, known = [], {}
+    faults, known = check_nav(root), {}
     for path in files(root):
         name = path.relative_to(root).as_posix()
         if name == "tests/check_links.py":
             continue
         text = path.read_text(encoding="utf-8", errors="replace")
         if path.suffix == ".md":
+            home = home_of(name)
+            for number, line in enumerate(text.splitlines() if home else [], 1):
+                faults += [f"{name}:{number}: {file} does not exist" for file in SPAN.findall(line) if not (root / file).exists()]
             for number, line in enumerate(without_code(text), 1):
                 for link in LINK.findall(line):
                     if re.match(r"[a-z][a-z0-9+.-]*:", link):  # another server's
                         continue
                     file, _, anchor = link.partition("#")
                     target = (path.parent / file).resolve() if file else path
+                    if home and not target.is_relative_to(root / home):
+                        faults.append(f"{name}:{number}: the link {link} leaves {home}/, and would break where the page is installed; "
+                                      "name the file in a code span")
+                        continue
                     faults += check_target(target, anchor, f"{name}:{number}", root, known)
             text = re.sub(LINK, "", text)
         for number, line in enumerate(text.splitlines(), 1):
@@ -111,7 +151,16 @@ def self_test():
                                            "[far](https://example.org/x.md) `[code](none.md)`\n\n    [block](none.md)\n")
         (root / "docs/other.md").write_text("## So it is\n\n<a id=\"e1\"></a>\n[up](#so-it-is) [lost](#lost)\n")
         (root / "core/a.hpp").write_text("// docs/page.md#a-page-here docs/other.md#e1\n// docs/other.md#e2\n// metrology.md\n")
-        expected = ["docs/page.md:2: docs/none.md does not exist", "docs/page.md:2: docs/other.md has no section #not",
+        (root / "examples/one").mkdir()
+        (root / "examples/one/README.md").write_text("[up](../../docs/page.md) [own](README.md) `core/a.hpp` `core/b.hpp`\n")
+        (root / "docs/far.md").write_text("# A - b\n[tree](../core/a.hpp) [page](page.md)\n[here](#a---b)\n")
+        (root / "mkdocs.yml").write_text("nav:\n  - P: page.md\n  - T:\n      - O: other.md\n      - O: other.md\n      - G: gone.md\n")
+        leaves = "and would break where the page is installed; name the file in a code span"
+        expected = ["mkdocs.yml: nav lacks far.md", "mkdocs.yml: nav has gone.md, which docs/ has not", "mkdocs.yml: nav has other.md more than once",
+                    f"examples/one/README.md:1: the link ../../docs/page.md leaves examples/one/, {leaves}",
+                    "examples/one/README.md:1: core/b.hpp does not exist", f"docs/far.md:2: the link ../core/a.hpp leaves docs/, {leaves}",
+                    "docs/far.md:3: #a---b of docs/far.md is spelled otherwise in the site; write the heading without marks between blanks",
+                    "docs/page.md:2: docs/none.md does not exist", "docs/page.md:2: docs/other.md has no section #not",
                     "docs/other.md:4: docs/other.md has no section #lost", "core/a.hpp:2: docs/other.md has no section #e2",
                     "core/a.hpp:3: metrology.md does not exist"]
         found = check(root)

@@ -14,7 +14,7 @@ import result_tables
 ROOT = result_tables.ROOT
 FOLDER = ROOT / "docs" / "explanation"
 MADE = """This page is made from `tests/bench/results/*.json` by `tests/bench/figures.py`; a test compares them. Do not edit the page by hand.
-Each figure holds for the commit and the date that stand with it. [How to measure](../../tests/bench/README.md).
+Each figure holds for the commit and the date that stand with it. How to measure: `tests/bench/README.md`.
 """
 INTROS = {
     "how-fast": """# How fast Invar is
