@@ -37,8 +37,8 @@ struct FusionJob : JobSpec {
 };
 
 /// One axis; `model` is the model of its fusion, `fused` the fused position. Each sensor of the fusion has a port
-/// `sensor_<name>`, or is the position or velocity of `feedback`. A model is taken back unless it lessens the error of the runs
-/// that were not fitted by more than chance: by two standard errors over the parts of these runs. Where the observer
+/// `sensor_<name>`, or is the position or velocity of `feedback`. A model is kept where it lessens the error of runs that were
+/// not fitted by more than chance: two standard errors over the parts of these runs. Else it is taken back. Where the observer
 /// identifies the sensors while it runs, a model brings no more than that.
 class FusionTrial final : public AxisRunner {
  public:

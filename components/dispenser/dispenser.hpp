@@ -23,8 +23,8 @@ namespace invar::dispenser {
 
 /// The slow half of a dispenser, for a worker; `valve` in the motion loop is the fast one. Keeps pressure and purge pressure at
 /// their setpoints, switches both off on a latched alarm, and refreshes the controller's heartbeat: when this process dies, the
-/// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use:
-/// compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet, as a StagedModel. It also switches off
+/// controller vents by itself. Answers a pattern command with the pattern's targets moved by the trajectory model in use. The
+/// model is compensation.yaml of kind dispenser, or a diagnosis's model.yaml of plant droplet, as a StagedModel. It also switches off
 /// while the pressure that the controller shows is impossible (outside the range of its register) and while the controller
 /// refuses writes, and says so in notices. Not real-time (Modbus).
 class Dispenser final : public Component {

@@ -35,7 +35,7 @@ struct CellView {
   std::map<std::string, std::vector<std::string>> dependents;  // component -> those that need its outputs
 };
 
-/// On a process that is not heard of for `timeout`, or a component in error, everything that needs its outputs, directly
+/// Answers a process that is not heard of for `timeout`, or a component in error. Everything that needs its outputs, directly
 /// or through others, is deactivated, downstream first, and notices say so. The devices' own watchdogs and the
 /// components' deadlines have acted long before; this keeps the rest of the cell from going on as if nothing were.
 /// A step that comes later than half of `timeout` after the one before begins all waiting anew.

@@ -9,8 +9,8 @@
 
 namespace invar::vision {
 
-/// Throws InputError for a missing or wrong key, and where the file's checksum does not fit its text. Of model `scale` only
-/// `scale` is required. A pinhole camera needs the plane that it looks at: its file's, or one straight below it at `distance`
+/// Throws InputError for a missing or wrong key, and where the file's checksum does not fit its text. A file of model `scale` needs
+/// `scale` alone. A pinhole camera needs the plane that it looks at: its file's, or one straight below it at `distance`
 /// [m] (0: none is given).
 CameraModel read_camera(const std::filesystem::path& file, double distance = 0.0);
 

@@ -15,8 +15,8 @@ struct EdgeFilter {
 
   double blur;  // px
   int half;     // px
-  // In single precision for the loop over rays: what a sample adds to ground, contrast, contrast * offset, to its product
-  // with the two ramps; and, of the sloped step, to the slopes, of the spread one to contrast and contrast * (change of blur).
+  // In single precision for the loop over rays: the part of a sample in ground, contrast, contrast * offset, and in its product
+  // with the two ramps. The sloped step adds the slopes; the spread one adds contrast and contrast * (change of blur).
   enum Row : std::size_t {
     to_ground,
     to_height,
@@ -30,8 +30,8 @@ struct EdgeFilter {
     rows
   };
   std::array<std::array<float, most>, rows> products{};
-  // What the ramps themselves add to ground, contrast, contrast * offset; the products of the columns 1, S, g with one
-  // another, and of the ramps: with them the misfit of a ray follows from its products alone.
+  // Part of the ramps themselves in ground, contrast, contrast * offset. The products of the columns 1, S, g with one
+  // another, and of the ramps, give the misfit of a ray from its products alone.
   Eigen::Vector3d from_inner, from_outer;
   Eigen::Matrix3d columns;
   double inner_inner = 0.0, inner_outer = 0.0, outer_outer = 0.0;

@@ -54,9 +54,9 @@ struct OutlineFit {
 /// no knowledge of blur or levels. `image`: CV_8UC1; `polarity` as in Detection.
 OutlineFit seek_outline(const cv::Mat& image, const Shape& shape, int polarity, double reach, Rays& rays);
 
-/// Places each ray's edge by least squares with the blurred step of `filter`, free levels on both sides, and slopes
-/// of the brightness inside and outside that are common to the drop (constant and, as far as beyond chance, first harmonic
-/// over the angle), so that shading shifts nothing. Start within about one blur of the edge.
+/// Places each ray's edge by least squares with the blurred step of `filter` and free levels on both sides. Slopes of the
+/// brightness inside and outside are common to the drop (constant and, as far as beyond chance, first harmonic
+/// over the angle), so shading shifts nothing. Start within about one blur of the edge.
 OutlineFit refine_outline(const cv::Mat& image, const Shape& shape, int polarity, const EdgeFilter& filter,
                           Rays& rays);
 

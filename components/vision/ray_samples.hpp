@@ -65,8 +65,8 @@ struct RayEdges {
 void place_edges(const RayProducts& products, const EdgeFilter& filter, const EdgeRule& rule,
                  const float* cosine, const float* sine, RayEdges& edges);
 
-/// The steepest step of the right sign (`polarity`) among samples 2 .. length - 3 of eight rays, those away from `expected`
-/// weighed less: `slope` of each sample, over two samples each side, and the place of the steepest, -1 where there is none.
+/// The steepest step of the right sign (`polarity`) among samples 2 .. length - 3 of eight rays; steps away from `expected`
+/// weigh less. Gives `slope` of each sample, over two samples each side, and the place of the steepest, -1 where there is none.
 void find_steps(const Lanes* samples, std::size_t length, float polarity, float expected, float reach,
                 Lanes* slope, std::array<std::int32_t, lanes>& at);
 

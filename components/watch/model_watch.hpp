@@ -14,9 +14,9 @@
 
 namespace invar::watch {
 
-/// Balances the forces that the model knows against the motion that the axis makes, stretch by stretch. Where the missing
-/// force exceeds, throughout `time` of motion, `parts` times the allowance for noise and the model's own sigmas, a notice names
-/// the site and the variable of the force, as `invar diagnose` would. `quiet` of motion below `agrees` times takes it back. It
+/// Balances the forces that the model knows against the motion that the axis makes, stretch by stretch. The
+/// allowance covers noise and the model's own sigmas. Where the missing force exceeds `parts` times the allowance throughout `time`
+/// of motion, a notice names the site and the variable of the force, as `invar diagnose` would. `quiet` of motion below `agrees` times takes it back. It
 /// stands in the loop of its stage, since it needs every cycle. It takes models as the stage does: connected to the stage's
 /// inbox it follows each `invar job apply`. Real-time.
 class ModelWatch final : public Component {

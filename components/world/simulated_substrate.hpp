@@ -14,10 +14,10 @@
 
 namespace invar::world {
 
-/// Each pulse of the valve becomes a droplet that leaves the true tool position of its instant and lands by the terms of
+/// Each pulse of the valve becomes a droplet that leaves the true tool position of its instant. The droplet lands by the terms of
 /// core/physics: valve delay, carry by the stage, pressure, slow loss of speed, air drag, crosswind. The head adds tilt,
 /// placement error, scatter and satellites. The volume grows with the on-time beyond the time that the valve needs to open, and
-/// with the root of the pressure: 0.619 mm at 180 us and 9.75 psi, 0.664 mm at 200 us and 10 psi (thesis, table 5.1).
+/// with the root of the pressure. Examples: 0.619 mm at 180 us and 9.75 psi, 0.664 mm at 200 us and 10 psi (thesis, table 5.1).
 class SimulatedSubstrate final : public Component {
  public:
   struct Parameters {

@@ -81,7 +81,7 @@ struct CompiledNetwork {
 };
 
 /// Compiles `network` (D inputs) so that the proven bound is at most `tolerance` (output units), with at most
-/// `most_nodes` nodes; where those do not suffice the bound that was reached is returned. Linear interpolation of f
+/// `most_nodes` nodes. Where those do not suffice, the bound that was reached is returned. Linear interpolation of f
 /// errs by at most h^2/8 max|f''| a dimension, and RbfNetwork::curvature_bound bounds f''.
 template <std::size_t D>
 CompiledNetwork<D> compile(const RbfNetwork& network, double tolerance, std::size_t most_nodes = 1U << 20U);

@@ -65,7 +65,7 @@ class New(unittest.TestCase):
         self.assertIn("move: following error", said)
 
     def test_map_is_sound_and_its_simulated_device_warms(self):
-        self.new("map", "hot_plate", "--domain", tutorials.claim("domain", 101, 1, 99))
+        self.new("map", "hot_plate", "--out", "hot_plate/", "--domain", tutorials.claim("domain", 101, 1, 99))
         made = self.folder / "hot_plate"
         self.assertTrue((made / "hot_plate.yaml").exists())
         cell = made / "cell.yaml"

@@ -1,5 +1,5 @@
-// What is wrong with components that go on all the same: an axis in fault, a latched heater, a device that does not answer, a
-// refused model. By what they publish, so that a component of a plug-in counts like one of ours.
+// Faults of components that go on all the same: an axis in fault, a latched heater, a device that does not answer, a
+// refused model. Read from published samples, so a component of a plug-in counts like one of ours.
 #pragma once
 
 #include <atomic>

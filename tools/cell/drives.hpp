@@ -6,11 +6,11 @@
 
 namespace invar::tools {
 
-/// After the ports are connected. A device that reports an axis and waits for its motor command, but is given none; a stage whose
-/// motor command goes nowhere, or to another axis than it reads: faults go to the document.
+/// After the ports are connected; faults go to the document. A device that reports an axis must be given the motor command it waits
+/// for. The motor command of a stage must go to the axis whose feedback the stage reads.
 void check_drives(const LoadedCell& loaded);
 
-/// What could not be checked, and what would have it checked: gains of a stage of which nobody says what it moves.
+/// Checks that could not be made, and how to make them possible: gains of a stage whose mass is not known.
 [[nodiscard]] std::vector<Fault> unchecked(const LoadedCell& loaded);
 
 }  // namespace invar::tools

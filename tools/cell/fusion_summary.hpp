@@ -1,4 +1,4 @@
-// What a job that identifies the sensors of an axis leaves: the fused position beside the laser, before and after.
+// Summary of a job that identifies the sensors of an axis: the fused position beside the laser, before and after.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// What a calibration over position and temperature was worth: figures and plots from its files.
+// Summary of a calibration over position and temperature: figures and plots from its files.
 #pragma once
 
 #include <filesystem>

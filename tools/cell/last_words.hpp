@@ -1,4 +1,4 @@
-// What a process leaves in files for its launcher: how far its job is, and at the end what became of it.
+// Files that a process leaves for its launcher: how far its job is, and at the end the outcome of the process.
 #pragma once
 
 #include <chrono>

@@ -37,9 +37,9 @@ struct LaunchOutcome {
   std::string failure;  // empty: in order
 };
 
-/// Runs until the job has ended, `stop` is set, the time is over or a process ended by itself; without a job, a process that
-/// was killed or failed is started again. To stop, all that moves comes to rest first, in every process; then they stop in the
-/// order of the cell file, each with its components downstream first: the file names what moves first and the recorder last.
+/// Runs until the job has ended, `stop` is set, the time is over or a process ended by itself. Without a job, a process that
+/// was killed or failed is started again. To stop, all that moves comes to rest first, in every process. Then the processes stop
+/// in the order of the cell file, each with its components downstream first. The file names moving processes first, the recorder last.
 LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace invar::tools

@@ -38,7 +38,7 @@ struct LoadedCell {
   [[nodiscard]] Port* port(const std::string& component, const std::string& name);
 };
 
-/// What a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.
+/// Words that a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.
 [[nodiscard]] std::string mend_name(const std::string& word, const std::vector<std::string>& names);
 
 /// Throws InputError with all faults of the file: structure, component types, parameters, connections, QoS that cannot

@@ -1,4 +1,4 @@
-// What a motion job leaves: how far the axis was off its setpoint, before and after a model was given to its stage.
+// Summary of a motion job: how far the axis was off its setpoint, before and after a model was given to its stage.
 #pragma once
 
 #include <filesystem>

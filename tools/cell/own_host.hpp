@@ -29,7 +29,7 @@ namespace invar::tools {
 
 /// Whether this PC has the address of a host. Where it does not, says that the host works alone until it comes; with an
 /// `address_wait` in the file, and for an interface without an address, waits instead. Throws std::runtime_error at the end
-/// of patience: whoever started the process may try again. False when `stop` came first.
+/// of patience; the caller of the process may try again. False when `stop` came first.
 bool wait_for_address(const config::Cell& cell, const std::string& host, const std::atomic<bool>& stop);
 
 /// Whether an address stays, as the kernel tells (netlink). Not for the loop.

@@ -8,7 +8,7 @@
 
 namespace invar::tools {
 
-/// Of this program.
+/// The stamp of this program.
 [[nodiscard]] const std::string& own_stamp();
 /// Without `what`: the file is a shared library that was built with the stamp of this program.
 [[nodiscard]] Fault why_not_a_plugin(const std::filesystem::path& file);

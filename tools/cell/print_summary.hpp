@@ -1,4 +1,4 @@
-// What a print job found and what it brought, for the summary of `invar run` and the report.
+// Findings of a print job and their gain, for the summary of `invar run` and the report.
 #pragma once
 
 #include <filesystem>

@@ -21,7 +21,7 @@ struct ProcessOptions {
   std::string last_end;           // how its last life ended
 };
 
-/// What others ask of a process; signal handlers may set both.
+/// Requests of others to a process; signal handlers may set both.
 struct ProcessOrders {
   std::atomic<bool> stop{false};
   std::atomic<bool> rest{false};  // by the clock: what moves comes to rest; all goes on until `stop`

@@ -9,8 +9,8 @@
 
 namespace invar::tools {
 
-/// A rate, as systemd's StartLimit and the intensity of Erlang's supervisors: never given up, for a cell runs for years; never
-/// faster than the PC bears, for a process that dies at once would take its CPU. Time counts while the process runs.
+/// A rate, as systemd's StartLimit and the intensity of Erlang's supervisors. A cell runs for years, so restarts are never given
+/// up. A process that dies at once would take the CPU, so restarts are bounded in rate. Time counts while the process runs.
 class Restarts {
  public:
   static constexpr std::size_t at_once = 5;  // so many ends within `window` ...

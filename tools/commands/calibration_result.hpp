@@ -1,4 +1,4 @@
-// What every calibration leaves: compensation.yaml, report.json, report.html - all three or none.
+// Files of every calibration: compensation.yaml, report.json, report.html - all three or none.
 #pragma once
 
 #include <Eigen/Core>

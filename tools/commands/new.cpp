@@ -110,7 +110,8 @@ std::map<std::string, std::string> files_of(const std::string& kind, const Optio
 /// All files or none: they are written beside, and the folder takes its name when it is whole.
 void write_folder(const std::filesystem::path& folder, const std::map<std::string, std::string>& files) {
   namespace fs = std::filesystem;
-  const fs::path target = fs::absolute(folder).lexically_normal();
+  fs::path target = fs::absolute(folder).lexically_normal();
+  if (!target.has_filename()) target = target.parent_path();  // it was written with `/` at the end
   if (fs::exists(fs::symlink_status(target)))
     throw InputError{folder.string(), "exists already",
                      "name another folder with --out, or take that one away"};

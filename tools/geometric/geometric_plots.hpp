@@ -1,4 +1,4 @@
-// What the pages of geometric calibrations and measuring plans draw and how they name places.
+// Plots of the pages of geometric calibrations and measuring plans, and how the pages name places.
 #pragma once
 
 #include "tools/geometric/geometric_report.hpp"
@@ -22,7 +22,7 @@ report::Plot line_plot(const GeometricResult& result, std::size_t line);
 report::Plot reversal_plot(const metrology::GeometricModel& model, int axis);
 /// The error vectors over every plane of two axes, at the middle of the third, less the plane's rigid motion.
 std::vector<report::Plot> field_plots(const metrology::GeometricModel& model);
-/// What is left of the points, beside a normal distribution.
+/// Residuals of the points, beside a normal distribution.
 report::Plot residual_histogram(const GeometricResult& result);
 
 }  // namespace invar::tools

@@ -1,4 +1,4 @@
-// What a geometric calibration found: evaluated on points not fitted, as JSON, as a page, as a few printed lines.
+// Result of a geometric calibration: evaluated on points not fitted, as JSON, as a page, as a few printed lines.
 #pragma once
 
 #include <filesystem>
@@ -97,7 +97,7 @@ std::string temperature_words(const GeometricResult& result);
 nlohmann::json report_json(const GeometricResult& result);
 report::Page report_page(const GeometricResult& result);
 void print_summary(const GeometricResult& result, std::ostream& out);
-/// Method, prior and noise, for whoever reads the model file.
+/// Method, prior and noise, for the reader of the model file.
 void describe_identification(const GeometricResult& result, compensation::ModelText& text);
 
 }  // namespace invar::tools

@@ -34,8 +34,8 @@ struct MeasuringPlan {
   const PlanChoice* best = nullptr;  // the quickest that meets the accuracy
 };
 
-/// Which lines, in what steps and passes, how to set them up, what to expect of them and of each without it, what stays
-/// open, and lines to check the result with. Precondition: there is a best choice.
+/// The lines, with their steps, passes and set-up, and the expected result with and without each. Then the error motions that
+/// stay open, and lines to check the result with. Precondition: there is a best choice.
 report::Page plan_page(const MeasuringPlan& plan);
 
 }  // namespace invar::tools

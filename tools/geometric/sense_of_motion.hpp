@@ -9,8 +9,8 @@
 namespace invar::tools {
 
 /// +1 or -1 for each position along the way, in the order of measurement; of a reading at the place of the last one, the sense
-/// that follows. A way back in one step over more than half of the range, much longer than the steps are, is a return without
-/// readings: the reading at its end begins the next pass and has that one's sense.
+/// that follows. A way back in one step over more than half of the range, much longer than the steps, is a return without
+/// readings. The reading at its end begins the next pass and has that one's sense.
 inline std::vector<int> senses_of_motion(const std::vector<double>& way) {
   constexpr double still = 1e-7;  // m or rad
   constexpr double much = 1.5;    // times the median step

@@ -9,7 +9,7 @@
 
 namespace invar::tools {
 
-/// What a figure may be at most [m or rad].
+/// Largest value that a figure may have [m or rad].
 struct Tolerance {
   std::optional<metrology::Iso230Figure>
       figure;  // none: straightness, angle or squareness of `motion` by ISO 230-1

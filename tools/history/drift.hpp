@@ -43,8 +43,8 @@ struct Due {
 std::vector<NameHistory> histories_of(const std::vector<std::vector<CalibratedNumber>>& numbers,
                                       const std::vector<double>& times);
 
-/// When the error of some name, two sigma, reaches `accuracy`: what the last calibration left open, and since then the drift by
-/// the line (with the sigma of its rate) and what wanders beyond it, RMS over the places. Needs two calibrations.
+/// The time at which the error of some name, two sigma, reaches `accuracy`. It is the error of the last calibration, plus the drift
+/// since then by the line (with the sigma of its rate), plus the wander beyond the line. RMS over the places. Needs two calibrations.
 Due due_for(const std::vector<NameHistory>& names, double accuracy);
 
 }  // namespace invar::tools

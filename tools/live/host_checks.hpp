@@ -1,4 +1,4 @@
-// What of this PC would hurt a cell: one finding a thing looked at.
+// Settings of this PC that would hurt a cell: one finding a thing looked at.
 #pragma once
 
 #include <string>

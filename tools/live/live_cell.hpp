@@ -57,7 +57,7 @@ class LiveCell {
  public:
   /// Takes part in the domain of the cell. Without a file, waits for the one cell that is there. Throws InputError for a
   /// faulty file and where several cells share the domain.
-  /// `nobody`: the call's name of the cell counts, whoever is there.
+  /// `nobody`: the call's name of the cell counts, and no process need be there.
   enum class Need { cell, nobody };
   explicit LiveCell(const CellCall& call, Need need = Need::cell);
 
@@ -76,8 +76,8 @@ class LiveCell {
   /// A cell that was just started activates its components one after the other: waits until all are active or in error, or
   /// the end of patience.
   void wait_for_components();
-  /// Waits until all writers and readers of the cell's processes have been discovered; where others take part, whom nobody
-  /// can ask how many they have, until nothing new has been for 3 s: a participant
+  /// Waits until all writers and readers of the cell's processes have been discovered. Other participants cannot be asked how
+  /// many they have; where some take part, waits until nothing new has come for 3 s. A participant
   /// that missed the first announcements hears the next after 1.5 s.
   void settle();
   /// The writers of the topic that `text` means: its full name, or `component.port` of this cell. Waits for one.

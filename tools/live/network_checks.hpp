@@ -8,8 +8,8 @@
 
 namespace invar::tools {
 
-/// Sends one datagram to the cell's discovery group on each address of this PC that the file names; it carries the header of an
-/// empty RTPS message, which every implementation ignores.
+/// Sends one datagram to the cell's discovery group on each address of this PC that the file names. The datagram is the header of
+/// an empty RTPS message, which every implementation ignores.
 [[nodiscard]] std::vector<Finding> check_network(const config::Cell& cell);
 
 }  // namespace invar::tools

@@ -8,9 +8,9 @@
 
 namespace invar::tools {
 
-/// What is known when Ctrl-C comes is put together within a second or so. Where a single step takes for ever it is not, and
-/// nobody should have to end the program by hand: while this lives, the program ends with status 130 so long after Ctrl-C,
-/// at once and with `said` on stderr. Nothing may be open then that must be closed.
+/// After Ctrl-C a command reports the results so far, within a second or so. A single step may take for ever, and nobody should have
+/// to end the program by hand. While this object lives, the program ends with status 130 so long after Ctrl-C, with `said` on
+/// stderr. Nothing may be open then that must be closed.
 class Patience {
  public:
   explicit Patience(std::string said, std::chrono::milliseconds left = std::chrono::seconds{10});

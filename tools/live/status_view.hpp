@@ -19,7 +19,7 @@ struct CellStatus {
   std::set<std::string> silent;        // processes that were there and fell silent
   std::vector<event::Notice> notices;  // what the cell said last, oldest first
 
-  /// What is wrong now, one line each: missing, ended, silent, tripped, in error, or at fault though it goes on.
+  /// Faults of now, one line each: missing, ended, silent, tripped, in error, or at fault though it goes on.
   [[nodiscard]] std::vector<std::string> faults() const;
   /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;

@@ -1,4 +1,4 @@
-// What a terminal is sent: texts as letters only, and the few orders that are the program's own.
+// Output to a terminal: texts as letters only, and the few orders that are the program's own.
 #pragma once
 
 #include <ostream>
@@ -8,8 +8,8 @@
 
 namespace invar::tools {
 
-/// For as long as it lives, nothing that goes into `stream` steers the terminal: control characters in the name of a file, a
-/// topic or a device come out as the sign for an unknown character. Line feeds and tabs stay.
+/// While this object lives, nothing that goes into `stream` steers the terminal. A control character in the name of a file, a
+/// topic or a device comes out as the sign for an unknown character. Line feeds and tabs stay.
 class LettersOnly final : public std::streambuf {
  public:
   explicit LettersOnly(std::ostream& stream);

@@ -8,7 +8,7 @@
 
 namespace invar::tools {
 
-/// What a line may hold: COLUMNS where it is set, else the terminal's width, else 80.
+/// Letters that a line may hold: COLUMNS where it is set, else the terminal's width, else 80.
 [[nodiscard]] std::size_t line_width();
 
 class TextTable {

@@ -13,8 +13,8 @@
 
 namespace invar::tools {
 
-/// What one writer's sequence numbers and times say. Times are those at which it sent, by its own clock. What it sent before
-/// anybody listened and keeps for late comers arrives in a burst and counts for nothing.
+/// Rate, jitter and losses by one writer's sequence numbers and times. Times are those of sending, by the writer's own clock.
+/// Earlier samples that the writer keeps for late comers arrive in a burst and count for nothing.
 struct Flow {
   std::uint64_t samples = 0;
   std::uint64_t missing = 0;  // by gaps in the numbers
@@ -26,7 +26,7 @@ struct Flow {
 
   /// `arrived_ns`: on this PC's clock, which may be another than the writer's.
   void add(const dds::RawSample& sample, std::int64_t arrived_ns);
-  /// Of the intervals [s].
+  /// Standard deviation of the intervals [s].
   [[nodiscard]] double deviation() const;
   /// Samples a second, bytes a second: what came since `before`, an earlier copy, over the time in which it was sent. A writer
   /// that sends less often than somebody looks keeps its rate until two of its intervals have passed in silence.

@@ -1,4 +1,4 @@
-// What a calibration left out of its fit, and what that costs: on the page, in report.json and on the console.
+// Rows that a calibration left out of its fit, and the cost of that: on the page, in report.json and on the console.
 #pragma once
 
 #include <cstddef>
@@ -11,8 +11,8 @@
 
 namespace invar::report {
 
-/// The rows of a calibration: how many there were, how many were used and why the others were not; the error of the model
-/// over the used ones and over all that have a value.
+/// The rows of a calibration: how many there were, how many were used, and why the others were not. The error of the model
+/// is given over the used ones and over all that have a value.
 struct LeftOut {
   struct Reason {
     std::size_t count = 0;
@@ -25,7 +25,7 @@ struct LeftOut {
   std::string unit = "m";
   double rms_used = std::numeric_limits<double>::quiet_NaN();  // NaN: cannot be told
   double rms_all = std::numeric_limits<double>::quiet_NaN();
-  /// What no model here explains, and what was not tested: sentences.
+  /// Errors that no model here explains, and properties that were not tested: sentences.
   std::vector<std::string> unexplained;
   /// The rows that were left out, one by one; the first of them are shown.
   std::vector<std::string> header;

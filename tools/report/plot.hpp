@@ -39,7 +39,7 @@ struct Plot {
 /// Both axes from -m to m and of one scale, where m takes in every point: a target with its hits.
 void centre(Plot& plot);
 
-/// What a curve is worth at a place, in the plot's units.
+/// Value and sigma of a curve at a place, in the plot's units.
 struct CurvePoint {
   double value = 0.0;
   double sigma = 0.0;

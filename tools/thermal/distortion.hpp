@@ -1,5 +1,5 @@
-// Thermal distortion of an axis over time, in the form of ISO 230-3: ranges of the error at places that were read again and
-// again, in the first hour and over the whole recording.
+// Thermal distortion of an axis over time, in the form of ISO 230-3. Ranges of the error at places that were read repeatedly,
+// in the first hour and over the whole recording.
 #pragma once
 
 #include <iosfwd>

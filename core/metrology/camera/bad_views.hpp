@@ -22,9 +22,9 @@ struct SortedViews {
   std::vector<BadView> bad;
 };
 
-/// Finds views whose points are in another order, doubled, exchanged, or of another camera: such whose homography leaves far
-/// more than those of the others do, or which a camera calibrated without them meets far worse than a typical view (three
-/// times where a cause is found, six times otherwise). Up to a third of the views; at least four are kept.
+/// Finds views whose points are in another order, doubled, exchanged, or of another camera. The homography of such a view leaves
+/// far more than those of the others. Or a camera calibrated without the view meets it far worse than a typical one: three
+/// times where a cause is found, six times otherwise. Up to a third of the views; at least four are kept.
 SortedViews sort_views(const Eigen::Matrix2Xd& target, const std::vector<Eigen::Matrix2Xd>& views);
 
 }  // namespace invar::metrology

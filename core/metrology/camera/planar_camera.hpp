@@ -56,7 +56,7 @@ std::optional<PlanarCalibration> calibrate_planar(const Eigen::Matrix2Xd& target
 std::optional<ViewFit> fit_pose(const PinholeCamera& camera, const Eigen::Matrix2Xd& target,
                                 const Eigen::Matrix2Xd& view);
 
-/// What the best map of the target's plane onto the view leaves [px, RMS distance]: the lens, noise, and points that are wrong.
+/// Residual of the best map of the target's plane onto the view [px, RMS distance]: the lens, noise, and points that are wrong.
 /// Infinite where there is none.
 double homography_rms(const Eigen::Matrix2Xd& target, const Eigen::Matrix2Xd& view);
 

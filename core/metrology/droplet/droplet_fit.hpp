@@ -36,7 +36,7 @@ struct DropletSolution {
   Eigen::MatrixXd covariance;  // for unit weights' variance
 };
 
-/// What every fit of the same droplets begins from.
+/// The start that every fit of the same droplets shares.
 struct DropletStart {
   const Droplets& drops;
   const Eigen::Matrix2Xd& offset;

@@ -8,8 +8,8 @@
 
 namespace invar::metrology {
 
-/// N droplets: target and place of landing (2 x N, m), height of the nozzle above the substrate [m]; optional
-/// velocity of the stage while jetting (2 x N, m/s; empty where it stood still) and diameter [m] (may be empty).
+/// N droplets: target and place of landing (2 x N, m), height of the nozzle above the substrate [m]. Optional: the
+/// velocity of the stage while jetting (2 x N, m/s; empty where it stood still) and the diameter [m].
 struct Droplets {
   Eigen::Matrix2Xd target;
   Eigen::Matrix2Xd landed;
@@ -31,13 +31,13 @@ struct DropletTrajectory {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();      // [m/m]
   double slowness = 0.0;                                // 1 / ejection speed [s/m]; 0: carry not identified
   double delay = 0.0;  // from trigger to droplet [s]; 0: not identified apart from the carry
-  /// Of (placement x, slope x), the same for y, before noise of single droplets [m, 1].
+  /// Covariance of (placement x, slope x), the same for y, before noise of single droplets [m, 1].
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
   double slowness_sigma = std::numeric_limits<double>::infinity();
   double delay_sigma = std::numeric_limits<double>::infinity();
   Eigen::Matrix2d field = Eigen::Matrix2d::Zero();         // [m/m]; zero: none identified
   Eigen::Vector2d field_centre = Eigen::Vector2d::Zero();  // [m], where the placement holds
-  /// Of one row of `field`: the variance that it adds to a component at `d` from the centre is d' covariance d.
+  /// Covariance of one row of `field`: the variance that it adds to a component at `d` from the centre is d' covariance d.
   Eigen::Matrix2d field_covariance = Eigen::Matrix2d::Zero();
   double least_height = 0.0;  // of the droplets it was identified from [m]
   double most_height = 0.0;
@@ -47,7 +47,7 @@ struct DropletTrajectory {
       double height, const Eigen::Vector2d& stage_velocity = Eigen::Vector2d::Zero()) const {
     return placement + height * slope + lead(height) * stage_velocity;
   }
-  /// What the field adds to it for a droplet aimed here.
+  /// Part of the landing error that the field makes for a droplet aimed here.
   [[nodiscard]] Eigen::Vector2d over_field(const Eigen::Vector2d& aimed) const {
     return field * (aimed - field_centre);
   }
@@ -87,7 +87,7 @@ struct ScatterTest {
 };
 inline constexpr double significant = 0.01;  // a pattern is said below this probability of chance
 
-/// What the field is: nothing, a rotation and one scale, or a rotation, two scales and a squareness.
+/// Form of the field: nothing, a rotation and one scale, or a rotation, two scales and a squareness.
 enum class FieldForm { none, rotation_and_scale, any };
 
 struct TrajectoryFit {

@@ -7,16 +7,16 @@
 
 namespace invar::metrology {
 
-/// How fast the parameters may wander (1 sigma after one second; a random walk), and how far from where they were
-/// identified before the head needs a hand instead of a new model.
+/// Rates at which the parameters wander (1 sigma after one second; a random walk), and their greatest distance from the
+/// identified values. Beyond that distance the head needs a hand instead of a new model.
 struct TrajectoryDrift {
   double placement = 2e-7;  // [m]
   double slowness = 1e-3;   // share of the slowness
   double limit = 1e-4;      // change of the offset at the height and velocity in use [m]
 };
 
-/// Kalman filter on (placement x, y; slope x, y; delay; slowness), begun from what a calibration identified with its
-/// uncertainty: one height while printing does not tell placement from tilt, and need not. Tilt and delay stand still.
+/// Kalman filter on (placement x, y; slope x, y; delay; slowness), begun from a calibration and its uncertainty.
+/// One height while printing does not tell placement from tilt, and need not. Tilt and delay stand still.
 class TrajectoryTracker {
  public:
   TrajectoryTracker(const TrajectoryFit& fit, const TrajectoryDrift& drift);

@@ -10,16 +10,15 @@
 
 namespace invar::metrology {
 
-/// The structured estimator: an interacting multiple model Kalman filter over position, velocity and
-/// acceleration, and over what drifts in the sensors while they work: gain, offset and lag of each velocity sensor,
-/// offset and delay of each position sensor but the first, which is the reference. A quantised reading is the
-/// certainty that the position lies in its cell, so every edge is an absolute fix; the cell's likelihood is applied
-/// by its exact first two moments. An encoder that counts on edge by edge, without a leap that no motion explains, is
-/// believed against any velocity sensor: then it is the estimate that was lost, and the gains are sought anew. Noise of
-/// the velocity sensors is estimated from their second differences. A sensor that repeats itself, contradicts the
-/// others or is missing loses its weight and gets it back when it agrees again: within one period where a reading is
-/// missing or jumps, within four repetitions more than it ever showed where a continuous one dies, within the way of
-/// about two cells where an encoder sticks.
+/// The structured estimator: an interacting multiple model Kalman filter over position, velocity and acceleration.
+/// Its further states drift while the sensors work: gain, offset and lag of each velocity sensor, offset and delay of
+/// each position sensor but the first, which is the reference. A quantised reading is the certainty that the position
+/// lies in its cell. Every edge is therefore an absolute fix; the cell's likelihood is applied by its exact first two
+/// moments. An encoder that counts on edge by edge, without an unexplained leap, overrides any velocity sensor. The
+/// estimate is then reset to the encoder, and the gains are identified anew. Noise of the velocity sensors is estimated
+/// from their second differences. A sensor that repeats itself, contradicts the others or is missing loses its weight,
+/// and gets it back when it agrees again. The loss takes one period for a missing or jumping reading. For a continuous
+/// sensor that dies it takes four repetitions more than ever before; for an encoder that sticks, the way of two cells.
 /// A second estimate runs without the readings that stand still. As these become improbable by that estimate, the fused
 /// position goes over to it, and sigma holds the distance of both. An encoder that stood still while the others moved
 /// comes back only after it has counted again: the true position may pass the stuck one.
@@ -55,14 +54,14 @@ class FusionObserver final : public FusionEstimator {
     [[nodiscard]] double dot(const State& state) const noexcept;
     [[nodiscard]] State times(const Covariance& covariance) const noexcept;  // covariance . row
   };
-  /// What a reading says about an estimate: how the distribution of the quantity that it measures changes, mode by mode.
+  /// Evidence of a reading about an estimate: how the distribution of the quantity that it measures changes, mode by mode.
   struct Reading {
     std::array<State, models> gains;      // covariance . row
     std::array<double, models> before{};  // variance of the quantity by the estimate
     std::array<double, models> shift{};   // of its mean
     std::array<double, models> keep{};    // part of its variance that is left
     std::array<double, models> likelihood{};
-    /// Of such a reading or an odder one; of a cell over the most that a cell of its size can hold.
+    /// Probability of such a reading or an odder one; of a cell over the most that a cell of its size can hold.
     double probability = 0.0;
   };
   struct PositionMemory {

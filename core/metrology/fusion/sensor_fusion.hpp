@@ -11,7 +11,7 @@ namespace invar::metrology {
 
 constexpr std::size_t most_sensors = 8;  // of all kinds together
 
-/// What the sensors read in one period; NaN where a reading is missing.
+/// Readings of the sensors in one period; NaN where a reading is missing.
 struct FusionSample {
   double period = 0.0;                            // since the last sample [s]; 0 for the first
   std::array<double, most_sensors> positions{};   // [m]

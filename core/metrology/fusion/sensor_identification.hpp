@@ -8,7 +8,7 @@
 
 namespace invar::metrology {
 
-/// What the runs leave open is added to `unidentified`, where that is given.
+/// Parameters that the runs leave open are added to `unidentified`, where that is given.
 FusionModel identify_sensors(const std::vector<FusionRun>& runs, std::vector<std::string> position_names,
                              std::vector<std::string> velocity_names, std::vector<std::string>* unidentified);
 

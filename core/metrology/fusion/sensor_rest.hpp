@@ -9,8 +9,8 @@
 namespace invar::metrology {
 
 /// For sensors that cost something to read (thesis, 6.2): a bus, a lamp, a processor. A sensor whose weight stays below
-/// `least_weight` for `after` rests. All wake for at least `after` when one stops or starts to be believed, when the position
-/// gets less certain by half, and every `look_again` in any case, since weights change with speed and noise. One believed
+/// `least_weight` for `after` rests. All wake for at least `after` when one stops or starts to be believed, or when the position
+/// gets less certain by half. Weights change with speed and noise, so all wake every `look_again` in any case. One believed
 /// position sensor and two believed sensors always stay awake. Real-time.
 class SensorRest {
  public:

@@ -8,8 +8,8 @@
 
 namespace invar::metrology {
 
-/// For a servo behind a fusion: when a sensor leaves or comes back, or the estimate jumps by more than four of its own
-/// sigmas, the jump is set aside and fades with a time constant, so that the servo sees no step. Real-time.
+/// For a servo behind a fusion. A sensor that leaves or comes back makes the estimate jump; a jump may also exceed four
+/// sigmas of the estimate. The jump is set aside and fades with a time constant, so the servo sees no step. Real-time.
 class StepFree {
  public:
   explicit StepFree(double time_constant) : time_constant_{time_constant} {}

@@ -13,8 +13,8 @@
 
 namespace invar::metrology {
 
-/// Weights that sum to one with an intercept, from positions of N sensors (rows: samples) and the reference:
-/// the constraint is built in, since the columns are nearly equal and K = (S'S)^-1 S'x is set by the error
+/// Weights that sum to one with an intercept, from positions of N sensors (rows: samples) and the reference.
+/// The constraint is built in: the columns are nearly equal, so K = (S'S)^-1 S'x follows from the error
 /// covariance alone (docs/references.md#e20). Batch, by QR.
 struct WeightFit {
   Eigen::VectorXd weights;  // N
@@ -38,9 +38,9 @@ using Powers = std::array<unsigned char, most_sensors>;
 std::vector<Powers> monomials(int variables, int degree);
 double monomial(const Powers& powers, const std::array<double, most_sensors>& variables) noexcept;
 
-/// Nonlinear fusion (docs/references.md#e29): x = m + sum of c_k times the monomials of the weighted mean m and the
-/// difference of each other sensor from the first, up to `degree`, centred and scaled. Held at the border of what was
-/// fitted.
+/// Nonlinear fusion (docs/references.md#e29): x = m + sum of c_k times monomials up to `degree`. Their variables are
+/// the weighted mean m and the difference of each other sensor from the first, centred and scaled. Held at the border
+/// of the fitted range.
 struct FusionPolynomial {
   int degree = 1;                 // 1: none
   double centre = 0.0;            // of m [m]
@@ -72,13 +72,13 @@ struct WeightLearning {
   double most_intercept = 2e-3;  // that the intercept moves [m]
 };
 
-/// Runs the weights: integrates the velocities from the first position reading, moves every sensor on by its delay,
-/// looks the weights up by the low-passed speed and the noise level - given, or by the model from the speed, or
-/// estimated over a window of readings. A sensor that is missing loses its weight at once, one that repeats itself after five
-/// readings (an encoder: after the way of three of its steps), one that leaps as no motion does at once and until it has agreed with the
-/// others for twenty readings; the last only of sensors that are `known` and of velocities. Where a sample has
-/// a reference, recursive least squares learns how far weights and intercept have moved from the model since: within bounds,
-/// and eased in with the memory, so that nothing steps.
+/// Runs the weights: integrates the velocities from the first position reading and moves every sensor on by its delay.
+/// The weights are looked up by the low-passed speed and the noise level. The noise level is given, or comes from the speed by
+/// the model, or is estimated over a window of readings. A missing sensor loses its weight at once. A sensor that repeats
+/// itself loses it after five readings, an encoder after the way of three of its steps. A sensor that leaps as no motion
+/// does loses it at once, until it has agreed with the others for twenty readings; this holds for `known` sensors and
+/// velocities. Where a sample has a reference, recursive least squares learns the change of weights and intercept since
+/// the model was made. The change stays within bounds and is blended in with the memory, so nothing steps.
 class WeightedFusion final : public FusionEstimator {
  public:
   explicit WeightedFusion(const WeightModel& model, const WeightLearning& learning = {});

@@ -26,14 +26,14 @@ struct ReversalCurve {
   [[nodiscard]] double mean() const noexcept;
 };
 
-/// What the sense of each axis' last motion adds to the error [m]: half its reversal, `moving` +1, -1 or 0 by axis; and the
+/// Part of the error that follows the sense of each axis' last motion [m]: half its reversal, `moving` +1, -1 or 0 by axis; and the
 /// standard deviation of that. Real-time.
 Eigen::Vector3d reversal_at(const std::array<ReversalCurve, 3>& reversal, const Eigen::Vector3d& position,
                             const Eigen::Vector3d& moving) noexcept;
 Eigen::Vector3d reversal_sigma_at(const std::array<ReversalCurve, 3>& reversal,
                                   const Eigen::Vector3d& position, const Eigen::Vector3d& moving) noexcept;
 
-/// Of readings of one axis' positioning in both directions: by the places that were read both ways.
+/// Reversal of one axis from readings of its positioning in both directions, at the places that were read both ways.
 ReversalCurve reversal_of_readings(const Eigen::VectorXd& position, const Eigen::VectorXd& value,
                                    const std::vector<int>& direction, Range travel);
 

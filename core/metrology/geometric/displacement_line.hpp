@@ -40,8 +40,8 @@ struct LineNoise {
   double degrees = 0.0;   // degrees of freedom behind it
   double reversal = 0.0;  // m, reading forward minus reading backward, mean over the line
   double drift = 0.0;     // m, end minus beginning of the measurement
-  /// 1/K, of the length along the beam, from temperatures that changed within the line, with what the line tells of it
-  /// (K^2): readings are reduced to the line's mean temperature by it. Information 0 where the temperature stood still.
+  /// Expansion of the length along the beam [1/K], from temperatures that changed within the line, with its information
+  /// (K^2). It reduces readings to the line's mean temperature. Information 0 where the temperature stood still.
   double expansion = 0.0;
   double expansion_information = 0.0;
   int readings = 0;
@@ -49,7 +49,7 @@ struct LineNoise {
   std::vector<int> breaks;  // rows (of this line) before which the count jumped
 };
 
-/// What a line tells of its reversal [m], reading forward minus backward at `places` along the beam and straight in between:
+/// Information of a line about its reversal [m], reading forward minus backward at `places` along the beam, straight in between.
 /// -2 log likelihood = constant - 2 weighted'r + r' information r, all else marginalised. Empty where no place was read both
 /// ways.
 struct LineReversal {
@@ -59,10 +59,10 @@ struct LineReversal {
   Eigen::VectorXd weighted;
 };
 
-/// A line condensed without loss: with e the beam-wise errors d.(e(P_j) - e(S)) at its J distinct points and n its q
-/// nuisances (reversal, drift, steps, expansion, zero point; the prior of them in `inner`), the readings say
+/// A line condensed without loss. The beam-wise errors at its J distinct points are e = d.(e(P_j) - e(S)). Its q nuisances n
+/// are reversal, drift, steps, expansion and zero point, with their prior in `inner`:
 ///   -2 log likelihood = square - 2 sum'e - 2 right'n + e' mass e + 2 e' cross n + n' inner n.
-/// Units 1/m^2, 1/m. What is left once n is marginalised, and points that do not fit are counted in: `information_of`.
+/// Units 1/m^2, 1/m. `information_of` marginalises n and counts points that do not fit in.
 struct CondensedLine {
   std::string name;
   Beam beam;
@@ -84,9 +84,9 @@ struct CondensedLine {
   Eigen::VectorXd weights;    // of each reading, 0..1; 0 is rejected
 };
 
-/// Condenses all lines together, since they share what repeats tell about noise and drift: robust within each line
-/// (repeats of one point must agree; Tukey weights), jumps of the count found and bridged, prior of drift
-/// by pooling. `resolution` [m] bounds the noise from below by resolution/sqrt(12). Lines without length (all points
+/// Condenses all lines together, since repeats of all lines tell about noise and drift. Robust within each line
+/// (repeats of one point must agree; Tukey weights); jumps of the count are found and bridged; the prior of drift
+/// is pooled. `resolution` [m] bounds the noise from below by resolution/sqrt(12). Lines without length (all points
 /// the same) are left out. Set-up only.
 std::vector<CondensedLine> condense(const std::vector<DisplacementLine>& lines, double resolution);
 

@@ -31,8 +31,8 @@ struct ErrorMotionFit {
 /// Least number of readings of an error motion.
 inline constexpr Eigen::Index least_error_motion_readings = 8;
 
-/// A network over the position by ridge regression (GCV), with a state of the machine for a further input where readings left
-/// out are met better by more than two standard errors, the best such state first. Readings at one position and state
+/// A network over the position by ridge regression (GCV). A state of the machine becomes a further input where that meets
+/// left-out readings better by more than two standard errors, the best such state first. Readings at one position and state
 /// (within a twentieth of its range) are averaged. Needs `least_error_motion_readings`, finite. Set-up only.
 ErrorMotionFit identify_error_motion(const ErrorMotionReadings& readings);
 

@@ -20,7 +20,7 @@ namespace invar::metrology {
 /// Beside the position an error motion may depend on so many states: the loop's tables have three inputs.
 inline constexpr std::size_t most_states_of_an_error_motion = 2;
 
-/// What an error motion may depend on beside the position of its axis: `temperature` and `temperature_<zone>` [degC],
+/// States on which an error motion may depend beside the position of its axis: `temperature` and `temperature_<zone>` [degC],
 /// `heating_rate` [K/s], and the range of the calibration.
 struct MachineState {
   std::string name;
@@ -44,9 +44,9 @@ struct ErrorMotionNetwork {
   [[nodiscard]] double sigma_at(double position, std::span<const double> of_machine) const noexcept;
 };
 
-/// The thesis's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more), for
-/// error motions that were measured themselves, by an angular interferometer, a level or a straightedge, at several states
-/// of the machine. From displacement lines take `identify`. Offline; `ErrorMotionTables` is for the loop.
+/// The thesis's form of the volumetric error (its chapter 2 over position, 3 over temperature, 6 over more). It is for
+/// error motions that were measured one by one, with an angular interferometer, a level or a straightedge, at several
+/// states of the machine. From displacement lines take `identify`. Offline; `ErrorMotionTables` is for the loop.
 struct ErrorMotionNetworks {
   Chain chain;
   std::array<Range, 3> travel{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m
@@ -58,15 +58,15 @@ struct ErrorMotionNetworks {
   std::array<ReversalCurve, 3> reversal;  // of positioning, half to either side; empty where one way was read
 
   [[nodiscard]] ErrorMotions motions(const Eigen::Vector3d& position, std::span<const double> state) const;
-  /// Actual minus commanded position [m] of a tool at a state of the machine, to first order with exact axis directions;
-  /// positions and states outside their ranges are held at the end.
+  /// Actual minus commanded position [m] of a tool at a state of the machine, to first order with exact axis directions.
+  /// Positions and states outside their ranges are held at the end.
   [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position, const Eigen::Vector3d& tool_offset,
                                       std::span<const double> state) const;
   /// Standard deviation [m] of `error`, the error motions' taken as independent.
   /// Real-time.
   [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position, const Eigen::Vector3d& tool_offset,
                                          std::span<const double> state) const noexcept;
-  /// What the sense of the last motion adds to `error` [m], and its standard deviation: as in `GeometricModel`. Real-time.
+  /// Part of `error` that follows the sense of the last motion [m], and its standard deviation: as in `GeometricModel`. Real-time.
   [[nodiscard]] Eigen::Vector3d reversal_at(const Eigen::Vector3d& position,
                                             const Eigen::Vector3d& moving) const noexcept {
     return metrology::reversal_at(reversal, position, moving);

@@ -42,8 +42,8 @@ constexpr int squareness_of(int a, int b) { return a + b - 1; }
 std::string_view squareness_iso_name(int pair);
 /// "cos(a_xy)": the thesis's symbol, the cosine of the angle between the positive axes.
 std::string_view squareness_thesis_symbol(int pair);
-/// Carries the cosine of the angle between two positive axes to ISO's angle [rad] and back
-/// (docs/explanation/geometric.md#squareness): cos a_xy = -sin EC0Y, cos a_xz = +sin EB0Z, cos a_yz = -sin EA0Z.
+/// ISO's angle [rad] from the cosine of the angle between two positive axes, and back
+/// (docs/explanation/geometric.md#squareness). cos a_xy = -sin EC0Y, cos a_xz = +sin EB0Z, cos a_yz = -sin EA0Z.
 double squareness_angle_from_cosine(int pair, double cosine);
 double squareness_cosine_from_angle(int pair, double angle);
 

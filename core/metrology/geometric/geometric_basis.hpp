@@ -22,9 +22,9 @@ struct AxisWave {
 };
 inline constexpr int wave_unknowns = 3;
 
-/// Cubic B-splines of every error motion that can show, in the canonical gauge (docs/explanation/geometric.md#gauge):
-/// each motion is zero at the origin of its axis, straightness has no end-point slope as well, and three squareness
-/// constants hold what is left. Displacements cannot see rigid motions of the frame; this gauge is one choice among
+/// Cubic B-splines of every error motion that can show, in the canonical gauge (docs/explanation/geometric.md#gauge).
+/// Each motion is zero at the origin of its axis, and straightness has no end-point slope. Three squareness
+/// constants hold the rest. Displacements cannot see rigid motions of the frame; this gauge is one choice among
 /// them.
 struct GeometricBasis {
   struct Block {
@@ -55,7 +55,7 @@ struct GeometricBasis {
   void set_waves(std::vector<AxisWave> found);
   /// A wave as found: its numbers by `unknowns`, the change of the number taken in.
   [[nodiscard]] AxisWave wave(std::size_t i, const Eigen::VectorXd& unknowns) const;
-  /// What a wave's unknowns do to positioning at `q` [m]: zero at the origin of the axis.
+  /// Effect of a wave's unknowns on positioning at `q` [m]: zero at the origin of the axis.
   [[nodiscard]] Eigen::RowVector3d wave_row(const AxisWave& wave, double q) const;
   /// Coefficients of an error motion's spline; zeros for one that cannot show.
   [[nodiscard]] Eigen::VectorXd spline_coefficients(int motion, const Eigen::VectorXd& unknowns) const;
@@ -68,7 +68,7 @@ struct GeometricBasis {
 GeometricBasis make_basis(const Chain& chain, const std::array<Range, 3>& ranges,
                           const std::array<int, 3>& intervals, const std::vector<Eigen::Vector3d>& tools);
 
-/// What one unit of the error motion of `blocks[block]` does to the tool, and the coefficients of its spline that count there.
+/// Effect of one unit of the error motion of `blocks[block]` on the tool, and the coefficients of its spline that count there.
 struct FieldTerm {
   std::size_t block;
   Eigen::Vector3d effect;  // m per m, or the arm in m per rad
@@ -77,7 +77,7 @@ struct FieldTerm {
 std::vector<FieldTerm> field_terms(const GeometricBasis& basis, const Squareness& squareness,
                                    const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
 
-/// What each squareness of `pairs` does to the tool, to first order about the given squareness: 3 x pairs.
+/// Effect of each squareness of `pairs` on the tool, to first order about the given squareness: 3 x pairs.
 Eigen::MatrixXd squareness_map(const GeometricBasis& basis, const Squareness& squareness,
                                const Eigen::Vector3d& position);
 
@@ -86,7 +86,7 @@ Eigen::MatrixXd squareness_map(const GeometricBasis& basis, const Squareness& sq
 Eigen::MatrixXd field_map(const GeometricBasis& basis, const Squareness& squareness,
                           const Eigen::Vector3d& position, const Eigen::Vector3d& tool);
 
-/// What the linear form in the squareness leaves out at `position` [m]: exact axis directions minus their tangent.
+/// Error of the linear form in the squareness at `position` [m]: exact axis directions minus their tangent.
 Eigen::Vector3d squareness_remainder(const GeometricBasis& basis, const Squareness& squareness,
                                      const Eigen::Vector3d& position);
 

@@ -23,9 +23,9 @@ LineRows rows_of(const CondensedLine& line, const GeometricBasis& basis, const S
 void update_wave_rows(const std::vector<CondensedLine>& lines, const GeometricBasis& basis,
                       std::vector<LineRows>& rows);
 
-/// What a line says of its rows * unknowns once `misfit` [m], the sd of what repeats at a point but no smooth model explains
-/// (encoder counts, pitch errors finer than the data), and points that do not fit are counted in, and the nuisances
-/// marginalised: -2 log likelihood = constant - 2 weighted'e + e'G e + log_misfit,  G = mass - cross inner^-1 cross'.
+/// Information of a line about its rows * unknowns, with the nuisances marginalised. `misfit` [m] and points that do not fit are
+/// counted in. Misfit is the sd of errors that repeat at a point but follow no smooth model (encoder counts, fine pitch errors).
+///   -2 log likelihood = constant - 2 weighted'e + e'G e + log_misfit,  G = mass - cross inner^-1 cross'.
 struct LineInformation {
   Eigen::VectorXd mass;
   Eigen::MatrixXd cross;
@@ -72,7 +72,7 @@ Posterior solve_mean(const NormalEquations& equations, const GeometricBasis& bas
 Eigen::LLT<Eigen::MatrixXd> factored(const NormalEquations& equations, const GeometricBasis& basis,
                                      const GeometricPrior& prior, Eigen::VectorXd& mean);
 
-/// What the other lines alone, at the same prior, say of a line that was among those solved: its rows * unknowns, m.
+/// Prediction by the other lines alone, at the same prior, for a line that was among those solved: its rows * unknowns, m.
 Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, double misfit,
                                const Eigen::VectorXd& points, const Posterior& posterior);
 

@@ -30,7 +30,7 @@ struct IdentificationOptions {
   std::function<void(double part, const std::string& what)> progress;  // may be empty
 };
 
-/// What was found, with all that reports and planning need. The unknowns are those of `basis`.
+/// Result of an identification, with all that reports and planning need. The unknowns are those of `basis`.
 struct Identification {
   GeometricModel model;
   GeometricBasis basis;

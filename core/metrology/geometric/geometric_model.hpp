@@ -22,7 +22,7 @@ struct SigmaGrid {
   [[nodiscard]] Eigen::Vector3d at(const Eigen::Vector3d& position) const noexcept;
 };
 
-/// What compensation.yaml of kind geometric holds.
+/// Content of compensation.yaml of kind geometric.
 struct GeometricModel {
   Chain chain;
   std::array<Range, 3> travel{Range{0, 1}, Range{0, 1}, Range{0, 1}};  // m
@@ -54,13 +54,13 @@ struct GeometricModel {
   /// convention. Another tool than the calibration's adds the angles' share as if independent.
   [[nodiscard]] Eigen::Vector3d sigma_at(const Eigen::Vector3d& position,
                                          const Eigen::Vector3d& tool) const noexcept;
-  /// What the sense of the last motion adds to `error` [m]: `moving` holds +1 or -1 by axis, 0 for the mean of both.
+  /// Part of `error` that follows the sense of the last motion [m]: `moving` holds +1 or -1 by axis, 0 for the mean of both.
   [[nodiscard]] Eigen::Vector3d reversal_at(const Eigen::Vector3d& position,
                                             const Eigen::Vector3d& moving) const noexcept;
   /// Standard deviation [m] of that.
   [[nodiscard]] Eigen::Vector3d reversal_sigma_at(const Eigen::Vector3d& position,
                                                   const Eigen::Vector3d& moving) const noexcept;
-  /// What another temperature [degC] adds to `error` [m], and its standard deviation about mid travel; zero without a
+  /// Part of `error` that another temperature [degC] makes [m], and its standard deviation about mid travel; zero without a
   /// reference.
   [[nodiscard]] Eigen::Vector3d expansion_at(const Eigen::Vector3d& position,
                                              double temperature) const noexcept;

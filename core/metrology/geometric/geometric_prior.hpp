@@ -27,14 +27,14 @@ struct GeometricPrior {
   double angle_slope = 2.0;         // sd of an angle's linear part over the axis' range, in amplitudes
   double squareness = 5e-3;         // rad, sd
   double expansion = 2e-5;          // 1/K, sd: steel 1.2e-5, aluminium 2.3e-5
-  /// Of the amplitude of its kind, by error motion: no two axes of a machine are equally good.
+  /// Factor on the amplitude of its kind, by error motion: no two axes of a machine are equally good.
   std::array<double, error_motion_count> relative = [] {
     std::array<double, error_motion_count> ones{};
     ones.fill(1.0);
     return ones;
   }();
-  /// Of the length of its kind, by axis: rails that bow over their length have waves in proportion to the travel, bolts and
-  /// screws the same waves whatever the travel.
+  /// Factor on the length of its kind, by axis. Rails that bow over their length have waves in proportion to the travel; bolts and
+  /// screws have the same waves whatever the travel.
   std::array<double, 3> stretch{1.0, 1.0, 1.0};
   [[nodiscard]] double length_of(int motion) const {
     return length[static_cast<std::size_t>(kind_of(motion))] *
@@ -45,15 +45,15 @@ struct GeometricPrior {
   }
 };
 
-/// What to expect of `stretch` before measuring: half way, in the log, between waves in proportion to the travel and waves
-/// that do not care for it.
+/// Expected `stretch` before measuring: half way, in the log, between waves in proportion to the travel and waves
+/// that do not depend on it.
 std::array<double, 3> expected_stretch(const std::array<Range, 3>& travel);
 
 /// The prior's covariance of the spline coefficients of one error motion: Matern 5/2 at their places + diffuse slope
 /// and offset (the gauge removes the latter).
 Eigen::MatrixXd coefficient_covariance(const GeometricBasis& basis, const GeometricPrior& prior, int motion);
-/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes, the fine length, how
-/// much stronger each error motion is than its kind, and how much longer each axis' waves are.
+/// The strengths that evidence sets, as logs: three amplitudes, three lengths, two fine amplitudes and the fine length.
+/// Then the factor of each error motion on its kind's amplitude, and of each axis on the length.
 inline constexpr int first_relative = 9;
 inline constexpr int first_stretch = first_relative + error_motion_count;
 inline constexpr int strength_count = first_stretch + 3;

@@ -13,8 +13,8 @@ namespace invar::metrology {
 /// [m, rad] The median step of a line's points along an axis; nothing where fewer than three are apart.
 std::optional<double> usual_step(const CondensedLine& line, int axis);
 
-/// Waves that the lines show beyond what the smooth curves of `basis` explain, strongest first: found one by one over the
-/// wave number by their evidence, each with what the others left. `basis` may hold waves already; they are not found again.
+/// Waves that the lines show beyond the smooth curves of `basis`, strongest first. They are found one by one over the
+/// wave number by their evidence, each in the residual of the others. `basis` may hold waves already; they are not found again.
 /// Where all places are so regular that two periods look alike, the longer one is taken. Set-up only.
 std::vector<AxisWave> find_waves(const std::vector<CondensedLine>& lines, const std::vector<LineRows>& rows,
                                  const std::vector<Eigen::VectorXd>& points, double misfit,

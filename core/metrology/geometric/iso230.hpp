@@ -55,7 +55,7 @@ struct Iso230 {
   }
 };
 
-/// What the readings share beside their chance, standard uncertainties.
+/// Standard uncertainties that the readings share, beside their chance.
 struct Iso230Conditions {
   double device =
       0.0;  // of 1: the instrument's scale, its alignment and the temperature of the axis, by the length

@@ -29,7 +29,7 @@ struct LineErrors {
 
 LineErrors line_errors(const LineReadings& readings);
 
-/// What would be left of them had the model's error been corrected: each less the model's displacement along the beam, which
+/// Errors that would be left had the model's error been corrected: each less the model's displacement along the beam, which
 /// goes from a line's first point to its farthest.
 LineErrors line_errors(const LineReadings& readings, const GeometricModel& model);
 

@@ -29,8 +29,8 @@ struct LineFit {
   std::vector<int> breaks;
   bool revisited = false;    // some point is read again after others: only that tells drift from place
   bool tells_drift = false;  // and in the same direction: only that tells drift from a reversal over the line
-  /// The reversal over the line: its values at places along the beam, straight in between, are a constant (the first
-  /// regressor) and `reversal_shape` times as many regressors from `first_shape` on, each of the same size beforehand.
+  /// The reversal over the line, by its values at places along the beam, straight in between. They are a constant (the first
+  /// regressor), and `reversal_shape` times as many regressors from `first_shape` on, each of the same prior size.
   std::vector<double> reversal_places;  // m from the start
   Eigen::MatrixXd reversal_shape;
   int first_shape = 0;
@@ -51,12 +51,12 @@ struct LineFit {
 void fit(LineFit& work, const Eigen::VectorXd& prior_variance);
 /// Weights of Tukey's biweight at six scales: what lies further off counts nothing.
 void tukey_weights(LineFit& work);
-/// What is expected beforehand of nuisances that lines share, as variances [m^2].
+/// Prior variances [m^2] of nuisances that lines share.
 struct NuisancePrior {
   std::array<double, drift_terms> drift{};  // by polynomial
   double reversal = 0.0;                    // of its waves over the line
 };
-/// Of the regressors.
+/// Prior variances of the regressors.
 Eigen::VectorXd prior_variances(const LineFit& work, const NuisancePrior& prior);
 /// Scale, weights and nuisance from the line alone; jumps of the count become regressors. `floor` [m] bounds the scale.
 void fit_robustly(LineFit& work, const NuisancePrior& prior, double floor);

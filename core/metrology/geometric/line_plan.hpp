@@ -18,7 +18,7 @@ struct PlannedLine {
 };
 
 /// The recipe of docs/explanation/geometric.md#line-recipe for a chain a, b, c (full rank for every order): 14 lines,
-/// 17 with the anti-diagonals, 20 with the steep diagonals; for an XY table 5, 6 and 7 (the thesis's four with y = x/2,
+/// 17 with the anti-diagonals, 20 with the steep diagonals. For an XY table 5, 6 and 7 (the thesis's four with y = x/2,
 /// + anti-diagonal, + y = 2x). `level` is 0, 1 or 2.
 std::vector<PlannedLine> recipe_lines(const Machine& machine, int level);
 
@@ -44,7 +44,7 @@ CondensedLine planned_equations(const PlannedLine& line, const Effort& effort);
 /// without a pilot. A prior's amplitude is more: it also holds what the straight line takes away.
 GeometricPrior assumed_prior(const Machine& machine, double motions, double angles);
 
-/// What to expect from a set of lines under a prior (of a pilot, or assumed).
+/// Expected result of a set of lines under a prior (of a pilot, or assumed).
 struct Expectation {
   Identifiability knowledge;
   int readings = 0;

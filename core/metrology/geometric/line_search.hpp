@@ -8,9 +8,9 @@
 
 namespace invar::metrology {
 
-/// Lines whose ends lie on a grid over the travels (3 nodes an axis, 5 for a table of two axes), chosen so that the expected
-/// volumetric error under `prior` is least: starts from `start`, exchanges one line at a time for the best of all
-/// candidates until none helps. So the result is never worse than the start, by the same expectation. The axes themselves
+/// Lines whose ends lie on a grid over the travels (3 nodes an axis, 5 for a table of two axes). They are chosen so that the
+/// expected volumetric error under `prior` is least. From `start`, one line at a time is exchanged for the best of all
+/// candidates, until none helps. The result is never worse than the start, by the same expectation. The axes themselves
 /// stay: they tell positioning and lost motion directly. Some seconds; `progress` [0..1] may be empty.
 std::vector<PlannedLine> search_lines(const Machine& machine, std::vector<PlannedLine> start,
                                       const Effort& effort, const GeometricPrior& prior, double misfit = 5e-8,

@@ -16,7 +16,7 @@ struct MachineErrors {
   std::array<ErrorFunction, error_motion_count> functions;
   Squareness squareness{};
   std::array<ErrorFunction, 3> reversal;  // m, lost motion of an axis: half of it to either side of the mean
-  // What heat does along each axis; core/machine/heat_growth.hpp makes a displacement of it.
+  // Effect of heat along each axis; core/machine/heat_growth.hpp makes a displacement of it.
   std::array<double, 3> expansion{};       // 1/K, of the axis' scale, by the slide's temperature
   std::array<double, 3> bending{};         // m/K at mid travel, by the slide's temperature
   std::array<double, 3> base_expansion{};  // 1/K, by the base's temperature

@@ -10,7 +10,7 @@
 
 namespace invar::metrology {
 
-/// What compensation.yaml of kind rotary holds. Angles in rad.
+/// Content of compensation.yaml of kind rotary. Angles in rad.
 struct RotaryAxis {
   char letter = 'c';         // 'a', 'b' or 'c'
   Range travel{0.0, 1.0};    // rad, of the readings; one turn exactly where the axis comes round

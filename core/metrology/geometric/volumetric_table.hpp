@@ -25,7 +25,7 @@ class VolumetricTable {
   [[nodiscard]] Eigen::Vector3d error(const Eigen::Vector3d& position) const noexcept {
     return error(position, tool_);
   }
-  /// What to command so that the tool stands at `wanted`: two steps of P - e(P), which leave |e| |de/dx|^2 (under a
+  /// Command that brings the tool to `wanted`: two steps of P - e(P), which leave |e| |de/dx|^2 (under a
   /// picometre for 6 um and 1e-4).
   [[nodiscard]] Eigen::Vector3d command_for(const Eigen::Vector3d& wanted,
                                             const Eigen::Vector3d& tool) const noexcept;
@@ -36,8 +36,8 @@ class VolumetricTable {
   /// True where the model was identified: a correction elsewhere holds the end value.
   [[nodiscard]] bool contains(const Eigen::Vector3d& position) const noexcept;
 
-  /// Proven bound [m] on the length of the difference between this table and the model within the travels, at the
-  /// calibration's tool: sum of h^2/8 max|f''| of every motion times its largest arm.
+  /// Proven bound [m] on the length of the difference between this table and the model, within the travels and at the
+  /// calibration's tool. It is the sum of h^2/8 max|f''| of every motion times its largest arm.
   [[nodiscard]] double bound() const noexcept { return bound_; }
   /// The largest error [m] over the nodes' corners, for limits on a correction.
   [[nodiscard]] double largest() const noexcept { return largest_; }

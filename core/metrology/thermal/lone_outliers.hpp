@@ -12,9 +12,9 @@ struct LoneOutliers {
   Eigen::Index in_stretches = 0;  // readings beyond the limit that belong to a stretch, weight 1
 };
 
-/// Judges residuals in the order of measurement, each at a numbered place. Two readings beyond `limit` that follow one
-/// another, or that are consecutive visits of one place, and that deviate alike (one sign, sizes within a factor of
-/// two), belong together; three or more that belong together are a stretch. Glitches differ from one another, a
+/// Judges residuals in the order of measurement, each at a numbered place. Two readings beyond `limit` belong together where they
+/// follow one another, or are consecutive visits of one place, and deviate alike (one sign, sizes within a factor of
+/// two). Three or more that belong together are a stretch. Glitches differ from one another, a
 /// transient goes on.
 LoneOutliers lone_outliers(const Eigen::VectorXd& residual, const std::vector<int>& place, double limit);
 

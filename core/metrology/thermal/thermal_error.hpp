@@ -45,8 +45,8 @@ enum class ThermalFactor {
 std::string name_of(ThermalFactor factor);
 std::optional<ThermalFactor> thermal_factor(const std::string& name);
 
-/// A constant, a slope and a bow over x, exact at any number of places, times the factors:
-/// trend.row(0) + trend.row(1) u + trend.row(2) (1 - u^2), with u from -1 to 1 over the model's range of x. Beside
+/// A constant, a slope and a bow over x, exact at any number of places, times the factors.
+/// With u from -1 to 1 over the range of x: trend.row(0) + trend.row(1) u + trend.row(2) (1 - u^2). Beside
 /// them sum_k phi((x - first - k spacing) / spacing) / sqrt(2 pi) * (weights.row(k) . factors), a Gaussian network
 /// over x whose width is one spacing, for all that is finer.
 struct ThermalTerm {

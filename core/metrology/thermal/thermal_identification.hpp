@@ -25,7 +25,7 @@ struct ThermalReadings {
     Eigen::VectorXd temperature;
   };
   std::vector<Zone> zones;
-  /// What the temperature did, also while nothing was read: for a lagged temperature. Ascending; empty: what the readings say.
+  /// Course of the temperature, also while nothing was read: for a lagged temperature. Ascending; empty: what the readings say.
   struct History {
     std::vector<double> time;         // [s]
     std::vector<double> temperature;  // [degC]
@@ -60,9 +60,9 @@ struct ThermalFit {
   std::vector<std::string> notes;        // what else the user should know, sentences
 };
 
-/// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)], every function with a
-/// Matern prior whose sizes and lengths are set by the evidence (docs/explanation/thermal.md#model). Terms of further
-/// zones' temperatures, a lagged temperature, the heating rate and hysteresis are tried in turn and kept where the log
+/// e(x, T, r) = g(x) + tau a(x) + surface(x, tau) [+ rate terms] [+ direction b(x)]. Every function has a
+/// Matern prior; evidence sets its size and length (docs/explanation/thermal.md#model). Terms of further
+/// zones' temperatures, a lagged temperature, the heating rate and hysteresis are tried in turn. A term is kept where the log
 /// evidence rises by more than three and passes that were not fitted are met no worse. Outliers (4.5 standard deviations) are rejected,
 /// stretches of them are not. At least four readings at two
 /// positions.

@@ -46,11 +46,11 @@ class ThermalRegression {
   [[nodiscard]] ThermalHyper typical() const;
   /// RMS of the residuals each reading would have if it had been left out.
   [[nodiscard]] double left_out_rms(const numerics::Posterior& p, double noise) const;
-  /// RMS of what is left of the readings of each pass - from one turn of the axis to the next - by a fit without that pass
-  /// (every fifth pass at a time). Neighbours in time share the heat's error, so leaving out single readings flatters.
+  /// RMS residual of each pass's readings by a fit without that pass (every fifth pass at a time). A pass goes from one
+  /// turn of the axis to the next. Neighbours in time share the heat's error, so leaving out single readings flatters.
   [[nodiscard]] double held_out_rms(const ThermalHyper& hyper) const;
-  /// What neighbours in time share of the residuals, RMS [m]: error that a hidden state (a lag, a branch, another body's
-  /// temperature) makes and noise does not. 0 where it is no more than chance (three standard errors).
+  /// Part of the residuals that neighbours in time share, RMS [m]. A hidden state makes such an error (a lag, a branch, another
+  /// body's temperature), and noise does not. 0 where the part is no more than chance (three standard errors).
   [[nodiscard]] double unexplained(const numerics::Posterior& p) const;
   /// The model with its weights and its table of standard deviations, `unexplained` in them.
   [[nodiscard]] ThermalError model(const numerics::Posterior& p, double noise, double unexplained) const;
