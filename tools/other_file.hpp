@@ -1,4 +1,4 @@
-// What a command writes is none of the files that it reads.
+// The check that a command writes none of the files that it reads.
 #pragma once
 
 #include <filesystem>

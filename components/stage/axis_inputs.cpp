@@ -31,7 +31,7 @@ void Stage::stop_blindly(const char* why, const Tick& tick) noexcept {
     blind_because_ = why;
     std::array<char, 200> text{};
     std::snprintf(text.data(), text.size(), "brakes without feedback, then %s: %s",
-                  holds ? "holds" : "lets go", why);
+                  holds ? "holds" : "disables the drive", why);
     notices_.say(event::SEVERITY_FAULT, text.data());
     if (moves()) in_vain_ = true;
     brake(setpoint(tick), tick);
@@ -50,7 +50,7 @@ void Stage::stop_blindly(const char* why, const Tick& tick) noexcept {
   if (std::exchange(in_vain_, false)) sample_.command_refused(true);
 }
 
-/// Sight came back: too late for a drive that is to be let go of; else the axis comes to rest where it is now.
+/// Sight came back: too late for a drive that is to be disabled; else the axis comes to rest where it is now.
 void Stage::see_again(const AxisFeedback& feedback, const Tick& tick) noexcept {
   if (parameters_.on_lost_input != "hold")
     return trip("tripped: feedback was lost, and came back while it braked");
@@ -74,7 +74,7 @@ void Stage::look_for_correction(const Tick& tick) noexcept {
   if (driving && !blind_ && !std::exchange(without_correction_, true)) {
     notices_.say(event::SEVERITY_FAULT,
                  holds ? "the correction stays away: brakes and holds, and takes no moves"
-                       : "the correction stays away: brakes, then lets go");
+                       : "the correction stays away: brakes, then disables the drive");
     if (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING) {
       in_vain_ = true;
       brake(setpoint(tick), tick);

@@ -111,7 +111,7 @@ void Stage::deactivate() noexcept {
   if (moves()) {
     std::array<char, 160> text{};
     std::snprintf(text.data(), text.size(),
-                  "axis %lld is let go of while it moves at %.4g m/s: it did not come to rest in time",
+                  "axis %lld is disabled while it moves at %.4g m/s: it did not come to rest in time",
                   static_cast<long long>(parameters_.axis), sample_.velocity());
     notices_.say(event::SEVERITY_TRIP, text.data());
   }
@@ -315,7 +315,7 @@ void Stage::supervise(const Tick& tick) noexcept {
   }
 }
 
-/// A limit switch that closes ahead ends the motion under control: let go of, the carriage would coast on past it.
+/// A limit switch that closes ahead ends the motion under control: with the drive disabled, the carriage would coast on past it.
 void Stage::stop_at_limit(const AxisFeedback& feedback, const Tick& tick) noexcept {
   const double velocity = setpoint(tick).velocity;
   const bool low = feedback.limit_low() && velocity < 0.0;

@@ -1,4 +1,4 @@
-// Whether the gains of a stage would make its axis swing up, as far as the inertia is known.
+// Whether the gains of a stage would make its axis unstable, as far as the inertia is known.
 #include <array>
 #include <cstdio>
 
@@ -46,7 +46,7 @@ std::optional<Component::Unfit> Stage::unfit(double period) const {
   if (radius < 1.0) return {};
   std::array<char, 160> why{};
   std::snprintf(why.data(), why.size(),
-                "with these gains the loop swings up when it runs at %.6g Hz (by %.3g times a period)",
+                "with these gains the loop is unstable at %.6g Hz (it grows by %.3g times a period)",
                 1.0 / period, radius);
   return Unfit{why.data(), "control", "step it more often, or lower kp, ki and kd (in a cascade kp and kv)"};
 }

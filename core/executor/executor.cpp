@@ -281,7 +281,8 @@ void Executor::deactivate(Slot& slot, Instant now) noexcept {
   const bool moves = !clock_is_over && !component.wind_down();
   component.deactivate();
   for (OutputPort* output : slot.outputs) output->write_safe_value();
-  constexpr std::string_view why = "it was let go of while it still moved: its time to come to rest was over";
+  constexpr std::string_view why =
+      "it was deactivated while it still moved: its time to come to rest was over";
   change_state(loop_changes_, slot, LifecycleState::inactive, now, moves ? why : std::string_view{});
   if (moves) box_.trip(slot.error_prefix, why, now, count_.cycle);
 }

@@ -174,8 +174,8 @@ class Reader {
     if (recording_.bytes() == 0) throw InputError{file_, "is empty", "record again"};
     if (damaged_chunks_ > 0)
       throw InputError{file_,
-                       "is damaged, " + std::to_string(damaged_chunks_) +
-                           " of its chunks cannot be read; the rest: " + what,
+                       "is damaged, chunks that cannot be read: " + std::to_string(damaged_chunks_) +
+                           "; the rest: " + what,
                        "copy the file again"};
     if (!recording_.complete() && !recording_.damage().empty())
       throw InputError{file_, recording_.damage().front() + "; there: " + what,

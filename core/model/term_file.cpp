@@ -80,7 +80,7 @@ bool check_place(const Node& node, const Model& model, const Term& term) {
     return false;
   }
   if (misreads && !term.with.empty()) {
-    node.fault("what an output reads wrong goes over one variable alone", "leave `with` out");
+    node.fault("an error of an output's reading goes over one variable alone", "leave `with` out");
     node.accept_all();
     return false;
   }

@@ -75,7 +75,7 @@ class Thermal(Calibrations):
         self.assertAlmostEqual(counts["rms_used"], 0.4e-6, delta=0.06e-6)
         self.assertGreater(counts["rms_all"], 19e-6)  # 390 um / sqrt(359)
         page = self.page()
-        self.assertIn("What was left out, and what it costs", page)
+        self.assertIn("Rows left out, and the cost of that", page)
         self.assertIn("400 um", page)
 
     def test_a_stretch_is_fitted_and_said(self):
@@ -176,7 +176,7 @@ class Dispenser(Calibrations):
     def test_a_curved_field_is_not_called_scatter(self):
         self.write("d.csv", self.HEADER, self.plate(curved=0.05))
         said = self.call("calibrate", "dispenser", "--droplets", "d.csv", "--out", "out")
-        self.assertIn("what is left is more than scatter", said)
+        self.assertIn("the residual is more than scatter", said)
         self.assertNotIn('class="callout good"', self.page())
         self.assertEqual(len(self.report()["rows"]["unexplained"]), 1)
 
@@ -398,7 +398,7 @@ class Geometric(Calibrations):
         rows = self.report()["rows"]
         self.assertAlmostEqual(rows["rms_used"], 0.2e-6, delta=0.04e-6)
         self.assertAlmostEqual(rows["rms_all"], 20e-6 * math.sqrt(3 / 504), delta=0.2e-6)
-        self.assertIn("What was left out, and what it costs", self.page())
+        self.assertIn("Rows left out, and the cost of that", self.page())
 
     def test_an_export_has_no_zeros_for_what_no_line_told(self):
         self.rows(self.LINES[:1])
@@ -423,7 +423,7 @@ class Components(Calibrations):
         self.assertEqual(one["rejected"], 1)
         self.assertGreater(one["rms_all"], 5e-6)
         self.assertLess(one["rms_used"], 0.2e-6)
-        self.assertIn("What was left out, and what it costs", self.page())
+        self.assertIn("Rows left out, and the cost of that", self.page())
 
 
     def test_a_prediction_says_what_is_not_in_it(self):
@@ -475,7 +475,7 @@ class History(Calibrations):
         self.assertAlmostEqual(kinds["thermal"]["due"]["days_after_last"], 55, delta=8)
         self.assertFalse(any(name["has_moved"] for name in kinds["thermistor"]["names"]))
         page = self.page("history")
-        for words in ("Due 2026-07-", "moved", "What was left out, and what it costs", "<svg"):
+        for words in ("Due 2026-07-", "moved", "Rows left out, and the cost of that", "<svg"):
             self.assertIn(words, page)
 
     def test_json_and_what_was_left_out(self):

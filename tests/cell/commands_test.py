@@ -711,7 +711,7 @@ class Planning(unittest.TestCase):
             self.assertIn(f"<td>{row['line']}</td>", page)
             length = sum((float(row[f"to_{k} [m]"]) - float(row[f"from_{k} [m]"])) ** 2 for k in "xyz") ** 0.5
             self.assertAlmostEqual(length / float(row["interval [m]"]), round(length / float(row["interval [m]"])), 6)
-        for words in ("expected without it", "line,x [m],y [m],z [m],displacement [m]", "What to expect, and what is not seen",
+        for words in ("expected without it", "line,x [m],y [m],z [m],displacement [m]", "Expected result, and error motions that stay open",
                       "Check the result on a line that was not used", "(0, 0, -30) mm", "EC0Y", "<svg", "proposed"):
             self.assertIn(words, page)
         self.assertNotRegex(page, r'(src|href)="http')

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The process that gives a moving axis its feedback is killed: the stage brakes under control, then lets go or holds as its file
+# The process that gives a moving axis its feedback is killed: the stage brakes under control, then disables the drive or holds as its file
 # says, and leaves its black box where it trips. Four processes over DDS, by the wall clock.
 # input_lost.sh INVAR SOURCE_DIR
 set -euo pipefail
@@ -45,7 +45,7 @@ P
 }
 
 lose_feedback hold HOLDING holds
-lose_feedback off FAULT "lets go"
+lose_feedback off FAULT "disables the drive"
 ls out/black-box-servo-*.mcap
 "$invar" recording info out/black-box-servo-*.mcap
 echo "passed"

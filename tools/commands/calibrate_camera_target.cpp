@@ -158,7 +158,7 @@ report::LeftOut rows_of(const Rival& best, const metrology::SortedViews& sorted,
   const double chance = chance_of_noise(best.fit);
   if (chance < 0.01)
     rows.unexplained.push_back(
-        "What is left of the " + std::to_string(points) +
+        "The residual of the " + std::to_string(points) +
         " points goes on from one point to the next (p = " + report::number(chance, 2) +
         "): no lens here, or the target, is as it is to the noise of the corners; the sigmas "
         "count the points as independent.");

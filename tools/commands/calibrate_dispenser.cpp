@@ -133,7 +133,7 @@ report::LeftOut left_out_of(const Droplets& drops, const TrajectoryFit& fit) {
   left_out.rms_used = report::rms_of(used);
   left_out.rms_all = report::rms_of(all);
   if (fit.scatter.tested && fit.scatter.probability < metrology::significant)
-    left_out.unexplained.push_back("What is left is more than scatter: " + fit.scatter.pattern +
+    left_out.unexplained.push_back("The residual is more than scatter: " + fit.scatter.pattern +
                                    " explains a part of it that chance would in " +
                                    number(100.0 * fit.scatter.probability, 2) +
                                    " % of cases; no model here has it.");
@@ -143,11 +143,11 @@ report::LeftOut left_out_of(const Droplets& drops, const TrajectoryFit& fit) {
 /// What the tests of the residual allow to say of it.
 std::string left_words(const TrajectoryFit& fit) {
   const auto& test = fit.scatter;
-  if (!test.tested) return "too few droplets to test whether what is left is scatter";
+  if (!test.tested) return "too few droplets to test whether the residual is scatter";
   const std::string chance = "(p = " + number(test.probability, 2) + ")";
   if (test.probability < metrology::significant)
-    return "what is left is more than scatter " + chance + ": " + test.pattern;
-  return "tests of what is left, over the targets and in order, find scatter alone " + chance;
+    return "the residual is more than scatter " + chance + ": " + test.pattern;
+  return "tests of the residual, over the targets and in order, find scatter alone " + chance;
 }
 
 /// Rotation, scale and squareness of the field, with their sigmas.

@@ -92,7 +92,7 @@ report::LeftOut rows_of(const physics::RippleSamples& samples, const physics::Ri
   rows.rms_used = fit.families.empty() ? fit.before : fit.after;
   if (fit.not_noise < 0.01)
     rows.unexplained.push_back(
-        "What is left of the force goes on from one place to the next (p = " + number(fit.not_noise, 2) +
+        "The residual force goes on from one place to the next (p = " + number(fit.not_noise, 2) +
         "): no family of ripple here explains it. The sigmas allow for it.");
   return rows;
 }

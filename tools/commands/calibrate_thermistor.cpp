@@ -92,10 +92,10 @@ report::LeftOut rows_of(const std::vector<double>& temperature, const std::vecto
   rows.rms_used = rows.rms_all = fit.rms;
   const double chance = numerics::chance_of_alike_neighbours(residual);
   if (residual.size() < 10)
-    rows.unexplained.emplace_back("Fewer than ten readings: whether what is left is noise was not tested.");
+    rows.unexplained.emplace_back("Fewer than ten readings: whether the residual is noise was not tested.");
   else if (chance < 0.01)
     rows.unexplained.push_back(
-        "What is left goes on from one temperature to the next (p = " + number(chance, 2) +
+        "The residual goes on from one temperature to the next (p = " + number(chance, 2) +
         "): neither equation here follows this thermistor to the noise of its readings.");
   return rows;
 }

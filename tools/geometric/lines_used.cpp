@@ -112,10 +112,10 @@ report::LeftOut lines_used(const metrology::Identification& found, const LinesFi
   left_out.rms_used = report::rms_of(sums.used);
   left_out.rms_all = report::rms_of(sums.all);
   if (found.misfit > found.noise)
-    left_out.unexplained.push_back("What repeats at its place and no function here explains is " +
-                                   report::si(found.misfit, "m") +
-                                   " RMS, more than the noise of a reading (" + report::si(found.noise, "m") +
-                                   "): the model leaves it.");
+    left_out.unexplained.push_back(
+        "Error that repeats at its place, and that no function here explains, is " +
+        report::si(found.misfit, "m") + " RMS, more than the noise of a reading (" +
+        report::si(found.noise, "m") + "): the model leaves it.");
   return left_out;
 }
 

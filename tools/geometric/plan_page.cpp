@@ -222,7 +222,7 @@ report::Page plan_page(const MeasuringPlan& plan) {
   write_lines(page, plan);
   page.heading("At the machine");
   write_instructions(page, plan);
-  page.heading("What to expect, and what is not seen");
+  page.heading("Expected result, and error motions that stay open");
   write_expectation(page, plan);
   page.heading("Weighed against each other");
   write_choices(page, plan);

@@ -40,7 +40,7 @@ std::string line_of(const LeftOut& left_out) {
 }
 
 void show(Page& page, const LeftOut& left_out) {
-  page.heading("What was left out, and what it costs");
+  page.heading("Rows left out, and the cost of that");
   const auto told = [&](double value) {
     return std::isnan(value) ? "cannot be told" : si(value, left_out.unit);
   };

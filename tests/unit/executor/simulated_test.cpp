@@ -233,7 +233,7 @@ TEST(Executor, WhatDoesNotComeToRestIsLetGoInTime) {
   for (StateChange change; track.executor.take_change(change);)
     if (change.to == LifecycleState::inactive && change.why[0] != 0)
       told.push_back(std::to_string(change.component) + ": " + change.why.data());
-  EXPECT_THAT(told, ElementsAre(HasSubstr("1: it was let go of while it still moved")));
+  EXPECT_THAT(told, ElementsAre(HasSubstr("1: it was deactivated while it still moved")));
 }
 
 TEST(Executor, AllThatMovesCanBeBroughtToRestWhileEverythingGoesOn) {

@@ -478,7 +478,7 @@ TEST(Stage, LetGoWhileItMovesItSaysWhichAxisAndHowFast) {
   bench.stage.deactivate();
   ASSERT_EQ(bench.notices.received(), 1U);
   const std::string text = bench.notices.latest()->text().c_str();
-  EXPECT_EQ(text.find("axis 0 is let go of while it moves at 0.09"), 0U) << text;
+  EXPECT_EQ(text.find("axis 0 is disabled while it moves at 0.09"), 0U) << text;
 }
 
 // Whatever numbers a command carries: every current is one within its limit, and setpoints keep to the axis' limits.
