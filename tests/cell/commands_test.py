@@ -374,6 +374,17 @@ class Acting(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("laser", err)
 
+    def test_a_model_waits_for_a_component_that_becomes_active(self):
+        """A component discards orders from before its activation: a cell that was just started must not leave one unanswered."""
+        self.assertEqual(invar("lifecycle", CELL_FILE, "compensation", "deactivate"), (0, "compensation: inactive\n", ""))
+        status, out, err = invar("job", "apply", CELL_FILE, "compensation", "--none", "--wait", "1")
+        self.assertEqual((status, out), (1, ""))
+        self.assertIn("`compensation` is not active, and takes no model", err)
+        waiting = Call("job", "apply", CELL_FILE, "compensation", "--none", "--wait", "30")
+        time.sleep(1.0)  # the order is not sent yet
+        self.assertEqual(invar("lifecycle", CELL_FILE, "compensation", "activate"), (0, "compensation: active\n", ""))
+        self.assertEqual(waiting.end(), (0, "compensation: no model any more\n", ""))
+
     def test_parameters_are_listed_read_and_changed_within_their_bounds(self):
         status, out, err = invar("param", "list", CELL_FILE, "thermal", "--json")
         self.assertEqual(status, 0, err)

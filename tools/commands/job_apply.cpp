@@ -250,6 +250,11 @@ int apply(Options& options) {
     std::cerr << options.call.command << ": " << why << '\n';
     return 1;
   }
+  if (!cell.process_of(component).empty() && !cell.wait_for_component(component)) {
+    std::cerr << options.call.command << ": `" << component
+              << "` is not active, and takes no model; activate it with invar lifecycle\n";
+    return 1;
+  }
   ModelPort port{cell, component};
   if (!port.connect()) {
     std::cerr << options.call.command << ": `" << component

@@ -250,6 +250,17 @@ void LiveCell::wait_for_components() {
   });
 }
 
+bool LiveCell::wait_for_component(const std::string& component) {
+  const auto is_up = [&] {
+    const auto components = client_->components();
+    return std::any_of(components.begin(), components.end(), [&](const auto& c) {
+      return component == c.component_name().c_str() && !is_inactive(c.state());
+    });
+  };
+  wait_until(patience_, is_up);
+  return is_up();
+}
+
 std::vector<dds::Endpoint> LiveCell::wait_for_writers(const std::string& text) {
   const std::string wanted = topic(text);
   std::vector<dds::Endpoint> writers;

@@ -76,6 +76,9 @@ class LiveCell {
   /// A cell that was just started activates its components one after the other: waits until all are active or in error, or
   /// the end of patience.
   void wait_for_components();
+  /// The same for one component, which discards commands from before its activation. False: it says that it is inactive, or
+  /// nothing, to the end of patience.
+  bool wait_for_component(const std::string& component);
   /// Waits until all writers and readers of the cell's processes have been discovered. Other participants cannot be asked how
   /// many they have; where some take part, waits until nothing new has come for 3 s. A participant
   /// that missed the first announcements hears the next after 1.5 s.
