@@ -49,18 +49,26 @@ Task AxisRunner::wait(double seconds) {
 Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* record) {
   send(command);
   loop_.reset();
+  link_.reset();
+  bool taken = false;
   const std::string axis_said = axis_name(state_.topic, axis_);
   const Instant started = now();
   for (;;) {
     co_await NextStep{};
     if (record != nullptr) take_down(*record);
     const auto* state = state_.latest();
-    if (state != nullptr) loop_.take(*state);
+    if (state != nullptr) {
+      loop_.take(*state);
+      link_.look(state_.age(now()));
+    }
     const bool answered = state != nullptr && state->command_id() == command.id();
     if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
       throw std::runtime_error{axis_said + " tripped while moving" + loop_.figures()};
     if (answered && state->command_refused())
-      throw std::runtime_error{axis_said + " refused a motion of the job"};
+      throw std::runtime_error{taken ? link_.stopped(axis_said, name)
+                                     : axis_said + " refused a motion of the job"};
+    if (const auto fault = link_.fault(axis_said, name)) throw std::runtime_error{*fault};
+    taken = taken || answered;
     if (answered && state->command_done()) {
       if (const auto fault = loop_.fault()) throw std::runtime_error{axis_said + ": " + *fault};
       co_return;

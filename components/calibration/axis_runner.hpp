@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "components/calibration/axis_link.hpp"
 #include "components/calibration/job_component.hpp"
 #include "components/calibration/loop_watch.hpp"
 #include "core/recording/table.hpp"
@@ -55,6 +56,7 @@ class AxisRunner : public JobComponent {
 
   const std::int64_t& axis_;
   LoopWatch loop_;  // of the motion under way
+  AxisLink link_;
   Output<stage::AxisCommand> command_{*this, "command", "command"};
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};

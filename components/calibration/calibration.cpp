@@ -86,6 +86,8 @@ void Calibration::send(std::size_t axis, stage::AxisCommandKind kind, double pos
   command.jerk(pace.jerk);
   axes_[axis]->last_command = command.id();
   axes_[axis]->loop.reset();
+  axes_[axis]->link.reset();
+  axes_[axis]->taken = false;
   axes_[axis]->command.write(command);
 }
 
@@ -131,13 +133,20 @@ Task Calibration::move_to(Point target, Pace pace) {
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       const auto* state = axes_[i]->state.latest();
       LoopWatch& loop = axes_[i]->loop;
-      if (state != nullptr) loop.take(*state);
+      if (state != nullptr) {
+        loop.take(*state);
+        axes_[i]->link.look(axes_[i]->state.age(now()));
+      }
       const bool answered = state != nullptr && state->command_id() == axes_[i]->last_command;
       const auto axis_said = [&] { return axis_name(axes_[i]->state.topic, static_cast<std::int64_t>(i)); };
       if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
         throw std::runtime_error{axis_said() + " tripped while moving" + loop.figures()};
       if (const auto fault = loop.fault(); fault && answered && state->command_done())
         throw std::runtime_error{axis_said() + ": " + *fault};
+      if (answered && state->command_refused() && axes_[i]->taken)
+        throw std::runtime_error{axes_[i]->link.stopped(axis_said(), name)};
+      if (const auto fault = axes_[i]->link.fault(axis_said(), name)) throw std::runtime_error{*fault};
+      axes_[i]->taken = axes_[i]->taken || answered;
       if (answered && state->command_refused())
         throw std::runtime_error{std::string{"axis "} + letters[i] + " refused to move to " +
                                  std::to_string(target[static_cast<Eigen::Index>(i)]) + " m"};

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "components/calibration/axis_link.hpp"
 #include "components/calibration/job_component.hpp"
 #include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
@@ -78,6 +79,8 @@ class Calibration final : public JobComponent, private JobHost {
     Output<stage::AxisCommand> command;
     std::uint64_t last_command = 0;
     LoopWatch loop;  // of the motion under way
+    AxisLink link;
+    bool taken = false;  // it is under way
   };
 
   // calibration.cpp: jobs, and what all of them are made of.

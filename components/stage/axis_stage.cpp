@@ -66,7 +66,7 @@ void Stage::activate() {
   fed_forward_ = reading_error_ = {};
   fused_watch_.reset(fused_.received());
   correction_watch_.reset(correction_.received());
-  without_correction_ = in_vain_ = false;
+  without_correction_ = without_commander_ = in_vain_ = false;
   standing_current_ = 0.0;
   model_changed_ = false;
   model_.announce();
@@ -365,6 +365,7 @@ void Stage::step(const Tick& tick) noexcept {
     }
   }
 
+  look_for_commander(tick);
   if (leaving_ && (mode_ == AXIS_MODE_MOVING || mode_ == AXIS_MODE_HOMING)) brake(setpoint(tick), tick);
   // At rest and about to leave, a plant that has left before is no fault.
   if (leaving_ && !seeing && mode_ == AXIS_MODE_HOLDING) mode_ = AXIS_MODE_DISABLED;

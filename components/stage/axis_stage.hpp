@@ -16,6 +16,7 @@
 #include "core/component/staged_model.hpp"
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
+#include "idl/commander.h"
 #include "idl/compensation.h"
 #include "idl/index.h"
 #include "idl/sensing.h"
@@ -30,7 +31,7 @@ namespace invar::stage {
 ///
 /// Safe value: motor not enabled. If feedback or a fused position is stale or no number, the axis brakes on feedforward. If a
 /// correction stays away, it brakes. Then the drive is disabled or the axis holds (`on_lost_input`). A limit switch that closes
-/// brakes the axis, and only moves away from the switch are taken. Following error and a fault of the drive trip it at once. A
+/// brakes the axis, and only moves away from the switch are taken. If the commander is lost, the axis brakes and stands. Following error and a fault of the drive trip it at once. A
 /// notice gives the reason. Before it is disabled or deactivated the axis brakes; if it still moves then, a notice states its
 /// speed.
 class Stage final : public Component {
@@ -86,6 +87,8 @@ class Stage final : public Component {
     double settle_time = 0.02;
     double feedback_timeout = 0.002;
     std::string on_lost_input = "off";
+    std::string lost_commander = "stop";
+    double commander_timeout = 0.08;
     void describe(auto& p) {
       p(axis, "axis", 0, 2, "0, 1, 2 for x, y, z");
       p(travel, "travel", "m", "soft limits");
@@ -105,9 +108,18 @@ class Stage final : public Component {
         "older feedback, or two periods of a slower fused position or correction: controlled stop");
       p(on_lost_input, "on_lost_input",
         "then off (the drive is disabled) or hold (on, standing; goes on where the input comes back)");
-      if constexpr (requires { p.node(); })
+      p(lost_commander, "lost_commander",
+        "stop (under control, then stands) or finish the motion, where its commander is lost");
+      p(commander_timeout, "commander_timeout", "s", Range{0.03, 10.0},
+        "lost: a commander on another PC that is silent for so long, or one on this PC that has ended; it "
+        "shows life "
+        "every 10 ms");
+      if constexpr (requires { p.node(); }) {
         if (on_lost_input != "off" && on_lost_input != "hold")
           p.node()["on_lost_input"].fault("`" + on_lost_input + "` is neither", "use off or hold");
+        if (lost_commander != "stop" && lost_commander != "finish")
+          p.node()["lost_commander"].fault("`" + lost_commander + "` is neither", "use stop or finish");
+      }
     }
   };
 
@@ -158,6 +170,7 @@ class Stage final : public Component {
   void stop_blindly(const char* why, const Tick& tick) noexcept;
   void see_again(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void look_for_correction(const Tick& tick) noexcept;
+  void look_for_commander(const Tick& tick) noexcept;
   void stop_at_limit(const AxisFeedback& feedback, const Tick& tick) noexcept;
   void supervise(const Tick& tick) noexcept;
   void track_settling(const Tick& tick, const MotionPoint& setpoint) noexcept;
@@ -170,6 +183,7 @@ class Stage final : public Component {
   Input<AxisFeedback> feedback_{*this, "feedback"};
   Input<sensing::FusedPosition> fused_{*this, "fused", {.optional = true}};
   Input<compensation::AxisCorrection> correction_{*this, "correction", {.optional = true}};
+  Input<commander::Link> commander_{*this, "commander", {.optional = true}};
   Input<IndexPulse> index_{*this, "index", {.optional = true}};
   Inbox<AxisCommand> command_{*this, "command"};
   Output<MotorCommand> motor_{*this, "motor"};
@@ -191,6 +205,7 @@ class Stage final : public Component {
   Homing homing_;
   InputWatch fused_watch_, correction_watch_;
   bool without_correction_ = false;  // it came, and stays away now
+  bool without_commander_ = false;   // it is silent, and the axis moved
   bool in_vain_ = false;             // the stop under way ends the command as refused
   double standing_current_ = 0.0;    // of the controller, while it holds
   bool leaving_ = false;             // to be deactivated: it brakes and takes no commands

@@ -57,7 +57,10 @@ bool CommandGate::passes(const std::string& writer, Instant sent) {
   if (!exclusive_) return true;
   const Instant now = monotonic_now();
   const Claimant* owner = ownership_.claim(who, now);
-  if (owner == nullptr) return true;
+  if (owner == nullptr) {
+    if (follower_.obeyed) follower_.obeyed(who);
+    return true;
+  }
   tell(who, "`" + discovery_.name_of(owner->participant) + "` commands there, with ownership strength " +
                 std::to_string(owner->strength) + ", last " + seconds(now - ownership_.last()) +
                 " ago; this one has strength " + std::to_string(who.strength) +
@@ -72,7 +75,7 @@ void CommandGate::refuse(const std::string& writer, const std::string& why) {
 
 void CommandGate::gone(const std::string& writer) {
   const std::lock_guard lock{mutex_};
-  ownership_.release(writer);
+  if (ownership_.release(writer) && follower_.gone) follower_.gone();
   told_.erase(writer);
   ahead_.erase(writer);
 }

@@ -23,6 +23,14 @@ class CommandGate {
   CommandGate(std::string topic, const Profile& profile, Discovery& discovery,
               std::function<void()> refused = {});
 
+  /// Is told of each sample that is obeyed, before it is handed over, and when its sender has gone.
+  struct Follower {
+    std::function<void(const Claimant& who)> obeyed;
+    std::function<void()> gone;
+  };
+  /// Set-up only, of a topic with exclusive ownership.
+  void follow(Follower follower) { follower_ = std::move(follower); }
+
   /// Whether ownership or lifespan bound this topic, so that `passes` is to be asked of every sample.
   [[nodiscard]] bool is_asked_of_all() const { return exclusive_ || lifespan_.ns > 0; }
   /// `writer`: GUID as text; `sent` by its clock (UTC).
@@ -43,6 +51,7 @@ class CommandGate {
   Duration lifespan_;
   Discovery& discovery_;
   std::function<void()> refused_;
+  Follower follower_;
   std::atomic<std::uint64_t> refusals_{0};
   std::mutex mutex_;
   Ownership ownership_;

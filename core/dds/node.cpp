@@ -1,5 +1,7 @@
 #include "core/dds/node.hpp"
 
+#include <unistd.h>
+
 #include <chrono>
 #include <mutex>
 #include <thread>
@@ -7,8 +9,10 @@
 #include "core/base/contract.hpp"
 #include "core/base/fault.hpp"
 #include "core/component/component.hpp"
+#include "core/dds/commander_watch.hpp"
 #include "core/dds/connection.hpp"
 #include "core/dds/endpoint_id.hpp"
+#include "core/dds/guid_text.hpp"
 #include "core/dds/local_exchange.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/promised_address.hpp"
@@ -21,6 +25,8 @@ namespace invar::dds {
 std::string topic_name(const std::string& cell, const std::string& component, const std::string& port) {
   return "cell/" + cell + "/" + component + "/" + port;
 }
+
+std::string heartbeat_topic(const std::string& cell) { return "cell/" + cell + "/heartbeat"; }
 
 namespace {
 
@@ -36,6 +42,22 @@ const WireType& wire_type_of(std::type_index type, const std::string& topic) {
 /// Where only the latest counts, reading instead of taking costs the receiving thread no allocation.
 bool is_kept(const Profile& profile) {
   return profile.traffic == Traffic::realtime && !profile.keep_all && profile.depth == 1;
+}
+
+/// Best effort on the sockets of the loop's traffic: a heartbeat that waits behind others says nothing.
+Profile heartbeat_profile() {
+  Profile profile;
+  profile.name = "heartbeat";
+  profile.traffic = Traffic::realtime;
+  return profile;
+}
+
+/// Where a component wants to know whether its commander is heard; nullptr: it does not, or the deployment tells it.
+Input<commander::Link>* commander_link(const Component& component) {
+  for (Port* port : component.ports())
+    if (auto* link = dynamic_cast<Input<commander::Link>*>(port); link != nullptr && link->topic.empty())
+      return link;
+  return nullptr;
 }
 
 struct BoundOutput {
@@ -55,6 +77,13 @@ struct Node::Parts {
   std::vector<BoundOutput> outputs;
   std::vector<std::unique_ptr<Connection>> inputs;
   Publishing realtime_publishing, general_publishing;
+  std::unique_ptr<Heart> heart;
+  std::unique_ptr<Connection> heartbeats;
+  std::unique_ptr<CommanderWatch> watch;
+
+  [[nodiscard]] std::string own_address() const {
+    return options.addresses.empty() ? "127.0.0.1" : options.addresses.front();
+  }
 
   Participant& participant(Traffic traffic) {
     const std::lock_guard lock{mutex};
@@ -143,6 +172,34 @@ void Node::bind(OutputPort& port, OutputBinding binding, const Profile& qos) {
     parts_->publishing(qos.traffic).add(*bound.outlet);
   }
   parts_->outputs.push_back(std::move(bound));
+  if (qos.exclusive) send_heartbeats(port.owner().cell);
+}
+
+void Node::send_heartbeats(std::uint32_t cell) {
+  if (parts_->heart) return;
+  commander::Heartbeat beat;
+  beat.cell(cell);
+  beat.participant(guid_text(parts_->participant(Traffic::general).id().guidPrefix));
+  beat.process(parts_->options.process);
+  beat.address(parts_->own_address());
+  beat.process_id(static_cast<std::uint32_t>(getpid()));
+  auto to = std::make_shared<Writer<commander::Heartbeat>>(
+      writer<commander::Heartbeat>(heartbeat_topic(parts_->options.cell), heartbeat_profile()));
+  parts_->heart = std::make_unique<Heart>(
+      [to](const commander::Heartbeat& sample) { (void)to->write(sample); }, std::move(beat));
+}
+
+void Node::watch_commander(const InputPort& port, CommandGate& gate, const Clock& clock) {
+  auto* link = commander_link(port.owner());
+  if (link == nullptr) return;
+  if (!parts_->watch) parts_->watch = std::make_unique<CommanderWatch>(parts_->own_address());
+  parts_->watch->add(gate, *link, clock);
+  if (!parts_->heartbeats)
+    parts_->heartbeats = reader<commander::Heartbeat>(
+        heartbeat_topic(parts_->options.cell), heartbeat_profile(),
+        [watch = parts_->watch.get(), cell = port.owner().cell](const commander::Heartbeat& beat) {
+          if (beat.cell() == cell) watch->heard(beat);
+        });
 }
 
 void Node::bind(InputPort& port, Clock clock) {
@@ -152,6 +209,7 @@ void Node::bind(InputPort& port, Clock clock) {
   const auto gate =
       std::make_shared<CommandGate>(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
   inlet->guard(gate, expected_keys(port));
+  if (qos.exclusive) watch_commander(port, *gate, clock);
   auto local = parts_->local_reader(qos, inlet, clock);
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
@@ -162,6 +220,8 @@ void Node::bind(InputPort& port, Clock clock) {
 void Node::start() {
   parts_->realtime_publishing.start(parts_->options.realtime_priority, parts_->options.realtime_cpu);
   parts_->general_publishing.start(0, std::nullopt);
+  if (parts_->heart) parts_->heart->start();
+  if (parts_->watch) parts_->watch->start(parts_->options.realtime_priority);
 }
 
 void Node::cycle_ended() noexcept {
@@ -175,6 +235,9 @@ void Node::stop() {
   parts_->general_publishing.stop();
   if (parts_->exchange) parts_->exchange->wake_readers();  // for what was written after the last cycle
   parts_->inputs.clear();
+  parts_->heartbeats.reset();
+  parts_->watch.reset();
+  parts_->heart.reset();
 }
 
 std::unique_ptr<Connection> Node::raw_reader(const std::string& topic, const std::string& type,

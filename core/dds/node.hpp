@@ -20,6 +20,8 @@
 
 namespace invar::dds {
 
+class CommandGate;
+
 /// A PC on which processes of the cell run: where its participants are looked for, one by one, without multicast.
 struct PeerHost {
   std::string address;
@@ -72,6 +74,9 @@ using Clock = std::function<Instant()>;
 
 [[nodiscard]] std::string topic_name(const std::string& cell, const std::string& component,
                                      const std::string& port);
+
+/// Where the processes that command say that they live.
+[[nodiscard]] std::string heartbeat_topic(const std::string& cell);
 
 /// Keeps a writer or reader alive; the node must outlive it.
 class Connection {
@@ -185,6 +190,8 @@ class Node {
   std::unique_ptr<Connection> make_reader(const std::string& topic, std::type_index type,
                                           const Profile& profile,
                                           std::function<void(const void*, Instant)> take);
+  void send_heartbeats(std::uint32_t cell);
+  void watch_commander(const InputPort& port, CommandGate& gate, const Clock& clock);
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };

@@ -14,8 +14,10 @@ const Claimant* Ownership::claim(const Claimant& who, Instant now) {
   return nullptr;
 }
 
-void Ownership::release(const std::string& writer) {
-  if (owner_ && owner_->who.writer == writer) owner_.reset();
+bool Ownership::release(const std::string& writer) {
+  if (!owner_ || owner_->who.writer != writer) return false;
+  owner_.reset();
+  return true;
 }
 
 }  // namespace invar::dds

@@ -30,7 +30,8 @@ class Ownership {
 
   /// Null: `who` commands now. Otherwise who keeps it; valid until the next call.
   const Claimant* claim(const Claimant& who, Instant now);
-  void release(const std::string& writer);
+  /// Whether it was the owner.
+  bool release(const std::string& writer);
   /// When the owner commanded last; Instant{INT64_MIN}: there is none.
   [[nodiscard]] Instant last() const { return owner_ ? owner_->last : Instant{INT64_MIN}; }
 

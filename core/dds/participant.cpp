@@ -12,7 +12,6 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <algorithm>
-#include <fstream>
 #include <span>
 #include <string_view>
 
@@ -22,6 +21,7 @@
 #include "core/dds/datagram_size.hpp"
 #include "core/dds/domain_ports.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/live_process.hpp"
 #include "core/dds/memory_plan.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
@@ -61,15 +61,6 @@ class Priority {
   int policy_ = 0;
   sched_param parameters_{};
 };
-
-/// Not when it has ended and its parent does not know it yet.
-bool is_alive(std::int32_t pid) {
-  std::ifstream stat{"/proc/" + std::to_string(pid) + "/stat"};
-  std::string text;
-  std::getline(stat, text);
-  const auto name_end = text.rfind(") ");
-  return name_end != std::string::npos && text[name_end + 2] != 'Z' && text[name_end + 2] != 'X';
-}
 
 std::vector<PeerAddress> addresses_of(const rtps::ParticipantProxyData& peer) {
   std::vector<PeerAddress> addresses;
