@@ -213,7 +213,7 @@ void Search::settle() {
 bool Search::add_pair(const Fit* rival) {
   progress_(rival == nullptr ? 0.05 : 0.9, "screening pairs");
   auto [claim, alone] = claim_pair(data_, d_.best, options_.without, rival);
-  alone_ = std::move(alone);
+  alone_.insert(alone_.end(), alone.begin(), alone.end());
   if (!claim) return false;
   d_.best = std::move(claim->fit);
   d_.weighing = std::move(claim->weighing);
@@ -243,17 +243,25 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
 constexpr int most_names = 3, most_names_of_heat = 4;
 
 void Search::name(int first_round) {
-  for (int round = first_round; round < (is_heat() ? most_names_of_heat : most_names); ++round)
-    if (!take("further terms of the library", [&] { return add_named(round); }) ||
-        !take("further terms of the library", [&] {
-          if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size
-          return true;
-        }))
-      break;
-  if (rivals_.empty()) return;
-  take("other laws of the same kind",
-       [&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
-  if (options_.refuses) take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
+  const auto most = static_cast<std::size_t>(is_heat() ? most_names_of_heat : most_names);
+  auto round = static_cast<std::size_t>(first_round);
+  for (int again = 0; again < 2; ++again) {
+    for (; round < most; ++round)
+      if (!take("further terms of the library", [&] { return add_named(static_cast<double>(round)); }) ||
+          !take("further terms of the library", [&] {
+            if (quieten() > 0.02) settle();  // which rows are chance shows once the claims have their size
+            return true;
+          }))
+        break;
+    if (rivals_.empty()) return;
+    take("other laws of the same kind",
+         [&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
+    const std::size_t claimed = rivals_.size();
+    if (options_.refuses) take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
+    // One that went (of a pair that began as the least of evils) leaves its place to what was not sought yet.
+    if (claimed < most || rivals_.size() == claimed) break;
+    round = rivals_.size();
+  }
   progress_(0.7, "comparing with near twins");
   if (!take(rivals_weighed,
             [&] { return weigh_alternatives(data_, d_, rivals_, options_.claims()), true; })) {

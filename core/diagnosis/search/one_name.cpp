@@ -190,8 +190,13 @@ std::optional<OneName> leader(const Naming& naming, const Fit& base, const std::
     if (followed[k].name) followed[k].name->place = leaders[k];
     if (!std::isfinite(followed[k].rank)) followed[k] = {};
   });
-  const auto best = std::max_element(followed.begin(), followed.end(),
-                                     [](const Followed& a, const Followed& b) { return a.rank < b.rank; });
+  auto best = std::max_element(followed.begin(), followed.end(),
+                               [](const Followed& a, const Followed& b) { return a.rank < b.rank; });
+  // Each was ranked under weights of its own residual; where one leaves plainly less in independent rows, it leads.
+  for (auto other = followed.begin(); other != followed.end() && !naming.noise.is_fed_back(); ++other)
+    if (other->name && best->name && other->name->gain >= naming.margin &&
+        lead(naming.data, other->name->with, best->name->with) > thresholds::claim_margin)
+      best = other;
   return best == followed.end() ? std::nullopt : std::move(best->name);
 }
 

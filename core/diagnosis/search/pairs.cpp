@@ -8,10 +8,12 @@
 
 #include "core/diagnosis/candidates/equation_candidates.hpp"
 #include "core/diagnosis/dataset/in_parallel.hpp"
+#include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
+#include "core/diagnosis/segments/windows.hpp"
 #include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
@@ -204,6 +206,21 @@ Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, 
   if (!found.alone.empty() && rival == nullptr)  // others have their turn from the same numbers
     for (const auto& one : singles(data, plain, under, without)) keep(found, one.fit.model);
   return found;
+}
+
+std::vector<physics::Model> names_in_windows(const Case& data,
+                                             const std::set<std::string, std::less<>>& without) {
+  const auto cut = in_short_windows(data);
+  if (!cut) return {};
+  auto plain = weigh(*cut, simulate(*cut, cut->model), Colour::white);
+  const auto under = fit(*cut, plain, cut->model, cut->model, Effort::follow(12));
+  plain = weigh(*cut, simulate(*cut, under.model), Colour::white);
+  std::vector<physics::Model> models;
+  for (auto& one : singles(*cut, plain, under, without)) {
+    std::erase_if(one.fit.model.parameters, is_start);
+    models.push_back(std::move(one.fit.model));
+  }
+  return models;
 }
 
 }  // namespace invar::diagnosis

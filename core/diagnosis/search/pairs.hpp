@@ -30,4 +30,9 @@ struct Pairs {
 Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
                  const Fit* rival = nullptr);
 
+/// The single terms that do most in short windows, each from states of its own: where one run goes another way than the
+/// machine, first order along it names nothing. Models without those states; none where there are no windows.
+std::vector<physics::Model> names_in_windows(const Case& data,
+                                             const std::set<std::string, std::less<>>& without);
+
 }  // namespace invar::diagnosis

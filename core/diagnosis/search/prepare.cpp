@@ -9,6 +9,7 @@
 #include "core/diagnosis/dataset/outliers.hpp"
 #include "core/diagnosis/estimate/unknown_sizes.hpp"
 #include "core/diagnosis/search/one_name.hpp"
+#include "core/diagnosis/search/pairs.hpp"
 #include "core/diagnosis/segments/steps.hpp"
 #include "core/diagnosis/segments/windows.hpp"
 #include "core/diagnosis/thresholds.hpp"
@@ -88,6 +89,7 @@ void Search::prepare() {
                    ? fit(data_, d_.weighing, d_.retuned.model, data_.model, Effort::evaluate(), &d_.retuned)
                    : std::move(coloured);
   d_.best = d_.retuned;
+  if (goes_another_way(data_, d_.best)) alone_ = names_in_windows(data_, options_.without);
 }
 
 }  // namespace invar::diagnosis

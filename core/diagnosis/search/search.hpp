@@ -129,7 +129,7 @@ class Search {
   Diagnosis d_;
   Rivals rivals_;
   std::vector<Screened> last_screen_;
-  std::vector<physics::Model> alone_;  // with one term, which a pair that was tried came to
+  std::vector<physics::Model> alone_;  // with one term, found in short windows or by a pair that was tried
   std::optional<LoopNoise> noise_;
   bool led_out_ = false;
   std::optional<Beside> beside_;  // of the best model, once it was looked for

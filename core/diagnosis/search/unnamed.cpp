@@ -181,22 +181,6 @@ Curved best_curve(const Case& data, const Fit& base, const Beside& looked) {
   return best;
 }
 
-namespace {
-
-/// Is a finding the chief effect? Without it more is left than without any other; `without`: the fit that lacks it.
-bool is_chief(const Case& data, const Diagnosis& d, const Fit& without, std::size_t finding) {
-  const double ratio = least_ratio(data, d.best, without);
-  for (std::size_t i = 0; i < d.findings.size(); ++i) {
-    if (i == finding) continue;
-    const auto model = physics::without_term(d.best.model, data.model.terms.size() + i);
-    const auto other = fit(data, d.weighing, model, data.model, Effort::follow(10));
-    if (least_ratio(data, d.best, other) < ratio) return false;
-  }
-  return true;
-}
-
-}  // namespace
-
 bool leave_out_drift(const Case& data, Diagnosis& d) {
   const std::size_t given = data.model.terms.size();
   if (d.findings.size() < 2) return false;
@@ -206,7 +190,8 @@ bool leave_out_drift(const Case& data, Diagnosis& d) {
       continue;
     const auto others = physics::without_term(d.best.model, given + i);
     auto without = fit(data, d.weighing, others, data.model, Effort::follow(10));
-    if (!takes_over(without.model, others, given) || is_chief(data, d, without, i)) continue;
+    if (!takes_over(without.model, others, given) || lead(data, d.best, without) > thresholds::claim_margin)
+      continue;  // where it pays beside the others in independent rows too, it is needed
     d.reject(std::string{drift.info->name}, "it takes over what the others explain", d.findings[i].gain);
     d.best = std::move(without);
     d.findings.erase(d.findings.begin() + static_cast<std::ptrdiff_t>(i));

@@ -325,7 +325,7 @@ void cut_into_windows(Case& data, const Model& near) {
   data = std::move(cut);
 }
 
-std::optional<Model> begun_in_windows(const Case& data) {
+std::optional<Case> in_short_windows(const Case& data) {
   const auto states = states_of(data.model).size();
   if (data.model.plant != physics::Plant::equations || states == 0 || data.windows.count > 0 ||
       data.windows.anew > 0 || !data.model.equations.controlled_input.empty())
@@ -336,8 +336,14 @@ std::optional<Model> begun_in_windows(const Case& data) {
   if (rows < 4 * window) return std::nullopt;
   auto cut = in_windows(data, window, Rows(data.recordings.size()));
   estimate_starts(cut);
-  const auto plain = weigh(cut, simulate(cut, cut.model), Colour::white);
-  auto near = fit(cut, plain, cut.model, cut.model, Effort::follow(12)).model;
+  return cut;
+}
+
+std::optional<Model> begun_in_windows(const Case& data) {
+  const auto cut = in_short_windows(data);
+  if (!cut) return std::nullopt;
+  const auto plain = weigh(*cut, simulate(*cut, cut->model), Colour::white);
+  auto near = fit(*cut, plain, cut->model, cut->model, Effort::follow(12)).model;
   std::erase_if(near.parameters, is_start);
   return near;
 }
