@@ -214,6 +214,8 @@ inline constexpr double goes_another_way = 20.0;
 inline constexpr double other_valley = 0.5;
 /// Values of an output in another recording; the start alone is none. Judgement.
 inline constexpr std::size_t values_to_compare = 8;
+/// Below so many rows of all recordings a run of equations is quick. Measured: 8000 rows take some 5 ms on one core.
+inline constexpr std::size_t quick_rows = 8000;
 /// Share of an RMS that each of two terms may leave beside the other. Judgement.
 inline constexpr double pair_adds = 0.8;
 /// Ratio to the noise where a name must be likelier than not. Judgement.

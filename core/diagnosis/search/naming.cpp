@@ -240,10 +240,12 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
 }
 
 /// More effects beside one another are better looked at in parts; of heat each node has its exchange, its loss and its sensor.
-constexpr int most_names = 3, most_names_of_heat = 4;
+/// In equations friction beside a drag looks like another power until both are there: a fourth where a run is quick.
+constexpr std::size_t most_names = 3, most_names_of_more = 4;
 
 void Search::name(int first_round) {
-  const auto most = static_cast<std::size_t>(is_heat() ? most_names_of_heat : most_names);
+  const std::size_t most = is_heat() || is_quick(data_) ? most_names_of_more : most_names;
+  const bool began_as_pair = first_round == 2;
   auto round = static_cast<std::size_t>(first_round);
   for (int again = 0; again < 2; ++again) {
     for (; round < most; ++round)
@@ -258,8 +260,8 @@ void Search::name(int first_round) {
          [&] { return put_laws_right(data_, d_, rivals_, options_.without), true; });
     const std::size_t claimed = rivals_.size();
     if (options_.refuses) take(all_needed, [&] { return prune(data_, d_, rivals_, options_.without), true; });
-    // One that went (of a pair that began as the least of evils) leaves its place to what was not sought yet.
-    if (claimed < most || rivals_.size() == claimed) break;
+    // One of a pair, claimed before names were sought one by one, leaves its place to what was not sought yet.
+    if (!began_as_pair || claimed < most || rivals_.size() == claimed) break;
     round = rivals_.size();
   }
   progress_(0.7, "comparing with near twins");

@@ -120,10 +120,9 @@ std::vector<Settled> settled_pairs(const Case& data, const Weighing& plain, cons
   });
   std::sort(rough.begin(), rough.end(), [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
   // A motion that swings for long has narrow, bent valleys: where a run is quick, a fit is followed to its end.
-  const bool quick = own && data.recordings.size() * data.recordings.front().inputs.rows() < 8000;
+  const int rounds = is_quick(data) ? 12 : 3;
   std::vector<Settled> settled(std::min<std::size_t>(3, rough.size()));
-  in_parallel(settled.size(),
-              [&](std::size_t i) { settled[i] = settle(data, std::move(rough[i]), quick ? 12 : 3); });
+  in_parallel(settled.size(), [&](std::size_t i) { settled[i] = settle(data, std::move(rough[i]), rounds); });
   std::sort(settled.begin(), settled.end(), [](const auto& a, const auto& b) { return a.score > b.score; });
   return settled;
 }
@@ -182,6 +181,11 @@ std::optional<JointClaim> claimed(const Case& data, const Fit& base, const Settl
 }
 
 }  // namespace
+
+bool is_quick(const Case& data) {
+  return data.model.plant == physics::Plant::equations &&
+         data.recordings.size() * data.recordings.front().inputs.rows() < thresholds::quick_rows;
+}
 
 Pairs claim_pair(const Case& data, const Fit& base, const std::set<std::string, std::less<>>& without,
                  const Fit* rival) {

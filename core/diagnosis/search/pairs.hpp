@@ -11,6 +11,9 @@
 
 namespace invar::diagnosis {
 
+/// Are the recordings of a model in the user's own equations short enough to follow more fits to their end?
+bool is_quick(const Case& data);
+
 struct JointClaim {
   Fit fit;  // the base and two terms, under filters of its own residual
   Weighing weighing;

@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/diagnosis/candidates/kin.hpp"
+#include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/detectable.hpp"
 #include "core/diagnosis/evidence/loop_noise.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/search/one_name.hpp"
+#include "core/diagnosis/search/pairs.hpp"
 #include "core/diagnosis/thresholds.hpp"
 
 namespace invar::diagnosis {
@@ -69,6 +72,32 @@ void Search::try_believed(const Diagnosis& begun) {
       [&](const Diagnosis& astray) {
         return !d_.findings.empty() && !(d_.parameter_excursion > thresholds::far_astray) &&
                lead(data_, d_.best, astray.best) > -thresholds::claim_margin;
+      });
+}
+
+void Search::try_other_power(const Diagnosis& begun) {
+  if (!is_quick(data_) || d_.findings.size() < 2 || !options_.refuses) return;
+  const auto chief = std::max_element(d_.findings.begin(), d_.findings.end(),
+                                      [](const Finding& a, const Finding& b) { return a.share < b.share; });
+  if (chief->term.info->power == 0 || was_stopped("another power in place of the chief effect's")) return;
+  const physics::Term term = chief->term;
+  begin_anew(
+      begun, 1,
+      [&](const Diagnosis&) {
+        auto model = begun.best.model;
+        model.terms.push_back(term);
+        const auto plain = weigh(data_, simulate(data_, model), Colour::white);
+        const auto alone = fit(data_, plain, model, data_.model, Effort::follow(8));
+        auto others = fits_of_other_laws(data_, plain, alone, given(), options_.without);
+        std::erase_if(others, [&](const Fit& f) { return !stands(data_, f, given()); });
+        if (others.empty()) return false;
+        d_.best = std::move(others.front());
+        d_.weighing = weigh(data_, simulate(data_, d_.best.model));
+        rivals_.assign(1, {alone.model.terms.back()});
+        return true;
+      },
+      [&](const Diagnosis& before) {
+        return !d_.is_unnamed && lead(data_, d_.best, before.best) >= thresholds::claim_margin;
       });
 }
 

@@ -112,6 +112,7 @@ Diagnosis Search::run() {
   finish();
   if (!is_equations() && !is_applied) try_pairs(begun);
   try_believed(begun);
+  try_other_power(begun);
   if (options_.refuses && !d_.is_partial) {
     const auto stated = d_;
     if (set_aside(data_, d_)) {
