@@ -45,8 +45,9 @@ std::size_t data_bytes(const Question& question) {
 
 void fill(const Question& question, std::span<const std::uint8_t> data, std::span<std::uint16_t> words) {
   for (std::size_t i = 0; i < question.count; ++i)
-    words[i] = question.is_of_bits() ? static_cast<std::uint16_t>((data[i / 8] >> (i % 8)) & 1U)
-                                     : word_at(data, 2 * i);
+    words[i] = question.is_of_bits()
+                   ? static_cast<std::uint16_t>((static_cast<unsigned>(data[i / 8]) >> (i % 8)) & 1U)
+                   : word_at(data, 2 * i);
 }
 
 }  // namespace
