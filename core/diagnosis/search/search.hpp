@@ -77,8 +77,8 @@ class Search {
   void try_pairs(const Diagnosis& begun);
   /// Where names lead the user's numbers far astray: begins anew with one that is sought from what he believes.
   void try_believed(const Diagnosis& begun);
-  /// Where the chief effect is a power of a variable in equations: begins anew with another power in its place. What is still
-  /// missing beside it, friction beside a drag, makes one look like the other.
+  /// Where the chief effect is a power of a variable in equations: begins anew with another power in its place. An
+  /// effect still missing beside it (friction beside a drag) makes one look like the other.
   void try_other_power(const Diagnosis& begun);
   /// Begins anew with what `start` claims, goes on from round `next` and keeps what is `better` than before.
   template <class Start, class Better>
