@@ -240,11 +240,13 @@ bool Search::put_one_in_place(const Diagnosis& begun) {
 }
 
 /// More effects beside one another are better looked at in parts; of heat each node has its exchange, its loss and its sensor.
-/// In equations friction beside a drag looks like another power until both are there: a fourth where a run is quick.
+/// In equations with states friction beside a drag looks like another power until both are there: a fourth where a run is quick.
 constexpr std::size_t most_names = 3, most_names_of_more = 4;
 
 void Search::name(int first_round) {
-  const std::size_t most = is_heat() || is_quick(data_) ? most_names_of_more : most_names;
+  const std::size_t most = is_heat() || (is_quick(data_) && !data_.model.equations.states.empty())
+                               ? most_names_of_more
+                               : most_names;
   const bool began_as_pair = first_round == 2;
   auto round = static_cast<std::size_t>(first_round);
   for (int again = 0; again < 2; ++again) {
