@@ -55,6 +55,12 @@ void JobComponent::obey(const job::JobCommand& command) {
     return;
   }
   sample_.result_path(std::filesystem::absolute(job->folder).string());
+  // Who gives a value means it: a job that runs without it would move as nobody asked.
+  if (command.arguments().size() > 0) {
+    report(job::JOB_FAILED,
+           "job `" + wanted + "` takes no arguments; leave them out, or change the cell file");
+    return;
+  }
   task_ = std::move(job->task);
   report(job::JOB_RUNNING, "started");
 }

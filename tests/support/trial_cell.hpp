@@ -119,10 +119,11 @@ class TrialCell {
     wired.start();
   }
   /// Runs a job to its end and returns what it said.
-  job::JobStatus run(const std::string& name) {
+  job::JobStatus run(const std::string& name, const std::string& arguments = {}) {
     job::JobCommand command;
     command.id(next++);
     command.name(name);
+    command.arguments(arguments);
     human.job.write(command);
     for (int k = 0; k < 400'000; ++k) {
       wired.step();

@@ -383,7 +383,17 @@ void add_job_run(CLI::App& group) {
           "the call or the file",
           run);
   auto* command = group.get_subcommand("run");
-  command->add_option("--arguments", started->arguments, "for the job, as YAML");
+  constexpr std::size_t longest = 4096;  // string<4096> of idl/job.idl
+  command
+      ->add_option("--arguments", started->arguments,
+                   "for a job of your own component, as YAML; the jobs of Invar take none")
+      ->check(CLI::Validator{[](const std::string& text) {
+                               return text.size() <= longest
+                                          ? std::string{}
+                                          : "has " + std::to_string(text.size()) +
+                                                " characters; give at most " + std::to_string(longest);
+                             },
+                             ""});
   command->add_flag("--detach", started->detach, "start it only");
   command->add_flag("--json", started->json, "print its end as JSON; progress goes to the error output");
   auto listed =

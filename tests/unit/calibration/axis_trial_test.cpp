@@ -152,6 +152,11 @@ TEST(AxisTrial, SaysWhyAJobCannotRun) {
   Cell cell{support::trial_world(), of_stage, of_trial};
   cell.bring_up();
   EXPECT_STREQ(cell.run("nonsense").text().c_str(), "`nonsense` is no job of this component");
+  for (const char* arguments : {"{velocities: [-1], from: .nan}", "["}) {
+    EXPECT_STREQ(cell.run("track", arguments).text().c_str(),
+                 "job `track` takes no arguments; leave them out, or change the cell file");
+    EXPECT_EQ(cell.axis.hand.state.latest()->mode(), stage::AXIS_MODE_DISABLED);
+  }
   const auto status = cell.run("track");
   EXPECT_EQ(status.phase(), job::JOB_FAILED);
   EXPECT_STREQ(status.text().c_str(), "axis x refused a motion of the job");
