@@ -1,11 +1,30 @@
 #include "core/modbus/endpoint.hpp"
 
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <utility>
 
 #include "core/base/fault.hpp"
 
 namespace invar::modbus {
+
+bool is_host(const std::string& text) {
+  std::array<unsigned char, 16> address{};
+  if (inet_pton(AF_INET, text.c_str(), address.data()) == 1 ||
+      inet_pton(AF_INET6, text.c_str(), address.data()) == 1)
+    return true;
+  const auto is_of_name = [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
+  };
+  const auto last =
+      text.substr(text.find_last_of('.') + 1);  // RFC 3696: the last label of a name is no number
+  const bool is_number = last.starts_with("0x") || last.find_first_not_of("0123456789") == std::string::npos;
+  return !is_number && std::all_of(text.begin(), text.end(), is_of_name);
+}
 
 std::string Endpoint::device(const RegisterMap& registers) const {
   const std::string address = host == "localhost" ? "127.0.0.1" : host;

@@ -15,6 +15,10 @@
 
 namespace invar::modbus {
 
+/// A name, or an address written in full. `127.1` and `0177.0.0.1` are other spellings of an address, by which two components
+/// would take one device for two.
+[[nodiscard]] bool is_host(const std::string& text);
+
 /// Parameters of a component that keeps a device.
 struct Endpoint {
   std::string host = "127.0.0.1";
@@ -23,6 +27,9 @@ struct Endpoint {
   bool several_masters = false;
   void describe(auto& p) {
     p(host, "host", "name or address of the device's controller");
+    if constexpr (requires { p.node(); })
+      if (!is_host(host))
+        p.node()["host"].fault("`" + host + "` is no host", "write a name, or an address as 10.0.0.5");
     p(port, "port", 1, 65535, "TCP port");
     p(map, "map", "register map");
     p(several_masters, "several_masters",

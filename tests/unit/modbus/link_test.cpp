@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "core/base/clock.hpp"
+#include "core/modbus/endpoint.hpp"
 #include "tests/support/modbus_peer.hpp"
 
 namespace invar::modbus {
@@ -253,4 +254,14 @@ TEST(Link, NobodyThereIsRefused) {
 }
 
 }  // namespace
+// Other spellings that inet_aton(3) takes for an address, and what no resolver should see.
+TEST(Host, IsANameOrAnAddressInFull) {
+  for (const char* good :
+       {"127.0.0.1", "10.0.0.5", "::1", "localhost", "plc-3.hall.example", "pad_heater", "7plc"})
+    EXPECT_TRUE(is_host(good)) << good;
+  for (const char* bad : {"", "127.1", "0177.0.0.1", "2130706433", "0x7f000001", "127.0.0.1 ", "127.0.0.1;id",
+                          "$(id)", "10.0.0.256", "host."})
+    EXPECT_FALSE(is_host(bad)) << bad;
+}
+
 }  // namespace invar::modbus
