@@ -1,4 +1,4 @@
-// What a stage does when the one who commanded its motion is not heard any more.
+// Answer of a stage to the loss of the commander of its motion.
 #include <array>
 #include <cstdio>
 #include <utility>
@@ -7,7 +7,7 @@
 
 namespace invar::stage {
 
-/// The axis comes to rest by its own deceleration and stands, driven on; a new command moves it again.
+/// The axis makes a controlled stop and is held under power; a new command moves it again.
 void Stage::look_for_commander(const Tick& tick) noexcept {
   const auto* link = commander_.latest();
   if (link == nullptr) return;

@@ -214,7 +214,7 @@ inline constexpr double goes_another_way = 20.0;
 inline constexpr double other_valley = 0.5;
 /// Values of an output in another recording; the start alone is none. Judgement.
 inline constexpr std::size_t values_to_compare = 8;
-/// Below so many rows of all recordings a run of equations is quick. Measured: 8000 rows take some 5 ms on one core.
+/// Below so many rows of all recordings a run of equations is quick. Judgement: pairs of terms had this bound.
 inline constexpr std::size_t quick_rows = 8000;
 /// Share of an RMS that each of two terms may leave beside the other. Judgement.
 inline constexpr double pair_adds = 0.8;
