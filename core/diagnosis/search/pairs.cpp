@@ -216,11 +216,9 @@ std::vector<physics::Model> names_in_windows(const Case& data,
                                              const std::set<std::string, std::less<>>& without) {
   const auto cut = in_short_windows(data);
   if (!cut) return {};
-  auto plain = weigh(*cut, simulate(*cut, cut->model), Colour::white);
-  const auto under = fit(*cut, plain, cut->model, cut->model, Effort::follow(12));
-  plain = weigh(*cut, simulate(*cut, under.model), Colour::white);
+  const auto plain = weigh(cut->data, simulate(cut->data, cut->fit.model), Colour::white);
   std::vector<physics::Model> models;
-  for (auto& one : singles(*cut, plain, under, without)) {
+  for (auto& one : singles(cut->data, plain, cut->fit, without)) {
     std::erase_if(one.fit.model.parameters, is_start);
     models.push_back(std::move(one.fit.model));
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/segments/anew.hpp"
@@ -325,7 +326,7 @@ void cut_into_windows(Case& data, const Model& near) {
   data = std::move(cut);
 }
 
-std::optional<Case> in_short_windows(const Case& data) {
+std::optional<InWindows> in_short_windows(const Case& data) {
   const auto states = states_of(data.model).size();
   if (data.model.plant != physics::Plant::equations || states == 0 || data.windows.count > 0 ||
       data.windows.anew > 0 || !data.model.equations.controlled_input.empty())
@@ -336,14 +337,15 @@ std::optional<Case> in_short_windows(const Case& data) {
   if (rows < 4 * window) return std::nullopt;
   auto cut = in_windows(data, window, Rows(data.recordings.size()));
   estimate_starts(cut);
-  return cut;
+  const auto plain = weigh(cut, simulate(cut, cut.model), Colour::white);
+  auto near = fit(cut, plain, cut.model, cut.model, Effort::follow(12));
+  return InWindows{std::move(cut), std::move(near)};
 }
 
 std::optional<Model> begun_in_windows(const Case& data) {
-  const auto cut = in_short_windows(data);
+  auto cut = in_short_windows(data);
   if (!cut) return std::nullopt;
-  const auto plain = weigh(*cut, simulate(*cut, cut->model), Colour::white);
-  auto near = fit(*cut, plain, cut->model, cut->model, Effort::follow(12)).model;
+  auto near = std::move(cut->fit.model);
   std::erase_if(near.parameters, is_start);
   return near;
 }

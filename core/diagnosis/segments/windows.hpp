@@ -20,8 +20,12 @@ void cut_into_windows(Case& data, const physics::Model& near);
 /// the first row goes another way than the machine (over the top, into another basin), no small step leads back. For a model
 /// in the user's own equations that is not cut into windows; nothing for others and for short recordings.
 std::optional<physics::Model> begun_in_windows(const Case& data);
-/// The case in those short windows; nothing where there are none.
-std::optional<Case> in_short_windows(const Case& data);
+struct InWindows {
+  Case data;
+  Fit fit;  // with every row alike
+};
+/// The case in those short windows, and its model fitted to them; nothing where there are none.
+std::optional<InWindows> in_short_windows(const Case& data);
 
 /// Are there longer windows in which the model stays near (`Case::Windows::few`)? Short ones keep a wrong model near the
 /// machine, but begin anew before anything slow shows.
