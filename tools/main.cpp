@@ -23,9 +23,11 @@ int run(int argc, char** argv) {
   program.require_subcommand(1);
   program.set_version_flag("--version", "invar " INVAR_VERSION);
   invar::tools::add_about(program);
+  invar::tools::add_backup(program);
   invar::tools::add_calibrate(program);
   invar::tools::add_check(program);
   invar::tools::add_completion(program);
+  invar::tools::add_deploy(program);
   invar::tools::add_diagnose(program);
   invar::tools::add_doctor(program);
   invar::tools::add_echo(program);
@@ -42,12 +44,14 @@ int run(int argc, char** argv) {
   invar::tools::add_record(program);
   invar::tools::add_recording(program);
   invar::tools::add_replay(program);
+  invar::tools::add_restore(program);
   invar::tools::add_run(program);
   invar::tools::add_simulate(program);
   invar::tools::add_status(program);
   invar::tools::add_top(program);
   invar::tools::add_topics(program);
   invar::tools::add_types(program);
+  invar::tools::add_units(program);
   try {
     program.parse(argc, argv);
   } catch (const CLI::RuntimeError& end) {

@@ -32,8 +32,27 @@ void check_file(const Node& node, const std::filesystem::path& path) {
     node.fault("file `" + path.string() + "` does not exist", "paths count from the cell file's folder");
 }
 
+/// Words of a command line of ssh: none begins with `-`, or holds what ssh or a shell would take for more than a name.
+SshAccess read_ssh(const Node& node) {
+  SshAccess ssh;
+  if (!node.exists()) return ssh;
+  ssh.port = static_cast<int>(node.integer("port", 1, 65535, 22));
+  const auto word = [&](const char* key, std::string_view also) {
+    const std::string text = node.text(key, "");
+    const auto flaw =
+        text.empty() ? std::nullopt : flaw_of_identifier(text.substr(0, longest_identifier), also);
+    if (flaw) node[key].fault("`" + clipped(text) + "` " + flaw->what, flaw->mend);
+    if (text.starts_with('-') || text.size() > 253)
+      node[key].fault("`" + clipped(text) + "` is no name", "write it as 10.0.0.11 or stage-pc.plant");
+    return text;
+  };
+  ssh.address = word("address", "-.");
+  ssh.user = word("user", "-.");
+  return ssh;
+}
+
 CellHost read_host(const Node& node) {
-  CellHost host{node.key(), "", ""};
+  CellHost host{node.key(), "", "", read_ssh(node["ssh"])};
   in_addr address{};
   if (node.has("interface")) host.interface = node.text("interface");
   if (node.has("address") || !node.has("interface")) host.address = node.text("address");

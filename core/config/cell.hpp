@@ -53,10 +53,18 @@ struct CellProcess {
   std::string where;                      // "cell.yaml:12: processes.motion"
 };
 
+/// How `invar deploy` reaches a host.
+struct SshAccess {
+  std::string address;  // IPv4 or a name; empty: the host's `address`
+  int port = 0;         // 0: what ssh takes
+  std::string user;     // empty: what ssh takes
+};
+
 struct CellHost {
   std::string name;
   std::string address;    // IPv4; empty: that of `interface`, which others learn from its announcements
   std::string interface;  // "eth0"; empty: the one that has `address`
+  SshAccess ssh{};
 };
 
 struct Cell {

@@ -20,6 +20,7 @@
 #include "core/base/temporary_folder.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
+#include "tools/cell/children_watch.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/loaded_cell.hpp"
 #include "tools/cell/own_host.hpp"
@@ -65,13 +66,15 @@ std::filesystem::path outcome_of(const std::string& process, const std::filesyst
   return folder / (process + ".json");
 }
 
+/// The program and the cell file are named where they lie: a link on the way may lead to another release by the time that a
+/// process is started again.
 Child spawn(const LaunchOptions& options, const std::string& process, bool simulated,
             const std::filesystem::path& folder, const Restarts& restarts = {},
             const std::string& last_end = "") {
   const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
   std::vector<std::string> words{program,
                                  "run",
-                                 options.cell.string(),
+                                 std::filesystem::weakly_canonical(options.cell).string(),
                                  "--process",
                                  process,
                                  simulated ? "--simulated" : "--real-time",
@@ -192,6 +195,19 @@ class JobNews {
   Clock::time_point looked_{};
 };
 
+/// What the launcher looks after while the processes run.
+struct Beside {
+  JobNews news;
+  ChildrenWatch service;
+
+  void look(const std::vector<Child>& children) {
+    news.look();
+    std::vector<ChildrenWatch::Child> seen;
+    for (const Child& child : children) seen.push_back({child.name, child.pid, child.running});
+    for (const pid_t hung : service.look(seen)) kill(hung, SIGKILL);
+  }
+};
+
 /// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
 bool keeps_time(const std::set<std::string>& hosts, const config::Cell& cell) {
   return hosts.contains(cell.processes.front().host);
@@ -217,14 +233,14 @@ bool any_runs(std::vector<Child>& children) {
 
 std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell,
                                 std::vector<Child>& children, const std::atomic<bool>& stop,
-                                Clock::time_point begin, JobNews& news, LaunchOutcome& outcome) {
+                                Clock::time_point begin, Beside& beside, LaunchOutcome& outcome) {
   dds::Node node{node_on(cell, "launcher", cell.processes.front().host), dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const auto& process : cell.processes) names.push_back(process.name);
   dds::SimulatedClockMaster master{node, names, cell.window};
   node.start();
   const auto given_up = [&] {
-    news.look();
+    beside.look(children);
     return stop.load() || any_ended(children);
   };
   // Somebody may have to start the other PCs by hand.
@@ -290,7 +306,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   if (!options.quiet) announce(hosts, cell, outcome.simulated);
 
   const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
-  JobNews news{options, cell, folder.path()};
+  Beside beside{{options, cell, folder.path()}, {ServiceManager::from_environment(), folder.path()}};
   RestartNews restart_news{cell};
   std::vector<Child> children;
   for (const auto& process : cell.processes)
@@ -298,17 +314,18 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
       children.push_back(spawn(options, process.name, outcome.simulated, folder.path()));
 
   if (outcome.simulated && !keeps_time(hosts, cell)) {
-    while (!stop && any_runs(children)) sleep_a_little();
+    for (; !stop && any_runs(children); sleep_a_little()) beside.look(children);
   } else if (outcome.simulated) {
-    outcome.failure = keep_simulated_time(options, cell, children, stop, begin, news, outcome);
+    outcome.failure = keep_simulated_time(options, cell, children, stop, begin, beside, outcome);
   } else {
     while (!stop && (options.duration <= 0.0 || seconds_since(begin) < options.duration) &&
            (options.job.empty() ? keep_alive(children, options, cell, folder.path(), restart_news)
                                 : !any_ended(children))) {
-      news.look();
+      beside.look(children);
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   }
+  beside.service.stopping();
   std::vector<bool> by_itself;
   for (const Child& child : children) by_itself.push_back(!child.running);
   if (!outcome.simulated) bring_to_rest(children, folder.path());

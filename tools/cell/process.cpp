@@ -36,6 +36,7 @@
 #include "tools/cell/notice_log.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
+#include "tools/cell/service_manager.hpp"
 
 namespace invar::tools {
 
@@ -265,11 +266,13 @@ class RunningProcess {
     executor_.start();
     const bool up = bring_up();
     service_->publish_status();  // who waits for the cell need not wait for the next regular one
+    if (up) manager_.ready();
     for (bool over = false; up && !over && !orders.stop.load() && !asked_to_stop_ && executor_.is_running() &&
                             (!job_.has_ended() || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (const std::string refused = memory_.look(); !refused.empty()) say(event::SEVERITY_WARNING, refused);
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
+      manager_.feed(executor_.counters().executed);
       leave_progress();
       watch_address();
       log_.write_waiting();
@@ -281,6 +284,7 @@ class RunningProcess {
   }
 
   void take_down() {
+    manager_.stopping();
     say_how_the_job_ended();
     status_ = control_.status();
     if (!resting_) faults_at_end_ = faults();
@@ -319,6 +323,7 @@ class RunningProcess {
       });
     node_.start();
     const bool up = bring_up();
+    if (up) manager_.ready();
     const auto outcome = clock.run(
         [&](Instant until) {
           if (!up) return std::string{"a component of `" + file_.name + "` did not come up"};
@@ -326,6 +331,7 @@ class RunningProcess {
           return std::string{};
         },
         [&] {
+          manager_.feed(executor_.counters().executed);
           leave_progress();
           log_.write_waiting();
           return !options_.job.empty() && (!job_.runs() || job_.has_ended());
@@ -465,6 +471,7 @@ class RunningProcess {
     write_whole(options_.outcome, outcome);
   }
 
+  ServiceManager manager_ = ServiceManager::from_environment();  // before any thread
   const ProcessOptions& options_;
   LoadedCell& loaded_;
   const config::CellProcess& file_;

@@ -1,0 +1,103 @@
+"""Three PCs of their own on this one for tests: Debian's systemd as PID 1 of each, sshd, a bridge between them (systemd_pc.sh)."""
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import time
+
+BOOT = pathlib.Path(__file__).resolve().parent.parent / "support" / "systemd_pc.sh"
+
+
+def run(*words, **more):
+    return subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True, **more)
+
+
+class Pcs:
+    NAMES = ("pc-a", "pc-b", "pc-c")
+
+    def __init__(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-pcs-"))
+        self.switch = f"invar-switch-{os.getpid()}"
+        self.started = []
+        self.address = {name: f"10.81.0.{11 + i}" for i, name in enumerate(self.NAMES)}
+        self.space = {name: f"invar-{name}-{os.getpid()}" for name in self.NAMES}
+        try:
+            self.cables()
+            self.keys()
+            self.boot()
+        except BaseException:
+            self.end()
+            raise
+
+    def cables(self):
+        """A switch, at which this program's own calls stand too (10.81.0.1)."""
+        run("ip", "netns", "add", self.switch)
+        run("ip", "-n", self.switch, "link", "add", "name", "bridge", "type", "bridge", "mcast_snooping", "0")
+        run("ip", "-n", self.switch, "address", "add", "10.81.0.1/24", "dev", "bridge")
+        run("ip", "-n", self.switch, "link", "set", "bridge", "up")
+        for name, space in self.space.items():
+            run("ip", "netns", "add", space)
+            run("ip", "-n", space, "link", "add", "cable", "type", "veth", "peer", "name", name, "netns", self.switch)
+            run("ip", "-n", self.switch, "link", "set", name, "master", "bridge", "up")
+            run("ip", "-n", space, "address", "add", f"{self.address[name]}/24", "dev", "cable")
+            run("ip", "-n", space, "link", "set", "cable", "up")
+            run("ip", "-n", space, "link", "set", "lo", "up")
+
+    def keys(self):
+        keys = self.folder / "keys"
+        keys.mkdir()
+        for name in ("host_key", "key"):
+            run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", keys / name)
+        known = (keys / "host_key.pub").read_text()
+        (self.folder / "known").write_text("".join(f"{address} {known}" for address in self.address.values()))
+        (self.folder / "ssh_config").write_text(
+            f"User root\nIdentityFile {keys}/key\nIdentitiesOnly yes\nUserKnownHostsFile {self.folder}/known\n")
+
+    def boot(self):
+        for name in self.NAMES:
+            pc = self.folder / name
+            pc.mkdir()
+            shutil.copytree(self.folder / "keys", pc / "keys")
+            with open(pc / "log", "wb") as log:
+                self.started.append(subprocess.Popen([BOOT, pc, self.space[name], self.address[name]], stdout=log, stderr=log,
+                                                     stdin=subprocess.DEVNULL))
+        end = time.monotonic() + 60
+        for name in self.NAMES:
+            while self.on(name, "systemctl is-active pc.target", check=False).stdout.strip() != "active":
+                if time.monotonic() > end:
+                    raise SystemExit(f"{name} does not boot: {(self.folder / name / 'log').read_text()}")
+                time.sleep(0.2)
+
+    def at_the_switch(self, *words):
+        return ["ip", "netns", "exec", self.switch, *[str(word) for word in words]]
+
+    def on(self, name, command, check=True):
+        return subprocess.run(self.at_the_switch("ssh", "-F", self.folder / "ssh_config", "-o", "BatchMode=yes", "-o", "ConnectTimeout=3",
+                                                 self.address[name], command), check=check, capture_output=True, text=True,
+                              stdin=subprocess.DEVNULL)
+
+    def cable(self, name, state):
+        run("ip", "-n", self.switch, "link", "set", name, state)
+
+    def end(self):
+        for pc in self.started:
+            pc.kill()
+        for pc in self.started:
+            pc.wait()
+        for space in (*self.space.values(), self.switch):
+            subprocess.run(["ip", "netns", "del", space], capture_output=True)
+        groups = pathlib.Path(next(line.split()[1] for line in pathlib.Path("/proc/mounts").read_text().splitlines()
+                                   if line.split()[2] == "cgroup2"))
+        for pc in self.started:
+            group = groups / f"invar-pc-{pc.pid}"
+            for _ in range(50):  # until the kernel is done with the last process
+                for folder, _, _ in os.walk(group, topdown=False):
+                    try:
+                        os.rmdir(folder)
+                    except OSError:
+                        pass
+                if not group.exists():
+                    break
+                time.sleep(0.1)
+        shutil.rmtree(self.folder, ignore_errors=True)

@@ -1,0 +1,190 @@
+// Scripts that run on the PCs of a cell during a deployment: POSIX shell and the tools that each Debian has.
+#pragma once
+
+#include <string>
+
+namespace invar::tools::scripts {
+
+// The folder of a cell on its PC, $1:
+//   store/SHA256        each content once, read-only; a program as SHA256.x
+//   releases/NAME/      hard links into the store, and MANIFEST; whole from the moment that it has its name
+//   current, previous   links to releases; `current` is what runs
+//   data/               where the cell runs: recordings, state; of the service's user
+
+/// Said by a script that ends by itself: the deployment acts on the status.
+inline constexpr int damaged = 3, not_told = 4, changed = 5, not_started = 6;
+
+inline const std::string common = R"sh(
+set -eu
+umask 022
+export LC_ALL=C
+home=$1
+shift
+at() { if [ -L "$home/$1" ]; then l=$(readlink "$home/$1"); echo "${l#releases/}"; else echo -; fi; }
+point() {  # point LINK RELEASE: at once or not at all
+  if [ "$2" = - ]; then rm -f "$home/$1"; return; fi
+  rm -f "$home/.$1.$$"
+  ln -s "releases/$2" "$home/.$1.$$"
+  mv -T "$home/.$1.$$" "$home/$1"
+}
+root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
+)sh";
+
+/// Input: names of contents. Says what is there, and which contents are missing. With a user, the service's, sees that it exists.
+/// HOME SERVICE USER
+inline const std::string look = common + R"sh(
+mkdir -p "$home/store" "$home/releases"
+[ -d "$home/data" ] || mkdir -m 0750 "$home/data"
+if [ "$1" = systemd ]; then
+  [ -d /run/systemd/system ] || { echo "systemd does not run there; --service none leaves the start to others" >&2; exit 1; }
+  if ! getent passwd "$2" >/dev/null; then
+    root useradd --system --user-group --no-create-home --home-dir "$home/data" --shell /usr/sbin/nologin "$2"
+  fi
+  [ "$(stat -c %U "$home/data")" = "$2" ] || root chown -R "$2:" "$home/data"
+fi
+find "$home/store" "$home/releases" -maxdepth 1 -name '.part.*' -cmin +60 -exec rm -rf {} +
+echo "machine $(uname -m)"
+echo "current $(at current)"
+echo "previous $(at previous)"
+while read -r name; do [ -f "$home/store/$name" ] || echo "missing $name"; done
+)sh";
+
+/// Input: a tar archive of contents, each named by its sum. They are kept when all have arrived, and each is what it says.
+inline const std::string receive = common + R"sh(
+part=$home/store/.part.$$
+trap 'rm -rf "$part"' EXIT
+mkdir -m 0700 "$part"
+tar -xf - -C "$part" --no-same-owner
+cd "$part"
+for f in *; do echo "${f%.x}  $f"; done | sha256sum -c --quiet --strict
+for f in *; do
+  case $f in *.x) chmod 0555 "$f" ;; *) chmod 0444 "$f" ;; esac
+  mv -f "$f" "$home/store/$f"
+done
+)sh";
+
+/// Input: the manifest. Makes the release of it, or mends one that is there; each file is summed up where it lies. HOME RELEASE
+inline const std::string stage = common + R"sh(
+release=$home/releases/$1
+part=$home/releases/.part.$$
+trap 'rm -rf "$part"' EXIT
+mkdir "$part"
+cat >"$part/MANIFEST"
+[ "$(sha256sum <"$part/MANIFEST" | cut -c1-16)" = "$1" ] || { echo "the manifest did not arrive whole" >&2; exit 1; }
+stored() { case $2 in bin/*) echo "$1.x" ;; *) echo "$1" ;; esac; }
+drop_damaged() {  # of the store, by the sums of their contents
+  while IFS= read -r line; do
+    sum=${line%%  *} name=$home/store/$(stored "${line%%  *}" "${line#*  }")
+    [ "$(sha256sum <"$name" | cut -c1-64)" = "$sum" ] || rm -f "$name"
+  done <"$part/MANIFEST"
+  exit 3
+}
+place() {  # each file, at once or not at all, where it is not there as it is in the store
+  while IFS= read -r line; do
+    path=$1/${line#*  } name=$home/store/$(stored "${line%%  *}" "${line#*  }")
+    [ -d "${path%/*}" ] || mkdir -p "${path%/*}"
+    [ "$path" -ef "$name" ] && continue
+    ln -f "$name" "$path.$$"
+    mv -f "$path.$$" "$path"
+  done <"$part/MANIFEST"
+}
+if [ -d "$release" ]; then
+  (cd "$release" && sha256sum -c --quiet --strict "$part/MANIFEST" >/dev/null 2>&1) && exit 0
+  place "$release"
+  (cd "$release" && sha256sum -c --quiet --strict "$part/MANIFEST" >/dev/null 2>&1) || drop_damaged
+  exit 0
+fi
+place "$part"
+(cd "$part" && sha256sum -c --quiet --strict MANIFEST >/dev/null 2>&1) || drop_damaged
+mv -T "$part" "$release"
+sync -f "$home"
+)sh";
+
+/// The judgement of the release on itself, on that PC. HOME RELEASE
+inline const std::string check = common + R"sh(
+cd "$home/data" 2>/dev/null || cd "$home"
+release=$home/releases/$1
+(cd "$release" && sha256sum -c --quiet --strict MANIFEST) >/dev/null || { echo "release $1 is not whole" >&2; exit 1; }
+export LD_LIBRARY_PATH="$release/lib"
+"$release/bin/invar" --version >/dev/null
+"$release/bin/invar" check "$release/$(cat "$release/CELL")" >/dev/null
+)sh";
+
+/// Says that it is ready, and waits for the line `go`; without it nothing changes. Then the release is current, and its service
+/// starts anew. HOME RELEASE EXPECTED SERVICE UNIT HOST PATIENCE
+inline const std::string switch_over = common + R"sh(
+exec 9>"$home/lock"
+flock -w 10 9 || { echo "another deployment is at work there" >&2; exit 1; }
+[ "$(at current)" = "$2" ] || { echo "the current release there is $(at current), no longer $2" >&2; exit 5; }
+[ -d "$home/releases/$1" ] || { echo "there is no release $1" >&2; exit 1; }
+echo ready
+read -r go && [ "$go" = go ] || exit 4
+trap '' HUP PIPE TERM INT
+if [ "$2" != "$1" ]; then
+  [ "$2" = - ] || point previous "$2"
+  point current "$1"
+  sync -f "$home"
+fi
+[ "$3" = systemd ] || exit 0
+units=/etc/systemd/system
+root ln -sfn "$home/current/units/$5/$4" "$units/$4"
+root mkdir -p "$units/multi-user.target.wants"
+root ln -sfn "../$4" "$units/multi-user.target.wants/$4"
+root systemctl daemon-reload
+root timeout "$6" systemctl restart "$4" || { root systemctl status --no-pager -n 20 "$4" >&2 || true; exit 6; }
+)sh";
+
+/// As it was before. HOME CURRENT PREVIOUS SERVICE UNIT PATIENCE
+inline const std::string restore = common + R"sh(
+exec 9>"$home/lock"
+flock -w 60 9 || { echo "another deployment is at work there" >&2; exit 1; }
+point previous "$2"
+if [ "$1" = - ] && [ "$3" = systemd ]; then
+  root systemctl stop "$4" || true
+  root rm -f "/etc/systemd/system/multi-user.target.wants/$4" "/etc/systemd/system/$4"
+  root systemctl daemon-reload
+fi
+point current "$1"
+sync -f "$home"
+[ "$3" = systemd ] && [ "$1" != - ] || exit 0
+root systemctl daemon-reload
+root timeout "$5" systemctl restart "$4" || { root systemctl status --no-pager -n 20 "$4" >&2 || true; exit 6; }
+)sh";
+
+/// HOME SECONDS
+inline const std::string status = common + R"sh(
+cd "$home/data" 2>/dev/null || cd "$home"
+export LD_LIBRARY_PATH="$home/current/lib"
+exec "$home/current/bin/invar" status "$home/current/$(cat "$home/current/CELL")" --wait "$1"
+)sh";
+
+/// An archive of what the cell has calibrated, as the output. HOME
+inline const std::string backup = common + R"sh(
+root env LD_LIBRARY_PATH="$home/current/lib" "$home/current/bin/invar" backup "$home/current/$(cat "$home/current/CELL")" \
+  --data "$home/data" --out -
+)sh";
+
+/// Input: such an archive. HOME SERVICE UNIT DRY; with DRY = yes it is judged, and nothing changes
+inline const std::string restore_backup = common + R"sh(
+invar() { root env LD_LIBRARY_PATH="$home/current/lib" "$home/current/bin/invar" "$@"; }
+cell=$home/current/$(cat "$home/current/CELL")
+if [ "$3" = yes ]; then invar restore "$cell" - --data "$home/data" --dry-run >/dev/null; exit; fi
+ran=no
+if [ "$1" = systemd ] && root systemctl is-active --quiet "$2"; then ran=yes; root systemctl stop "$2"; fi
+invar restore "$cell" - --data "$home/data" >/dev/null && said=0 || said=$?
+[ "$ran" = no ] || root systemctl start --no-block "$2"
+exit "$said"
+)sh";
+
+/// Keeps the newest releases, and those that are linked; contents of no release go. HOME COUNT
+inline const std::string clean = common + R"sh(
+exec 9>"$home/lock"
+flock -n 9 || exit 0
+cd "$home/releases"
+ls -1t | tail -n "+$(($1 + 1))" | while read -r name; do
+  [ "$name" = "$(at current)" ] || [ "$name" = "$(at previous)" ] || rm -rf "$name"
+done
+find "$home/store" -type f -links 1 -cmin +60 -delete
+)sh";
+
+}  // namespace invar::tools::scripts
