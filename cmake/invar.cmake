@@ -36,7 +36,7 @@ function(invar_loadable target)
   target_link_libraries(${target} PRIVATE ${ARG_LIBRARIES})
   target_link_options(${target} PRIVATE -Wl,--exclude-libs,ALL)
   set_target_properties(${target} PROPERTIES OUTPUT_NAME ${ARG_FILE} LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/lib/invar)
-  install(TARGETS ${target} LIBRARY DESTINATION lib/invar)
+  install(TARGETS ${target} LIBRARY DESTINATION lib/invar COMPONENT vision)
 endfunction()
 
 # invar_paths(target) tells a target of the tests where this tree lies. Only the few that read from it: a path on the command

@@ -16,7 +16,9 @@ def run(*words, **more):
 class Pcs:
     NAMES = ("pc-a", "pc-b", "pc-c")
 
-    def __init__(self):
+    def __init__(self, names=NAMES, keep_libraries=False):
+        self.NAMES = names
+        self.environment = dict(os.environ, KEEP_LIBRARIES="1" if keep_libraries else "")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-pcs-"))
         self.switch = f"invar-switch-{os.getpid()}"
         self.started = []
@@ -61,7 +63,7 @@ class Pcs:
             shutil.copytree(self.folder / "keys", pc / "keys")
             with open(pc / "log", "wb") as log:
                 self.started.append(subprocess.Popen([BOOT, pc, self.space[name], self.address[name]], stdout=log, stderr=log,
-                                                     stdin=subprocess.DEVNULL))
+                                                     stdin=subprocess.DEVNULL, env=self.environment))
         end = time.monotonic() + 60
         for name in self.NAMES:
             while self.on(name, "systemctl is-active pc.target", check=False).stdout.strip() != "active":
@@ -76,6 +78,11 @@ class Pcs:
         return subprocess.run(self.at_the_switch("ssh", "-F", self.folder / "ssh_config", "-o", "BatchMode=yes", "-o", "ConnectTimeout=3",
                                                  self.address[name], command), check=check, capture_output=True, text=True,
                               stdin=subprocess.DEVNULL)
+
+    def put(self, name, file, path):
+        with open(file, "rb") as content:
+            subprocess.run(self.at_the_switch("ssh", "-F", self.folder / "ssh_config", "-o", "BatchMode=yes", self.address[name], f"cat >'{path}'"),
+                           check=True, stdin=content)
 
     def cable(self, name, state):
         run("ip", "-n", self.switch, "link", "set", name, state)

@@ -76,12 +76,12 @@ class Notified(Cell):
         self.heard = []  # (time, line)
         self.held = []  # threads; their end waits for us
 
-    def start(self, *words):
+    def start(self, *words, program=INVAR):
         environment = dict(os.environ, NOTIFY_SOCKET=str(self.folder / "notify"), WATCHDOG_USEC=str(int(1e6 * self.WATCHDOG)))
         environment.pop("WATCHDOG_PID", None)
         log = open(self.folder / "log", "ab")
         self.addCleanup(log.close)
-        started = subprocess.Popen([INVAR, "run", self.file, "--real-time", *words], env=environment, stdout=log, stderr=log,
+        started = subprocess.Popen([program, "run", self.file, "--real-time", *words], env=environment, stdout=log, stderr=log,
                                    cwd=self.folder)
         self.addCleanup(self.end, started)
         return started
@@ -192,6 +192,21 @@ class UnderAManager(Notified):
         self.listen(self.WATCHDOG / 2)
         self.assertEqual(self.meals(began), [], "the thread that feeds lives, and its loop stands")
         process.kill()
+
+    def test_a_program_in_whose_place_another_is_installed_goes_on(self):
+        (self.folder / "bin").mkdir()
+        program = self.folder / "bin" / "invar"
+        shutil.copy(INVAR, program)
+        launcher = self.start(program=program)
+        self.wait_for("READY=1")
+        (self.folder / "new").write_text("#!/bin/sh\nexit 1\n")
+        (self.folder / "new").chmod(0o755)
+        os.replace(self.folder / "new", program)
+        old = self.child(launcher, "device")
+        os.kill(old, signal.SIGKILL)
+        self.assertTrue(self.listen(20, lambda line: line == "STATUS=2 of 3 processes up; not up: device"), self.log())
+        self.assertTrue(self.listen(30, lambda line: line == "STATUS=3 of 3 processes up"), self.log())
+        self.assertNotIn(self.child(launcher, "device"), (None, old))
 
     def test_without_a_manager_or_with_another_ones_watchdog_nothing_is_told(self):
         environment = dict(os.environ, NOTIFY_SOCKET="relative/no/socket", WATCHDOG_USEC="1000", WATCHDOG_PID="1")

@@ -2,7 +2,7 @@
 # A PC of its own kind on this one, for tests of what systemd does: systemd_pc.sh FOLDER NETWORK_NAMESPACE ADDRESS
 # Debian's systemd is its PID 1, in namespaces of its own, over a throw-away layer above this PC's files: what it writes is gone with it.
 # sshd listens on ADDRESS with FOLDER/host_key, for root by FOLDER/key.pub. It ends when this script is killed. Needs root.
-# The libraries that Invar stands on are not there: what runs there must bring them.
+# The libraries that Invar stands on are not there: what runs there must bring them. KEEP_LIBRARIES=1 leaves them.
 set -euo pipefail
 pc=$1 network=$2 address=$3
 group=$(awk '$3 == "cgroup2" {print $2; exit}' /proc/mounts)/invar-pc-$$
@@ -27,7 +27,7 @@ mount -t devpts -o newinstance,ptmxmode=0666,mode=620 devpts "$root/dev/pts"
 ln -s pts/ptmx "$root/dev/ptmx"
 mount -t tmpfs tmpfs "$root/dev/shm"
 mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup" 2>/dev/null || { mount -t tmpfs tmpfs "$root/sys/fs/cgroup"; mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup"; }
-rm -f "$root"/usr/lib/*-linux-gnu/lib{fastrtps,fastcdr,yaml-cpp,spdlog,fmt}.so*
+[[ -n ${KEEP_LIBRARIES:-} ]] || rm -f "$root"/usr/lib/*-linux-gnu/lib{fastrtps,fastcdr,yaml-cpp,spdlog,fmt}.so*
 mount -t tmpfs -o mode=1777 tmpfs "$root/tmp"
 mount -t tmpfs tmpfs "$root/opt"
 rm -f "$root/etc/machine-id"; tr -d - </proc/sys/kernel/random/uuid >"$root/etc/machine-id"

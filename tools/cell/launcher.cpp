@@ -71,8 +71,9 @@ std::filesystem::path outcome_of(const std::string& process, const std::filesyst
 Child spawn(const LaunchOptions& options, const std::string& process, bool simulated,
             const std::filesystem::path& folder, const Restarts& restarts = {},
             const std::string& last_end = "") {
-  const std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
-  std::vector<std::string> words{program,
+  std::string program = std::filesystem::read_symlink("/proc/self/exe").string();
+  if (program.ends_with(" (deleted)")) program = "/proc/self/exe";  // another was installed in its place
+  std::vector<std::string> words{"invar",
                                  "run",
                                  std::filesystem::weakly_canonical(options.cell).string(),
                                  "--process",
