@@ -97,12 +97,12 @@ void check_publish_rates(const CellComponent& component, Duration period) {
           "lower it, or leave it out: every step is then published");
 }
 
-CellProcess read_process(const Node& node, std::uint32_t& next_id) {
+CellProcess read_process(const Node& node, const std::vector<CellHost>& hosts, std::uint32_t& next_id) {
   CellProcess process;
   process.name = node.key();
   process.where = node.where();
   check_name(node, process.name, In::files);
-  process.host = node.text("host");
+  process.host = hosts.size() == 1 ? node.text("host", hosts.front().name) : node.text("host");
   const Range rates{0.1, 20'000.0};
   double rate = 1.0;
   if (const Node realtime = node["realtime"]; realtime.exists()) {
@@ -202,13 +202,16 @@ Cell read_cell(const Yaml& yaml) {
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);
   for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
   for (const Node& folder : root["models"].list()) cell.models.push_back(folder_beside(folder));
-  const Node hosts = root.required("hosts");
+  const Node hosts = root["hosts"];
   for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));
   if (hosts.is_map() && cell.hosts.empty())
-    hosts.fault("has no hosts", "name at least one, as `pc: {address: 127.0.0.1}`");
+    hosts.fault("has no hosts", "name at least one, or leave it out: the cell then stays on loopback");
+  // Whoever wants a network says so: anybody on it can command an unsecured cell.
+  if (!root.has("hosts")) cell.hosts.push_back({"pc", "127.0.0.1", ""});
   const Node processes = root.required("processes");
   std::uint32_t next_id = 1;
-  for (const Node& process : processes.map()) cell.processes.push_back(read_process(process, next_id));
+  for (const Node& process : processes.map())
+    cell.processes.push_back(read_process(process, cell.hosts, next_id));
   constexpr std::size_t most_processes = 64;
   if (processes.is_map() && cell.processes.empty()) processes.fault("has no processes", "name at least one");
   if (cell.processes.size() > most_processes)

@@ -43,8 +43,8 @@ std::vector<event::Notice> hear_notices(LiveCell& cell) {
 int status(Options& options) {
   options.call.resolve();
   LiveCell cell{options.call};
-  CellStatus status{
-      .cell = cell.name(), .processes = {}, .components = {}, .missing = {}, .silent = {}, .notices = {}};
+  CellStatus status;
+  status.cell = cell.name();
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
     status.notices = hear_notices(cell);

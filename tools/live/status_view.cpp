@@ -105,6 +105,13 @@ std::vector<std::string> CellStatus::faults() const {
 
 bool CellStatus::healthy() const { return !processes.empty() && faults().empty(); }
 
+std::string CellStatus::security() const {
+  return secured
+             ? "secured by certificates"
+             : "unsecured, whoever reaches its network can read and command it; keep the cell on a network "
+               "of its own, or on loopback alone by a file without `hosts`";
+}
+
 bool is_inactive(lifecycle::ComponentState state) {
   return state == lifecycle::STATE_UNCONFIGURED || state == lifecycle::STATE_INACTIVE;
 }
@@ -116,6 +123,8 @@ std::string state_text(lifecycle::ComponentState state) {
 }
 
 void print(const CellStatus& status, std::ostream& out) {
+  print_wrapped("cell " + status.cell + ": " + status.security(), 2, out);
+  out << '\n';
   TextTable processes{{"process", "host", "pid>", "real time", "rate [Hz]>", "cycles>", "overruns>",
                        "skipped>", "late>", "lost>", "restarts>"}};
   for (const auto& p : status.processes)
@@ -220,6 +229,8 @@ nlohmann::ordered_json json_of(const lifecycle::ComponentStatus& c) {
 
 nlohmann::ordered_json to_json(const CellStatus& status) {
   nlohmann::ordered_json json{{"cell", status.cell},
+                              {"secured", status.secured},
+                              {"security", status.security()},
                               {"healthy", status.healthy()},
                               {"faults", status.faults()},
                               {"missing", status.missing},

@@ -18,11 +18,14 @@ struct CellStatus {
   std::vector<std::string> missing;    // processes that should be there and say nothing
   std::set<std::string> silent;        // processes that were there and fell silent
   std::vector<event::Notice> notices;  // what the cell said last, oldest first
+  bool secured = false;                // the cell and this program know each other by certificates
 
   /// Faults of now, one line each: missing, ended, silent, tripped, in error, or at fault though it goes on.
   [[nodiscard]] std::vector<std::string> faults() const;
   /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;
+  /// Who may read and command the cell, and the mend where that is everybody.
+  [[nodiscard]] std::string security() const;
 };
 
 void print(const CellStatus& status, std::ostream& out);
