@@ -12,7 +12,7 @@ LIBRARIES = {
     "yaml-cpp/": "yaml-cpp", "Eigen/": "Eigen", "opencv2/": "OpenCV", "modbus.h": "libmodbus",
     "modbus/": "libmodbus", "fastdds/": "Fast DDS", "fastrtps/": "Fast DDS", "fastcdr/": "Fast DDS", "zlib.h": "compression",
     "zstd.h": "compression", "lz4": "compression", "CLI/": "CLI11", "nlohmann/": "nlohmann-json", "muParser": "muParser",
-    "spdlog/": "spdlog", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
+    "spdlog/": "spdlog", "openssl/": "OpenSSL", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
 }
 
 # The rooms of core/metrology know nothing of one another.
@@ -29,7 +29,7 @@ ROOMS = {
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
     "core/executor": ["core/base", "core/config", "core/component", "idl"],
-    "core/dds": ["core/base", "core/config", "core/component", "core/executor", "idl", "Fast DDS"],
+    "core/dds": ["core/base", "core/config", "core/component", "core/executor", "idl", "Fast DDS", "OpenSSL"],
     "core/modbus": ["core/base", "core/config", "libmodbus"],
     "core/recording": ["core/base", "idl", "compression", "nlohmann-json"],
     "tools": None,  # everything

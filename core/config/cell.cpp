@@ -156,7 +156,26 @@ void check_identities(const Node& root, const Cell& cell) {
   }
 }
 
+/// Each process has a key, and each host one for its `invar run`.
+void check_key_names(const Node& node, const Cell& cell) {
+  std::set<std::string> taken{"authority", "public"};
+  for (const CellProcess& process : cell.processes) taken.insert(process.name);
+  for (const CellHost& host : cell.hosts)
+    if (!taken.insert(launcher_name(host.name)).second)
+      node.fault("`" + launcher_name(host.name) + "` is the key of `invar run` on a host",
+                 "rename the process");
+  const auto check = [&](const std::string& name) {
+    if (taken.contains(name))
+      node.fault("`" + name + "` is a process or a folder of the keys already", "choose another name");
+  };
+  for (const std::string& name : cell.security->operators) check(name);
+  for (const std::string& name : cell.security->viewers) check(name);
+  for (const PlantProgram& program : cell.security->plant) check(program.name);
+}
+
 }  // namespace
+
+std::string launcher_name(const std::string& host) { return "launcher-" + host; }
 
 std::string Cell::topic(const std::string& connection) const {
   if (connection.starts_with('/')) return connection.substr(1);
@@ -218,6 +237,10 @@ Cell read_cell(const Yaml& yaml) {
     processes.fault("has " + std::to_string(cell.processes.size()) + " processes",
                     "use at most " + std::to_string(most_processes) + ": several components fit in one");
   check_identities(root, cell);
+  if (const Node security = root["security"]; security.exists()) {
+    cell.security = read_security(security, cell.file.parent_path());
+    check_key_names(security, cell);
+  }
   for (const Node& job : root["jobs"].map()) {
     cell.jobs[job.key()] = job.as_text();
     if (job.is_scalar() && cell.find(job.as_text()) == nullptr)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/time.hpp"
+#include "core/config/security.hpp"
 #include "core/config/yaml.hpp"
 
 namespace invar::config {
@@ -84,6 +85,7 @@ struct Cell {
   std::vector<CellHost> hosts;
   std::vector<CellProcess> processes;
   std::map<std::string, std::string> jobs;  // job -> the component that runs it
+  std::optional<CellSecurity> security;     // none: every program on the network may command
 
   [[nodiscard]] std::string topic(const std::string& component, const std::string& port) const {
     return "cell/" + name + "/" + component + "/" + port;
@@ -92,6 +94,9 @@ struct Cell {
   [[nodiscard]] std::string topic(const std::string& connection) const;
   [[nodiscard]] const CellComponent* find(const std::string& component) const;
 };
+
+/// Whose key `invar run` has on a host.
+[[nodiscard]] std::string launcher_name(const std::string& host);
 
 /// Reads the structure of a cell file; faults are put on the document, parameters of components are left to
 /// their types. Component types are not known here: tools/cell checks them, and the connections.

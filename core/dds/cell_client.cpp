@@ -32,11 +32,9 @@ ServiceTopics::ServiceTopics(const std::string& cell) {
 
 CellClient::CellClient(Node& node, const std::string& cell)
     : client_{(std::uint64_t{std::random_device{}()} << 32U) | std::random_device{}()},
-      lifecycle_{
-          node.writer<lifecycle::LifecycleRequest>(topics_of(node, cell).lifecycle_request, "request")},
-      parameter_{
-          node.writer<lifecycle::ParameterRequest>(topics_of(node, cell).parameter_request, "request")},
-      model_{node.writer<transfer::ModelRequest>(topics_of(node, cell).model_request, "request")} {
+      lifecycle_{node, topics_of(node, cell).lifecycle_request},
+      parameter_{node, topics_of(node, cell).parameter_request},
+      model_{node, topics_of(node, cell).model_request} {
   const ServiceTopics topics = topics_of(node, cell);
   readers_.push_back(listen(node, topics.lifecycle_reply, lifecycle_replies_));
   readers_.push_back(listen(node, topics.parameter_reply, parameter_replies_));
@@ -66,6 +64,19 @@ CellClient::CellClient(Node& node, const std::string& cell)
   }));
 }
 
+template <class Request>
+CellClient::Asking<Request>::Asking(Node& node, std::string topic) : node_{node}, topic_{std::move(topic)} {
+  const auto& identity = node.options().identity;
+  if (!identity || identity->may_command) (void)writer();
+}
+
+template <class Request>
+Writer<Request>& CellClient::Asking<Request>::writer() {
+  const std::lock_guard lock{mutex_};
+  if (!writer_) writer_ = std::make_unique<Writer<Request>>(node_.writer<Request>(topic_, "request"));
+  return *writer_;
+}
+
 template <class Reply>
 std::unique_ptr<Connection> CellClient::listen(Node& node, const std::string& topic,
                                                std::map<std::uint64_t, Reply>& replies) {
@@ -78,9 +89,10 @@ std::unique_ptr<Connection> CellClient::listen(Node& node, const std::string& to
 }
 
 template <class Request, class Reply>
-std::optional<Reply> CellClient::call(Writer<Request>& writer, std::map<std::uint64_t, Reply>& replies,
+std::optional<Reply> CellClient::call(Asking<Request>& asking, std::map<std::uint64_t, Reply>& replies,
                                       Request request, const std::string& process, Duration patience,
                                       Duration interval) {
+  Writer<Request>& writer = asking.writer();
   std::unique_lock lock{mutex_};
   request.client(client_);
   request.request(++requests_);

@@ -57,9 +57,22 @@ class CellClient {
                                             const std::string& text, Duration patience);
 
  private:
+  /// A writer of requests. Where the certificate permits none it is made at the first request, which then says so.
+  template <class Request>
+  class Asking {
+   public:
+    Asking(Node& node, std::string topic);
+    Writer<Request>& writer();
+
+   private:
+    Node& node_;
+    std::string topic_;
+    std::mutex mutex_;
+    std::unique_ptr<Writer<Request>> writer_;
+  };
   /// The request is sent again after each `interval` without a reply.
   template <class Request, class Reply>
-  std::optional<Reply> call(Writer<Request>& writer, std::map<std::uint64_t, Reply>& replies, Request request,
+  std::optional<Reply> call(Asking<Request>& asking, std::map<std::uint64_t, Reply>& replies, Request request,
                             const std::string& process, Duration patience,
                             Duration interval = Duration::milliseconds(50));
   template <class Reply>
@@ -78,9 +91,9 @@ class CellClient {
   std::map<std::uint64_t, lifecycle::LifecycleReply> lifecycle_replies_;
   std::map<std::uint64_t, lifecycle::ParameterReply> parameter_replies_;
   std::map<std::uint64_t, transfer::ModelReply> model_replies_;
-  Writer<lifecycle::LifecycleRequest> lifecycle_;
-  Writer<lifecycle::ParameterRequest> parameter_;
-  Writer<transfer::ModelRequest> model_;
+  Asking<lifecycle::LifecycleRequest> lifecycle_;
+  Asking<lifecycle::ParameterRequest> parameter_;
+  Asking<transfer::ModelRequest> model_;
   std::vector<std::unique_ptr<Connection>> readers_;  // last: nothing arrives before all else stands
 };
 

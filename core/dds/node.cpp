@@ -87,13 +87,17 @@ struct Node::Parts {
 
   Participant& participant(Traffic traffic) {
     const std::lock_guard lock{mutex};
-    auto& participant = traffic == Traffic::realtime ? realtime : general;
+    // Each secured pair needs a handshake, and Fast DDS 2.9 loses some where many take part.
+    auto& participant = traffic == Traffic::realtime && !options.identity ? realtime : general;
     if (!participant) participant = std::make_unique<Participant>(options, traffic, profiles, discovery);
     return *participant;
   }
   Participant& raw_participant() {
     const std::lock_guard lock{mutex};
-    if (!raw) raw = std::make_unique<Participant>(options, Traffic::general, profiles, discovery);
+    if (raw) return *raw;
+    NodeOptions second = options;
+    if (second.identity) second.identity->name = second_name(second.identity->name);
+    raw = std::make_unique<Participant>(second, Traffic::general, profiles, discovery);
     return *raw;
   }
   /// nullptr where samples of this profile have no way through shared memory.

@@ -15,6 +15,7 @@
 #include "core/base/clock.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/discovery.hpp"
+#include "core/dds/identity.hpp"
 #include "core/dds/profile.hpp"
 #include "core/dds/sample_key.hpp"
 
@@ -49,6 +50,8 @@ struct NodeOptions {
   /// The core of the loop: the thread that publishes its samples then shares it and, with a lower priority, runs the
   /// moment the loop sleeps.
   std::optional<int> realtime_cpu;
+  /// In a secured cell the node has one participant for all traffic. None: each program that reaches the network may take part.
+  std::optional<Identity> identity;
 };
 
 /// How the samples of an output come from its loop to the middleware.

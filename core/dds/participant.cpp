@@ -85,7 +85,7 @@ std::uint32_t entity_of(const rtps::GUID_t& guid) {
 RtpsLimits limits_of(const NodeOptions& options) {
   const std::uint32_t first = DomainPorts{options.domain}.multicast();
   // The sender's segment counts, and the largest is that of a process with a camera.
-  return {NodeOptions{}.segment_size / 2, first, first + 249U};
+  return {NodeOptions{}.segment_size / 2, first, first + 249U, options.identity.has_value()};
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -152,7 +152,8 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   }
   auto udp = std::make_shared<Filtered<transport::UDPv4TransportDescriptor>>();
   udp->reception = reception;
-  udp->largest_sent = largest_datagram(options.addresses);
+  // A handshake carries certificate and permissions in one message, which Fast DDS does not part: the network does.
+  udp->largest_sent = options.identity ? 0 : largest_datagram(options.addresses);
   udp->interfaceWhiteList = with_loopback(options.addresses);
   udp->parts_loopback = udp->interfaceWhiteList.size() > options.addresses.size();
   udp->non_blocking_send = realtime;
@@ -168,6 +169,9 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   discovery.initial_announcements.count = 10;
   discovery.initial_announcements.period = {0, 50'000'000};
   qos.wire_protocol().builtin.initialPeersList = called_peers(options, memory);
+  if (options.identity)
+    for (auto& [key, value] : security_properties(*options.identity))
+      qos.properties().properties().emplace_back(key, value);
   // Nobody asks for types over the wire: the IDL is the contract.
   qos.wire_protocol().builtin.typelookup_config.use_client = false;
   qos.wire_protocol().builtin.typelookup_config.use_server = false;
@@ -190,7 +194,8 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
     : discovery_{discovery},
       name_{"invar/" + options.cell + "/" + options.process},
       reception_{std::make_shared<Reception>(limits_of(options))},
-      identity_{own_memory_identity()} {
+      identity_{own_memory_identity()},
+      owner_{options.identity ? options.identity->name : ""} {
   MemoryPlan memory;
   if (options.shared_memory) memory = plan_memory(traffic, options.segment_size, options.processes);
   if (!memory.sizes.any()) identity_.folder = 0;
@@ -210,7 +215,9 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 
-  const Priority priority{traffic == Traffic::realtime ? options.realtime_priority : 0};
+  if (options.identity) check_identity(*options.identity);
+  // The one participant of a secured process carries the loop's signals and heartbeats, too.
+  const Priority priority{traffic == Traffic::realtime || options.identity ? options.realtime_priority : 0};
   participant_ = fdds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, participant_qos(options, name_, traffic, profiles, reception_, identity_, memory.sizes),
       this, fdds::StatusMask::none());
@@ -233,6 +240,13 @@ Participant::~Participant() {
   participant_->set_listener(nullptr);
   participant_->delete_contained_entities();
   fdds::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+void Participant::refuse(const char* what, const std::string& topic) const {
+  (void)newest_middleware_error();  // said here, in other words
+  throw InputError{
+      "topic `" + topic + "`", "the certificate of `" + owner_ + "` does not permit to " + what + " it",
+      "an operator commands, a viewer looks; after a change of the cell file call `invar keys CELL`"};
 }
 
 void Participant::call_peers() {
@@ -284,6 +298,7 @@ fdds::DataWriter& Participant::create_writer(const std::string& name, fdds::Topi
   const std::lock_guard lock{mutex_};
   fdds::Topic* on = topic(name, type);
   auto* writer = publisher(profile.partitions)->create_datawriter(on, writer_qos(profile), listener);
+  if (writer == nullptr && !owner_.empty()) refuse("write", name);
   INVAR_EXPECTS(writer != nullptr, name, profile.name);  // the profile was checked when it was read
   discovery_.add_endpoint({guid_text(writer->guid()), name_, name, on->get_type_name(), true, true, profile});
   return *writer;
@@ -310,6 +325,7 @@ fdds::DataReader& Participant::create_reader(const std::string& name, fdds::Topi
   fdds::Topic* on = topic(name, type);  // takes the type support over
   const WriterKeys::Making making{instances};
   auto* reader = subscriber(profile.partitions)->create_datareader(on, reader_qos(profile), listener);
+  if (reader == nullptr && !owner_.empty()) refuse("read", name);
   INVAR_EXPECTS(reader != nullptr, name, profile.name);
   discovery_.add_endpoint(
       {guid_text(reader->guid()), name_, name, on->get_type_name(), false, true, profile});

@@ -53,6 +53,7 @@ class Participant final : private fdds::DomainParticipantListener {
   [[nodiscard]] const Reception& reception() const { return *reception_; }
 
  private:
+  [[noreturn]] void refuse(const char* what, const std::string& topic) const;
   fdds::Topic* topic(const std::string& name, fdds::TopicDataType* type);
   fdds::Publisher* publisher(const std::vector<std::string>& partitions);
   fdds::Subscriber* subscriber(const std::vector<std::string>& partitions);
@@ -68,6 +69,7 @@ class Participant final : private fdds::DomainParticipantListener {
   std::string name_;
   std::shared_ptr<Reception> reception_;
   MemoryIdentity identity_;
+  std::string owner_;  // of the certificate; empty: none
   std::uint8_t calls_ = 0;
   fdds::DomainParticipant* participant_ = nullptr;
   std::mutex mutex_;

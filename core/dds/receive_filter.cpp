@@ -166,6 +166,8 @@ class Filter final : public transport::ChainingTransport {
     } else if (content.hidden_count > 0) {
       return reception_->drop(Flaw::discovery, remote);
     }
+    std::unique_lock alone{reception_->acquaintance(), std::defer_lock};
+    if (content.makes_known && reception_->limits().secured) alone.lock();
     next->OnDataReceived(data, static_cast<std::uint32_t>(content.size), local, remote);
   }
 

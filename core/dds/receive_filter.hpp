@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -31,6 +32,11 @@ class Reception {
   /// Receiving threads: until `open`, one second at most.
   void wait_until_open();
 
+  /// A receiving thread of a secured participant holds it while the middleware takes a message by which participants get to know
+  /// or to trust each other. Fast DDS 2.9 has one place, without a lock, for the endpoints that a handshake is about to match.
+  /// Two threads that discover two participants at once overwrite it, and one of the two is never trusted.
+  [[nodiscard]] std::mutex& acquaintance() { return acquaintance_; }
+
   /// Receiving threads, without locks.
   void drop(Flaw flaw, const eprosima::fastrtps::rtps::Locator_t& sender);
   /// Messages dropped since the start, of one cause or of all.
@@ -42,6 +48,7 @@ class Reception {
  private:
   RtpsLimits limits_;
   SequenceGuard guard_;
+  std::mutex acquaintance_;
   std::atomic<bool> open_{false};
   std::array<std::atomic<std::uint64_t>, flaws> dropped_{};
   std::atomic<std::uint64_t> sender_{0};  // IPv4 address and port of the last one; 0: this PC's shared memory

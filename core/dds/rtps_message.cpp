@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bitset>
+#include <utility>
 
 #include "core/base/clock.hpp"
 #include "core/dds/rtps_bytes.hpp"
@@ -32,6 +33,7 @@ struct Context {
   GuidPrefix source{};
   std::uint16_t vendor = 0;
   Instant now = monotonic_now();
+  int behind_prefix = -1;  // submessages since a secure prefix; -1: there is none
 };
 
 bool is_number(std::int64_t number) { return number >= 1 && number <= SequenceGuard::last; }
@@ -95,8 +97,11 @@ Flaw check_builtin(const DataHead& head, const Submessage& sub, const RtpsBytes&
                    Context& context) {
   constexpr std::size_t least_liveliness = 24;  // encapsulation, prefix, kind, length
   const bool has_data = sub.has(2);
+  if (head.writer == participant_writer || head.writer == stateless_writer) context.content.makes_known = true;
   if (head.writer == participant_message_writer)
     return has_data && bytes.left() < least_liveliness ? Flaw::payload : Flaw::none;
+  if (head.writer == stateless_writer && context.limits.secured)
+    return has_data && is_sound_handshake(bytes.rest()) ? Flaw::none : Flaw::payload;
   if (!is_of_discovery(head.writer)) return Flaw::none;
   if (!has_data) return disposes ? Flaw::none : Flaw::discovery;
   const std::size_t offset = sub.offset + bytes.position();
@@ -238,8 +243,51 @@ Flaw at_least(const Submessage& sub, std::size_t size) {
   return sub.body.size() < size ? Flaw::length : Flaw::none;
 }
 
+/// Security, section 7.3.6 of DDS Security 1.1. A prefix stands before one submessage, a postfix behind; the library walks over
+/// lengths in them that it believes.
+enum Secure : std::uint8_t { secure_body = 0x30, secure_prefix = 0x31, secure_postfix = 0x32 };
+
+Flaw check_secure_body(const Submessage& sub) {
+  RtpsBytes bytes{sub.body, false};  // whatever the flag says, as Fast DDS and Cyclone DDS write it
+  const std::size_t size = bytes.u32();
+  return bytes.ok() && size <= bytes.left() ? Flaw::none : Flaw::length;
+}
+
+/// A tag for all, and one for each of some receivers.
+Flaw check_secure_postfix(const Submessage& sub) {
+  constexpr std::size_t tag = 16, receiver = 20;
+  RtpsBytes bytes{sub.body, false};
+  bytes.skip(tag);
+  const std::size_t receivers = bytes.u32();
+  return bytes.ok() && receivers <= bytes.left() / receiver ? Flaw::none : Flaw::length;
+}
+
+/// A prefix, one submessage, a postfix.
+Flaw check_secure(const Submessage& sub, Context& context) {
+  constexpr std::size_t crypto_header = 20;
+  if (!context.limits.secured) return Flaw::kind;
+  switch (sub.id) {
+    case secure_prefix:
+      if (std::exchange(context.behind_prefix, 0) >= 0) return Flaw::kind;
+      return sub.body.size() == crypto_header ? Flaw::none : Flaw::length;
+    case secure_body:
+      if (context.behind_prefix != 0) return Flaw::kind;
+      context.behind_prefix = 1;
+      return check_secure_body(sub);
+    default:
+      if (std::exchange(context.behind_prefix, -1) != 1) return Flaw::kind;
+      return check_secure_postfix(sub);
+  }
+}
+
+bool is_secure(std::uint8_t id) { return id >= secure_body && id <= secure_postfix; }
+
 Flaw check(const Submessage& sub, Context& context) {
   switch (sub.id) {
+    case secure_body:
+    case secure_prefix:
+    case secure_postfix:
+      return check_secure(sub, context);
     case 0x01:  // PAD
       return Flaw::none;
     case 0x06:
@@ -319,10 +367,11 @@ Flaw examine(std::span<const std::byte> message, const RtpsLimits& limits, Seque
     const auto sub = submessage_at(message, content.size);
     if (!sub) return Flaw::length;
     if (is_statistics(*sub, context, sub->end == message.size())) return Flaw::none;
+    if (context.behind_prefix >= 0 && !is_secure(sub->id) && context.behind_prefix++ > 0) return Flaw::kind;
     if (const Flaw flaw = check(*sub, context); flaw != Flaw::none) return flaw;
     content.size = sub->end;
   }
-  return Flaw::none;
+  return context.behind_prefix < 0 ? Flaw::none : Flaw::kind;
 }
 
 }  // namespace invar::dds

@@ -33,6 +33,7 @@ enum BuiltinWriter : std::uint32_t {
   participant_message_writer = 0x000200c2,
   publication_writer = 0x000003c2,
   subscription_writer = 0x000004c2,
+  stateless_writer = 0x000201c3,  // of handshakes
 };
 
 /// Bounds on counts over which the library loops or for which it allocates, and which only a sender's history can justify.
@@ -45,6 +46,8 @@ struct RtpsLimits {
   /// Shared-memory ports of this domain: the library makes a file for each that a peer names.
   std::uint32_t first_port = 0;
   std::uint32_t last_port = UINT32_MAX;
+  /// Submessages of security come, and the middleware is to see the tokens of those who take part.
+  bool secured = false;
 };
 
 /// Further content of a sound message that the parser found.
@@ -52,6 +55,8 @@ struct RtpsContent {
   /// Up to here the middleware reads: a trailing statistics submessage of Fast DDS is not handed on.
   std::size_t size = 0;
   bool has_fragments = false;
+  /// Participants get to know each other by it, or to trust each other.
+  bool makes_known = false;
   /// Parameters of discovery that the middleware must not see: where their ids stand, and how many of them.
   std::array<std::uint32_t, 8> hidden{};
   std::size_t hidden_count = 0;

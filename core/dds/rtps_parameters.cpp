@@ -28,6 +28,8 @@ enum class Form : std::uint8_t {
   lease,     // a time above zero
   at_least,  // so many bytes or more
   hidden,    // not for the middleware
+  token,     // of security; hidden where nothing is secured
+  security,  // so many bytes; hidden where nothing is secured
 };
 
 struct Parameter {
@@ -38,8 +40,8 @@ struct Parameter {
 };
 
 /// What Fast DDS 2.9 reads of discovery. Ids that stand not here it leaves alone.
-/// Hidden are descriptions of types, filters and tokens of security: trees of unbounded depth and sequences of unbounded length
-/// for its reader, of which nothing here makes use.
+/// Hidden are descriptions of types, filters and, where the cell is not secured, tokens of security: trees of unbounded depth and
+/// sequences of unbounded length for its reader, of which nothing here makes use.
 constexpr std::array parameters{
     Parameter{0x0002, Form::lease, 8},     // participant lease duration
     Parameter{0x0004, Form::fixed, 8},     // time-based filter
@@ -81,14 +83,14 @@ constexpr std::array parameters{
     Parameter{0x0073, Form::shorts},       // data representation
     Parameter{0x0074, Form::at_least, 2},  // type consistency
     Parameter{0x0075, Form::hidden},       // type information
-    Parameter{0x1001, Form::hidden},
-    Parameter{0x1002, Form::hidden},  // identity, permissions
-    Parameter{0x1004, Form::hidden},
-    Parameter{0x1005, Form::hidden},      // security of endpoint, participant
-    Parameter{0x1006, Form::hidden},      // identity status
-    Parameter{0x8002, Form::fixed, 16},   // persistence (Fast DDS)
-    Parameter{0x8005, Form::boolean, 4},  // disable positive acks (Fast DDS)
-    Parameter{0x8006, Form::longs},       // data sharing (Fast DDS)
+    Parameter{0x1001, Form::token},
+    Parameter{0x1002, Form::token},  // identity, permissions
+    Parameter{0x1004, Form::security, 8},
+    Parameter{0x1005, Form::security, 8},  // security of endpoint, participant
+    Parameter{0x1006, Form::hidden},       // identity status
+    Parameter{0x8002, Form::fixed, 16},    // persistence (Fast DDS)
+    Parameter{0x8005, Form::boolean, 4},   // disable positive acks (Fast DDS)
+    Parameter{0x8006, Form::longs},        // data sharing (Fast DDS)
 };
 static_assert(std::is_sorted(parameters.begin(), parameters.end(),
                              [](const Parameter& a, const Parameter& b) { return a.id < b.id; }));
@@ -140,6 +142,26 @@ bool read_numbers(RtpsBytes& value, std::size_t each) {
   return value.ok() && count <= value.left() / each && value.left() == aligned(count * each);
 }
 
+/// Name, properties, and properties of octets.
+bool read_token(RtpsBytes& value) {
+  if (!read_text(value) || !read_texts(value, 2)) return false;
+  if (value.left() == 0) return true;
+  const std::size_t count = value.u32();
+  if (!value.ok() || count > value.left() / 4) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!read_text(value)) return false;
+    const std::size_t size = value.u32();
+    value.skip(size);
+    if (!value.ok()) return false;
+    value.skip(std::min(aligned(size) - size, value.left()));
+  }
+  return true;
+}
+
+bool is_hidden(Form form, const RtpsLimits& limits) {
+  return form == Form::hidden || (!limits.secured && (form == Form::token || form == Form::security));
+}
+
 bool is_sound(const Parameter& p, std::span<const std::byte> bytes, bool little, const GuidPrefix& source,
               const RtpsLimits& limits) {
   constexpr std::size_t longest_text =
@@ -175,6 +197,10 @@ bool is_sound(const Parameter& p, std::span<const std::byte> bytes, bool little,
       return bytes.size() >= p.size;
     case Form::hidden:
       return true;
+    case Form::token:
+      return !limits.secured || (read_token(value) && value.left() == 0);
+    case Form::security:
+      return !limits.secured || bytes.size() == p.size;
   }
   return false;
 }
@@ -209,6 +235,22 @@ InlineQos read_inline_qos(RtpsBytes& bytes, const GuidPrefix& source, bool of_di
   return qos;
 }
 
+bool is_sound_handshake(std::span<const std::byte> payload) {
+  constexpr std::size_t identities =
+      2 * 24 + 3 * 16;  // of the message, the one it answers, and whom it is for
+  constexpr std::size_t most_tokens = 16;
+  if (payload.size() < 4 || payload[0] != std::byte{} || (payload[1] & ~std::byte{1}) != std::byte{})
+    return false;
+  RtpsBytes bytes{payload.subspan(4), payload[1] == std::byte{1}};
+  bytes.skip(identities);
+  if (!bytes.ok() || !read_text(bytes)) return false;
+  const std::size_t count = bytes.u32();
+  if (!bytes.ok() || count > most_tokens) return false;
+  for (std::size_t i = 0; i < count; ++i)
+    if (!read_token(bytes)) return false;
+  return true;
+}
+
 bool is_sound_discovery(std::span<const std::byte> payload, const GuidPrefix& source, std::size_t offset,
                         const RtpsLimits& limits, RtpsContent& content) {
   constexpr std::size_t encapsulation = 4;
@@ -223,7 +265,7 @@ bool is_sound_discovery(std::span<const std::byte> payload, const GuidPrefix& so
         if (known == nullptr) return true;
         if (!is_sound(*known, value, little, source, limits)) return false;
         has_name = has_name || known->form == Form::guid;
-        if (known->form != Form::hidden) return true;
+        if (!is_hidden(known->form, limits)) return true;
         if (content.hidden_count == content.hidden.size()) return false;
         content.hidden[content.hidden_count++] = static_cast<std::uint32_t>(offset + encapsulation + where);
         return true;

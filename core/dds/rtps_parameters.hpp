@@ -17,4 +17,7 @@ struct InlineQos {
 [[nodiscard]] bool is_sound_discovery(std::span<const std::byte> payload, const GuidPrefix& source,
                                       std::size_t offset, const RtpsLimits& limits, RtpsContent& content);
 
+/// The payload of the writer of handshakes: identities, a class, tokens. Only of a secured cell.
+[[nodiscard]] bool is_sound_handshake(std::span<const std::byte> payload);
+
 }  // namespace invar::dds

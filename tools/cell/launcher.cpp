@@ -235,7 +235,10 @@ bool any_runs(std::vector<Child>& children) {
 std::string keep_simulated_time(const LaunchOptions& options, const config::Cell& cell,
                                 std::vector<Child>& children, const std::atomic<bool>& stop,
                                 Clock::time_point begin, Beside& beside, LaunchOutcome& outcome) {
-  dds::Node node{node_on(cell, "launcher", cell.processes.front().host), dds::load_profiles(cell.profiles)};
+  const std::string& host = cell.processes.front().host;
+  dds::NodeOptions node_options = node_on(cell, "launcher", host);
+  if (node_options.identity) node_options.identity->name = config::launcher_name(host);
+  dds::Node node{node_options, dds::load_profiles(cell.profiles)};
   std::vector<std::string> names;
   for (const auto& process : cell.processes) names.push_back(process.name);
   dds::SimulatedClockMaster master{node, names, cell.window};

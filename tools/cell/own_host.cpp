@@ -74,6 +74,7 @@ dds::NodeOptions node_on(const config::Cell& cell, const std::string& process, c
     if (each.name == host) options.addresses = {address_of(each)};
   options.may_come_later = true;
   options.peers = peers_of(cell);
+  if (cell.security) options.identity = dds::Identity{{cell.security->keys}, process, false};
   return options;
 }
 

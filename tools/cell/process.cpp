@@ -50,12 +50,19 @@ std::vector<std::type_index> outputs_of(const LoadedProcess& process) {
   return types;
 }
 
+bool asks_others(const LoadedProcess& process) {
+  return std::any_of(process.components.begin(), process.components.end(), [](const LoadedComponent& member) {
+    return dynamic_cast<const supervisor::Supervisor*>(member.component.get()) != nullptr;
+  });
+}
+
 dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of, bool simulated) {
   const config::CellProcess& process = *of.file;
   dds::NodeOptions options = node_on(*loaded.cell, process.name, process.host);
   options.processes =
       static_cast<std::size_t>(std::count_if(loaded.cell->processes.begin(), loaded.cell->processes.end(),
                                              [&](const auto& other) { return other.host == process.host; }));
+  if (options.identity) options.identity->may_command = asks_others(of);
   if (process.realtime) {
     options.realtime_priority = std::max(0, process.realtime->priority - 10);
     options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps

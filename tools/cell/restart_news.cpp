@@ -19,6 +19,7 @@ namespace {
 
 dds::NodeOptions node_options(const config::Cell& cell, const config::CellProcess& process) {
   dds::NodeOptions options = node_on(cell, "launcher", process.host);
+  if (options.identity) options.identity->name = config::launcher_name(process.host);
   options.shared_memory = false;  // a few samples an hour
   return options;
 }

@@ -45,6 +45,7 @@ int status(Options& options) {
   LiveCell cell{options.call};
   CellStatus status;
   status.cell = cell.name();
+  status.secured = cell.is_secured();
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
     status.notices = hear_notices(cell);

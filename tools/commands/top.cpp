@@ -88,6 +88,7 @@ int top(Options& options) {
   LiveCell cell{options.call};
   CellStatus status;
   status.cell = cell.name();
+  status.secured = cell.is_secured();
   if (cell.found()) status.missing = cell.wait_for_processes();
   if (!cell.found() || cell.client().processes().empty()) {
     cell.say_not_found("invar top");

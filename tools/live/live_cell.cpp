@@ -1,5 +1,7 @@
 #include "tools/live/live_cell.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <iostream>
@@ -62,6 +64,25 @@ std::set<std::string> processes_in(const dds::Snapshot& snapshot, const std::str
   return processes;
 }
 
+/// The strongest of those whose key this user can read, or the one that is asked for.
+dds::Identity identity_of(const config::CellSecurity& security, const std::string& as) {
+  const dds::KeyFolder keys{security.keys};
+  std::vector<std::pair<std::string, bool>> people;
+  for (const auto& name : security.operators) people.emplace_back(name, true);
+  for (const auto& name : security.viewers) people.emplace_back(name, false);
+  std::string names;
+  for (const auto& [name, may_command] : people) {
+    names += (names.empty() ? "" : ", ") + name;
+    const bool is_meant = as.empty() ? access(keys.key(name).c_str(), R_OK) == 0 : as == name;
+    if (is_meant) return {keys, name, may_command};
+  }
+  if (!as.empty())
+    throw InputError{"--as", "`" + as + "` is no operator and no viewer of this cell", "it has: " + names};
+  throw InputError{security.keys.string(), "has no key of an operator or viewer that this user can read",
+                   "`invar keys CELL` makes them for " + names +
+                       "; bring `public` and the folder of one of them to this PC, for this user"};
+}
+
 }  // namespace
 
 std::unique_ptr<config::Cell> read_structure(const std::filesystem::path& file) {
@@ -90,6 +111,7 @@ CellCall::CellCall(CLI::App& app, std::vector<Word> words)
       ->allow_extra_args(false);
   app.add_option("--peer", peers, "address of a PC of the cell, with --domain, where multicast does not pass")
       ->allow_extra_args(false);
+  app.add_option("--as", as, "in whose name, where the cell is secured (the first whose key can be read)");
   app.add_option("--wait", patience, "how long to wait for the cell [s] (5)")->check(CLI::Range(0.1, 3600.0));
 }
 
@@ -133,6 +155,7 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
       options.may_come_later = true;  // a host that was cut off can look at itself
     }
     options.peers = peers_of(*cell_);
+    if (cell_->security) options.identity = identity_of(*cell_->security, call.as);
     profiles = dds::load_profiles(cell_->profiles);
     for (const char* needed : {"state", "event", "request", "command"})
       if (!profiles.contains(needed))
@@ -316,7 +339,11 @@ void LiveCell::say_not_found(const std::string& command) const {
     for (const auto& host : cell_->hosts)
       hosts += (hosts.empty() ? ", whose hosts are " : ", ") + host.address;
   std::cerr << command << ": no cell answers in " << where_ << hosts << " within " << patience_.in_seconds()
-            << " s; this PC has " << dds::own_addresses_text()
+            << " s"
+            << (cell_ && !is_secured() ? ""
+                : cell_                ? ", in the name of " + node_->options().identity->name
+                                       : " (a secured cell answers to a call with its file alone)")
+            << "; this PC has " << dds::own_addresses_text()
             << ". Is it running, on one network with this PC, "
             << "and open to UDP " << ports_
             << " in the firewalls of both? (`invar doctor` looks; --wait gives a "

@@ -43,6 +43,7 @@ class CellCall {
   std::string cell;            // its name, where several share the domain
   std::vector<std::string> addresses;
   std::vector<std::string> peers;
+  std::string as;         // in whose name, where the cell is secured; empty: whose key this user can read
   double patience = 5.0;  // s
 
  private:
@@ -69,6 +70,8 @@ class LiveCell {
   /// Null where the call names none.
   [[nodiscard]] const config::Cell* file() const { return cell_.get(); }
   [[nodiscard]] Duration patience() const { return patience_; }
+  /// This program and the cell know each other by certificates.
+  [[nodiscard]] bool is_secured() const { return node_->options().identity.has_value(); }
 
   /// Waits until every process of the file has said how it is; without a file, every one that takes part in the domain.
   /// Returns the processes that did not.

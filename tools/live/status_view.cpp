@@ -106,10 +106,10 @@ std::vector<std::string> CellStatus::faults() const {
 bool CellStatus::healthy() const { return !processes.empty() && faults().empty(); }
 
 std::string CellStatus::security() const {
-  return secured
-             ? "secured by certificates"
-             : "unsecured, whoever reaches its network can read and command it; keep the cell on a network "
-               "of its own, or on loopback alone by a file without `hosts`";
+  return secured ? "secured by certificates"
+                 : "unsecured, every program that reaches its network can read and command it; `invar keys "
+                   "CELL` makes "
+                   "the keys that mend it";
 }
 
 bool is_inactive(lifecycle::ComponentState state) {

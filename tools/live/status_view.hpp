@@ -24,7 +24,7 @@ struct CellStatus {
   [[nodiscard]] std::vector<std::string> faults() const;
   /// Somebody answers, and nothing is wrong.
   [[nodiscard]] bool healthy() const;
-  /// Who may read and command the cell, and the mend where that is everybody.
+  /// Whether everybody may read and command the cell, and the mend if so.
   [[nodiscard]] std::string security() const;
 };
 
