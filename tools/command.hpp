@@ -13,6 +13,7 @@ void add_calibrate(CLI::App& program);
 void add_check(CLI::App& program);
 void add_export(CLI::App& program);
 void add_job(CLI::App& program);
+void add_keys(CLI::App& program);
 void add_measure(CLI::App& program);
 void add_new(CLI::App& program);
 void add_predict(CLI::App& program);

@@ -34,6 +34,7 @@ int run(int argc, char** argv) {
   invar::tools::add_export(program);
   invar::tools::add_hz(program);
   invar::tools::add_job(program);
+  invar::tools::add_keys(program);
   invar::tools::add_latency_test(program);
   invar::tools::add_lifecycle(program);
   invar::tools::add_measure(program);

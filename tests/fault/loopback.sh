@@ -28,7 +28,7 @@ bound() { on "$a" ss -Hltun | awk '{print $5}' | sed 's/%[^:]*//; s/:[0-9]*$//' 
 
 begin alone.yaml
 head -n 3 own.log | tr '\n' ' ' >head.log
-says '^cell lonely: unsecured, .*can read and command it' head.log
+says '^cell lonely: unsecured, .*can read and +command it' head.log
 on "$a" "$invar" status alone.yaml --json >json.log
 says '"secured": false' json.log
 on "$a" "$invar" top alone.yaml --once --no-topics >top.log
