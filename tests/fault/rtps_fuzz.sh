@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A running cell whose ports get broken RTPS messages, mutated from its own traffic and under the names of its participants:
 # no process ends, every component stays active, samples flow, memory stays bounded, and the cell says what was dropped.
-# rtps_fuzz.sh INVAR FUZZER SOURCE_DIR [MESSAGES [SEED [MESSAGES_A_SECOND]]]
+# INVAR_SECURED=1: of a secured cell. rtps_fuzz.sh INVAR FUZZER SOURCE_DIR [MESSAGES [SEED [MESSAGES_A_SECOND]]]
 set -euo pipefail
 invar=$1 fuzzer=$2 source=$3 messages=${4:-${INVAR_FUZZ_MESSAGES:-60000}} seed=${5:-$RANDOM} rate=${6:-10000}
 folder=$(mktemp -d)
@@ -11,6 +11,10 @@ cell=$folder/deployment/xy-table.yaml
 # A supervisor that gives a busy host time: what it takes down stays so.
 sed -i "s/^domain: .*/domain: $domain/; s/15020/$port/; s/type: supervisor/type: supervisor\n        timeout: 30/" "$cell"
 cd "$folder"
+if [[ -n ${INVAR_SECURED:-} ]]; then
+  echo "security: {keys: keys}" >>"$cell"
+  "$invar" keys "$cell" >keys.log
+fi
 "$invar" run "$cell" --real-time >log 2>&1 &
 launcher=$!
 trap 'kill "$launcher" 2>/dev/null || true; wait "$launcher" 2>/dev/null || true; rm -rf "$folder"' EXIT

@@ -193,6 +193,51 @@ TEST(RtpsMessage, NamesTheParametersThatTheLibraryMustNotRead) {
   EXPECT_EQ(message[content.hidden[0]], std::byte{0x75});
 }
 
+Build& secure_prefix(Build& build) { return build.begin(0x31).fill(20); }
+/// `size`: of the encrypted octets, as the body says; four are there.
+Build& secure_body(Build& build, std::uint8_t size = 4) { return build.begin(0x30).fill(3).u8(size).fill(4); }
+/// `tags`: of single receivers, as the postfix says; none is there.
+Build& secure_postfix(Build& build, std::uint8_t tags = 0) {
+  return build.begin(0x32).fill(16).fill(3).u8(tags);
+}
+
+Flaw flaw_of(Build& build, bool secured) {
+  SequenceGuard guard;
+  RtpsContent content;
+  return examine(build.bytes(), {8U << 20U, 7400, 7649, secured}, guard, content);
+}
+
+TEST(SecuredMessage, IsReadInASecuredCellAlone) {
+  Build whole, prefix_of_wrong_size, plain;
+  secure_postfix(secure_body(secure_prefix(whole)));
+  EXPECT_EQ(flaw_text(flaw_of(whole, true)), flaw_text(Flaw::none));
+  EXPECT_EQ(flaw_text(flaw_of(whole, false)), flaw_text(Flaw::kind));
+  secure_postfix(secure_body(prefix_of_wrong_size.begin(0x31).fill(16)));
+  EXPECT_EQ(flaw_text(flaw_of(prefix_of_wrong_size, true)), flaw_text(Flaw::length));
+  secure_postfix(secure_prefix(plain).heartbeat(1, 0));  // signed alone
+  EXPECT_EQ(flaw_text(flaw_of(plain, true)), flaw_text(Flaw::none));
+}
+
+TEST(SecuredMessage, SaysNoMoreThanItHas) {
+  Build body, tags;
+  secure_postfix(
+      secure_body(secure_prefix(body), 200));  // Fast DDS 2.9 would decrypt what lies behind the message
+  EXPECT_EQ(flaw_text(flaw_of(body, true)), flaw_text(Flaw::length));
+  secure_postfix(secure_body(secure_prefix(tags)), 9);
+  EXPECT_EQ(flaw_text(flaw_of(tags, true)), flaw_text(Flaw::length));
+}
+
+TEST(SecuredMessage, HasOneSubmessageBetweenPrefixAndPostfix) {
+  Build two, none, open, twice, loose;
+  secure_postfix(secure_prefix(two).heartbeat(1, 0).heartbeat(1, 0));
+  secure_postfix(secure_prefix(none));
+  secure_body(secure_prefix(open));
+  secure_postfix(secure_body(secure_prefix(secure_prefix(twice))));
+  secure_body(loose);
+  for (Build* broken : {&two, &none, &open, &twice, &loose})
+    EXPECT_EQ(flaw_text(flaw_of(*broken, true)), flaw_text(Flaw::kind));
+}
+
 GuidPrefix known_prefix() {
   GuidPrefix prefix;
   prefix.fill(std::byte{Build::prefix_octet});
