@@ -1,4 +1,5 @@
 // invar: the one program that people type; its subcommands stand in tools/commands/, one a file.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -6,6 +7,7 @@
 #include <iostream>
 #include <new>
 #include <string>
+#include <string_view>
 
 #include "core/base/fault.hpp"
 #include "core/base/input_file.hpp"
@@ -17,11 +19,13 @@
 
 namespace {
 
+constexpr const char* version = "invar " INVAR_VERSION;
+
 int run(int argc, char** argv) {
   CLI::App program{
       "Invar: a component framework for industrial cells that must place things to the micrometre.", "invar"};
   program.require_subcommand(1);
-  program.set_version_flag("--version", "invar " INVAR_VERSION);
+  program.set_version_flag("--version", version);
   invar::tools::add_about(program);
   invar::tools::add_backup(program);
   invar::tools::add_calibrate(program);
@@ -60,6 +64,11 @@ int run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     // Help and version come this way too, with status 0; every real fault of the call is status 2.
     if (error.get_exit_code() == 0) return program.exit(error);
+    if (std::find(argv + 1, argv + argc, std::string_view{"--version"}) !=
+        argv + argc) {  // behind any command
+      std::cout << version << '\n';
+      return 0;
+    }
     std::cerr << "invar: "
               << invar::printable(invar::tools::wrong_call(program, {argv + 1, argv + argc}, error)) << '\n';
     return 2;

@@ -921,10 +921,16 @@ class WrongCalls(unittest.TestCase):
                       ["topics"], ["types"]):
             self.assertIn("--json", invar(*words, "--help")[1], words)
 
+    def test_any_command_says_its_version(self):
+        for words in ([], ["run"], ["param", "list"], ["calibrate", "geometric"], ["deploy", "cell.yaml"]):
+            self.assertEqual(invar(*words, "--version")[:2], invar("--version")[:2], words)
+            self.assertRegex(invar(*words, "--version")[1], r"^invar [0-9.]+\n$")
+
     def test_help_has_an_example(self):
         for words in (["status"], ["top"], ["topics"], ["echo"], ["hz"], ["lifecycle"], ["param", "list"],
                       ["param", "get"], ["param", "set"], ["job", "run"], ["job", "list"], ["job", "cancel"],
-                      ["record"], ["replay"], ["doctor"], ["latency-test"], ["profiles"], ["types"], ["about"], ["job", "apply"]):
+                      ["record"], ["replay"], ["doctor"], ["latency-test"], ["profiles"], ["types"], ["about"], ["job", "apply"],
+                      ["units"], ["deploy"], ["backup"], ["restore"]):
             status, out, _ = invar(*words, "--help")
             self.assertEqual(status, 0)
             self.assertIn("Example: invar " + " ".join(words), out)

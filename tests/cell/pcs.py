@@ -8,6 +8,42 @@ import time
 
 BOOT = pathlib.Path(__file__).resolve().parent.parent / "support" / "systemd_pc.sh"
 
+# A cell of three PCs whose parts need one another little.
+PLANT = """invar_cell: 1
+name: plant
+domain: {domain}
+profiles: profiles.yaml
+hosts:
+  pc-a: {{address: 10.81.0.11}}
+  pc-b: {{address: 10.81.0.12, ssh: {{user: root, port: 22}}}}
+  pc-c: {{address: 10.81.0.13, ssh: {{address: 10.81.0.13}}}}
+  spare: {{address: 10.81.0.14}}
+processes:
+  device:
+    host: pc-a
+    realtime: {{rate: 20, priority: 10, lock_memory: true}}
+    components: {{heater: {{type: simulated_heater, map: ../maps/heater.yaml, port: {port}}}}}
+  recorder:
+    host: pc-b
+    rate: 20
+    components: {{recorder: {{type: recorder, out: out}}}}
+  supervisor:
+    host: pc-c
+    rate: 20
+    components: {{supervisor: {{type: supervisor, timeout: 10}}}}
+"""
+
+
+def plant(folder, source, domain):
+    """Writes the cell and what it names into a folder: the cell file, and a file that changes without a meaning."""
+    for part in ("cells", "maps"):
+        (folder / part).mkdir()
+    shutil.copy(source / "deployment" / "profiles.yaml", folder / "cells")
+    shutil.copy(source / "deployment" / "maps" / "heater.yaml", folder / "maps")
+    cell = folder / "cells" / "plant cell.yaml"
+    cell.write_text(PLANT.format(domain=domain, port=15020))
+    return cell, folder / "maps" / "heater.yaml"
+
 
 def run(*words, **more):
     return subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True, **more)

@@ -4,6 +4,7 @@
 set -euo pipefail
 packages=$(realpath "$1") mirror=${2:-}
 bare=$(mktemp -d)
+chmod 755 "$bare"  # apt fetches as a user of its own
 leave() { umount "$bare/proc" "$bare/dev/shm" 2>/dev/null || true; rm -rf "$bare"; }
 trap leave EXIT
 debootstrap --variant=minbase bookworm "$bare" $mirror >"$bare.log" 2>&1 || { tail "$bare.log"; exit 1; }
@@ -23,7 +24,8 @@ inside invar --version
 inside getent passwd invar
 inside invar check /usr/share/invar/deployment/xy-table.yaml
 mkdir "$bare/cell"
-inside unshare -n bash -c 'ip link set lo up 2>/dev/null; cd /cell && invar run /usr/share/invar/deployment/xy-table.yaml --simulated --duration 2 --quiet >/dev/null'
+in_a_network_of_its_own() { unshare -n bash -c 'ip link set lo up; exec "$@"' bash "$@"; }
+in_a_network_of_its_own chroot "$bare" bash -c 'cd /cell && invar run /usr/share/invar/deployment/xy-table.yaml --simulated --duration 2 --quiet >/dev/null'
 ls -l "$bare/cell/out/xy-table/recording.mcap"
 inside bash -c 'apt-get -qq purge -y invar-runtime >/dev/null 2>&1'
 left=$(inside bash -c "find /usr /etc /var/lib/dpkg/info -name '*invar*'")

@@ -25,6 +25,7 @@
 #include "core/physics/expression_units.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tools/cell/loaded_cell.hpp"
+#include "tools/deploy/archive.hpp"
 #include "tools/geometric/lines_file.hpp"
 
 namespace invar::fuzz {
@@ -286,6 +287,15 @@ std::vector<Target> text_targets() {
                           [](const config::Node& root) { (void)compensation::read_components(root); }));
   all.push_back(compensation_target("rotary", texts({rotary_compensation()}),
                                     [](const config::Node& root) { (void)compensation::read_rotary(root); }));
+  const std::string archive =
+      tools::archive_of({{"BACKUP", "invar_backup: 1\n"}, {"data/state/models.yaml", "a: 1\n"}});
+  all.push_back({"backup",
+                 ".tar",
+                 texts({archive}),
+                 {"../", std::string(512, '\0')},
+                 [](const Bytes& bytes, const fs::path& file) {
+                   (void)tools::read_archive({bytes.begin(), bytes.end()}, file.string());
+                 }});
   // --- tables
   const auto read_csv = [](const Bytes&, const fs::path& file) { read_table(file); };
   all.push_back({"recording_csv", ".csv", texts({recorded}), {" [mm]", "nan", ",,", "\"a,b\""}, read_csv});

@@ -90,16 +90,11 @@ class Hosts {
     return on_each([&](std::size_t i) { return look(i, names); });
   }
   std::string look(std::size_t i, const std::string& names) {
-    const Said said = ask(i, scripts::look, {service(), options_.user}, names);
-    states_[i] = {};
-    std::istringstream lines{said.out};
-    for (std::string key, value; lines >> key >> value;) {
-      if (key == "machine") states_[i].machine = value;
-      if (key == "current") states_[i].current = value;
-      if (key == "previous") states_[i].previous = value;
-      if (key == "missing") states_[i].missing.push_back(value);
-    }
-    return why(said);
+    return read_state(i, ask(i, scripts::look, {service(), options_.user}, names));
+  }
+  /// Only which releases there are; nothing is made there.
+  HostFaults read_states() {
+    return on_each([&](std::size_t i) { return read_state(i, ask(i, scripts::state, {})); });
   }
 
   [[nodiscard]] bool all_have(const std::string& release) const {
@@ -150,6 +145,17 @@ class Hosts {
   [[nodiscard]] const std::string& unit() const { return unit_; }
 
  private:
+  std::string read_state(std::size_t i, const Said& said) {
+    states_[i] = {};
+    std::istringstream lines{said.out};
+    for (std::string key, value; lines >> key >> value;) {
+      if (key == "machine") states_[i].machine = value;
+      if (key == "current") states_[i].current = value;
+      if (key == "previous") states_[i].previous = value;
+      if (key == "missing") states_[i].missing.push_back(value);
+    }
+    return why(said);
+  }
   static std::string told(const std::string& table) {
     return table.empty() ? "" : "\n" + printable_lines(table);
   }
@@ -310,7 +316,7 @@ HostFaults deploy(const DeployOptions& options, const Tell& tell) {
 HostFaults roll_back(const DeployOptions& options, const Tell& tell) {
   const auto began = std::chrono::steady_clock::now();
   Hosts hosts{hosts_of(options), options};
-  if (HostFaults faults = hosts.look(""); !faults.empty()) return faults;
+  if (HostFaults faults = hosts.read_states(); !faults.empty()) return faults;
   HostFaults faults;
   const std::string release = hosts.state(0).previous;
   for (std::size_t i = 0; i < hosts.size(); ++i)
@@ -360,7 +366,7 @@ HostFaults restore_backups(const DeployOptions& options, const std::string& byte
 
 HostFaults show(const DeployOptions& options, const Tell& tell) {
   Hosts hosts{hosts_of(options), options};
-  HostFaults faults = hosts.look("");
+  HostFaults faults = hosts.read_states();
   for (std::size_t i = 0; i < hosts.size(); ++i)
     tell(hosts.host(i).name + ": current " + hosts.state(i).current + ", before " + hosts.state(i).previous);
   return faults;

@@ -30,6 +30,12 @@ point() {  # point LINK RELEASE: at once or not at all
 root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
 )sh";
 
+/// Changes nothing. HOME
+inline const std::string state = common + R"sh(
+echo "current $(at current)"
+echo "previous $(at previous)"
+)sh";
+
 /// Input: names of contents. Says what is there, and which contents are missing. With a user, the service's, sees that it exists.
 /// HOME SERVICE USER
 inline const std::string look = common + R"sh(
