@@ -265,6 +265,19 @@ class FilesOnly(Deployed):
                 self.assertIn(expected, said.stderr)
         self.cell.write_text(self.text)
 
+    def test_keys_of_a_secured_cell_stay_on_their_pc(self):
+        self.PREFIX = "/opt/secured"
+        self.cell.write_text(self.text + "security: {keys: secrets}\n")
+        subprocess.run([INVAR, "keys", self.cell], check=True, stdout=subprocess.DEVNULL)
+        self.deploy()
+        for name in PCS.NAMES:
+            self.assertEqual(PCS.on(name, f"readlink {self.home()}/current/cell/cells/secrets").stdout.strip(), f"{self.home()}/keys")
+            found = PCS.on(name, f"ls {self.home()}/current/cell/cells; grep -rlI 'PRIVATE KEY' {self.home()}/store", check=False)
+            self.assertEqual(found.stdout.split("\n"), ["plant cell.yaml", "profiles.yaml", "secrets", ""])
+        self.cell.write_text(self.text.replace("profiles: ", "security: {keys: ../../../keys}\nprofiles: "))
+        self.assertIn("lies outside of the folders of the cell's files", self.deploy(status=2).stderr)
+        self.cell.write_text(self.text)
+
     def test_names_of_files_are_letters_to_every_shell(self):
         maps = self.folder / "maps" / "a'b $(touch PWNED) `touch PWNED` %n \"c\" ;d.yaml"
         shutil.copy(self.map, maps)

@@ -110,6 +110,19 @@ void check_name(const std::string& path) {
                    "rename it"};
 }
 
+/// Where the cell file finds the keys, within the release: there a link leads to those of the PC. Secrets are in no release.
+std::string place_of_keys(const config::Cell& cell, const std::string& cell_file) {
+  const fs::path folder = fs::absolute(cell.file).lexically_normal().parent_path();
+  const std::string place =
+      (fs::path{cell_file}.parent_path() / cell.security->keys.lexically_relative(folder))
+          .lexically_normal()
+          .string();
+  if (!place.starts_with("cell/") || place.size() <= 5)
+    throw InputError{cell.file.string() + ": security.keys",
+                     "lies outside of the folders of the cell's files", "name a folder beside the cell file"};
+  return place;
+}
+
 }  // namespace
 
 std::uintmax_t Release::size() const {
@@ -179,6 +192,7 @@ Release make_release(const LoadedCell& loaded, const ReleaseOptions& options) {
     release.files.push_back({path, "", text, sha256_of(text), text.size()});
   };
   add_text("CELL", release.cell_file + "\n");
+  if (loaded.cell->security) add_text("KEYS", place_of_keys(*loaded.cell, release.cell_file) + "\n");
   const fs::path current = options.home / "current";
   std::set<std::string> hosts;
   for (const config::CellProcess& process : loaded.cell->processes) hosts.insert(process.host);

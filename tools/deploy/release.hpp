@@ -41,8 +41,9 @@ struct ReleaseOptions {
 
 /// Folders bin/ and lib/ hold this program, its loadable parts and the shared libraries that it has loaded, but for the C
 /// library's. Folder cell/ holds the cell file and all files and folders that it names, where they lie to one another. File
-/// CELL holds its path. Folder units/ holds a systemd unit a host. Throws InputError for a file that is named by an absolute
-/// path, that cannot be read, or whose name cannot be in a manifest.
+/// CELL holds its path; KEYS holds the place of a secured cell's keys, which stay on each PC. Folder units/ holds a systemd
+/// unit a host. Throws InputError for a file that is named by an absolute path, that cannot be read, or whose name cannot be in
+/// a manifest.
 [[nodiscard]] Release make_release(const LoadedCell& loaded, const ReleaseOptions& options);
 
 /// Hexadecimal, of a text and of a file. The second throws InputError.

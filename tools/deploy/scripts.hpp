@@ -9,6 +9,7 @@ namespace invar::tools::scripts {
 //   store/SHA256        each content once, read-only; a program as SHA256.x
 //   releases/NAME/      hard links into the store, and MANIFEST; whole from the moment that it has its name
 //   current, previous   links to releases; `current` is what runs
+//   keys/               of a secured cell, brought there by hand; no part of a release
 //   data/               where the cell runs: recordings, state; of the service's user
 
 /// Said by a script that ends by itself: the deployment acts on the status.
@@ -101,6 +102,11 @@ if [ -d "$release" ]; then
   exit 0
 fi
 place "$part"
+if [ -f "$part/KEYS" ]; then
+  keys=$part/$(cat "$part/KEYS")
+  mkdir -p "${keys%/*}"
+  ln -s "$home/keys" "$keys"
+fi
 (cd "$part" && sha256sum -c --quiet --strict MANIFEST >/dev/null 2>&1) || drop_damaged
 mv -T "$part" "$release"
 sync -f "$home"
