@@ -111,7 +111,8 @@ OpensslRevocations read_revocations(const std::filesystem::path& path) {
 
 }  // namespace
 
-Authority::Authority(std::filesystem::path certificate, std::filesystem::path key, const std::string& name) {
+Authority::Authority(const std::filesystem::path& certificate, const std::filesystem::path& key,
+                     const std::string& name) {
   namespace fs = std::filesystem;
   if (fs::exists(key) != fs::exists(certificate))
     throw InputError{(fs::exists(key) ? certificate : key).string(), "is not there, but its other half is",

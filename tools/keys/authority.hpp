@@ -22,7 +22,8 @@ class Authority {
  public:
   /// Reads the authority whose certificate and key these are, or makes it where neither is there. Throws InputError where one
   /// of the two is missing: an authority is never overwritten.
-  Authority(std::filesystem::path certificate, std::filesystem::path key, const std::string& name);
+  Authority(const std::filesystem::path& certificate, const std::filesystem::path& key,
+            const std::string& name);
 
   [[nodiscard]] bool is_new() const { return is_new_; }
   [[nodiscard]] X509* certificate() const { return certificate_.get(); }

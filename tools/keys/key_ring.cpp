@@ -126,6 +126,7 @@ std::vector<KeyState> make_keys(LoadedCell& loaded, const KeyOrder& order) {
   for (const std::string& name : order.renew)
     if (std::none_of(all.begin(), all.end(), [&](const Rights& rights) { return rights.name == name; })) {
       std::vector<std::string> names;
+      names.reserve(all.size());
       for (const Rights& rights : all) names.push_back(rights.name);
       throw InputError{"--renew", "`" + name + "` is nobody of this cell", mend_name(name, names)};
     }
@@ -135,6 +136,7 @@ std::vector<KeyState> make_keys(LoadedCell& loaded, const KeyOrder& order) {
   for (const std::string& name : order.revoke) ring.revoke(name);
   ring.sign_common();
   std::vector<KeyState> states;
+  states.reserve(all.size());
   for (const Rights& rights : all) states.push_back(ring.provide(rights));
   return states;
 }
