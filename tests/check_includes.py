@@ -63,7 +63,6 @@ CIRCLES = [
     {"core/dds/rtps_message", "core/dds/rtps_parameters", "core/dds/sequence_guard"},
     {"core/dds/node", "core/dds/connection", "core/dds/participant"},
     {"core/recording/recording_reader", "core/recording/mcap_scan"},
-    {"tools/cell/connections", "tools/cell/drives", "tools/cell/loaded_cell", "tools/cell/qos"},
     {"tools/geometric/components_file", "tools/geometric/components_page"},
 ]
 

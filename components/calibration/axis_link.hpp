@@ -7,6 +7,7 @@
 
 #include "core/base/shown.hpp"
 #include "core/base/time.hpp"
+#include "idl/stage.h"
 
 namespace invar::calibration {
 
@@ -23,6 +24,15 @@ class AxisLink {
     constexpr Duration patience = Duration::milliseconds(1000);
     if (longest_ < patience) return std::nullopt;
     return "nothing comes from " + stage + between(stage, commander, "is");
+  }
+  /// Why an axis does not become enabled; `state`: its newest answer, nullptr where nothing was heard.
+  [[nodiscard]] static std::string not_enabled(const std::string& stage, const stage::AxisState* state) {
+    if (state == nullptr) return "nothing is heard from " + stage + ": is its stage active?";
+    if (state->mode() == stage::AXIS_MODE_FAULT)
+      return stage +
+             " tripped before the job: mend the cause that its notices state, then deactivate and "
+             "activate the stage by `invar lifecycle`";
+    return stage + " does not take `enable`; its notices say why";
   }
   /// The reason of a job whose motion was taken and did not end as ordered.
   [[nodiscard]] std::string stopped(const std::string& stage, const std::string& commander) const {

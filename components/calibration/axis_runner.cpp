@@ -85,8 +85,10 @@ Task AxisRunner::enable() {
     command.kind(stage::AXIS_COMMAND_ENABLE);
     send(command);
     co_await wait(0.5);
-    if (now() > give_up)
-      throw std::runtime_error{"the axis does not answer to `enable`: is its stage active?"};
+    const auto* state = state_.latest();
+    const bool tripped = state != nullptr && state->mode() == stage::AXIS_MODE_FAULT;
+    if (tripped || now() > give_up)
+      throw std::runtime_error{AxisLink::not_enabled(axis_name(state_.topic, axis_), state)};
   }
 }
 

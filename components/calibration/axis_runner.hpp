@@ -26,9 +26,26 @@ Size size_of(const std::vector<double>& values);
 /// With its unit, for what a job says.
 std::string micrometres(double value);
 
+/// The way of a job, as its stage will be asked to go: both ends [m], and where the file states the job: `list[place]`.
+struct Reach {
+  std::string list;
+  std::size_t place = 0;
+  double from = 0.0, to = 0.0;
+};
+
+/// A job of sinusoids: from its lower end over two amplitudes.
+template <class Job>
+Reach reach_of(std::string list, std::size_t place, const Job& job) {
+  return {std::move(list), place, job.from, job.from + 2.0 * job.amplitude};
+}
+
 /// Its stage on `state` and `command`, a laser along the axis on `reading` and `beam`, and on `model` what uses the model that
 /// a job makes. Not real-time.
 class AxisRunner : public JobComponent {
+ public:
+  /// The ways of all its jobs.
+  [[nodiscard]] virtual std::vector<Reach> reaches() const = 0;
+
  protected:
   explicit AxisRunner(const std::int64_t& axis) : axis_{axis} {}
   /// Adds the row of a step to the record of a motion.

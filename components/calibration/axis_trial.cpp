@@ -53,9 +53,19 @@ std::vector<double> following(const recording::Table& table) {
 
 }  // namespace
 
+std::vector<Reach> AxisTrial::reaches() const {
+  std::vector<Reach> all;
+  for (std::size_t i = 0; i < parameters_.ripple.size(); ++i)
+    all.push_back({"ripple", i, parameters_.ripple[i].from, parameters_.ripple[i].to});
+  for (std::size_t i = 0; i < parameters_.tracking.size(); ++i)
+    all.push_back(reach_of("tracking", i, parameters_.tracking[i]));
+  for (std::size_t i = 0; i < parameters_.motion.size(); ++i)
+    all.push_back({"motion", i, parameters_.motion[i].from, parameters_.motion[i].to});
+  return all;
+}
+
 std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
   const auto begin = [&](const auto& job) {
-    std::filesystem::create_directories(job.out);
     began_ = now();
     return Job{run(job), job.out};
   };

@@ -44,7 +44,7 @@ struct TrackingJob : JobSpec {
     JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
-    p(periods, "periods", "s", "one sinusoid each");
+    p(periods, "periods", "s", Range{1e-2, 1e4}, "one sinusoid each");
     p(cycles, "cycles", 1, 1000, "periods of each");
   }
 };
@@ -62,7 +62,7 @@ struct MotionJob : JobSpec {
     JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
-    p(velocities, "velocities", "m/s", "one after the other");
+    p(velocities, "velocities", "m/s", Range{1e-4, 10.0}, "one after the other");
     p(passes, "passes", 1, 100, "forth and back so often, at each velocity");
     p(model, "model", "with apply: model.yaml of the axis as it was believed to be");
     p(apply, "apply", "model.yaml that `invar diagnose` writes; relative to where the cell was started");
@@ -91,6 +91,7 @@ class AxisTrial final : public AxisRunner {
     }
   };
   explicit AxisTrial(const Parameters& parameters) : AxisRunner{parameters.axis}, parameters_{parameters} {}
+  [[nodiscard]] std::vector<Reach> reaches() const override;
 
  private:
   std::optional<Job> find(const std::string& wanted) override;

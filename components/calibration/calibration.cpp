@@ -106,8 +106,13 @@ Task Calibration::enable_axes() {
       return state != nullptr && state->command_id() == axis->last_command && state->enabled();
     });
     if (all) co_return;
-    if (now() > give_up)
-      throw std::runtime_error{"an axis does not answer to `enable`: is its stage active?"};
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      const auto* state = axes_[i]->state.latest();
+      const bool tripped = state != nullptr && state->mode() == stage::AXIS_MODE_FAULT;
+      if (tripped || (now() > give_up && (state == nullptr || !state->enabled())))
+        throw std::runtime_error{
+            AxisLink::not_enabled(axis_name(axes_[i]->state.topic, static_cast<std::int64_t>(i)), state)};
+    }
   }
 }
 

@@ -111,10 +111,16 @@ FusionTrial::FusionTrial(const Parameters& parameters)
 
 FusionTrial::~FusionTrial() = default;
 
+std::vector<Reach> FusionTrial::reaches() const {
+  std::vector<Reach> all;
+  for (std::size_t i = 0; i < parameters_.jobs.size(); ++i)
+    all.push_back(reach_of("jobs", i, parameters_.jobs[i]));
+  return all;
+}
+
 std::optional<JobComponent::Job> FusionTrial::find(const std::string& wanted) {
   const auto* job = named(parameters_.jobs, wanted);
   if (job == nullptr) return std::nullopt;
-  std::filesystem::create_directories(job->out);
   return Job{run(*job), job->out};
 }
 

@@ -26,12 +26,11 @@ struct FusionJob : JobSpec {
     JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
-    p(periods, "periods", "s", "one sinusoid each, to identify from");
-    p(verify_periods, "verify_periods", "s", "those before and after");
+    p(periods, "periods", "s", Range{1e-2, 1e4}, "one sinusoid each, to identify from");
+    p(verify_periods, "verify_periods", "s", Range{1e-2, 1e4}, "those before and after");
     if constexpr (requires { p.node(); }) {
       if (periods.size() < 3)
         p.node()["periods"].fault("fewer than three sinusoids: none could be held out", "give three or more");
-      if (verify_periods.empty()) p.node()["verify_periods"].fault("is empty", "give one period or more");
     }
   }
 };
@@ -67,6 +66,7 @@ class FusionTrial final : public AxisRunner {
   };
   explicit FusionTrial(const Parameters& parameters);
   ~FusionTrial() override;
+  [[nodiscard]] std::vector<Reach> reaches() const override;
 
  private:
   struct Source;

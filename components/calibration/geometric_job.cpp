@@ -103,7 +103,6 @@ Task Calibration::run(const GeometricJob& job) {
 
 Task Calibration::calibrate(const GeometricJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
-  std::filesystem::create_directories(folder);
   const double share = 1.0 / static_cast<double>(job.lines.size() + 2 * job.verify.size() + 1);
   co_await enable_axes();
   co_await clear_models("");

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/folder.hpp"
 #include "core/compensation/geometric_file.hpp"
 #include "core/compensation/thermal_file.hpp"
 #include "core/machine/machine_file.hpp"
@@ -70,7 +71,7 @@ metrology::ThermalReadings heat_readings(const recording::Table& table, const st
 IdentifiedHeat identify_heat(const metrology::ThermalReadings& readings, std::size_t axis,
                              std::uint32_t above, const std::filesystem::path& source,
                              const std::filesystem::path& folder) {
-  std::filesystem::create_directories(folder);
+  make_folder(folder);
   IdentifiedHeat result{metrology::identify_thermal(readings), folder / "compensation.yaml"};
   compensation::ModelText text{"thermal", {source}};
   compensation::write_place(text, {static_cast<int>(axis), above});

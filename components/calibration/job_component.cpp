@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "core/base/folder.hpp"
+
 namespace invar::calibration {
 
 void JobComponent::activate() {
@@ -48,19 +50,23 @@ void JobComponent::obey(const job::JobCommand& command) {
   const std::string wanted{command.name().c_str()};
   sample_.id(command.id());
   sample_.name(wanted);
+  sample_.result_path("");
   progress_ = 0.0;
   std::optional<Job> job = find(wanted);
   if (!job) {
     report(job::JOB_FAILED, "`" + wanted + "` is no job of this component");
     return;
   }
-  sample_.result_path(std::filesystem::absolute(job->folder).string());
   // Who gives a value means it: a job that runs without it would move as nobody asked.
   if (command.arguments().size() > 0) {
     report(job::JOB_FAILED,
            "job `" + wanted + "` takes no arguments; leave them out, or change the cell file");
     return;
   }
+  if (const std::string why = objection_ ? objection_() : ""; !why.empty())
+    return report(job::JOB_FAILED, "job `" + wanted + "` is refused: " + why);
+  make_folder(job->folder);
+  sample_.result_path(std::filesystem::absolute(job->folder).string());
   task_ = std::move(job->task);
   report(job::JOB_RUNNING, "started");
 }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -24,6 +25,9 @@ class JobComponent : public Component {
 
   /// There is a job of this name.
   [[nodiscard]] bool has(const std::string& job) { return find(job).has_value(); }
+
+  /// Set-up: no job begins while `objection` says why not.
+  void refuse_while(std::function<std::string()> objection) { objection_ = std::move(objection); }
 
  protected:
   struct Job {
@@ -50,6 +54,7 @@ class JobComponent : public Component {
   Inbox<job::JobCommand> job_{*this, "job", {.optional = true, .profile = "command"}};
   Output<job::JobStatus> status_{*this, "status", "state"};
   Task task_;
+  std::function<std::string()> objection_;
   job::JobStatus sample_;
   std::uint64_t next_command_ = 1;
 };

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/range.hpp"
+#include "core/component/parameters.hpp"
 #include "core/config/yaml.hpp"
 
 namespace invar::calibration {
@@ -22,6 +23,7 @@ struct JobSpec {
   void describe(auto& p) {
     p(name, "name", "name of the job in `invar job run`");
     p(out, "out", "folder for the files, created; relative to where the cell was started");
+    if constexpr (requires { p.node(); }) check_folder(p.node(), "out", out);
   }
 };
 

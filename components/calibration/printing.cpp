@@ -399,7 +399,6 @@ Task Printing::watch_drift(const PrintJob& job, const TrajectoryFit& fit) {
 
 Task Printing::run(const PrintJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
-  std::filesystem::create_directories(folder);
   begun_ = owner_.now();
   progress_ = 0.0;
   share_ = 1.0 / static_cast<double>(2 * job.heights.size() + static_cast<std::size_t>(job.drift.prints) + 1);

@@ -163,7 +163,6 @@ Task Calibration::compare(const ThermalJob& job, const TraceSpec* trace,
 Task Calibration::run(const ThermalJob& job) {
   began_ = now();
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
-  std::filesystem::create_directories(folder);
   if (const auto* heat = temperature_.latest(); heat == nullptr) co_await wait(5.0);  // the cell is coming up
   if (temperature_.latest() == nullptr)
     throw std::runtime_error{"no temperature arrives: connect `temperature` and `heater`"};

@@ -7,7 +7,7 @@
 namespace invar::recorder {
 
 void Recorder::configure() {
-  std::filesystem::create_directories(parameters_.out);
+  make_folder(parameters_.out);
   recording::keep_earlier(file());
   const std::scoped_lock lock{mutex_};
   constexpr std::uint64_t megabyte = 1'000'000;

@@ -39,10 +39,12 @@ class Recorder final : public Component {
     void describe(auto& p) {
       p(out, "out", "folder for the file, created; relative to where the cell was started");
       p(name, "name", "name of the file");
-      if constexpr (requires { p.node(); })
+      if constexpr (requires { p.node(); }) {
+        check_folder(p.node(), "out", out);
         if (name.empty() || name == "." || name == ".." || std::filesystem::path{name}.filename() != name)
           p.node()["name"].fault("`" + name + "` is no name of a file",
                                  "write a name alone, as recording.mcap; `out` names the folder");
+      }
       p(topics, "topics", "only topics that contain one of these texts; none: all of the cell");
       p(reserve_mb, "reserve_mb", 0, 1'000'000,
         "free space [MB] at which recording ends, left on the disk for black boxes");

@@ -129,6 +129,8 @@ class Stage final : public Component {
   [[nodiscard]] std::optional<Unfit> unfit(double period) const override;
   /// False where nobody says what the motor moves, so that `unfit` cannot know. Set-up.
   [[nodiscard]] bool gains_can_be_checked() const { return inertia().has_value(); }
+  /// Soft limits [m].
+  [[nodiscard]] Range travel() const { return parameters_.travel; }
   void configure() override { model_.open(parameters_.model, "diagnose the axis again"); }
   void activate() override;
   void cleanup() noexcept override { model_.close(); }

@@ -202,7 +202,7 @@ void Vision::calibrate(const PixelsView& picture) {
     write_picture(library().draw_outlines(picture, outlines));
   }
   const std::filesystem::path folder = parameters_.out;
-  std::filesystem::create_directories(folder);
+  make_folder(folder);
   std::ofstream out = new_stream(folder / "camera.yaml");
   out << camera_yaml(fit->camera);
   out.close();
@@ -268,7 +268,7 @@ bool Vision::wants_picture() const { return running_ && picture_; }
 
 void Vision::write_picture(const std::vector<unsigned char>& png) const {
   const std::filesystem::path file = *picture_;
-  if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
+  if (file.has_parent_path()) make_folder(file.parent_path());
   std::ofstream out = new_stream(file);
   out.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
   out.close();

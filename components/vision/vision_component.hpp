@@ -37,6 +37,7 @@ class Vision final : public Component {
       p(mount, "mount", "where the camera hangs");
       p(ruler, "ruler", "ruler.yaml: radii of the ruler's circles");
       p(out, "out", "folder for the camera.yaml of a calibration; relative to where the cell was started");
+      if constexpr (requires { p.node(); }) check_folder(p.node(), "out", out);
       p(polarity, "polarity", "drops are `light`, `dark`, or `auto`: found out frame by frame");
       p(least_diameter, "least_diameter", "m", Range{0.0, 0.1}, "smaller drops are satellites; 0: found out",
         while_running);

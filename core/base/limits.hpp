@@ -17,7 +17,9 @@ constexpr std::size_t yaml_text = 64 * 1024;  // one scalar; a formula or a desc
 constexpr std::size_t faults_of_a_kind =
     20;  // one cause makes a thousand faults; who mends twenty has found it
 
-constexpr std::size_t map_registers = 2000;  // of a Modbus device: each is compared with each other
+constexpr std::size_t model_terms = 1000;      // each is tried by a diagnosis; a model of ours has 30
+constexpr std::size_t cell_components = 1000;  // of a cell file; each costs some 2 kB before it is made
+constexpr std::size_t map_registers = 2000;    // of a Modbus device: each is compared with each other
 
 // --- CSV: a plain file bounds itself; what is packed may not grow without end.
 constexpr std::size_t csv_line = 4 * mib;              // 16384 columns of 25 digits are 0.4 MiB

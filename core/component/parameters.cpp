@@ -84,6 +84,11 @@ void ParameterLister::operator()(std::vector<double>& values, std::string_view n
   info.unit = unit;
   info.otherwise = bracketed(values, [](double value) { return shown(value); });
 }
+void ParameterLister::operator()(std::vector<double>& values, std::string_view name, std::string_view unit,
+                                 Range each, std::string_view description) {
+  (*this)(values, name, unit, description);
+  list_.back().range = each;
+}
 void ParameterLister::operator()(Range& value, std::string_view name, std::string_view unit,
                                  std::string_view description) {
   ParameterInfo& info = add(name, "range", description);

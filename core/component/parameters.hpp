@@ -13,7 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/folder.hpp"
 #include "core/base/range.hpp"
+#include "core/base/shown.hpp"
 #include "core/config/yaml.hpp"
 
 namespace invar {
@@ -55,6 +57,7 @@ concept Described = requires(T& group, detail::Probe& probe) {
 ///   p(enabled, "enabled", "...");                                                 bool
 ///   p(map, "map", "...");                                                         std::string, path
 ///   p(limits, "limits", "N", "...");                                              std::vector<double>, Range
+///   p(speeds, "speeds", "m/s", Range{1e-4, 1.0}, "...");                          std::vector<double>, not empty
 ///   p(trajectory, "trajectory", "...");                                           a described group
 ///   p(lines, "lines", "...");                                                     a vector of such groups
 ///
@@ -88,6 +91,13 @@ class ParameterReader {
   void operator()(std::vector<double>& value, std::string_view name, std::string_view unit,
                   std::string_view) {
     if (node_.has(name)) value = node_[name].as_numbers(unit);
+  }
+  void operator()(std::vector<double>& value, std::string_view name, std::string_view unit, Range each,
+                  std::string_view) {
+    if (!node_.has(name)) return;
+    value = node_[name].as_numbers(unit, each);
+    if (node_[name].is_list() && value.empty())
+      node_[name].fault("holds no number", "write one at least, or leave it out");
   }
   void operator()(Range& value, std::string_view name, std::string_view unit, std::string_view) {
     if (node_.has(name)) value = node_[name].as_range(unit);
@@ -142,6 +152,8 @@ class ParameterLister {
   void operator()(std::filesystem::path& value, std::string_view name, std::string_view description);
   void operator()(std::vector<double>& value, std::string_view name, std::string_view unit,
                   std::string_view description);
+  void operator()(std::vector<double>& value, std::string_view name, std::string_view unit, Range each,
+                  std::string_view description);
   void operator()(Range& value, std::string_view name, std::string_view unit, std::string_view description);
   void operator()(std::vector<std::string>& value, std::string_view name, std::string_view description);
   template <Described Group>
@@ -178,6 +190,12 @@ class ParameterLister {
   std::vector<ParameterInfo>& list_;
   std::string prefix_;
 };
+
+/// A fault where no folder can stand under the name that `key` gives.
+inline void check_folder(const config::Node& node, std::string_view key, const std::string& folder) {
+  if (const auto flaw = flaw_of_folder(folder))
+    node[key].fault("`" + clipped(folder) + "` " + *flaw, "name a folder, or one that can be created");
+}
 
 /// Objection of the checks between parameters in `describe` to these numbers; empty: none. The numbers stand beside the list
 /// of infos; those that may not change are not read. Any thread.

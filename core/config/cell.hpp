@@ -78,6 +78,8 @@ struct Cell {
   bool shared_memory = true;
   /// How long a process waits for its host's address, and then ends. None: it works alone until the address is there.
   std::optional<Duration> address_wait;
+  /// How far the clocks of two hosts may be apart for a job to begin.
+  Duration clock_bound = Duration::seconds(60.0);
   std::filesystem::path profiles;
   std::vector<std::filesystem::path>
       models;  // folders from which a command may load a model, beside the usual

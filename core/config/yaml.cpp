@@ -105,7 +105,7 @@ Node Node::operator[](std::string_view name) const {
   const std::string key{name};
   place_->known.insert(key);
   if (auto known = place_->child(key)) return {document_, std::move(known)};
-  if (is_scalar()) fault("a map is expected here", "write `" + key + ": ...` below it");
+  if (is_scalar() || is_list()) fault("a map is expected here", "write `" + key + ": ...` below it");
   auto child = std::make_shared<Place>();
   bool stands = false;
   if (is_map()) {
@@ -127,7 +127,6 @@ Node Node::operator[](std::string_view name) const {
 }
 
 Node Node::required(std::string_view name) const {
-  if (is_list()) fault("a map is expected here", "write `" + std::string{name} + ": ...` below it");
   Node child = (*this)[name];
   if (!child.exists() && !child.place_->empty && is_map()) child.missing("add `" + std::string{name} + ":`");
   return child;
@@ -298,11 +297,11 @@ Range Node::as_range(std::string_view unit) const {
   return {numbers[0], numbers[1]};
 }
 
-std::vector<double> Node::as_numbers(std::string_view unit) const {
+std::vector<double> Node::as_numbers(std::string_view unit, Range each) const {
   std::vector<double> result;
   if (exists() && !is_list()) fault("a list of numbers is expected here", "write [1, 2, 3]");
   if (is_list())
-    for (const Node& child : children()) result.push_back(child.as_number(unit));
+    for (const Node& child : children()) result.push_back(child.as_number(unit, each));
   return result;
 }
 

@@ -78,7 +78,7 @@ class Node {
   [[nodiscard]] bool as_flag() const;
   /// [lower, upper] with lower < upper.
   [[nodiscard]] Range as_range(std::string_view unit) const;
-  [[nodiscard]] std::vector<double> as_numbers(std::string_view unit) const;
+  [[nodiscard]] std::vector<double> as_numbers(std::string_view unit, Range each = {}) const;
   [[nodiscard]] std::vector<std::string> as_texts() const;
 
   /// A child as a value; without `otherwise` its absence is a fault.

@@ -28,8 +28,9 @@ class Bounds final : public YAML::EventHandler {
     if (found == sizes_.end()) refuse(mark, "an alias stands within what it names", "write it out");
     add(mark, {}, found->second);
   }
-  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                 const std::string& text) override {
+    check_tag(mark, tag);
     const bool key = !open_.empty() && open_.back().is_map && open_.back().items % 2 == 0;
     if (text.size() > limits::yaml_text)
       refuse(mark, "a text has " + std::to_string(text.size()) + " bytes",
@@ -38,13 +39,15 @@ class Bounds final : public YAML::EventHandler {
       refuse(mark, (key ? "key `" : "`") + clipped(text) + "` " + flaw->what, flaw->mend);
     add(mark, anchor, 1);
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
+    check_tag(mark, tag);
     open(mark, anchor, false);
   }
   void OnSequenceEnd() override { close(); }
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
+    check_tag(mark, tag);
     open(mark, anchor, true);
   }
   void OnMapEnd() override { close(); }
@@ -59,6 +62,12 @@ class Bounds final : public YAML::EventHandler {
 
   [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& what, const std::string& mend) const {
     throw InputError{name_ + ":" + std::to_string(mark.line + 1), what, mend};
+  }
+  /// No tag changes how a value is read, so one that is written says something that is not done. `?` and `!` are the parser's
+  /// own, for plain and quoted text.
+  void check_tag(const YAML::Mark& mark, const std::string& tag) const {
+    if (!tag.empty() && tag != "?" && tag != "!")
+      refuse(mark, "the tag `" + clipped(tag) + "` is not understood", "remove it");
   }
   void open(const YAML::Mark& mark, YAML::anchor_t anchor, bool is_map) {
     if (open_.size() == limits::yaml_depth)
@@ -91,9 +100,8 @@ class Bounds final : public YAML::EventHandler {
 
 void check_bounds(const std::string& text, const std::string& name) {
   if (text.size() > limits::yaml_bytes)
-    throw InputError{name, "has " + std::to_string(text.size() / limits::mib) + " MiB",
-                     "a YAML file of at most " + std::to_string(limits::yaml_bytes / limits::mib) +
-                         " MiB is read: name the right one"};
+    throw InputError{name, "has more than " + std::to_string(limits::yaml_bytes / limits::mib) + " MiB",
+                     "no YAML file is so long: name the right one"};
   std::istringstream stream{text};
   YAML::Parser parser{stream};
   Bounds bounds{name};

@@ -65,6 +65,16 @@ std::string reason(const std::optional<Failure>& failure, const RegisterMap& map
   return "exception " + std::to_string(failure->exception) + ", " + meaning_of_exception(failure->exception);
 }
 
+/// Why a register has no value. A device that answers has a connection: that one failed earlier explains nothing.
+std::string reason_of(const Device& device, const Register& reg) {
+  const auto failure = device.last_failure();
+  const bool no_connection =
+      failure && (failure->cause == Cause::refused || failure->cause == Cause::unreachable);
+  if (device.is_online() && (!failure || no_connection))
+    return "no answer came within " + milliseconds(reg.stale_after) + "; the others take the time";
+  return reason(failure, device.map());
+}
+
 /// The counts since the start that are not 0.
 std::string counts(const DeviceCounters& device, const LinkCounters& link) {
   std::uint64_t exceptions = 0;
@@ -111,7 +121,6 @@ void Health::look_at_readings(const Device& device, const LinkCounters& link, In
     if (!reading.stale && reading.out_of_range && !outside) outside = i;
   }
   if (lost_.begins(stale.has_value(), now, was_well_ ? Duration{} : patience_at_start)) {
-    const auto failure = device.last_failure();
     // Of a device that answers, one register may be missing, or all come too seldom.
     const bool slow = device.is_online() && device.round() > registers[*stale].stale_after;
     std::string text = subject(device);
@@ -121,7 +130,7 @@ void Health::look_at_readings(const Device& device, const LinkCounters& link, In
     else
       text += " does not answer" +
               (device.is_online() ? " for `" + registers[*stale].name + "`" : std::string{}) + ": " +
-              reason(failure, device.map());
+              reason_of(device, registers[*stale]);
     say(Level::fault, text + counts(device.counters(), link));
   }
   if (lost_.ends(stale.has_value())) say(Level::note, subject(device) + " answers again");

@@ -142,6 +142,8 @@ void read_quantity(const config::Yaml& yaml, const Node& node, Register& reg) {
   reg.scale *= si.factor;
   const Range holds = representable(reg);
   reg.range = holds;
+  if (reg.type != Type::float32 && (!std::isfinite(holds.lower) || !std::isfinite(holds.upper)))
+    (scale.exists() ? scale : node).fault("the largest count is no finite value", "choose a smaller scale");
   if (!range.exists()) return;
   const Range written = range.as_range(reg.unit);
   reg.range = {written.lower * si.factor + si.offset, written.upper * si.factor + si.offset};
@@ -359,6 +361,10 @@ RegisterMap read(const config::Yaml& yaml) {
   if (stale < map.poll * 2)
     (timeouts.has("stale") ? timeouts["stale"] : root["poll"])
         .fault("values would be stale between two polls", "make `timeouts.stale` at least twice `poll`");
+  else if (map.answer_timeout > stale && (timeouts.has("answer") || timeouts.has("stale")))
+    timeouts[timeouts.has("answer") ? "answer" : "stale"].fault(
+        "a value would be stale before its answer is late",
+        "make `timeouts.answer` at most `timeouts.stale`");
 
   const Node registers = root.required("registers");
   if (registers.map().size() > limits::map_registers) {

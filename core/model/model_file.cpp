@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/limits.hpp"
 #include "core/base/unit.hpp"
 #include "core/model/own_expressions.hpp"
 #include "core/model/term_file.hpp"
@@ -377,7 +378,13 @@ physics::Model read(const config::Yaml& yaml) {
     else
       model.noise[at->name] = sigma;
   }
-  for (const auto& node : root["terms"].children())
+  const auto terms = root["terms"].children();
+  if (terms.size() > limits::model_terms) {
+    root["terms"].fault("has " + std::to_string(terms.size()) + " terms",
+                        "keep at most " + std::to_string(limits::model_terms));
+    yaml.finish();
+  }
+  for (const auto& node : terms)
     if (auto term = read_term(node, model)) model.terms.push_back(*term);
   return model;
 }

@@ -264,7 +264,7 @@ void scan(RecordingContents& contents) {
     contents.add_damage("the file ends at byte " + std::to_string(contents.bytes.size()) +
                         " without its end; it is read up to there");
   else if (!contents.complete)
-    contents.add_damage("the file's summary is missing; all its data are there");
+    contents.damage.push_back("the file's summary is missing; all its data are there");
   if (contents.more_damage > 0)
     contents.damage.back() += " (and " + std::to_string(contents.more_damage) + " more of such faults)";
 }

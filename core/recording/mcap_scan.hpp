@@ -26,8 +26,10 @@ struct RecordingContents {
   std::uint64_t unpacked = 0;       // [bytes] of all chunks so far
   std::uint64_t definitions = 0;    // [bytes] of schemas, channels and metadata so far
   bool complete = false;
+  bool loses_data = false;  // by one of them
 
   void add_damage(std::string sentence) {
+    loses_data = true;
     if (damage.size() < limits::mcap_damage)
       damage.push_back(std::move(sentence));
     else

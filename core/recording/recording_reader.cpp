@@ -76,6 +76,7 @@ const std::vector<mcap::Attachment>& Recording::attachments() const { return con
 const std::vector<mcap::Metadata>& Recording::metadata() const { return contents_->metadata; }
 bool Recording::complete() const { return contents_->complete; }
 const std::vector<std::string>& Recording::damage() const { return contents_->damage; }
+bool Recording::has_all_data() const { return !contents_->loses_data; }
 std::uint64_t Recording::bytes() const { return contents_->bytes.size(); }
 
 std::optional<LossLedger> Recording::ledger() const {

@@ -58,6 +58,8 @@ class Recording {
   [[nodiscard]] bool complete() const;
   /// Damage of the file, one sentence each: where it is cut, which chunks fail their CRC.
   [[nodiscard]] const std::vector<std::string>& damage() const;
+  /// False where some of its data cannot be read.
+  [[nodiscard]] bool has_all_data() const;
   [[nodiscard]] std::uint64_t bytes() const;
 
   [[nodiscard]] MessageStream messages(Selection selection = {}) const;

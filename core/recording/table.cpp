@@ -383,10 +383,12 @@ const Column* Table::find(std::string_view name) const {
 }
 
 std::string Table::names() const {
+  constexpr std::size_t shown = 40;  // a screen of names; a table may have thousands
+  const std::size_t count = columns.size() + left_out.size();
   std::string list;
-  for (const Column& column : columns) list += (list.empty() ? "" : ", ") + column.name;
-  for (const auto& name : left_out) list += (list.empty() ? "" : ", ") + name;
-  return list;
+  for (std::size_t i = 0; i < std::min(count, shown); ++i)
+    list += (i == 0 ? "" : ", ") + (i < columns.size() ? columns[i].name : left_out[i - columns.size()]);
+  return count > shown ? list + " and " + std::to_string(count - shown) + " more" : list;
 }
 
 std::vector<double> Table::in(std::string_view name, std::string_view unit) const {

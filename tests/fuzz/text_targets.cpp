@@ -24,7 +24,7 @@
 #include "core/physics/expression.hpp"
 #include "core/physics/expression_units.hpp"
 #include "tests/fuzz/targets.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"
 #include "tools/geometric/lines_file.hpp"
 

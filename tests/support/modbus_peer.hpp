@@ -97,13 +97,17 @@ class Talk {
 class ModbusPeer {
  public:
   using Answer = std::function<void(Talk&)>;
-  explicit ModbusPeer(Answer answer) : answer_{std::move(answer)} {
+  /// `at`: a port that is free; 0: any.
+  explicit ModbusPeer(Answer answer, std::uint16_t at = 0) : answer_{std::move(answer)} {
     listening_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(at);
     socklen_t size = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
+    const int again = 1;  // a port that was in use a moment ago
+    (void)::setsockopt(listening_, SOL_SOCKET, SO_REUSEADDR, &again, sizeof again);
     if (::bind(listening_, generic, size) != 0 || ::listen(listening_, 16) != 0 ||
         ::getsockname(listening_, generic, &size) != 0)
       throw std::runtime_error{"no peer"};

@@ -1,4 +1,4 @@
-// A cell file, read and checked completely: every fault is found before anything starts.
+// LoadedCell: a cell file with its components made.
 #pragma once
 
 #include <filesystem>
@@ -40,9 +40,5 @@ struct LoadedCell {
 
 /// Words that a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.
 [[nodiscard]] std::string mend_name(const std::string& word, const std::vector<std::string>& names);
-
-/// Throws InputError with all faults of the file: structure, component types, parameters, connections, QoS that cannot
-/// match, two owners of one command.
-LoadedCell load_cell(const std::filesystem::path& file);
 
 }  // namespace invar::tools

@@ -13,7 +13,7 @@
 #include "core/recording/recording_reader.hpp"
 #include "core/recording/type_book.hpp"
 #include "core/recording/value_json.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 
 namespace invar::tools {
 

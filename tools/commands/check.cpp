@@ -6,7 +6,7 @@
 
 #include "core/base/name.hpp"
 #include "tools/cell/drives.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/command.hpp"
 
 namespace invar::tools {

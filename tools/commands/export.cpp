@@ -28,7 +28,7 @@ int export_(const Options& options) {
   if (options.from) how.selection.from = start + Duration::seconds(*options.from);
   if (options.to) how.selection.to = start + Duration::seconds(*options.to);
   const auto report = recording::export_recording(recording, options.out, how);
-  bool complete = report.damaged_chunks == 0;
+  bool complete = report.damaged_chunks == 0 && recording.has_all_data();
   for (const std::string& damage : recording.damage())
     std::cerr << options.recording.string() << ": " << damage << '\n';
   if (report.damaged_chunks > 0)
@@ -61,7 +61,7 @@ void add_export(CLI::App& program) {
       "`received` is\n"
       "the time of arrival at the recorder; --from and --to go by it. Both are in s since the recording's "
       "first message.\n"
-      "Exit status: 0 everything was written, 1 some messages could not be read, 2 a fault of the call");
+      "Exit status: 0 every message was written, 1 some could not be read, 2 a fault of the call");
   auto options = std::make_shared<Options>();
   command->add_option("recording", options->recording, "the recording (.mcap)")->required();
   command->add_option("--out", options->out, "folder for the tables; made where missing")->required();

@@ -113,12 +113,15 @@ struct Options {
   bool json = false;
 };
 
-void info(const Options& options) {
-  const auto json = json_of(Recording::open(options.file), options.file);
+/// The exit status: 1 where something is damaged.
+int info(const Options& options) {
+  const auto recording = Recording::open(options.file);
+  const auto json = json_of(recording, options.file);
   if (options.json)
     std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   else
     print(json);
+  return recording.has_all_data() ? 0 : 1;
 }
 
 void recover(const Options& options) {
@@ -154,10 +157,13 @@ void add_recording(CLI::App& program) {
   auto options = std::make_shared<Options>();
 
   auto* about = group->add_subcommand("info", "Show channels, counts and the loss ledger");
-  about->footer("Example: invar recording info run.mcap");
+  about->footer(
+      "Example: invar recording info run.mcap\nExit status: 0 all data are there, 1 some cannot be read");
   about->add_option("file", options->file, "the recording (.mcap)")->required();
   about->add_flag("--json", options->json, "print it as JSON");
-  about->callback([options] { info(*options); });
+  about->callback([options] {
+    if (const int status = info(*options); status != 0) throw CLI::RuntimeError(status);
+  });
 
   auto* mend =
       group->add_subcommand("recover", "Write a whole file with everything that a cut or damaged one holds");

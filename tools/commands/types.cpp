@@ -11,7 +11,7 @@
 #include "core/config/yaml.hpp"
 #include "core/dds/wire_type.hpp"
 #include "core/recording/type_book.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/cell/plugins.hpp"
 #include "tools/command.hpp"
 #include "tools/live/parameter_json.hpp"

@@ -162,6 +162,24 @@ TEST(AxisTrial, SaysWhyAJobCannotRun) {
   EXPECT_STREQ(status.text().c_str(), "axis x refused a motion of the job");
 }
 
+TEST(AxisTrial, AJobAfterATripSaysSoAtOnce) {
+  AxisTrial::Parameters of_trial;
+  of_trial.tracking.resize(1);
+  of_trial.tracking[0].name = "track";
+  of_trial.tracking[0].periods = {5.0};
+  const invar::testing::TemporaryFolder folder;
+  of_trial.tracking[0].out = (folder / "trips").string();
+  stage::Stage::Parameters of_stage = support::coarse_stage();
+  of_stage.following_error = 1e-7;
+  Cell cell{support::trial_world(), of_stage, of_trial};
+  cell.bring_up();
+  EXPECT_THAT(cell.run("track").text().c_str(), ::testing::HasSubstr("tripped while moving"));
+  const Instant asked = cell.trial.now();
+  EXPECT_THAT(cell.run("track").text().c_str(),
+              ::testing::HasSubstr("tripped before the job: mend the cause"));
+  EXPECT_LT((cell.trial.now() - asked).in_seconds(), 2.0);
+}
+
 /// The job `track` with a servo and an axis that do not go together.
 std::string tracked(const stage::Stage::Parameters& of_stage, double mass) {
   AxisTrial::Parameters of_trial;

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <vector>
 
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 
 namespace invar::tools {
 namespace {

@@ -350,5 +350,44 @@ TEST(Habits, WhyNothingComesIsSaidInWords) {
   }
 }
 
+TEST(Habits, ADeviceThatCameUpLateAndIsSlowIsNotSaidToBeAbsent) {
+  std::uint16_t port = 0;
+  {
+    const ModbusPeer gone{[](Talk&) {}};
+    port = gone.port;
+  }
+  // Six requests of 0.6 s each: at the third second some values are there and others are not.
+  const RegisterMap map = parse_map(
+      "invar_modbus_map: 1\ndevice: oven\npoll: 0.5\ntimeouts: {answer: 1, write: 2, read_back: 1, stale: "
+      "1.5}\n"
+      "registers:\n"
+      "  a: {address: 0, kind: holding, type: uint16, access: read}\n"
+      "  b: {address: 10, kind: holding, type: uint16, access: read}\n"
+      "  c: {address: 20, kind: holding, type: uint16, access: read}\n"
+      "  d: {address: 30, kind: holding, type: uint16, access: read}\n"
+      "  e: {address: 40, kind: holding, type: uint16, access: read}\n"
+      "  f: {address: 50, kind: holding, type: uint16, access: read}\n",
+      "oven.yaml");
+  Bus bus{{.port = port}};
+  Device& device = bus.add(map);
+  Health health{"here"};
+  bus.start();
+  ASSERT_TRUE(comes_true([&] { return bus.counters().refused > 0; }));
+  const ModbusPeer late{[](Talk& talk) {
+                          Talk::wait(600);
+                          be_honest(talk);
+                        },
+                        port};
+  std::string said;
+  EXPECT_TRUE(comes_true([&] {
+    for (const auto& change : health.look(device, bus.counters(), monotonic_now()))
+      said += change.text + "\n";
+    return !said.empty();
+  }));
+  bus.stop();
+  EXPECT_THAT(said, HasSubstr("does not answer"));
+  EXPECT_THAT(said, testing::Not(HasSubstr("nobody listens"))) << said;
+}
+
 }  // namespace
 }  // namespace invar::modbus
