@@ -13,7 +13,7 @@ Instant read(clockid_t clock) noexcept {
   return {std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec};
 }
 
-/// How far the host's UTC is ahead of its monotonic clock: of a few readings the one that was interrupted the least.
+/// Of a few readings the one that was interrupted the least.
 Duration host_offset() noexcept {
   Duration best{};
   Duration width{INT64_MAX};
@@ -28,8 +28,10 @@ Duration host_offset() noexcept {
   return best;
 }
 
+std::atomic<std::int64_t> continued_ns{0};  // 0: the host's
+
 SlewedClock& process_clock() noexcept {
-  static SlewedClock clock{host_offset()};
+  static SlewedClock clock{continued_ns != 0 ? Duration{continued_ns} : host_offset()};
   return clock;
 }
 
@@ -68,8 +70,12 @@ void SlewedClock::aim(Duration target, Instant monotonic) noexcept {
   turn_.store(turn + 1, std::memory_order_release);
 }
 
+void continue_stamps(Duration offset) noexcept { continued_ns = offset.ns; }
+
 Instant utc_at(Instant monotonic) noexcept { return process_clock().at(monotonic); }
 Instant utc_now() noexcept { return utc_at(monotonic_now()); }
+
+Duration system_offset() noexcept { return host_offset(); }
 
 Duration follow_utc() noexcept {
   // Both clocks of a host are steered alike, so that the offset only changes when somebody sets UTC; less than this is

@@ -39,6 +39,11 @@ class SlewedClock {
 [[nodiscard]] Instant utc_now() noexcept;
 /// The same at an instant of the monotonic clock.
 [[nodiscard]] Instant utc_at(Instant monotonic) noexcept;
+/// How far the host's UTC is ahead of its monotonic clock.
+[[nodiscard]] Duration system_offset() noexcept;
+/// At the start of a process, before the first `utc_now()`: its stamps go on from those of its launcher. A process that
+/// is started again after somebody set UTC must not stamp behind its former life.
+void continue_stamps(Duration offset) noexcept;
 /// Looks again what the host takes for UTC and lets utc_now() follow slowly. Returns how far the host is ahead. Now and
 /// then, from one thread that is not the loop's.
 Duration follow_utc() noexcept;

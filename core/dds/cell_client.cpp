@@ -48,7 +48,7 @@ CellClient::CellClient(Node& node, const std::string& cell)
         if (status.pid() == 0 && status.at().time_ns() < known.at().time_ns()) return;
         known = status;
         if (status.pid() == 0) return;  // not sent by the process itself
-        const Duration age = system_now() - sent;
+        const Duration age = system_now() - (sent + Duration{status.stamps_behind_ns()});
         const auto [least, first] = ages_.try_emplace(process, age);
         least->second = std::min(least->second, age);
       }));

@@ -1,6 +1,7 @@
 #include "core/dds/command_gate.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "core/base/clock.hpp"
 #include "core/dds/clock_offset.hpp"
@@ -10,6 +11,13 @@ namespace invar::dds {
 namespace {
 constexpr Duration between_alarms = Duration::milliseconds(5000);
 constexpr std::size_t most_told = 1000;  // writers of which it is remembered what was told
+
+/// The source timestamp of a process of ours goes on where its host's clock is set, and so do our stamps; that of another
+/// program follows the host's. The nearer one counts.
+Duration age_of(Instant sent) {
+  const Duration by_host = system_now() - sent, by_stamps = utc_now() - sent;
+  return std::abs(by_stamps.ns) < std::abs(by_host.ns) ? by_stamps : by_host;
+}
 
 std::string seconds(Duration time) { return seconds_text(time); }
 }  // namespace
@@ -24,25 +32,27 @@ CommandGate::CommandGate(std::string topic, const Profile& profile, Discovery& d
       ownership_{profile.lease,
                  [&discovery](const Claimant& owner) { return discovery.is_gone(owner.participant); }} {}
 
-/// Refuses what is older than the lifespan, by the clock of the sender less what that one is ahead.
+/// Refuses what is older than the lifespan, by the clock of the sender less what that one is apart.
 bool CommandGate::is_too_late(const Claimant& who, Duration age) {
-  if (lifespan_.ns <= 0) return false;
-  if (age > lifespan_) {
+  if (lifespan_.ns <= 0 || (age <= lifespan_ && age >= -lifespan_)) return false;
+  auto least = least_.find(who.writer);
+  const bool is_new = monotonic_now() - who.found < lifespan_;
+  if (least == least_.end() && (age < -lifespan_ || (age > lifespan_ && is_new))) {
+    if (least_.size() >= most_told) least_.clear();
+    least = least_.emplace(who.writer, age).first;
+    raise("a sample of `" + discovery_.name_of(who.participant) + "` on `" + topic_ + "` " +
+          (age.ns < 0 ? "was sent in the future" : "seems old") + " and is taken; " +
+          clocks_apart("the sender's PC", Duration{} - age, "this one"));
+  }
+  if (least == least_.end()) {
     tell(who, "it was sent " + seconds(age) + " before it arrived, and is not obeyed after " +
                   seconds(lifespan_) + " (lifespan); " +
                   clocks_apart("the sender's PC", Duration{} - age, "this one") +
                   ", or look for what holds samples up");
     return true;
   }
-  if (age >= -lifespan_) return false;
-  if (ahead_.size() >= most_told && !ahead_.contains(who.writer)) ahead_.clear();
-  const auto [known, first] = ahead_.try_emplace(who.writer, Duration{} - age);
-  if (first)
-    raise("a sample of `" + discovery_.name_of(who.participant) + "` on `" + topic_ +
-          "` was sent in the future and is taken; " +
-          clocks_apart("the sender's PC", Duration{} - age, "this one"));
-  known->second = std::max(known->second, Duration{} - age);
-  const Duration late = age + known->second;
+  least->second = std::min(least->second, age);
+  const Duration late = age - least->second;
   if (late <= lifespan_) return false;
   tell(who, "it came " + seconds(late) +
                 " later after it was sent than others of this sender, and is not obeyed after " +
@@ -53,7 +63,7 @@ bool CommandGate::is_too_late(const Claimant& who, Duration age) {
 bool CommandGate::passes(const std::string& writer, Instant sent) {
   const std::lock_guard lock{mutex_};
   const Claimant who = discovery_.claimant(writer);
-  if (is_too_late(who, system_now() - sent)) return false;
+  if (is_too_late(who, age_of(sent))) return false;
   if (!exclusive_) return true;
   const Instant now = monotonic_now();
   const Claimant* owner = ownership_.claim(who, now);
@@ -77,7 +87,7 @@ void CommandGate::gone(const std::string& writer) {
   const std::lock_guard lock{mutex_};
   if (ownership_.release(writer) && follower_.gone) follower_.gone();
   told_.erase(writer);
-  ahead_.erase(writer);
+  least_.erase(writer);
 }
 
 void CommandGate::tell(const Claimant& who, const std::string& why) {

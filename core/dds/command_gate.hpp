@@ -16,7 +16,8 @@ namespace invar::dds {
 
 /// Between a reader and the receiver of its samples. Beside ownership it holds the lifespan, by the stamps of the middleware:
 /// Fast DDS would drop old samples in silence, and all commands of a PC whose clock is behind. A sender whose clock is
-/// ahead is obeyed; its late samples are known by the earliest one that came. Any thread.
+/// ahead is obeyed, and so is one that was found within the lifespan, however old its sample seems: none is older than that.
+/// Late samples of both are known by the one that seemed youngest. Any thread.
 class CommandGate {
  public:
   /// `refused` is called for every sample that is not taken. The discovery must outlive it.
@@ -33,7 +34,7 @@ class CommandGate {
 
   /// Whether ownership or lifespan bound this topic, so that `passes` is to be asked of every sample.
   [[nodiscard]] bool is_asked_of_all() const { return exclusive_ || lifespan_.ns > 0; }
-  /// `writer`: GUID as text; `sent` by its clock (UTC).
+  /// `writer`: GUID as text; `sent` by the clock (UTC) of this PC, or by that of the sender where theirs are not known apart.
   bool passes(const std::string& writer, Instant sent);
   /// Counts a sample that is not taken and tells why, now and then.
   void refuse(const std::string& writer, const std::string& why);
@@ -59,9 +60,8 @@ class CommandGate {
     Instant at{INT64_MIN / 2};
     std::uint64_t since = 0;  // refused without a word since then
   };
-  std::map<std::string, Told> told_;  // by writer
-  std::map<std::string, Duration>
-      ahead_;  // how far the clock of a writer is ahead, of those that are beyond the lifespan
+  std::map<std::string, Told> told_;       // by writer
+  std::map<std::string, Duration> least_;  // age, of writers whose clock is further apart than the lifespan
 };
 
 }  // namespace invar::dds

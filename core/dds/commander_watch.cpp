@@ -1,10 +1,6 @@
 #include "core/dds/commander_watch.hpp"
 
-#include <pthread.h>
-#include <sys/prctl.h>
-
 #include <algorithm>
-#include <chrono>
 
 #include "core/base/clock.hpp"
 #include "core/dds/live_process.hpp"
@@ -15,25 +11,6 @@ namespace {
 constexpr std::size_t most_peers = 1000;  // processes that were heard; strangers take no more memory
 constexpr std::uint64_t asked_after =
     6;  // wakings without a heartbeat, before a process of this PC is looked up
-
-void be_first(std::thread& thread, int priority) {
-  if (priority <= 0) return;
-  sched_param parameters{};
-  parameters.sched_priority = priority;
-  (void)pthread_setschedparam(thread.native_handle(), SCHED_FIFO, &parameters);
-}
-
-/// Calls `act` once a period; what was missed is not made up for.
-template <class Act>
-void keep_time(Duration period, const std::atomic<bool>& stopping, Act act) {
-  prctl(PR_SET_TIMERSLACK, 1);
-  const auto step = std::chrono::nanoseconds{period.ns};
-  for (auto next = std::chrono::steady_clock::now(); !stopping;) {
-    act();
-    next = std::max(next + step, std::chrono::steady_clock::now());
-    std::this_thread::sleep_until(next);
-  }
-}
 }  // namespace
 
 void CommanderWatch::add(CommandGate& gate, Input<commander::Link>& link, std::function<Instant()> clock) {
@@ -112,36 +89,15 @@ void CommanderWatch::give(Watched& watched, std::int64_t silence_ns) {
 }
 
 void CommanderWatch::start(int priority) {
-  if (watched_.empty() || thread_.joinable()) return;
-  stopping_ = false;
-  thread_ = std::thread{[this] {
-    prctl(PR_SET_NAME, "invar-watch");
-    keep_time(look_period, stopping_, [this] { look(); });
-  }};
-  be_first(thread_, priority);
-}
-
-void CommanderWatch::stop() {
-  stopping_ = true;
-  if (thread_.joinable()) thread_.join();
+  if (!watched_.empty() && !pulse_) pulse_.emplace("invar-watch", look_period, priority, [this] { look(); });
 }
 
 void Heart::start() {
-  if (thread_.joinable()) return;
-  stopping_ = false;
-  thread_ = std::thread{[this] {
-    prctl(PR_SET_NAME, "invar-heart");
-    keep_time(CommanderWatch::beat_period, stopping_, [this] {
-      sample_.at().time_ns(utc_now().ns);
-      send_(sample_);
-    });
-  }};
-  be_first(thread_, 1);
-}
-
-void Heart::stop() {
-  stopping_ = true;
-  if (thread_.joinable()) thread_.join();
+  if (pulse_) return;
+  pulse_.emplace("invar-heart", CommanderWatch::beat_period, 1, [this] {
+    sample_.at().time_ns(utc_now().ns);
+    send_(sample_);
+  });
 }
 
 }  // namespace invar::dds

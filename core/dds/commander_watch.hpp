@@ -1,19 +1,19 @@
 // CommanderWatch: how long those who command the components of this process are silent.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/base/time.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/command_gate.hpp"
+#include "core/dds/pulse.hpp"
 #include "idl/commander.h"
 
 namespace invar::dds {
@@ -30,7 +30,7 @@ class CommanderWatch {
 
   /// `own_address`: of this PC; a commander with the same one runs here.
   explicit CommanderWatch(std::string own_address) : own_address_{std::move(own_address)} {}
-  ~CommanderWatch() { stop(); }
+  ~CommanderWatch() = default;
   CommanderWatch(const CommanderWatch&) = delete;
   CommanderWatch& operator=(const CommanderWatch&) = delete;
 
@@ -41,7 +41,6 @@ class CommanderWatch {
   /// One waking.
   void look();
   void start(int priority);
-  void stop();
 
  private:
   struct Watched {
@@ -71,8 +70,7 @@ class CommanderWatch {
   std::uint64_t wakings_ = 0;
   std::vector<std::unique_ptr<Watched>> watched_;
   std::map<std::string, Peer> peers_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  std::optional<Pulse> pulse_;
 };
 
 /// Sends the heartbeat of this process. Its thread goes before the usual ones where the system allows that: the sign of life
@@ -81,17 +79,15 @@ class Heart {
  public:
   using Send = std::function<void(const commander::Heartbeat&)>;
   Heart(Send send, commander::Heartbeat beat) : send_{std::move(send)}, sample_{std::move(beat)} {}
-  ~Heart() { stop(); }
+  ~Heart() = default;
   Heart(const Heart&) = delete;
   Heart& operator=(const Heart&) = delete;
   void start();
-  void stop();
 
  private:
   Send send_;
   commander::Heartbeat sample_;
-  std::atomic<bool> stopping_{false};
-  std::thread thread_;
+  std::optional<Pulse> pulse_;
 };
 
 }  // namespace invar::dds

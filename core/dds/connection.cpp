@@ -7,7 +7,9 @@
 
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/host_clocks.hpp"
 #include "core/dds/raw_type.hpp"
+#include "core/dds/source_time.hpp"
 
 namespace invar::dds {
 
@@ -137,7 +139,7 @@ std::size_t RawWriterConnection::matched() const { return readers_of(*writer_); 
 bool RawWriterConnection::write(const void* span) {
   const auto& bytes = *static_cast<const std::span<const std::byte>*>(span);
   std::vector<std::byte> copy{bytes.begin(), bytes.end()};
-  const bool written = writer_->write(&copy);
+  const bool written = write_stamped(*writer_, &copy);
   if (!written) ++refused_;
   return written;
 }
@@ -161,7 +163,8 @@ ReaderConnection::Receive raw_receiver(std::function<void(const RawSample&)> tak
       take({.cdr = state->bytes,
             .sent_ns = info.source_timestamp.to_ns(),
             .sequence = info.sample_identity.sequence_number().to64long(),
-            .writer = writer});
+            .writer = writer,
+            .participant = participant_key(info.sample_identity.writer_guid().guidPrefix.value)});
     }
   };
 }

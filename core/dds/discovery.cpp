@@ -47,8 +47,10 @@ void Discovery::add_endpoint(Endpoint endpoint) {
                                     [&](const auto& entry) { return endpoint.id.starts_with(entry.first); });
     endpoint.participant = known != participants_.end() ? known->second.name : "an unnamed participant";
   }
+  endpoint.found = monotonic_now();
   const auto old = endpoints_.find(endpoint.id);
   if (old != endpoints_.end()) {
+    endpoint.found = old->second.found;
     // Another participant of this node sees our endpoints as foreign ones; and news may come repeatedly.
     if (endpoint.is_local == old->second.is_local) old->second = std::move(endpoint);
     if (old->second.is_local || !endpoint.is_local) return;
@@ -132,8 +134,11 @@ std::string Discovery::name_of(const std::string& participant) const {
 Claimant Discovery::claimant(const std::string& writer) const {
   const std::lock_guard lock{mutex_};
   const auto known = endpoints_.find(writer);
-  return {writer, writer.substr(0, writer.find('|')),
-          known == endpoints_.end() ? 0 : known->second.qos.strength};
+  Claimant who{writer, writer.substr(0, writer.find('|'))};
+  if (known == endpoints_.end()) return who;
+  who.strength = known->second.qos.strength;
+  who.found = known->second.found;
+  return who;
 }
 
 bool Discovery::is_gone(const std::string& participant) {

@@ -26,6 +26,7 @@ struct Endpoint {
   bool is_writer = false;
   bool is_local = false;  // of this node
   Profile qos;
+  Instant found{INT64_MIN / 2};  // when, monotonic
 };
 
 struct ParticipantInfo {

@@ -13,10 +13,12 @@
 #include "core/dds/connection.hpp"
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/host_clocks.hpp"
 #include "core/dds/local_exchange.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/promised_address.hpp"
 #include "core/dds/publishing.hpp"
+#include "core/dds/pulse.hpp"
 #include "core/dds/raw_type.hpp"
 #include "core/dds/shared_memory.hpp"
 
@@ -27,6 +29,8 @@ std::string topic_name(const std::string& cell, const std::string& component, co
 }
 
 std::string heartbeat_topic(const std::string& cell) { return "cell/" + cell + "/heartbeat"; }
+
+std::string clock_topic(const std::string& cell) { return "cell/" + cell + "/clock"; }
 
 namespace {
 
@@ -50,6 +54,33 @@ Profile heartbeat_profile() {
   profile.name = "heartbeat";
   profile.traffic = Traffic::realtime;
   return profile;
+}
+
+/// Best effort: a beat that was sent again says nothing of the way.
+Profile clock_profile() {
+  Profile profile;
+  profile.name = "clock";
+  profile.depth = 16;
+  return profile;
+}
+
+/// The stamp in the CDR of `sample` and when it was sent, in the clock of this process; `copy` keeps it.
+void align(RawSample& sample, std::size_t position, const HostClocks& clocks, std::vector<std::byte>& copy) {
+  const Duration ahead = clocks.stamps_ahead(sample.participant);
+  sample.sent_ns -= ahead.ns;
+  if (ahead.ns == 0 || sample.cdr.size() < position + sizeof ahead.ns) return;
+  copy.assign(sample.cdr.begin(), sample.cdr.end());
+  const bool is_swapped = (copy[1] & std::byte{1}) == std::byte{0};  // big-endian CDR
+  std::int64_t stamp = 0;
+  const auto at = copy.begin() + static_cast<std::ptrdiff_t>(position);
+  const auto bytes = reinterpret_cast<std::byte*>(&stamp);
+  std::copy_n(at, sizeof stamp, bytes);
+  if (is_swapped) std::reverse(bytes, bytes + sizeof stamp);
+  if (stamp == 0) return;  // nobody filled it
+  stamp -= ahead.ns;
+  if (is_swapped) std::reverse(bytes, bytes + sizeof stamp);
+  std::copy_n(bytes, sizeof stamp, at);
+  sample.cdr = copy;
 }
 
 /// Where a component wants to know whether its commander is heard; nullptr: it does not, or the deployment tells it.
@@ -80,6 +111,9 @@ struct Node::Parts {
   std::unique_ptr<Heart> heart;
   std::unique_ptr<Connection> heartbeats;
   std::unique_ptr<CommanderWatch> watch;
+  std::unique_ptr<HostClocks> clocks;
+  std::unique_ptr<Connection> clock_beats;
+  std::unique_ptr<Pulse> clock_pulse;
 
   [[nodiscard]] std::string own_address() const {
     return options.addresses.empty() ? "127.0.0.1" : options.addresses.front();
@@ -89,7 +123,7 @@ struct Node::Parts {
     const std::lock_guard lock{mutex};
     // Each secured pair needs a handshake, and Fast DDS 2.9 loses some where many take part.
     auto& participant = traffic == Traffic::realtime && !options.identity ? realtime : general;
-    if (!participant) participant = std::make_unique<Participant>(options, traffic, profiles, discovery);
+    if (!participant) participant = made(options, traffic);
     return *participant;
   }
   Participant& raw_participant() {
@@ -97,8 +131,13 @@ struct Node::Parts {
     if (raw) return *raw;
     NodeOptions second = options;
     if (second.identity) second.identity->name = second_name(second.identity->name);
-    raw = std::make_unique<Participant>(second, Traffic::general, profiles, discovery);
+    raw = made(second, Traffic::general);
     return *raw;
+  }
+  std::unique_ptr<Participant> made(const NodeOptions& of, Traffic traffic) {
+    auto participant = std::make_unique<Participant>(of, traffic, profiles, discovery);
+    if (clocks) clocks->add_participant(participant_key(participant->id().guidPrefix.value));
+    return participant;
   }
   /// nullptr where samples of this profile have no way through shared memory.
   LocalExchange* exchange_of(const Profile& qos) {
@@ -129,7 +168,10 @@ Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Par
   parts_->options = std::move(options);
   parts_->profiles = std::move(profiles);
   if (parts_->options.shared_memory) remove_shared_memory_leftovers();
+  if (const auto& clocks = parts_->options.clocks)
+    parts_->clocks = std::make_unique<HostClocks>(clocks->cell, clocks->host);
   (void)parts_->participant(Traffic::general);  // discovery begins
+  if (parts_->clocks) compare_clocks();
 }
 
 Node::~Node() {
@@ -193,6 +235,20 @@ void Node::send_heartbeats(std::uint32_t cell) {
       [to](const commander::Heartbeat& sample) { (void)to->write(sample); }, std::move(beat));
 }
 
+void Node::compare_clocks() {
+  HostClocks& clocks = *parts_->clocks;
+  const std::string topic = clock_topic(parts_->options.cell);
+  parts_->clock_beats = reader<clock::Beat>(topic, clock_profile(), [&clocks](const clock::Beat& beat) {
+    clocks.heard(beat, ClockReading::now());
+  });
+  auto to = std::make_shared<Writer<clock::Beat>>(writer<clock::Beat>(topic, clock_profile()));
+  parts_->clock_pulse = std::make_unique<Pulse>("invar-clock", HostClocks::period, 0, [to, &clocks] {
+    (void)to->write(clocks.beat(ClockReading::now()));
+  });
+}
+
+const HostClocks* Node::clocks() const { return parts_->clocks.get(); }
+
 void Node::watch_commander(const InputPort& port, CommandGate& gate, const Clock& clock) {
   auto* link = commander_link(port.owner());
   if (link == nullptr) return;
@@ -213,6 +269,7 @@ void Node::bind(InputPort& port, Clock clock) {
   const auto gate =
       std::make_shared<CommandGate>(port.topic, qos, parts_->discovery, [&port] { port.refuse(); });
   inlet->guard(gate, expected_keys(port));
+  inlet->align(parts_->clocks.get());
   if (qos.exclusive) watch_commander(port, *gate, clock);
   auto local = parts_->local_reader(qos, inlet, clock);
   parts_->inputs.push_back(std::make_unique<ReaderConnection>(
@@ -239,6 +296,8 @@ void Node::stop() {
   parts_->general_publishing.stop();
   if (parts_->exchange) parts_->exchange->wake_readers();  // for what was written after the last cycle
   parts_->inputs.clear();
+  parts_->clock_pulse.reset();
+  parts_->clock_beats.reset();
   parts_->heartbeats.reset();
   parts_->watch.reset();
   parts_->heart.reset();
@@ -247,6 +306,14 @@ void Node::stop() {
 std::unique_ptr<Connection> Node::raw_reader(const std::string& topic, const std::string& type,
                                              const Profile& profile,
                                              std::function<void(const RawSample&)> take, bool keyed) {
+  const WireType* wire = WireTypes::all().find(type);
+  const auto stamp = wire == nullptr ? std::nullopt : wire->stamp_position();
+  if (stamp && parts_->clocks)
+    take = [take = std::move(take), position = *stamp, &clocks = *parts_->clocks,
+            copy = std::vector<std::byte>{}](RawSample sample) mutable {
+      align(sample, position, clocks, copy);
+      take(sample);
+    };
   return std::make_unique<ReaderConnection>(parts_->raw_participant(), topic, new RawType{type, keyed},
                                             profile, parts_->discovery, raw_receiver(std::move(take)));
 }
@@ -303,6 +370,7 @@ std::unique_ptr<Connection> Node::make_reader(const std::string& topic, std::typ
   const auto gate =
       profile.exclusive ? std::make_shared<CommandGate>(topic, profile, parts_->discovery) : nullptr;
   inlet->guard(gate);
+  inlet->align(parts_->clocks.get());
   auto local = parts_->local_reader(profile, inlet, utc_now);
   return std::make_unique<ReaderConnection>(
       parts_->participant(profile.traffic), topic, wire.make_support(), profile, parts_->discovery,

@@ -22,12 +22,19 @@
 namespace invar::dds {
 
 class CommandGate;
+class HostClocks;
 
 /// A PC on which processes of the cell run: where its participants are looked for, one by one, without multicast.
 struct PeerHost {
   std::string address;
   std::size_t processes = 0;  // of the cell, on that PC
   bool operator==(const PeerHost&) const = default;
+};
+
+/// A process that finds out how far the clocks of the other hosts are apart, and gives its own.
+struct ClockOptions {
+  std::uint32_t cell = 0;
+  std::string host;  // of this process, as the cell file names it
 };
 
 struct NodeOptions {
@@ -40,6 +47,8 @@ struct NodeOptions {
   bool may_come_later = false;
   /// The hosts of the cell, this one among them. Multicast finds others in addition, where the network lets it through.
   std::vector<PeerHost> peers;
+  /// Only of a cell on several hosts in real time.
+  std::optional<ClockOptions> clocks;
   bool shared_memory = true;
   /// Of the cell on this PC; they share /dev/shm.
   std::size_t processes = 1;
@@ -68,9 +77,10 @@ struct OutputBinding {
 /// Where a raw sample came from.
 struct RawSample {
   std::span<const std::byte> cdr;  // with its encapsulation; valid during the call
-  std::int64_t sent_ns = 0;        // source timestamp, UTC since 1970
+  std::int64_t sent_ns = 0;        // source timestamp, UTC since 1970, by the sender's clock
   std::uint64_t sequence = 0;      // counts the writer's samples from 1: a gap is a loss
   std::string_view writer;         // GUID as text
+  std::uint64_t participant = 0;   // of the writer: participant_key of its GUID prefix
 };
 
 using Clock = std::function<Instant()>;
@@ -80,6 +90,9 @@ using Clock = std::function<Instant()>;
 
 /// Where the processes that command say that they live.
 [[nodiscard]] std::string heartbeat_topic(const std::string& cell);
+
+/// Where the processes of several hosts compare their clocks.
+[[nodiscard]] std::string clock_topic(const std::string& cell);
 
 /// Keeps a writer or reader alive; the node must outlive it.
 class Connection {
@@ -177,6 +190,8 @@ class Node {
   [[nodiscard]] std::unique_ptr<Connection> raw_writer(const std::string& topic, const std::string& type,
                                                        const Profile& profile);
 
+  /// nullptr without `clocks` in its options.
+  [[nodiscard]] const HostClocks* clocks() const;
   /// What was discovered so far; a full picture takes about a second after the node was made.
   [[nodiscard]] Snapshot snapshot() const;
   /// The alarms since the last call.
@@ -194,6 +209,7 @@ class Node {
                                           const Profile& profile,
                                           std::function<void(const void*, Instant)> take);
   void send_heartbeats(std::uint32_t cell);
+  void compare_clocks();
   void watch_commander(const InputPort& port, CommandGate& gate, const Clock& clock);
   struct Parts;
   std::unique_ptr<Parts> parts_;

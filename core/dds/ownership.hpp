@@ -14,6 +14,7 @@ struct Claimant {
   std::string writer;       // GUID as text
   std::string participant;  // the part of it that writers of one process have in common
   std::int64_t strength = 0;
+  Instant found{INT64_MIN / 2};  // when discovery found the writer, monotonic
 };
 
 /// The rules of DDS, made definite, and for the thing that is commanded, whatever key a sample carries:

@@ -12,6 +12,7 @@
 #include "core/base/clock.hpp"
 #include "core/base/shown.hpp"
 #include "core/dds/clock_offset.hpp"
+#include "core/dds/host_clocks.hpp"
 #include "core/dds/simulated_clock.hpp"
 
 namespace invar::dds {
@@ -221,6 +222,22 @@ void ProcessService::publish_late(const ProcessStatus& status) {
               milliseconds(input.limit, 3) + "; the oldest so far was of " + milliseconds(input.age.max, 3));
 }
 
+/// How far the clock of this host is ahead of that of the reference, where both are measured.
+void ProcessService::tell_clock(lifecycle::ProcessStatus& process) const {
+  const ClockReading own = ClockReading::now();
+  process.stamps_behind_ns(process.simulated() ? 0 : (own.system - own.stamps).ns);
+  process.clock_error_ns(-1);
+  const HostClocks* clocks = node_.clocks();
+  if (clocks == nullptr) return;
+  process.clock_reference(options_.clock_reference);
+  if (options_.clock_reference == clocks->host()) process.clock_error_ns(0);
+  for (const HostClock& other : clocks->hosts(monotonic_now()))
+    if (other.host == options_.clock_reference) {
+      process.clock_ahead_ns(-other.ahead.ns);
+      process.clock_error_ns(other.error.ns);
+    }
+}
+
 void ProcessService::publish_status() {
   const std::lock_guard turn{status_turn_};
   const ProcessStatus status = control_.status();
@@ -254,6 +271,7 @@ void ProcessService::publish_status() {
   process.recent_wake_up(on_wire(recent.wake_up));
   process.recent_compute(on_wire(recent.compute));
   process.recent_latency(on_wire(recent.latency));
+  tell_clock(process);
   process_.write(process);
 
   for (std::size_t i = 0; i < status.components.size(); ++i) {

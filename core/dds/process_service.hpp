@@ -40,6 +40,8 @@ class ProcessService {
     /// How often the process was started again, and how its last life ended.
     std::uint32_t restarts = 0;
     std::string last_end;
+    /// Host with whose clock the others are compared; empty: a cell on one host.
+    std::string clock_reference;
   };
   ProcessService(Node& node, ProcessControl& control, Options options);
   ~ProcessService();
@@ -62,6 +64,7 @@ class ProcessService {
   void run();
   void publish_news();
   void follow_clock();
+  void tell_clock(lifecycle::ProcessStatus& process) const;
   void publish_late(const ProcessStatus& status);
   void serve(const lifecycle::LifecycleRequest& request, Duration age);
   void serve(const lifecycle::ParameterRequest& request, Duration age);

@@ -12,7 +12,9 @@
 #include "core/dds/command_gate.hpp"
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
+#include "core/dds/host_clocks.hpp"
 #include "core/dds/local_exchange.hpp"
+#include "core/dds/source_time.hpp"
 #include "core/dds/type.hpp"
 #include "core/dds/wire_type.hpp"
 
@@ -21,10 +23,11 @@ namespace invar::dds {
 namespace fdds = eprosima::fastdds::dds;
 using eprosima::fastrtps::types::ReturnCode_t;
 
-/// The generated code takes void*, though it only reads.
+/// The generated code takes void*, though it only reads. The source timestamp is that of this process's stamps, which never go
+/// back: a reader that keeps the newest sample would drop all others until they are newer.
 template <class T>
 bool write_sample(fdds::DataWriter& writer, const T& sample) {
-  return writer.write(const_cast<T*>(&sample));  // NOLINT
+  return write_stamped(writer, const_cast<T*>(&sample));  // NOLINT
 }
 
 /// Leaves out cycles that come too soon after the last one sent; all samples of one cycle share its fate.
@@ -125,9 +128,10 @@ class TypedInlet final : public Inlet {
     while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
            ReturnCode_t::RETCODE_OK) {
       if (!info.valid_data) continue;
+      const bool is_of_cell = align(info);
       if (came_locally(info)) {
         if (keep_ && expected_ && !has_expected_key(sample_, *expected_)) drop(reader, info);  // told already
-      } else if (is_obeyed(info)) {
+      } else if (is_obeyed(info, is_of_cell)) {
         sink_(sample_, time_ == SinkTime::arrival ? now : Instant{info.source_timestamp.to_ns()});
       } else if (keep_) {
         drop(reader, info);
@@ -168,11 +172,26 @@ class TypedInlet final : public Inlet {
     }
     return true;
   }
-  bool is_obeyed(const fdds::SampleInfo& info) {
+  /// Turns the stamp into that of this process; true where the sender's clock is known.
+  bool align(const fdds::SampleInfo& info) {
+    if constexpr (requires { sample_.at().time_ns(); }) {
+      if (clocks_ == nullptr || sample_.at().time_ns() == 0) return false;
+      const std::uint64_t sender = participant_key(info.sample_identity.writer_guid().guidPrefix.value);
+      sample_.at().time_ns(sample_.at().time_ns() - clocks_->stamps_ahead(sender).ns);
+      return clocks_->knows(sender);
+    }
+    return false;
+  }
+  /// When it was sent, by the clock of this process where that of the sender is known, else by that one.
+  [[nodiscard]] Instant sent(const fdds::SampleInfo& info, bool is_of_cell) const {
+    if constexpr (requires { sample_.at().time_ns(); })
+      if (is_of_cell) return Instant{sample_.at().time_ns()};
+    return {info.source_timestamp.to_ns()};
+  }
+  bool is_obeyed(const fdds::SampleInfo& info, bool is_of_cell) {
     const auto writer = [&info] { return guid_text(info.sample_identity.writer_guid()); };
     if (!is_sound(writer)) return false;
-    return !gate_ || !gate_->is_asked_of_all() ||
-           gate_->passes(writer(), Instant{info.source_timestamp.to_ns()});
+    return !gate_ || !gate_->is_asked_of_all() || gate_->passes(writer(), sent(info, is_of_cell));
   }
   /// A refused sample that stayed would keep its instance, and so many foreign keys leave no room for the right one.
   static void drop(fdds::DataReader& reader, const fdds::SampleInfo& info) {
@@ -198,6 +217,18 @@ class TypedWire final : public WireType {
   [[nodiscard]] std::type_index index() const override { return typeid(T); }
   [[nodiscard]] bool is_stamped() const override {
     return requires(const T& sample) { sample.at().time_ns(); };
+  }
+  [[nodiscard]] std::optional<std::size_t> stamp_position() const override {
+    if constexpr (requires(T & sample) { sample.at().time_ns(0); }) {
+      T sample;
+      sample.at().time_ns(0);
+      const auto zero = cdr_of(sample);
+      sample.at().time_ns(-1);
+      const auto ones = cdr_of(sample);
+      return static_cast<std::size_t>(std::mismatch(zero.begin(), zero.end(), ones.begin()).first -
+                                      zero.begin());
+    }
+    return std::nullopt;
   }
   [[nodiscard]] std::size_t largest_sample() const override { return Type<B>{}.m_typeSize; }
   [[nodiscard]] std::string key_part() const override {
@@ -248,6 +279,14 @@ class TypedWire final : public WireType {
   }
   bool write(fdds::DataWriter& writer, const void* sample) const override {
     return write_sample(writer, *static_cast<const T*>(sample));
+  }
+
+ private:
+  static std::vector<eprosima::fastrtps::rtps::octet> cdr_of(T& sample) {
+    Type<B> type;
+    eprosima::fastrtps::rtps::SerializedPayload_t payload{type.getSerializedSizeProvider(&sample)()};
+    (void)type.serialize(&sample, &payload);
+    return {payload.data, payload.data + payload.length};
   }
 };
 

@@ -25,6 +25,7 @@ class TopicDataType;
 namespace invar::dds {
 
 class CommandGate;
+class HostClocks;
 class LocalReader;
 class LocalWriter;
 
@@ -58,8 +59,11 @@ class Inlet {
   }
   /// Set-up only: samples of writers that `local` serves are left out of what a reader hands over.
   void prefer(std::shared_ptr<const LocalReader> local) { local_ = std::move(local); }
+  /// Set-up only: stamps of samples are turned into those of this process.
+  void align(const HostClocks* clocks) { clocks_ = clocks; }
 
  protected:
+  const HostClocks* clocks_ = nullptr;
   std::shared_ptr<CommandGate> gate_;
   std::optional<ExpectedKeys> expected_;
   std::shared_ptr<const LocalReader> local_;
@@ -77,6 +81,8 @@ class WireType {
   [[nodiscard]] virtual std::type_index index() const = 0;
   /// Its samples say when they were made: `at`, an invar::base::Stamp.
   [[nodiscard]] virtual bool is_stamped() const = 0;
+  /// Where `at.time_ns` stands in its CDR (with encapsulation); nothing: it has no stamp.
+  [[nodiscard]] virtual std::optional<std::size_t> stamp_position() const = 0;
   /// Bytes of the largest sample on the wire.
   [[nodiscard]] virtual std::size_t largest_sample() const = 0;
   /// The member of its key beside `cell`: axis, node, sensor or component_id; empty: none.

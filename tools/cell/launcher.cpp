@@ -22,7 +22,7 @@
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/children_watch.hpp"
 #include "tools/cell/last_words.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
@@ -89,6 +89,10 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   if (options.quiet) words.emplace_back("--quiet");
   if (restarts.count() > 0)
     words.insert(words.end(), {"--restarts", std::to_string(restarts.count()), "--last-end", last_end});
+  if (!simulated) {
+    const Instant now = monotonic_now();
+    words.insert(words.end(), {"--stamps", std::to_string((utc_at(now) - now).ns)});
+  }
   if (simulated && options.pace > 0.0) words.insert(words.end(), {"--pace", std::to_string(options.pace)});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
@@ -326,6 +330,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
            (options.job.empty() ? keep_alive(children, options, cell, folder.path(), restart_news)
                                 : !any_ended(children))) {
       beside.look(children);
+      (void)follow_utc();  // as its processes do, for those that it starts again
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   }

@@ -14,10 +14,13 @@
 #include <set>
 #include <thread>
 
+#include "components/calibration/job_component.hpp"
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "core/base/clock.hpp"
 #include "core/dds/cell_client.hpp"
+#include "core/dds/clock_offset.hpp"
+#include "core/dds/host_clocks.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
 #include "core/dds/segment_size.hpp"
@@ -31,7 +34,7 @@
 #include "tools/cell/component_faults.hpp"
 #include "tools/cell/job_follower.hpp"
 #include "tools/cell/last_words.hpp"
-#include "tools/cell/loaded_cell.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/cell/node_courier.hpp"
 #include "tools/cell/notice_log.hpp"
 #include "tools/cell/own_host.hpp"
@@ -63,6 +66,8 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of,
       static_cast<std::size_t>(std::count_if(loaded.cell->processes.begin(), loaded.cell->processes.end(),
                                              [&](const auto& other) { return other.host == process.host; }));
   if (options.identity) options.identity->may_command = asks_others(of);
+  if (!simulated && loaded.cell->hosts.size() > 1)
+    options.clocks = dds::ClockOptions{loaded.cell->id, process.host};
   if (process.realtime) {
     options.realtime_priority = std::max(0, process.realtime->priority - 10);
     options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps
@@ -94,6 +99,8 @@ class RunningProcess {
       member.component->folders = folders;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
       if (auto* found = dynamic_cast<supervisor::Supervisor*>(member.component.get())) supervisor_ = found;
+      if (auto* found = dynamic_cast<calibration::JobComponent*>(member.component.get()))
+        found->refuse_while([this] { return clocks_too_far_apart(); });
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
@@ -118,7 +125,8 @@ class RunningProcess {
             .fault_of = [this](std::size_t index) { return faults_.of(index, executor_.now()); },
             .on_notice = [this](const event::Notice& notice) { log_.write(notice); },
             .restarts = options.restarts,
-            .last_end = options.last_end});
+            .last_end = options.last_end,
+            .clock_reference = loaded.cell->hosts.front().name});
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
   }
 
@@ -201,6 +209,16 @@ class RunningProcess {
         lines.push_back(component.name + ": " + fault);
     }
     return lines;
+  }
+
+  /// Stamps are turned into this process's whatever the clocks say; a clock that is far off is one that nobody keeps.
+  std::string clocks_too_far_apart() {
+    if (node_.clocks() == nullptr) return "";
+    for (const dds::HostClock& other : node_.clocks()->hosts(monotonic_now()))
+      if (other.ahead > loaded_.cell->clock_bound || other.ahead < -loaded_.cell->clock_bound)
+        return dds::clocks_apart("host `" + other.host + "`", other.ahead, "`" + file_.host + "`") +
+               "; `clock_bound` of the cell is " + dds::seconds_text(loaded_.cell->clock_bound);
+    return "";
   }
 
   void follow_job() {

@@ -12,6 +12,7 @@
 #include "core/base/input_file.hpp"
 #include "core/base/name.hpp"
 #include "core/base/new_file.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/remote_options.hpp"
 #include "tools/deploy/calibrations.hpp"

@@ -14,6 +14,7 @@
 #include <optional>
 #include <sstream>
 
+#include "core/base/clock.hpp"
 #include "core/base/name.hpp"
 #include "core/base/temporary_folder.hpp"
 #include "tools/cell/launcher.hpp"
@@ -38,6 +39,7 @@ struct Options {
   pid_t launcher = 0;
   std::uint32_t restarts = 0;
   std::string last_end;
+  std::int64_t stamps_ns = 0;
   bool simulated = false;
   bool real_time = false;
   bool json = false;
@@ -45,6 +47,7 @@ struct Options {
 
 /// One process, without a launcher.
 int run_one(const Options& options) {
+  if (options.stamps_ns != 0) continue_stamps(Duration{options.stamps_ns});
   std::optional<TemporaryFolder> folder;  // for its last words, where only we want them
   std::filesystem::path outcome = options.outcome;
   if (options.json && outcome.empty()) outcome = folder.emplace("invar-run").path() / "outcome.json";
@@ -150,6 +153,9 @@ void add_run(CLI::App& program) {
   // For `invar run` alone.
   command->add_option("--launcher", options->launcher, "its process id")->group("");
   command->add_option("--restarts", options->restarts, "how often it started this process again")->group("");
+  command
+      ->add_option("--stamps", options->stamps_ns, "how far its stamps are ahead of the monotonic clock [ns]")
+      ->group("");
   command->add_option("--last-end", options->last_end, "how the last life of this process ended")->group("");
   command->callback([options] {
     if (const int status = run(*options); status != 0) throw CLI::RuntimeError(status);

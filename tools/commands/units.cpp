@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/base/new_file.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/command.hpp"
 #include "tools/deploy/unit.hpp"
 #include "tools/positive.hpp"

@@ -1,3 +1,4 @@
+#include "tools/cell/load_cell.hpp"
 #include "tools/deploy/deployment.hpp"
 
 #include <signal.h>

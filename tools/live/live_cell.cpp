@@ -368,7 +368,9 @@ dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers, std::int6
 }
 
 bool is_service_topic(const std::string& topic) {
-  return topic.find("/process/") != std::string::npos || topic.find("/lockstep/") != std::string::npos;
+  return topic.find("/process/") != std::string::npos || topic.find("/lockstep/") != std::string::npos ||
+         (topic.starts_with("cell/") &&
+          std::count(topic.begin(), topic.end(), '/') == 2);  // heartbeat, clock
 }
 
 }  // namespace invar::tools

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <ctime>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "tools/live/text_table.hpp"
@@ -13,6 +14,14 @@ namespace {
 
 nlohmann::ordered_json json_of(const lifecycle::Percentiles& p) {
   return {{"p50_ns", p.p50_ns()}, {"p99_ns", p.p99_ns()}, {"p999_ns", p.p999_ns()}, {"max_ns", p.max_ns()}};
+}
+
+/// null: a cell on one host, or not measured yet.
+nlohmann::ordered_json json_of_clock(const lifecycle::ProcessStatus& p) {
+  if (p.clock_reference().to_string().empty() || p.clock_error_ns() < 0) return nullptr;
+  return {{"reference", p.clock_reference().c_str()},
+          {"ahead_ns", p.clock_ahead_ns()},
+          {"error_ns", p.clock_error_ns()}};
 }
 
 std::string clock_text(const lifecycle::ProcessStatus& process) {
@@ -68,6 +77,29 @@ void print_times(const CellStatus& status, std::ostream& out) {
           nullptr, input.limit_ns());
   }
   if (table.empty()) return;
+  out << '\n';
+  table.print(out);
+}
+
+/// The clocks of the hosts, of each host the process that knows its own best.
+void print_clocks(const CellStatus& status, std::ostream& out) {
+  std::map<std::string, const lifecycle::ProcessStatus*> hosts;
+  std::string reference;
+  for (const auto& p : status.processes) {
+    if (p.clock_reference().to_string().empty() || p.pid() == 0) continue;
+    reference = p.clock_reference().c_str();
+    const auto [known, first] = hosts.try_emplace(p.host().c_str(), &p);
+    const std::int64_t error = p.clock_error_ns(), before = known->second->clock_error_ns();
+    if (!first && error >= 0 && (before < 0 || error < before)) known->second = &p;
+  }
+  if (hosts.size() < 2) return;
+  TextTable table{{"clock of host", "ahead of " + reference + " [ms]>", "known within [ms]>"}};
+  for (const auto& [host, p] : hosts)
+    if (p->clock_error_ns() < 0)
+      table.add({host, "not measured", "-"});
+    else
+      table.add({host, number_text(static_cast<double>(p->clock_ahead_ns()) * 1e-6),
+                 number_text(static_cast<double>(p->clock_error_ns()) * 1e-6)});
   out << '\n';
   table.print(out);
 }
@@ -143,6 +175,7 @@ void print(const CellStatus& status, std::ostream& out) {
                     state_text(c.state()), std::to_string(c.steps()), std::to_string(c.lost())});
   out << '\n';
   components.print(out);
+  print_clocks(status, out);
   print_times(status, out);
 
   const auto faults = status.faults();
@@ -196,6 +229,7 @@ nlohmann::ordered_json json_of(const lifecycle::ProcessStatus& p, bool silent) {
           {"lost", p.lost()},
           {"restarts", p.restarts()},
           {"last_end", p.last_end().c_str()},
+          {"clock", json_of_clock(p)},
           {"wake_up", json_of(p.wake_up())},
           {"compute", json_of(p.compute())},
           {"latency", json_of(p.latency())},

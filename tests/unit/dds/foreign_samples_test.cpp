@@ -222,6 +222,26 @@ TEST(CommandGateClocks, ASenderBehindIsRefusedAndTheDifferenceIsNamed) {
   EXPECT_THAT(alarms[0].text, HasSubstr("3600 s behind"));
 }
 
+TEST(CommandGateClocks, ASenderThatWasJustFoundCannotBeLateSoThatItsClockIsBehind) {
+  Discovery discovery;
+  discovery.add_participant("p", "plant");
+  discovery.add_endpoint({.id = "p|1",
+                          .participant = "plant",
+                          .topic = "cell/test/c",
+                          .type = "T",
+                          .is_writer = true,
+                          .is_local = false,
+                          .qos = {}});
+  CommandGate gate{"cell/test/c", standard_profiles().at("command"), discovery};
+  const Duration behind = Duration::seconds(3.0);
+  EXPECT_TRUE(gate.passes("p|1", system_now() - behind));
+  EXPECT_TRUE(gate.passes("p|1", system_now() - behind));
+  EXPECT_FALSE(gate.passes("p|1", system_now() - behind - Duration::seconds(1.5))) << "1.5 s on its way";
+  std::string told;
+  for (const auto& alarm : discovery.take_alarms()) told += alarm.text + "\n";
+  EXPECT_THAT(told, HasSubstr("is 3 s behind that of"));
+}
+
 // A command of a person is a client of its own: a cell that runs for years hears millions.
 TEST(Requests, EachClientIsHeardAndLeavesNoMemoryBehind) {
   Node server{local("server"), standard_profiles()}, clients{local("clients"), standard_profiles()};

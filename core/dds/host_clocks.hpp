@@ -1,0 +1,91 @@
+// HostClocks: how far the clocks of other processes are ahead of this one's, measured by beats over DDS.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/time.hpp"
+#include "idl/clock.h"
+
+namespace invar::dds {
+
+/// The clocks of this process at one instant.
+struct ClockReading {
+  Instant monotonic;
+  Duration stamps;  // the clock of its stamps less the monotonic one
+  Duration system;  // the host's UTC less the monotonic one
+  static ClockReading now();
+};
+
+/// The clock (UTC) of another host.
+struct HostClock {
+  std::string host;
+  Duration ahead;  // of this host's
+  Duration
+      error;  // half of the round trip: the offset lies within it, however the way there differs from the way back
+};
+
+/// Names a participant in beats.
+[[nodiscard]] std::uint64_t participant_key(std::span<const unsigned char, 12> prefix) noexcept;
+
+/// The offset of two monotonic clocks from four stamps (RFC 5905, 8), of the last 16 measurements the one with the shortest
+/// round trip. Nobody sets a monotonic clock, so an offset holds while somebody sets a host's clock; how far stamps are from
+/// it comes with each beat. Any thread.
+class HostClocks {
+ public:
+  static constexpr Duration period = Duration::milliseconds(100);
+
+  HostClocks(std::uint32_t cell, std::string host);
+  /// Set-up: one of this process.
+  void add_participant(std::uint64_t key);
+  [[nodiscard]] clock::Beat beat(const ClockReading& own);
+  void heard(const clock::Beat& beat, const ClockReading& own);
+
+  [[nodiscard]] bool knows(std::uint64_t participant) const noexcept { return find(participant) != nullptr; }
+  /// How far the stamps of a participant are ahead of ours; 0 where that cannot be told from nothing, and of strangers. Takes
+  /// no lock.
+  [[nodiscard]] Duration stamps_ahead(std::uint64_t participant) const noexcept;
+  /// The other hosts that were heard in the last 5 s, each by its process with the shortest round trip.
+  [[nodiscard]] std::vector<HostClock> hosts(Instant monotonic) const;
+  [[nodiscard]] const std::string& host() const { return host_; }
+
+ private:
+  struct Measurement {
+    Duration offset, round_trip;
+  };
+  struct Peer {
+    std::string host;
+    Instant heard;
+    std::int64_t sent_ns = 0;  // of its newest beat
+    Duration system;
+    std::array<Measurement, 16> last{};
+    std::size_t count = 0;
+  };
+  struct Known {
+    std::atomic<std::uint64_t> participant{0};
+    std::atomic<std::int64_t> ahead_ns{0};
+  };
+
+  [[nodiscard]] static const Measurement& best(const Peer& peer);
+  [[nodiscard]] const Known* find(std::uint64_t participant) const noexcept;
+  void know(std::uint64_t participant, Duration ahead) noexcept;
+
+  std::uint32_t cell_;
+  std::string host_;
+  std::uint64_t id_;
+  mutable std::mutex mutex_;
+  std::vector<std::uint64_t> participants_;
+  std::map<std::uint64_t, Peer> peers_;
+  Duration system_;  // of this host, at the last beat
+  static constexpr std::size_t most_known = 256;
+  std::array<Known, most_known> known_{};
+};
+
+}  // namespace invar::dds
