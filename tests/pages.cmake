@@ -7,6 +7,7 @@ set(pages
   docs/tutorials/print-and-correct.md
   docs/how-to/apply-a-model.md
   docs/how-to/calibrate.md
+  docs/how-to/connect-to-the-plant.md
   docs/how-to/correct-live.md
   docs/how-to/deploy-a-cell.md
   docs/how-to/diagnose-a-recording.md

@@ -28,6 +28,7 @@ int run(int argc, char** argv) {
   program.set_version_flag("--version", version);
   invar::tools::add_about(program);
   invar::tools::add_backup(program);
+  invar::tools::add_bridge(program);
   invar::tools::add_calibrate(program);
   invar::tools::add_check(program);
   invar::tools::add_completion(program);

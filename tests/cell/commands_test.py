@@ -384,6 +384,9 @@ class Acting(unittest.TestCase):
         time.sleep(1.0)  # the order is not sent yet
         self.assertEqual(invar("lifecycle", CELL_FILE, "compensation", "activate"), (0, "compensation: active\n", ""))
         self.assertEqual(waiting.end(), (0, "compensation: no model any more\n", ""))
+        for stage in ("stage_x", "stage_y"):  # which let go of its motor when its correction stayed away
+            for transition in ("deactivate", "activate"):
+                self.assertEqual(invar("lifecycle", CELL_FILE, stage, transition)[0], 0)
 
     def test_parameters_are_listed_read_and_changed_within_their_bounds(self):
         status, out, err = invar("param", "list", CELL_FILE, "thermal", "--json")

@@ -5,6 +5,7 @@
 #include "components/all.hpp"
 #include "components/calibration/job_component.hpp"
 #include "core/base/shown.hpp"
+#include "tools/cell/bridge_file.hpp"
 #include "tools/cell/connections.hpp"
 #include "tools/cell/plugins.hpp"
 #include "tools/cell/qos.hpp"
@@ -114,6 +115,7 @@ LoadedCell load_cell(const std::filesystem::path& file) {
   check_qos(loaded);
   check_jobs(loaded);
   check_reach(loaded);
+  (void)read_bridge(loaded);
   find_places(loaded);
   loaded.yaml.finish();
   return loaded;

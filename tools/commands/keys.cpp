@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/fault.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/command.hpp"
 #include "tools/keys/key_ring.hpp"
 #include "tools/live/text_table.hpp"

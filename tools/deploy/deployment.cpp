@@ -1,4 +1,3 @@
-#include "tools/cell/load_cell.hpp"
 #include "tools/deploy/deployment.hpp"
 
 #include <signal.h>
@@ -18,6 +17,7 @@
 
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"
 #include "tools/deploy/scripts.hpp"
 #include "tools/deploy/unit.hpp"

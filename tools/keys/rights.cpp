@@ -39,9 +39,10 @@ void add_service(const config::Cell& cell, Rights& rights) {
   const dds::ServiceTopics topics{cell.name};
   rights.writes.insert({topics.process_status, topics.component_status, topics.notices,
                         topics.lifecycle_reply, topics.parameter_reply, topics.model_reply,
-                        lockstep(cell, "reached")});
+                        lockstep(cell, "reached"), dds::clock_topic(cell.name)});
   rights.reads.insert({topics.lifecycle_request, topics.parameter_request, topics.model_request,
-                       lockstep(cell, "grant"), dds::heartbeat_topic(cell.name)});
+                       lockstep(cell, "grant"), dds::heartbeat_topic(cell.name),
+                       dds::clock_topic(cell.name)});
 }
 
 /// What a program must read that asks others.

@@ -6,6 +6,7 @@
 namespace invar::tools {
 
 /// As those in tools/command.hpp.
+void add_bridge(CLI::App& program);
 void add_completion(CLI::App& program);
 void add_doctor(CLI::App& program);
 void add_echo(CLI::App& program);

@@ -17,21 +17,24 @@ namespace invar::dds::testing {
 
 /// Programs that run at the same time get different domains: each claims one by a socket that goes with the process. Ports
 /// of domains up to 100 stay below those that the system gives to others.
+inline std::uint32_t claim_domain() {
+  const auto first = static_cast<std::uint32_t>(getpid());
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    const std::uint32_t domain = 1U + (first + i) % 100U;
+    const std::string name = "invar-test-domain/" + std::to_string(domain);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    std::copy(name.begin(), name.end(), address.sun_path + 1);
+    const int claim = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    if (bind(claim, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return domain;
+    close(claim);
+  }
+  return 1U + first % 100U;
+}
+
+/// The domain of this program.
 inline std::uint32_t test_domain() {
-  static const std::uint32_t claimed = [] {
-    const auto first = static_cast<std::uint32_t>(getpid());
-    for (std::uint32_t i = 0; i < 100; ++i) {
-      const std::uint32_t domain = 1U + (first + i) % 100U;
-      const std::string name = "invar-test-domain/" + std::to_string(domain);
-      sockaddr_un address{};
-      address.sun_family = AF_UNIX;
-      std::copy(name.begin(), name.end(), address.sun_path + 1);
-      const int claim = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-      if (bind(claim, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return domain;
-      close(claim);
-    }
-    return 1U + first % 100U;
-  }();
+  static const std::uint32_t claimed = claim_domain();
   return claimed;
 }
 
