@@ -118,8 +118,9 @@ void add_restore(CLI::App& program) {
   auto* command = program.add_subcommand("restore", "Put back what a cell had calibrated, from a backup");
   command->footer(
       "Example: invar restore deployment/xy-table.yaml xy-table.tar\n"
-      "The cell must not run; with --deployed it is stopped and started. All folders change at once, or none "
-      "does.\n"
+      "The cell must not run; with --deployed it is stopped and started. Each folder changes as a whole; a "
+      "fault "
+      "in one leaves all as they were.\n"
       "A folder as it was before stays beside it as NAME.before. The cell file and the files that it names "
       "stay.\n"
       "Exit status: 0 restored, 1 a PC failed, 2 the call or a file is wrong: nothing was changed");

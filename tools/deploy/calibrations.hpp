@@ -18,7 +18,8 @@ namespace invar::tools {
 /// files that it names. Throws InputError where a folder changes again and again, or a file cannot be read.
 [[nodiscard]] std::string backup_of(const LoadedCell& loaded, const std::filesystem::path& data);
 
-/// The folders take the content of the backup, all of them or none; a folder as it was before stays beside it as NAME.before.
+/// The folders take the content of the backup; after a fault all are as they were. A folder as it was before stays beside it as
+/// NAME.before. A program that is killed between two folders leaves each of them whole.
 /// Returns what was restored, one line a folder. Throws InputError for another cell's backup, a damaged one, or a cell of which a
 /// process runs on this PC; nothing is changed then. `dry_run`: only these are looked for, but the last.
 std::vector<std::string> restore(const LoadedCell& loaded, const std::filesystem::path& data,
