@@ -3,8 +3,10 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <string>
 
+#include "core/base/clock.hpp"
 #include "core/base/shown.hpp"
 #include "core/base/time.hpp"
 
@@ -14,6 +16,13 @@ namespace invar::dds {
 inline Instant system_now() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+}
+
+/// Age of a sample. The source timestamp of a process of Invar goes on where its host's clock is set, and so do our stamps; that
+/// of another program follows the host's. The nearer one counts.
+inline Duration age_by_nearer_clock(Instant sent) {
+  const Duration by_host = system_now() - sent, by_stamps = utc_now() - sent;
+  return std::abs(by_stamps.ns) < std::abs(by_host.ns) ? by_stamps : by_host;
 }
 
 inline std::string seconds_text(Duration time) {

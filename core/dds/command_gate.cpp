@@ -1,7 +1,6 @@
 #include "core/dds/command_gate.hpp"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "core/base/clock.hpp"
 #include "core/dds/clock_offset.hpp"
@@ -11,13 +10,6 @@ namespace invar::dds {
 namespace {
 constexpr Duration between_alarms = Duration::milliseconds(5000);
 constexpr std::size_t most_told = 1000;  // writers of which it is remembered what was told
-
-/// The source timestamp of a process of ours goes on where its host's clock is set, and so do our stamps; that of another
-/// program follows the host's. The nearer one counts.
-Duration age_of(Instant sent) {
-  const Duration by_host = system_now() - sent, by_stamps = utc_now() - sent;
-  return std::abs(by_stamps.ns) < std::abs(by_host.ns) ? by_stamps : by_host;
-}
 
 std::string seconds(Duration time) { return seconds_text(time); }
 }  // namespace
@@ -33,13 +25,14 @@ CommandGate::CommandGate(std::string topic, const Profile& profile, Discovery& d
                  [&discovery](const Claimant& owner) { return discovery.is_gone(owner.participant); }} {}
 
 /// Refuses what is older than the lifespan, by the clock of the sender less what that one is apart.
-bool CommandGate::is_too_late(const Claimant& who, Duration age) {
+bool CommandGate::is_too_late(const Claimant& who, Duration age, Sender sender) {
   if (lifespan_.ns <= 0 || (age <= lifespan_ && age >= -lifespan_)) return false;
-  auto least = least_.find(who.writer);
-  const bool is_new = monotonic_now() - who.found < lifespan_;
-  if (least == least_.end() && (age < -lifespan_ || (age > lifespan_ && is_new))) {
+  const Instant now = monotonic_now();
+  auto least = sender == Sender::of_cell ? least_.end() : least_.find(who.writer);
+  const bool is_new = now - who.found < lifespan_;
+  if (sender == Sender::other && least == least_.end() && (age < -lifespan_ || (age > lifespan_ && is_new))) {
     if (least_.size() >= most_told) least_.clear();
-    least = least_.emplace(who.writer, age).first;
+    least = least_.emplace(who.writer, Least{age, now}).first;
     raise("a sample of `" + discovery_.name_of(who.participant) + "` on `" + topic_ + "` " +
           (age.ns < 0 ? "was sent in the future" : "seems old") + " and is taken; " +
           clocks_apart("the sender's PC", Duration{} - age, "this one"));
@@ -51,8 +44,10 @@ bool CommandGate::is_too_late(const Claimant& who, Duration age) {
                   ", or look for what holds samples up");
     return true;
   }
-  least->second = std::min(least->second, age);
-  const Duration late = age - least->second;
+  // Clocks drift apart, by less than a thousandth.
+  Least& youngest = least->second;
+  youngest = {std::min(youngest.age + (now - youngest.at) / 1000, age), now};
+  const Duration late = age - youngest.age;
   if (late <= lifespan_) return false;
   tell(who, "it came " + seconds(late) +
                 " later after it was sent than others of this sender, and is not obeyed after " +
@@ -60,10 +55,11 @@ bool CommandGate::is_too_late(const Claimant& who, Duration age) {
   return true;
 }
 
-bool CommandGate::passes(const std::string& writer, Instant sent) {
+bool CommandGate::passes(const std::string& writer, Instant sent, Sender sender) {
   const std::lock_guard lock{mutex_};
   const Claimant who = discovery_.claimant(writer);
-  if (is_too_late(who, age_of(sent))) return false;
+  if (is_too_late(who, sender == Sender::of_cell ? utc_now() - sent : age_by_nearer_clock(sent), sender))
+    return false;
   if (!exclusive_) return true;
   const Instant now = monotonic_now();
   const Claimant* owner = ownership_.claim(who, now);
@@ -87,7 +83,6 @@ void CommandGate::gone(const std::string& writer) {
   const std::lock_guard lock{mutex_};
   if (ownership_.release(writer) && follower_.gone) follower_.gone();
   told_.erase(writer);
-  least_.erase(writer);
 }
 
 void CommandGate::tell(const Claimant& who, const std::string& why) {

@@ -34,8 +34,9 @@ class CommandGate {
 
   /// Whether ownership or lifespan bound this topic, so that `passes` is to be asked of every sample.
   [[nodiscard]] bool is_asked_of_all() const { return exclusive_ || lifespan_.ns > 0; }
-  /// `writer`: GUID as text; `sent` by the clock (UTC) of this PC, or by that of the sender where theirs are not known apart.
-  bool passes(const std::string& writer, Instant sent);
+  enum class Sender { of_cell, other };  // the former's clock is known
+  /// `writer`: GUID as text; `sent` by the clock of this process's stamps, or of an unknown sender by its own.
+  bool passes(const std::string& writer, Instant sent, Sender sender = Sender::other);
   /// Counts a sample that is not taken and tells why, now and then.
   void refuse(const std::string& writer, const std::string& why);
   /// The writer took its leave, or its lease ran out.
@@ -43,7 +44,7 @@ class CommandGate {
   [[nodiscard]] std::uint64_t refused() const { return refusals_; }
 
  private:
-  bool is_too_late(const Claimant& who, Duration age);
+  bool is_too_late(const Claimant& who, Duration age, Sender sender);
   void tell(const Claimant& who, const std::string& why);
   void raise(const std::string& text);
 
@@ -60,8 +61,12 @@ class CommandGate {
     Instant at{INT64_MIN / 2};
     std::uint64_t since = 0;  // refused without a word since then
   };
-  std::map<std::string, Told> told_;       // by writer
-  std::map<std::string, Duration> least_;  // age, of writers whose clock is further apart than the lifespan
+  std::map<std::string, Told> told_;  // by writer
+  struct Least {
+    Duration age;
+    Instant at;
+  };
+  std::map<std::string, Least> least_;  // of writers whose clock is further apart than the lifespan
 };
 
 }  // namespace invar::dds

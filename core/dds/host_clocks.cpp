@@ -83,7 +83,10 @@ void HostClocks::heard(const clock::Beat& beat, const ClockReading& own) {
   const std::lock_guard lock{mutex_};
   std::erase_if(peers_,
                 [&](const auto& entry) { return own.monotonic - entry.second.heard > silent_after * 12; });
-  if (peers_.size() >= most_peers && !peers_.contains(beat.process_id())) return;
+  if (peers_.size() >= most_peers && !peers_.contains(beat.process_id()))
+    peers_.erase(std::min_element(peers_.begin(), peers_.end(), [](const auto& a, const auto& b) {
+      return a.second.heard < b.second.heard;
+    }));
   Peer& peer = peers_[beat.process_id()];
   peer.host = beat.host().to_string();
   peer.heard = own.monotonic;
@@ -100,7 +103,7 @@ void HostClocks::heard(const clock::Beat& beat, const ClockReading& own) {
   const Measurement& offset = best(peer);
   const Duration ahead = offset.offset + Duration{beat.stamps_ns()} - own.stamps;
   for (const std::uint64_t participant : beat.participants())
-    know(participant, magnitude(ahead) * 2 > offset.round_trip ? ahead : Duration{});
+    know(participant, magnitude(ahead) > offset.round_trip / 2 ? ahead : Duration{});
 }
 
 const HostClocks::Known* HostClocks::find(std::uint64_t participant) const noexcept {

@@ -35,6 +35,11 @@ struct HostClock {
 /// Names a participant in beats.
 [[nodiscard]] std::uint64_t participant_key(std::span<const unsigned char, 12> prefix) noexcept;
 
+/// A stamp that came over DDS, so much earlier; whatever it is, the difference wraps around.
+[[nodiscard]] inline std::int64_t earlier(std::int64_t stamp_ns, Duration by) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(stamp_ns) - static_cast<std::uint64_t>(by.ns));
+}
+
 /// The offset of two monotonic clocks from four stamps (RFC 5905, 8), of the last 16 measurements the one with the shortest
 /// round trip. Nobody sets a monotonic clock, so an offset holds while somebody sets a host's clock; how far stamps are from
 /// it comes with each beat. Any thread.

@@ -77,7 +77,7 @@ void align(RawSample& sample, std::size_t position, const HostClocks& clocks, st
   std::copy_n(at, sizeof stamp, bytes);
   if (is_swapped) std::reverse(bytes, bytes + sizeof stamp);
   if (stamp == 0) return;  // nobody filled it
-  stamp -= ahead.ns;
+  stamp = earlier(stamp, ahead);
   if (is_swapped) std::reverse(bytes, bytes + sizeof stamp);
   std::copy_n(bytes, sizeof stamp, at);
   sample.cdr = copy;

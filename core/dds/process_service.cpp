@@ -103,7 +103,7 @@ ProcessService::ProcessService(Node& node, ProcessControl& control, Options opti
       models_{options_.models} {
   const ServiceTopics topics{node.options().cell};
   const auto take = [this](const auto& request, Instant sent) {
-    if (request.process_id() == number_) enqueue({request, system_now() - sent});
+    if (request.process_id() == number_) enqueue({request, age_by_nearer_clock(sent)});
   };
   const Profile& qos = node.profile("request");
   readers_.push_back(node.timed_reader<lifecycle::LifecycleRequest>(topics.lifecycle_request, qos, take));

@@ -128,11 +128,11 @@ class TypedInlet final : public Inlet {
     while ((keep_ ? reader.read_next_sample(&sample_, &info) : reader.take_next_sample(&sample_, &info)) ==
            ReturnCode_t::RETCODE_OK) {
       if (!info.valid_data) continue;
-      const bool is_of_cell = align(info);
+      const CommandGate::Sender sender = align(info);
       if (came_locally(info)) {
         if (keep_ && expected_ && !has_expected_key(sample_, *expected_)) drop(reader, info);  // told already
-      } else if (is_obeyed(info, is_of_cell)) {
-        sink_(sample_, time_ == SinkTime::arrival ? now : Instant{info.source_timestamp.to_ns()});
+      } else if (is_obeyed(info, sender)) {
+        sink_(sample_, time_ == SinkTime::arrival ? now : sent_);
       } else if (keep_) {
         drop(reader, info);
       }
@@ -172,26 +172,22 @@ class TypedInlet final : public Inlet {
     }
     return true;
   }
-  /// Turns the stamp into that of this process; true where the sender's clock is known.
-  bool align(const fdds::SampleInfo& info) {
-    if constexpr (requires { sample_.at().time_ns(); }) {
-      if (clocks_ == nullptr || sample_.at().time_ns() == 0) return false;
-      const std::uint64_t sender = participant_key(info.sample_identity.writer_guid().guidPrefix.value);
-      sample_.at().time_ns(sample_.at().time_ns() - clocks_->stamps_ahead(sender).ns);
-      return clocks_->knows(sender);
-    }
-    return false;
-  }
-  /// When it was sent, by the clock of this process where that of the sender is known, else by that one.
-  [[nodiscard]] Instant sent(const fdds::SampleInfo& info, bool is_of_cell) const {
+  /// Turns the stamp into that of this process, and the source timestamp too.
+  CommandGate::Sender align(const fdds::SampleInfo& info) {
+    sent_ = {info.source_timestamp.to_ns()};
+    if (clocks_ == nullptr) return CommandGate::Sender::other;
+    const std::uint64_t sender = participant_key(info.sample_identity.writer_guid().guidPrefix.value);
+    if (!clocks_->knows(sender)) return CommandGate::Sender::other;
+    const Duration ahead = clocks_->stamps_ahead(sender);
+    sent_ = sent_ - ahead;
     if constexpr (requires { sample_.at().time_ns(); })
-      if (is_of_cell) return Instant{sample_.at().time_ns()};
-    return {info.source_timestamp.to_ns()};
+      if (sample_.at().time_ns() != 0) sample_.at().time_ns(earlier(sample_.at().time_ns(), ahead));
+    return CommandGate::Sender::of_cell;
   }
-  bool is_obeyed(const fdds::SampleInfo& info, bool is_of_cell) {
+  bool is_obeyed(const fdds::SampleInfo& info, CommandGate::Sender sender) {
     const auto writer = [&info] { return guid_text(info.sample_identity.writer_guid()); };
     if (!is_sound(writer)) return false;
-    return !gate_ || !gate_->is_asked_of_all() || gate_->passes(writer(), sent(info, is_of_cell));
+    return !gate_ || !gate_->is_asked_of_all() || gate_->passes(writer(), sent_, sender);
   }
   /// A refused sample that stayed would keep its instance, and so many foreign keys leave no room for the right one.
   static void drop(fdds::DataReader& reader, const fdds::SampleInfo& info) {
@@ -206,6 +202,7 @@ class TypedInlet final : public Inlet {
   Sink<T> sink_;
   bool keep_;
   SinkTime time_;
+  Instant sent_;  // the newest sample, by the clock of this process where that of its sender is known
   T sample_;
   Type<B> type_;
 };

@@ -12,37 +12,44 @@
 namespace invar::tools {
 
 namespace {
-constexpr std::size_t most_waiting = 16;
-}
+constexpr std::ptrdiff_t most_of_writer = 16;
+constexpr std::size_t most_waiting = 256;
+}  // namespace
 
 struct Bridge::Line {
   struct Waiting {
     std::string writer;
     std::vector<std::byte> cdr;
+    Instant came;
   };
   bool newest_counts = false;
-  Duration separation;
+  Duration separation, lifespan;
   std::mutex mutex;
   std::deque<Waiting> waiting;
   Instant next{INT64_MIN / 2};
   BridgeCount count;
   std::unique_ptr<dds::Inlet> check;
+  std::shared_ptr<dds::CommandGate> gate;
   std::unique_ptr<dds::Connection> writer, reader;
 
   void take(const dds::RawSample& sample) {
     const std::lock_guard lock{mutex};
     ++count.came;
-    if (check->deliver(sample.cdr, utc_now(), std::string{sample.writer}) != dds::Inlet::Delivery::taken) {
+    const std::string writer_id{sample.writer};
+    if (check->deliver(sample.cdr, utc_now(), writer_id) != dds::Inlet::Delivery::taken ||
+        !gate->passes(writer_id, {sample.sent_ns})) {
       ++count.refused;
       return;
     }
-    const auto same = std::find_if(waiting.begin(), waiting.end(),
-                                   [&](const Waiting& one) { return one.writer == sample.writer; });
+    const auto is_same = [&](const Waiting& one) { return one.writer == writer_id; };
+    const auto same = std::find_if(waiting.begin(), waiting.end(), is_same);
+    const auto of_writer = std::count_if(waiting.begin(), waiting.end(), is_same);
     if (newest_counts && same != waiting.end()) {
       same->cdr.assign(sample.cdr.begin(), sample.cdr.end());
+      same->came = monotonic_now();
       ++count.left_out;
-    } else if (waiting.size() < most_waiting) {
-      waiting.push_back({std::string{sample.writer}, {sample.cdr.begin(), sample.cdr.end()}});
+    } else if (of_writer < most_of_writer && waiting.size() < most_waiting) {
+      waiting.push_back({writer_id, {sample.cdr.begin(), sample.cdr.end()}, monotonic_now()});
     } else {
       ++count.left_out;
     }
@@ -50,6 +57,9 @@ struct Bridge::Line {
 
   void pass(Instant now) {
     const std::lock_guard lock{mutex};
+    // An order that waited too long would be obeyed as a new one.
+    if (lifespan.ns > 0)
+      count.left_out += std::erase_if(waiting, [&](const Waiting& one) { return now - one.came > lifespan; });
     if (waiting.empty() || now < next) return;
     const std::span<const std::byte> cdr{waiting.front().cdr};
     ++(writer->write(&cdr) ? count.passed : count.refused);
@@ -71,12 +81,12 @@ Bridge::Bridge(const BridgeFile& file, std::uint32_t cell_number, dds::Node& cel
     passing.separation = Duration::seconds(1.0 / line.rate);
     passing.check =
         dds::WireTypes::all().find(std::string_view{line.type})->attach([](const void*, Instant) {}, false);
-    // Who commands is for the receiver to decide; here only what a sample is.
+    // Who commands is for the receiver to decide; here only what a sample is, and how old.
     dds::Profile any = qos;
     any.exclusive = false;
-    any.lifespan = {};
-    passing.check->guard(std::make_shared<dds::CommandGate>(read, any, from.discovery()),
-                         dds::ExpectedKeys{cell_number, false, {}});
+    passing.lifespan = qos.lifespan;
+    passing.gate = std::make_shared<dds::CommandGate>(read, any, from.discovery());
+    passing.check->guard(passing.gate, dds::ExpectedKeys{cell_number, false, {}});
     passing.writer = to.raw_writer(written, line.type, qos);
     passing.reader = from.raw_reader(read, line.type, qos,
                                      [&passing](const dds::RawSample& sample) { passing.take(sample); });

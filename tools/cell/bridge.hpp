@@ -18,8 +18,8 @@ struct BridgeCount {
 };
 
 /// Samples pass as they came, byte for byte, if they are sound: decoded, within the bounds of their IDL, with finite numbers,
-/// and of the cell's own number. Where the newest sample counts (depth 1) it takes the place of one that waits. Otherwise sixteen
-/// wait, and further ones are left out.
+/// and of the cell's own number. Where the newest sample counts (depth 1) it takes the place of one that waits. Otherwise sixteen of a
+/// writer wait, none longer than its lifespan; further ones are left out.
 class Bridge {
  public:
   /// `cell`, `plant`: a node in each domain; they must outlive it.

@@ -8,6 +8,7 @@
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
 #include "core/dds/wire_type.hpp"
+#include "idl/stage.h"
 
 namespace invar::tools {
 
@@ -59,6 +60,9 @@ void read_line(const LoadedCell& loaded, const Node& node, Direction direction, 
   const Node at = node.required("port");
   const Port* port = at.exists() ? find_port(loaded, at, direction) : nullptr;
   if (port == nullptr) return;
+  if (direction == Direction::in && port->type() == typeid(stage::AxisCommand))
+    at.fault("moves an axis, and the cell could not tell that the plant's program died",
+             "let the plant order a job, or join the cell itself");
   line.profile = port->profile;
   line.cell_topic = port->topic.empty() ? loaded.cell->topic(at.as_text()) : port->topic;
   const dds::WireType* type = dds::WireTypes::all().find(port->type());

@@ -68,9 +68,13 @@ int run(const Options& options) {
   if (loaded.cell->security)
     throw InputError{options.cell.string() + ": bridge", "has no certificate in a secured cell",
                      "let programs of the plant join the cell itself: `security.plant` names their topics"};
-  (void)own_hosts(*loaded.cell, file.host);
+  if (!own_hosts(*loaded.cell, "").contains(file.host))
+    throw InputError{options.cell.string() + ": bridge.host",
+                     "`" + file.host + "` is another PC than this one", "start the bridge there"};
   (void)interrupted();
-  dds::Node cell{node_on(*loaded.cell, "bridge", file.host), dds::load_profiles(loaded.cell->profiles)};
+  dds::NodeOptions of_cell = node_on(*loaded.cell, "bridge", file.host);
+  if (loaded.cell->hosts.size() > 1) of_cell.clocks = dds::ClockOptions{loaded.cell->id, file.host};
+  dds::Node cell{of_cell, dds::load_profiles(loaded.cell->profiles)};
   dds::Node plant{plant_options(*loaded.cell, file), dds::load_profiles(loaded.cell->profiles)};
   Bridge bridge{file, loaded.cell->id, cell, plant};
   std::cerr << "bridge: cell `" << loaded.cell->name << "`, domain " << loaded.cell->domain

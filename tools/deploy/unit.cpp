@@ -146,7 +146,7 @@ std::string unit_text(const LoadedCell& loaded, const UnitPaths& paths, const Un
   std::ostringstream unit;
   unit << "# Written by `invar units` of version " INVAR_VERSION "; written anew by each `invar deploy`.\n"
        << "[Unit]\nDescription=Invar cell " << cell.name << ", host " << options.host
-       << "\nWants=network-online.target\nAfter=network-online.target\n"
+       << "\nWants=network-online.target\nAfter=network-online.target time-sync.target\n"
        << "# Restarts are bounded in rate, and never given up.\nStartLimitIntervalSec=0\n\n[Service]\n"
        << "Type=notify\nNotifyAccess=main\nUser=" << options.user << "\nGroup=" << options.user
        << "\nWorkingDirectory=" << path_value(paths.data.string())

@@ -146,5 +146,30 @@ TEST_F(BetweenDomains, OrdersOfAnotherCellAndNonsenseAreRefusedAndAFloodIsBounde
   EXPECT_EQ(foreign, 0);
 }
 
+TEST_F(BetweenDomains, AnOrderThatWaitsLongerThanItsLifespanIsLeftOut) {
+  BridgeFile slow;
+  slow.lines = {
+      {Direction::in, "cell/test/slow/job", "plant/slow", "invar::job::JobCommand", "command", 0.5}};
+  Bridge passing_slowly{slow, 7, in_cell, in_plant};
+  std::atomic<int> taken{0};
+  const auto worker =
+      cell.reader<job::JobCommand>("cell/test/slow/job", "command", [&](const job::JobCommand&) { ++taken; });
+  auto writer = plant.writer<job::JobCommand>("plant/slow", "command");
+  std::uint64_t id = 0;
+  ASSERT_TRUE(eventually([&] {
+    if (taken == 0 && passing_slowly.count(0).came == 0) (void)writer.write(order(++id));
+    passing_slowly.pass();
+    return taken > 0;
+  }));
+  for (int i = 0; i < 5; ++i) (void)writer.write(order(++id));
+  const Instant until = monotonic_now() + Duration::seconds(3.0);
+  while (monotonic_now() < until) {
+    passing_slowly.pass();
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
+  }
+  EXPECT_LE(taken, 2) << "the next turn came two seconds later, and orders live for one";
+  EXPECT_GE(passing_slowly.count(0).left_out, 4U);
+}
+
 }  // namespace
 }  // namespace invar::tools

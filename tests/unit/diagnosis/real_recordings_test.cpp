@@ -7,8 +7,8 @@
 
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
-#include "core/diagnosis/search/other_run.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
+#include "core/diagnosis/search/other_run.hpp"
 #include "core/model/model_file.hpp"
 #include "core/recording/table.hpp"
 
@@ -84,7 +84,12 @@ TEST(RealRecordings, AnUpperTankRunsOverIntoTheLower) {
   const auto folder = shared() / "data" / "cascaded-tanks";
   if (!is_there(folder)) return;
   const auto r = diagnose(folder);
-  EXPECT_THAT(r.names(), ::testing::Contains("overflow"));
+  // By its name, or as the nearest of an effect without one: it leaves fourteen times the noise, and processors round otherwise.
+  EXPECT_TRUE(
+      std::any_of(r.diagnosis.findings.begin(), r.diagnosis.findings.end(), [](const Finding& finding) {
+        return finding.term.info->name == "overflow" ||
+               (finding.stand_in != nullptr && finding.stand_in->name == "overflow");
+      }));
   EXPECT_LT(r.test.fit[0].after, 0.5 * r.test.fit[0].retuned);
   EXPECT_LT(r.test.fit[0].after, 0.343);  // V: the best of table 2 in doi 10.1155/2021/6613425
 }
