@@ -4,6 +4,7 @@
 #include <random>
 
 #include "core/base/clock.hpp"
+#include "core/dds/clock_offset.hpp"
 
 namespace invar::dds {
 
@@ -132,6 +133,14 @@ void HostClocks::know(std::uint64_t participant, Duration ahead) noexcept {
 Duration HostClocks::stamps_ahead(std::uint64_t participant) const noexcept {
   const Known* known = find(participant);
   return known == nullptr ? Duration{} : Duration{known->ahead_ns.load(std::memory_order_relaxed)};
+}
+
+std::string HostClocks::farther_than(Duration bound) const {
+  for (const HostClock& other : hosts(monotonic_now()))
+    if (magnitude(other.ahead) > bound)
+      return clocks_apart("host `" + other.host + "`", other.ahead, "`" + host_ + "`") +
+             "; `clock_bound` of the cell is " + seconds_text(bound);
+  return "";
 }
 
 std::vector<HostClock> HostClocks::hosts(Instant monotonic) const {

@@ -59,6 +59,9 @@ class HostClocks {
   [[nodiscard]] Duration stamps_ahead(std::uint64_t participant) const noexcept;
   /// The other hosts that were heard in the last 5 s, each by its process with the shortest round trip.
   [[nodiscard]] std::vector<HostClock> hosts(Instant monotonic) const;
+  /// Names a host whose clock is further off than `bound`; empty: there is none. Stamps are turned whatever the clocks say, but one
+  /// that is far off is one that nobody keeps.
+  [[nodiscard]] std::string farther_than(Duration bound) const;
   [[nodiscard]] const std::string& host() const { return host_; }
 
  private:

@@ -12,24 +12,14 @@
 #include <memory>
 
 #include "core/base/fault.hpp"
+#include "core/dds/openssl_object.hpp"
 
 namespace invar::dds {
 
 namespace {
 
-template <auto release>
-struct Release {
-  template <class T>
-  void operator()(T* object) const {
-    release(object);
-  }
-};
-using File = std::unique_ptr<BIO, Release<BIO_free>>;
-using Certificate = std::unique_ptr<X509, Release<X509_free>>;
-using RevocationList = std::unique_ptr<X509_CRL, Release<X509_CRL_free>>;
-
-File open_file(const std::filesystem::path& path, const std::string& whose) {
-  File file{BIO_new_file(path.c_str(), "r")};
+OpensslFile open_file(const std::filesystem::path& path, const std::string& whose) {
+  OpensslFile file{BIO_new_file(path.c_str(), "r")};
   if (!file)
     throw InputError{path.string(), errno == EACCES ? "cannot be read by this user" : "is not there",
                      "`invar keys CELL` makes the keys of the cell; bring `public` and `" + whose +
@@ -60,7 +50,7 @@ void check_identity(const Identity& identity) {
     (void)open_file(file, identity.name);
   check_key(keys.key(identity.name), identity.name);
   const auto path = keys.certificate(identity.name);
-  const Certificate certificate{
+  const OpensslCertificate certificate{
       PEM_read_bio_X509(open_file(path, identity.name).get(), nullptr, nullptr, nullptr)};
   if (!certificate) throw InputError{path.string(), "is no certificate", "`invar keys CELL --renew NAME`"};
   const std::string renew = "`invar keys CELL --renew " + identity.name + "` makes another one";
@@ -71,7 +61,7 @@ void check_identity(const Identity& identity) {
   if (X509_cmp_current_time(begin) > 0)
     throw InputError{path.string(), "is valid from " + date_text(begin) + " on",
                      "look at the clock of this PC"};
-  const RevocationList list{
+  const OpensslRevocations list{
       PEM_read_bio_X509_CRL(open_file(keys.revoked(), identity.name).get(), nullptr, nullptr, nullptr)};
   X509_REVOKED* entry = nullptr;
   if (list && X509_CRL_get0_by_cert(list.get(), &entry, certificate.get()) == 1)

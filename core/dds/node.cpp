@@ -306,9 +306,8 @@ void Node::stop() {
 std::unique_ptr<Connection> Node::raw_reader(const std::string& topic, const std::string& type,
                                              const Profile& profile,
                                              std::function<void(const RawSample&)> take, bool keyed) {
-  const WireType* wire = WireTypes::all().find(type);
-  const auto stamp = wire == nullptr ? std::nullopt : wire->stamp_position();
-  if (stamp && parts_->clocks)
+  const WireType* wire = parts_->clocks ? WireTypes::all().find(type) : nullptr;
+  if (const auto stamp = wire == nullptr ? std::nullopt : wire->stamp_position())
     take = [take = std::move(take), position = *stamp, &clocks = *parts_->clocks,
             copy = std::vector<std::byte>{}](RawSample sample) mutable {
       align(sample, position, clocks, copy);

@@ -231,7 +231,7 @@ void ProcessService::tell_clock(lifecycle::ProcessStatus& process) const {
   if (clocks == nullptr) return;
   process.clock_reference(options_.clock_reference);
   if (options_.clock_reference == clocks->host()) process.clock_error_ns(0);
-  for (const HostClock& other : clocks->hosts(monotonic_now()))
+  for (const HostClock& other : clocks->hosts(own.monotonic))
     if (other.host == options_.clock_reference) {
       process.clock_ahead_ns(-other.ahead.ns);
       process.clock_error_ns(other.error.ns);

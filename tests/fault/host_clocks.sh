@@ -4,6 +4,7 @@
 # host_clocks.sh INVAR SOURCE_DIR
 set -euo pipefail
 source "$(dirname "$0")/../interop/three_namespaces.sh"
+source "$(dirname "$0")/axis_process.sh"
 as_root "$@"
 invar=$1 source=$2
 library=/usr/lib/$(uname -m)-linux-gnu/faketime/libfaketimeMT.so.1
@@ -12,7 +13,8 @@ three_namespaces
 cp "$source/deployment/profiles.yaml" "$folder"
 cp "$source/deployment/machines/xy-table-nominal.yaml" "$folder/machine.yaml"
 cd "$folder"
-cat >cell.yaml <<'Y'
+{
+cat <<'Y'
 invar_cell: 1
 name: clocks
 domain: 14
@@ -20,19 +22,9 @@ time: real
 profiles: profiles.yaml
 hosts: {stage-pc: {address: 10.81.0.11}, trial-pc: {address: 10.81.0.12}}
 processes:
-  motion:
-    host: stage-pc
-    realtime: {rate: 1000, priority: 60}
-    components:
-      world: {type: simulated_stage, machine: machine.yaml, connect: {motor_x: stage_x.motor}}
-      stage_x:
-        type: stage
-        travel: [0, 0.2]
-        following_error: 0.05
-        feedback_timeout: 0.1
-        limits: {velocity: 0.2, acceleration: 2, jerk: 100}
-        control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
-        connect: {feedback: world.feedback_x}
+Y
+axis_process 'realtime: {rate: 1000, priority: 60}' '{velocity: 0.2, acceleration: 2, jerk: 100}'
+cat <<'Y'
   trials:
     host: trial-pc
     rate: 500
@@ -45,13 +37,13 @@ processes:
   recorder: {host: stage-pc, rate: 50, components: {recorder: {type: recorder}}}
 jobs: {follow: trial}
 Y
+} >cell.yaml
 "$invar" check cell.yaml >/dev/null
 fail() { echo "$*"; tail -n 30 ./*.log said job 2>/dev/null; exit 1; }
 set_clock() { echo "$1" >offset.new && mv offset.new offset; }
 set_clock "+3s"
 clock=(env LD_PRELOAD="$library" FAKETIME_TIMESTAMP_FILE="$folder/offset" FAKETIME_NO_CACHE=1 FAKETIME_DONT_FAKE_MONOTONIC=1)
-# A PC each: nothing goes from one to the other through /dev/shm.
-start() { ip netns exec "${pc[$1]}" unshare --mount bash -c 'mount -t tmpfs tmpfs /dev/shm && exec "$@"' pc "${@:3}" "$invar" run cell.yaml --host "$2" >"$2.log" 2>&1 & pids+=("$!"); run[$1]=$!; }
+start() { apart "$1" "${@:3}" "$invar" run cell.yaml --host "$2" >"$2.log" 2>&1 & pids+=("$!"); run[$1]=$!; }
 start 0 stage-pc
 start 1 trial-pc "${clock[@]}"
 for _ in $(seq 100); do on 0 "$invar" status cell.yaml --wait 0.5 >said 2>&1 && break; done

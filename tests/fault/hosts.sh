@@ -4,13 +4,15 @@
 # hosts.sh INVAR SOURCE_DIR [RUNS]
 set -euo pipefail
 source "$(dirname "$0")/../interop/three_namespaces.sh"
+source "$(dirname "$0")/axis_process.sh"
 as_root "$@"
 invar=$1 source=$2 runs=${3:-1}
 three_namespaces
 cp "$source/deployment/profiles.yaml" "$folder"
 cp "$source/deployment/machines/xy-table-nominal.yaml" "$folder/machine.yaml"
 cd "$folder"
-cat >cell.yaml <<'Y'
+{
+cat <<'Y'
 invar_cell: 1
 name: hosts
 domain: 12
@@ -18,19 +20,9 @@ time: real
 profiles: profiles.yaml
 hosts: {stage-pc: {address: 10.81.0.11}, trial-pc: {address: 10.81.0.12}, office-pc: {address: 10.81.0.13}}
 processes:
-  motion:
-    host: stage-pc
-    rate: 1000
-    components:
-      world: {type: simulated_stage, machine: machine.yaml, connect: {motor_x: stage_x.motor}}
-      stage_x:
-        type: stage
-        travel: [0, 0.2]
-        following_error: 0.05
-        feedback_timeout: 0.1
-        limits: {velocity: 0.05, acceleration: 0.05, jerk: 10}
-        control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
-        connect: {feedback: world.feedback_x}
+Y
+axis_process 'rate: 1000' '{velocity: 0.05, acceleration: 0.05, jerk: 10}'
+cat <<'Y'
   trials:
     host: trial-pc
     rate: 100
@@ -43,6 +35,7 @@ processes:
   watch: {host: office-pc, rate: 10, components: {supervisor: {type: supervisor}}}
 jobs: {move: trial}
 Y
+} >cell.yaml
 names=(stage-pc trial-pc office-pc)
 fail() { echo "$*"; tail -n 20 ./*.log; exit 1; }
 start() { ip netns exec "${pc[$1]}" "$invar" run cell.yaml --host "${names[$1]}" >"$1.log" 2>&1 & run[$1]=$!; pids+=("$!"); }

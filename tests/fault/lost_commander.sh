@@ -5,6 +5,7 @@
 # lost_commander.sh INVAR SOURCE_DIR
 set -euo pipefail
 source "$(dirname "$0")/../interop/three_namespaces.sh"
+source "$(dirname "$0")/axis_process.sh"
 as_root "$@"
 invar=$1 source=$2
 three_namespaces
@@ -13,7 +14,8 @@ cp "$source/deployment/machines/xy-table-nominal.yaml" "$folder/machine.yaml"
 cd "$folder"
 # cell NAME TRIAL_HOST LOST_COMMANDER STROKES
 cell() {
-  cat >"$1" <<Y
+  {
+  cat <<Y
 invar_cell: 1
 name: lost
 domain: 13
@@ -21,20 +23,9 @@ time: real
 profiles: profiles.yaml
 hosts: {stage-pc: {address: 10.81.0.11}, trial-pc: {address: 10.81.0.12}}
 processes:
-  motion:
-    host: stage-pc
-    realtime: {rate: 1000, priority: 60}
-    components:
-      world: {type: simulated_stage, machine: machine.yaml, connect: {motor_x: stage_x.motor}}
-      stage_x:
-        type: stage
-        travel: [0, 0.2]
-        following_error: 0.05
-        feedback_timeout: 0.1
-        lost_commander: $3
-        limits: {velocity: 0.05, acceleration: 0.5, jerk: 50}
-        control: {kp: 400, ki: 0, kd: 40, velocity_filter: 50, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}
-        connect: {feedback: world.feedback_x}
+Y
+  axis_process 'realtime: {rate: 1000, priority: 60}' '{velocity: 0.05, acceleration: 0.5, jerk: 50}' "lost_commander: $3"
+  cat <<Y
   trials:
     host: $2
     rate: 100
@@ -47,12 +38,12 @@ processes:
   recorder: {host: stage-pc, rate: 50, components: {recorder: {type: recorder}}}
 jobs: {move: trial}
 Y
+  } >"$1"
   "$invar" check "$1" >/dev/null
 }
 names=(stage-pc trial-pc)
 fail() { echo "$*"; tail -n 30 ./*.log said; exit 1; }
-# A PC each: nothing goes from one to the other through /dev/shm.
-start() { ip netns exec "${pc[$2]}" unshare --mount bash -c 'mount -t tmpfs tmpfs /dev/shm && exec "$@"' pc "$invar" run "$1" --host "${names[$2]}" >"$2.log" 2>&1 & run[$2]=$!; pids+=("$!"); }
+start() { apart "$2" "$invar" run "$1" --host "${names[$2]}" >"$2.log" 2>&1 & run[$2]=$!; pids+=("$!"); }
 stop() { kill -INT "${run[$1]}"; wait "${run[$1]}" || true; }
 up() { for _ in $(seq 100); do on 0 "$invar" status "$1" --wait 0.5 >said 2>&1 && return; done; fail "the cell does not come up"; }
 moving() { on 0 "$invar" echo "$1" stage_x.state --count 1 --json --wait 20 2>/dev/null | /usr/bin/python3 -c '

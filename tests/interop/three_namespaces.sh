@@ -20,6 +20,8 @@ three_namespaces() {
   done
   sleep 2  # the kernel says "up" before the first packets pass
 }
+# apart HOST COMMAND... &: on a PC with a /dev/shm of its own, as PCs have; takes the place of the shell that it runs in.
+apart() { exec ip netns exec "${pc[$1]}" unshare --mount bash -c 'mount -t tmpfs tmpfs /dev/shm && exec "$@"' pc "${@:2}"; }
 on() { local i=$1; shift; ip netns exec "${pc[$i]}" "$@"; }
 # The cable of a PC: out is seen by the PC itself (no carrier), cut is not (the switch passes nothing).
 cable() { ip -n "$switch" link set "port$1" "$2"; }

@@ -9,6 +9,7 @@
 #include "core/base/shown.hpp"
 #include "core/dds/wire_type.hpp"
 #include "idl/stage.h"
+#include "tools/cell/connections.hpp"
 
 namespace invar::tools {
 
@@ -16,30 +17,17 @@ namespace {
 
 using config::Node;
 
-/// A port of the cell: `component.port`. nullptr with a fault: there is none, or one that has no topic of its own.
+/// An output of the cell for `out`, an input for `in`; nullptr with a fault: there is none.
 const Port* find_port(const LoadedCell& loaded, const Node& node, Direction direction) {
   const std::string text = node.as_text();
-  const auto dot = text.find('.');
-  if (dot == std::string::npos) {
-    node.fault("`" + clipped(text) + "` is no port", "write component.port, as stage_x.state");
-    return nullptr;
-  }
-  for (const LoadedProcess& process : loaded.processes)
-    for (const LoadedComponent& member : process.components) {
-      if (member.file->name != text.substr(0, dot)) continue;
-      if (!member.component) return nullptr;  // its own faults are told
-      const Port* port = member.component->find_port(text.substr(dot + 1));
-      const bool is_output = port != nullptr && port->direction() == Port::Direction::output;
-      if (port == nullptr || is_output != (direction == Direction::out)) {
-        node.fault("`" + clipped(text) + "` is no " + (direction == Direction::out ? "output" : "input") +
-                       " of the cell",
-                   "`invar types " + member.file->type + "` lists its ports");
-        return nullptr;
-      }
-      return port;
-    }
-  node.fault("`" + clipped(text.substr(0, dot)) + "` is no component of this cell",
-             "name one that stands under `processes`");
+  const Port* port = named_port(loaded, text, node);
+  if (port == nullptr) return nullptr;
+  const bool is_output = port->direction() == Port::Direction::output;
+  if (is_output == (direction == Direction::out)) return port;
+  const config::CellComponent* component = loaded.cell->find(text.substr(0, text.find('.')));
+  node.fault(
+      "`" + clipped(text) + "` is no " + (direction == Direction::out ? "output" : "input") + " of the cell",
+      "`invar types " + component->type + "` lists its ports");
   return nullptr;
 }
 

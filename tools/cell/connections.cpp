@@ -55,34 +55,6 @@ void check_port_keys(const LoadedComponent& member) {
   if (!member.file->node["latency"].is_scalar()) check("latency", Port::Direction::input);
 }
 
-/// The port that "component.port" names; a fault at `at` when there is none.
-Port* named_port(LoadedCell& loaded, const std::string& connection, const Node& at) {
-  const auto dot = connection.find('.');
-  if (dot == std::string::npos) {
-    at.fault("`" + clipped(connection) + "` names no port",
-             "write `component.port`, or `/topic` for one of the plant");
-    return nullptr;
-  }
-  const std::string component = connection.substr(0, dot);
-  const std::string port = connection.substr(dot + 1);
-  if (loaded.cell->find(component) == nullptr) {
-    std::vector<std::string> names;
-    for (const auto& process : loaded.cell->processes)
-      for (const auto& candidate : process.components) names.push_back(candidate.name);
-    at.fault("`" + clipped(component) + "` is no component of this cell", mend_name(component, names));
-    return nullptr;
-  }
-  Port* found = loaded.port(component, port);
-  if (found == nullptr) {
-    for (const LoadedProcess& process : loaded.processes)
-      for (const LoadedComponent& member : process.components)
-        if (member.file->name == component && member.component)
-          at.fault("`" + component + "` has no port `" + clipped(port) + "`",
-                   mend_name(port, port_names(*member.component)));
-  }
-  return found;
-}
-
 void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port) {
   const auto& connections = member.file->connections;
   const auto found = connections.find(port.name());
@@ -277,6 +249,33 @@ void set_keys(LoadedCell& loaded) {
 }
 
 }  // namespace
+
+Port* named_port(const LoadedCell& loaded, const std::string& connection, const Node& at) {
+  const auto dot = connection.find('.');
+  if (dot == std::string::npos) {
+    at.fault("`" + clipped(connection) + "` names no port",
+             "write `component.port`, or `/topic` for one of the plant");
+    return nullptr;
+  }
+  const std::string component = connection.substr(0, dot);
+  const std::string port = connection.substr(dot + 1);
+  if (loaded.cell->find(component) == nullptr) {
+    std::vector<std::string> names;
+    for (const auto& process : loaded.cell->processes)
+      for (const auto& candidate : process.components) names.push_back(candidate.name);
+    at.fault("`" + clipped(component) + "` is no component of this cell", mend_name(component, names));
+    return nullptr;
+  }
+  Port* found = loaded.port(component, port);
+  if (found == nullptr) {
+    for (const LoadedProcess& process : loaded.processes)
+      for (const LoadedComponent& member : process.components)
+        if (member.file->name == component && member.component)
+          at.fault("`" + component + "` has no port `" + clipped(port) + "`",
+                   mend_name(port, port_names(*member.component)));
+  }
+  return found;
+}
 
 void connect_ports(LoadedCell& loaded) {
   for (LoadedProcess& process : loaded.processes)

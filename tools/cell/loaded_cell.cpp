@@ -23,9 +23,9 @@ LoadedProcess* LoadedCell::process(const std::string& name) {
   return nullptr;
 }
 
-Port* LoadedCell::port(const std::string& component, const std::string& name) {
-  for (LoadedProcess& candidate : processes)
-    for (LoadedComponent& member : candidate.components) {
+Port* LoadedCell::port(const std::string& component, const std::string& name) const {
+  for (const LoadedProcess& candidate : processes)
+    for (const LoadedComponent& member : candidate.components) {
       if (member.file->name != component || !member.component) continue;
       return member.component->find_port(name);
     }

@@ -35,7 +35,7 @@ struct LoadedCell {
 
   [[nodiscard]] LoadedProcess* process(const std::string& name);
   [[nodiscard]] std::vector<std::string> process_names() const;
-  [[nodiscard]] Port* port(const std::string& component, const std::string& name);
+  [[nodiscard]] Port* port(const std::string& component, const std::string& name) const;
 };
 
 /// Words that a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.

@@ -19,7 +19,6 @@
 #include "components/supervisor/supervisor.hpp"
 #include "core/base/clock.hpp"
 #include "core/dds/cell_client.hpp"
-#include "core/dds/clock_offset.hpp"
 #include "core/dds/host_clocks.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
@@ -100,7 +99,9 @@ class RunningProcess {
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
       if (auto* found = dynamic_cast<supervisor::Supervisor*>(member.component.get())) supervisor_ = found;
       if (auto* found = dynamic_cast<calibration::JobComponent*>(member.component.get()))
-        found->refuse_while([this] { return clocks_too_far_apart(); });
+        found->refuse_while([this] {
+          return node_.clocks() == nullptr ? "" : node_.clocks()->farther_than(loaded_.cell->clock_bound);
+        });
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
@@ -209,16 +210,6 @@ class RunningProcess {
         lines.push_back(component.name + ": " + fault);
     }
     return lines;
-  }
-
-  /// Stamps are turned into this process's whatever the clocks say; a clock that is far off is one that nobody keeps.
-  std::string clocks_too_far_apart() {
-    if (node_.clocks() == nullptr) return "";
-    for (const dds::HostClock& other : node_.clocks()->hosts(monotonic_now()))
-      if (other.ahead > loaded_.cell->clock_bound || other.ahead < -loaded_.cell->clock_bound)
-        return dds::clocks_apart("host `" + other.host + "`", other.ahead, "`" + file_.host + "`") +
-               "; `clock_bound` of the cell is " + dds::seconds_text(loaded_.cell->clock_bound);
-    return "";
   }
 
   void follow_job() {

@@ -1,28 +1,19 @@
-// OpensslObject: owners of libcrypto's objects, and what to say when a call of it fails.
+// OpensslObject: owners of libcrypto's objects, and the fault of a call that fails.
 #pragma once
 
-#include <openssl/evp.h>
-#include <openssl/pkcs7.h>
-#include <openssl/x509.h>
-
-#include <memory>
 #include <string>
+
+#include "core/dds/openssl_object.hpp"
 
 namespace invar::tools {
 
-template <auto release>
-struct OpensslRelease {
-  template <class T>
-  void operator()(T* object) const {
-    release(object);
-  }
-};
-using OpensslFile = std::unique_ptr<BIO, OpensslRelease<BIO_free>>;
-using OpensslKey = std::unique_ptr<EVP_PKEY, OpensslRelease<EVP_PKEY_free>>;
-using OpensslCertificate = std::unique_ptr<X509, OpensslRelease<X509_free>>;
-using OpensslName = std::unique_ptr<X509_NAME, OpensslRelease<X509_NAME_free>>;
-using OpensslRevocations = std::unique_ptr<X509_CRL, OpensslRelease<X509_CRL_free>>;
-using OpensslSigned = std::unique_ptr<PKCS7, OpensslRelease<PKCS7_free>>;
+using dds::OpensslCertificate;
+using dds::OpensslFile;
+using dds::OpensslKey;
+using dds::OpensslName;
+using dds::OpensslRelease;
+using dds::OpensslRevocations;
+using dds::OpensslSigned;
 
 /// Throws std::runtime_error with the library's own reason unless `done`.
 void require_openssl(bool done, const std::string& what);
