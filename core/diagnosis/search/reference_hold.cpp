@@ -49,7 +49,7 @@ void settle_hold(Case& data) {
   const auto off = [&](const Case& as) { return residual(as, weighing, as.model).squaredNorm(); };
   if (!(smooth.cost < held.cost - thresholds::claim_margin) || !(off(goes_on) < off(data))) return;
   data = std::move(goes_on);
-  data.doubts.push_back(
+  data.doubts.emplace_back(
       "not every cycle of the controller has its row, and between the rows its reference is taken to go "
       "on smoothly (`hold: smooth`), which lies nearer than `hold: step`");
 }

@@ -45,7 +45,9 @@ TEST(YamlBounds, AreOfDepthCountSizeAndText) {
   EXPECT_THAT(refusal("a: " + std::string(limits::yaml_bytes, 'x')),
               HasSubstr("f.yaml: has more than 16 MiB"));
   EXPECT_THAT(refusal("a: " + std::string(70'000, 'x')), HasSubstr("a text has 70000 bytes"));
-  EXPECT_THAT(refusal(std::string(300, 'k') + ": 1"), HasSubstr("has 300 bytes"));
+  std::string long_key(300, 'k');
+  long_key += ": 1";
+  EXPECT_THAT(refusal(long_key), HasSubstr("has 300 bytes"));
 }
 
 TEST(YamlBounds, NoTextSteersATerminal) {

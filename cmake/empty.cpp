@@ -1,0 +1,2 @@
+// A target of headers alone needs one source.
+int main() {}
