@@ -1,4 +1,4 @@
-// What comes once and goes again: somebody leans on a stage, a cable is caught for a moment.
+// A burst comes once and goes again: somebody leans on a stage, a cable is caught for a moment.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// What changes at once: a scale that slips, a nozzle that clogs, counts that are lost, a joint between two rails.
+// A jump changes the outputs at once: a scale that slips, a nozzle that clogs, lost counts, a joint between two rails.
 #pragma once
 
 #include <vector>

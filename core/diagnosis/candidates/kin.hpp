@@ -5,10 +5,10 @@
 
 namespace invar::diagnosis {
 
-/// The model with found term `term` put as another law of the same variable: another power, with the strength that gives as
-/// much at the sizes that the variable takes; of what comes late, a lag or a delay of the same
+/// The model with found term `term` put as another law of the same variable. For a power: another power, with the strength that
+/// gives as much at the sizes that the variable takes. For a delay or a lag: the other of the two with the same
 /// time, there and of each input. A machine that swings for long answers in phase: from strength zero no such fit arrives.
-/// Of an axis's friction that sticks or bends, Coulomb's. Empty for anything else; without the names in `without`.
+/// For friction of an axis that sticks or bends: Coulomb's. Empty for anything else; without the names in `without`.
 std::vector<physics::Model> other_laws(const Case& data, const physics::Model& model, std::size_t term,
                                        const std::set<std::string, std::less<>>& without);
 

@@ -1,4 +1,4 @@
-// What candidates are laid by: how large signals usually are, and whether friction was found already.
+// Sizes by which candidates are laid: how large signals usually are, and whether friction was found already.
 #pragma once
 
 #include <string>

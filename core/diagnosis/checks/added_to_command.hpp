@@ -1,5 +1,5 @@
-// What is added to the current, or changed in it, between controller and drive: where the current is recorded behind that, it
-// stands in the recording beside the controller's law, and no model of the plant is needed to see it.
+// Effects on the current between controller and drive. Where the current is recorded behind them, they
+// stand in the recording beside the controller's law, and no model of the plant is needed to see them.
 #pragma once
 
 #include <optional>
@@ -9,18 +9,16 @@
 
 namespace invar::diagnosis {
 
-/// A wave in time, an offset, a limit, steps, a dead zone or a delay: the one that explains most of what the law leaves of the
-/// recorded current, if that is more than half of what is beyond noise. Nothing where what is left goes with the motion by
-/// another law.
+/// A wave in time, an offset, a limit, steps, a dead zone or a delay: the one that explains most of the recorded current beside
+/// the law, if that is more than half of the part beyond noise. Nothing where the rest goes with the motion by another law.
 std::optional<Added> added_to_command(const Case& data, const std::vector<LawRows>& law);
 
-/// What the carriage feels of what the recorded current is beyond the law: 1 where it acts, 0 where only the reading of the
+/// The share of the current beyond the law that the carriage feels: 1 where it acts, 0 where only the reading of the
 /// current is off. By projection of what the model leaves of the position on what such a current would do to it.
 double felt_by_carriage(const Case& data, const std::vector<LawRows>& law);
 
-/// Where what the recorded current is beyond the law is of such a kind and is felt by the carriage, the current is recorded
-/// behind what acts on it: the model says so from then on (`current: applied`), with a clause in `data.doubts`, and the term is
-/// in `data.beside_law`.
+/// Where the current beyond the law is of such a kind and the carriage feels it, the current is recorded behind what acts on it.
+/// The model says so from then on (`current: applied`), with a clause in `data.doubts`, and the term is in `data.beside_law`.
 void settle_recorded_current(Case& data);
 
 }  // namespace invar::diagnosis

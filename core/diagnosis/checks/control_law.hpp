@@ -8,10 +8,10 @@
 
 namespace invar::diagnosis {
 
-/// Of one recording, by row: the current that the model's law makes of what was recorded, whatever its limit, and what the
-/// recorded current is beyond that [A]. NaN where cycles are lost, where the current is at its limit and until the law's
-/// filter has settled. A law with a sum begins as the model does; behind a gap, and where the loop has run before, its sum is
-/// somewhere, and what is beyond the law has the mean zero there.
+/// By row of one recording [A]: the current that the model's law makes of the readings, whatever its limit, and what the
+/// recorded current is beyond that. NaN where cycles are lost, where the current is at its limit and until the law's
+/// filter has settled. A law with a sum begins as the model does. Behind a gap, and where the loop has run before, its sum is
+/// unknown, and the current beyond the law has the mean zero.
 struct LawRows {
   std::vector<double> asked, beyond;
   bool has_open_level = false;  // of a part
@@ -34,14 +34,14 @@ struct LawOff {
   [[nodiscard]] bool is_beside() const { return is_another_law() && !is_chief(); }
 };
 
-/// What the law leaves of the recorded current, as far as it goes with the motion that the model expects, which is free of the
-/// noise of the readings: readings that the controller did not see in the same way, or a current with noise of its own, are no
+/// The current beside the law, as far as it goes with the motion that the model expects, which is free of the noise of the
+/// readings. Readings that the controller did not see in the same way, or a current with noise of its own, are no
 /// other law (instrumental variables, Soderstrom and Stoica 1983). Found on a half of the blocks of rows, counted on the
 /// other half. Nothing without a controller, or where the recordings have too few cycles in a row. `share` is left alone.
 std::optional<LawOff> off_the_law(const Case& data);
 
-/// The same recordings, with what the law leaves of the current given to each loop as a feedforward: it departs from its law
-/// as the machine did, so that what is left is the plant's.
+/// The same recordings, with the current beside the law given to each loop as a feedforward. The loop departs from its law
+/// as the machine did, so that the residual is the plant's.
 Case told_what_law_leaves(const Case& data, const std::vector<LawRows>& rows);
 /// The share of the squares that a model leaves of the position which goes away in that loop: 0 to 1.
 double share_of_law(const Case& data, const physics::Model& retuned);

@@ -21,7 +21,7 @@ struct Added {
 physics::Term started(const char* name);
 
 /// The current is what the law asked for some time ago. Noise of the readings that the controller did not see makes a late
-/// law look better whatever is true: only what goes with the current that the model expects counts (instrumental variables).
+/// law look better whatever is true. Only the part that goes with the expected current counts (instrumental variables).
 std::optional<Added> comes_late_from_law(const Case& data, const std::vector<LawRows>& law);
 
 }  // namespace invar::diagnosis

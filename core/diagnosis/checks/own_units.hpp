@@ -5,8 +5,8 @@
 
 namespace invar::diagnosis {
 
-/// Throws InputError where an input that was taken in SI, as it stands in its column, brings the model far nearer to the
-/// recording than `retuned`, which no numbers of the user's do: then nothing is missing but a factor.
+/// Throws InputError where nothing is missing but a factor. An input taken as it stands in its column, not in SI, then brings
+/// the model far nearer to the recording than `retuned`, as no numbers of the user's do.
 void check_own_units(const Case& data, const Fit& retuned);
 
 }  // namespace invar::diagnosis

@@ -48,7 +48,7 @@ struct TakenInSi {
   double factor = 1.0, offset = 0.0;
 };
 
-/// What the diagnosis knows of the machine.
+/// The knowledge of the machine that a diagnosis works with.
 struct Case {
   physics::Model model;  // as the user believes
   std::vector<Recording> recordings;

@@ -8,8 +8,8 @@
 
 namespace invar::diagnosis {
 
-/// Puts the rows onto even steps where their stamps scatter about such and an output that moves goes far more smoothly over
-/// these than over the stamps; with a clause in `doubts`. Of machines that move on from row to row without a controller that
+/// Puts the rows onto even steps where their stamps scatter about such steps; with a clause in `doubts`. A moving output must go
+/// far more smoothly over the steps than over the stamps. For machines that move on from row to row without a controller that
 /// ticks by itself. `record.time` in order.
 void even_out(const physics::Model& model, physics::Record& record, const std::string& file,
               std::vector<std::string>& doubts);

@@ -5,8 +5,8 @@
 
 namespace invar::diagnosis {
 
-/// In a gap nobody knows what the reference did, and the loop goes on to feel it for a while. What its bridge by a cubic
-/// and by a straight line make different in the simulation shows where: there nothing is compared.
+/// In a gap nobody knows what the reference did, and the loop goes on to feel it for a while. Where bridges by a cubic
+/// and by a straight line make a difference in the simulation, nothing is compared.
 void bridge_gaps(const physics::Model& model, Recording& recording, double step);
 
 }  // namespace invar::diagnosis

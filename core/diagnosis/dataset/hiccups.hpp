@@ -8,9 +8,9 @@
 
 namespace invar::diagnosis {
 
-/// Leaves out the readings of a velocity sensor about such stamps, with a clause in `doubts`: the true rate there is a way over a
-/// false time, and a few of those carry a whole fit. A late instrument reads it some rows later; what one reads at first that the
-/// model has as late was before the recording, and is left out too. `record.time` in order.
+/// Leaves out the readings of a velocity sensor about such stamps, with a clause in `doubts`. The true rate there is a way over a
+/// false time, and a few of those carry a whole fit. A late instrument reads it some rows later. The first readings of an
+/// instrument that the model has as late are from before the recording, and are left out too. `record.time` in order.
 void leave_out_hiccups(const physics::Model& model, physics::Record& record, const std::string& file,
                        std::vector<std::string>& doubts);
 

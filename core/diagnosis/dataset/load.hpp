@@ -9,8 +9,8 @@
 
 namespace invar::diagnosis {
 
-/// Throws InputError, naming the model's file, where a model in the user's own equations gives no numbers from some row on
-/// to the end, for more than this share of a recording.
+/// Throws InputError, naming the model's file, where the user's own equations give no numbers from some row to the end.
+/// The rows without numbers must be more than this share of a recording.
 void check_runs(const Case& data, const physics::Model& model, double most,
                 const std::filesystem::path& file);
 /// Reads and cleans. Throws InputError for what is unusable.

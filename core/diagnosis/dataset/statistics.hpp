@@ -26,7 +26,7 @@ Whitening fit_whitening(const std::vector<std::vector<double>>& series, std::siz
 void whiten(const Whitening& filter, const std::vector<double>& r, const std::vector<bool>& present,
             double* out);
 
-/// How many independent values a correlated series is worth, as a share of its values: 1 / (1 + 2 sum of its
+/// The number of independent values that a correlated series is worth, as a share of its values. It is 1 / (1 + 2 sum of its
 /// autocorrelations), summed in pairs until a pair is not positive (Geyer 1992); NaN are skipped.
 double independent_share(const std::vector<std::vector<double>>& series);
 

@@ -27,7 +27,7 @@ struct Span {
   [[nodiscard]] bool turns() const { return std::min(-falls, rises) > 0.03 * rate; }
 };
 
-/// What goes over the fitted model: states that nobody measures too.
+/// Variables from the fitted model: states that nobody measures too.
 class Spans {
  public:
   Spans(const Case& data, const physics::Model& fitted);

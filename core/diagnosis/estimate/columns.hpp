@@ -1,4 +1,4 @@
-// Columns of a Jacobian. A state at the beginning of a window moves the rows of that window alone: such a column is kept as
+// Columns of a Jacobian. A state at the beginning of a window moves the rows of that window alone. Such a column is kept as
 // these rows, so that zeros are neither stored nor filtered nor multiplied.
 #pragma once
 
@@ -44,8 +44,8 @@ class Columns {
   [[nodiscard]] Eigen::VectorXd times(const Eigen::VectorXd& by) const;
 
   void divide(Eigen::Index column, double factor);
-  /// Broyden's rule row by row: the least change, in the scales of the numbers, with which the columns times `taken` are by
-  /// `error` more, while what was zero stays so (Schubert 1970).
+  /// Broyden's rule row by row (Schubert 1970). It is the least change, in the scales of the numbers, with which the columns
+  /// times `taken` are by `error` more. Zeros stay zeros.
   void update(const Eigen::VectorXd& error, const Eigen::VectorXd& taken, const Eigen::VectorXd& scale);
 
  private:

@@ -35,7 +35,7 @@ struct Fit {
   Columns columns;           // sensitivities at or near the solution, not whitened
 };
 
-/// What it costs (log) to call a sine in time a current and not a force: one recording shows both alike. Hum sits at the
+/// The price (log odds) of calling a sine in time a current and not a force: one recording shows both alike. Hum sits at the
 /// mains' frequencies, shaking anywhere.
 double price_of_current(double frequency);
 

@@ -8,7 +8,7 @@
 
 namespace invar::diagnosis {
 
-/// Of measured - simulated of one output.
+/// The sums of measured - simulated of one output.
 struct Squares {
   double sum = 0.0, count = 0.0;
   void operator+=(const Squares& more) { sum += more.sum, count += more.count; }

@@ -41,7 +41,7 @@ Eigen::VectorXd filtered(const Case& data, const Weighing& weighing, const Eigen
 /// Each column through the filters of the weighing.
 Eigen::MatrixXd whitened(const Case& data, const Weighing& weighing, const Eigen::MatrixXd& columns);
 Columns whitened(const Case& data, const Weighing& weighing, const Columns& columns);
-/// Of all outputs of all recordings, one behind the other.
+/// The residuals of all outputs of all recordings, one behind the other.
 Eigen::Index rows_of(const Case& data);
 /// measured - simulated of all recordings and outputs below one another; NaN where nothing was measured.
 Eigen::VectorXd differences(const Case& data, const std::vector<physics::Outputs>& simulated);

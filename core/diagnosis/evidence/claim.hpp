@@ -1,4 +1,4 @@
-// What a term must be before it is claimed: of possible strength, clearly not zero, and seen to act.
+// Conditions of a claim: a term has a possible strength, is clearly not zero, and is seen to act.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@ namespace invar::diagnosis {
 /// "overflow@x1+x2"
 std::string label(const physics::Term& term);
 
-/// Are there rows enough for this many numbers? What a few rows leave is the curve of their scale as much as physics.
+/// Are there rows enough for this many numbers? The residual of a few rows is the curve of their scale as much as physics.
 bool is_affordable(const Case& data, const Fit& fit);
 
 /// A claim must have a strength that is possible and clearly not zero.

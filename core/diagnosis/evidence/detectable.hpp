@@ -6,7 +6,7 @@
 
 namespace invar::diagnosis {
 
-/// What of each screened term would just have been seen beside the best model, in the unit of its amplitude: to first order
+/// The smallest amplitude of each screened term that would have been seen beside the best model: to first order
 /// in its strength, the model's own numbers free beside it. In a time series it must also lead in independent rows and
 /// be more than a wander of the noise, as a claim must.
 void smallest_effects(const Case& data, const std::vector<Screened>& screened, Diagnosis& d);

@@ -9,8 +9,8 @@
 
 namespace invar::diagnosis {
 
-/// Directions of the base's own numbers, to be taken out of every other, and how far they still have to go: a fit that ends within a
-/// fraction of its own uncertainty is not at its end for what is nearly along its numbers.
+/// Directions of the base's own numbers, to be taken out of every other, and how far they still have to go. A fit may end within
+/// a fraction of its own uncertainty, which is not its end for an effect nearly along its numbers.
 struct Nuisance {
   Eigen::MatrixXd columns;
   Eigen::LDLT<Eigen::MatrixXd> hessian;

@@ -19,8 +19,8 @@ bool is_over_time(const physics::Term& term);
 /// May this curve stand for another course of the term's own effect?
 bool is_course_of(const physics::Term& curve, const physics::Term& term);
 
-/// The best fit of `base` with one of its found terms free to take any course over its own variable, where that has more
-/// evidence than `further` (which has one term more than `base`); the number of that term. Both under one weighing.
+/// The best fit of `base` with one of its found terms free to take any course over its own variable, and the number of that
+/// term. Nothing where `further`, which has one term more than `base`, has more evidence. Both under one weighing.
 struct OtherForm {
   std::size_t term = 0;
   double evidence = 0.0;

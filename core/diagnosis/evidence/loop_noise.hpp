@@ -1,4 +1,4 @@
-// What the noise of the readings does to a loop with friction, play or a dead zone: it shakes the carriage across them, so
+// Noise of the readings in a loop with friction, play or a dead zone. It shakes the carriage across them, so
 // that they act more softly than in a run without noise.
 #pragma once
 
@@ -15,8 +15,8 @@ class LoopNoise {
   explicit LoopNoise(Case& data);
   /// Does a loop feed the noise of the readings back?
   [[nodiscard]] bool is_fed_back() const;
-  /// Leaves in the case what is recorded less what noise makes of this model, where that brings the two nearer, and without
-  /// the rows in which noise decides when the carriage sticks and slips. The share of these.
+  /// Takes off the recorded readings what noise makes of this model, where that brings the two nearer. Leaves out
+  /// the rows in which noise decides when the carriage sticks and slips; returns their share.
   double take_off(const physics::Model& model);
   /// The readings as recorded; what was in their place.
   Readings put_back();
@@ -34,9 +34,9 @@ class LoopNoise {
   /// By how much log likelihood does it then, under this weighing? Infinite where no loop feeds noise back.
   [[nodiscard]] double gain(const physics::Model& with, const physics::Model& without,
                             const Weighing& weighing) const;
-  /// What `with` explains beyond `without`, in log likelihood by what noise itself makes of it: along their difference the
-  /// readings lie so far from runs of `without` that noise shakes, against the scatter of these. Where a carriage sticks and
-  /// slips noise goes far, and a fit follows it. Infinite where no loop feeds noise back.
+  /// Log likelihood by which `with` explains more than `without`, against what noise alone would do. Measured along the
+  /// difference of the two: how far the readings lie from runs of `without` with noise, against the scatter of these runs.
+  /// Where a carriage sticks and slips noise goes far, and a fit follows it. Infinite where no loop feeds noise back.
   [[nodiscard]] double beyond(const physics::Model& with, const physics::Model& without,
                               const Weighing& weighing) const;
 

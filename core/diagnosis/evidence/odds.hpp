@@ -1,5 +1,5 @@
-// How likely a name is the right one: against the other names that were tried, against its relatives, which look the same where
-// a recording does not show what sets them apart, and against a cause that none of these is.
+// Probability that a name is the right one. It stands against the other names that were tried, against its relatives, which
+// look the same where a recording does not set them apart, and against a cause that none of these is.
 #pragma once
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
@@ -7,17 +7,17 @@
 
 namespace invar::diagnosis {
 
-/// Odds of "some other cause" against a claimed name: they fall with the log evidence by which the name wins (a small
-/// effect looks like many things; the evidence is counted in independent rows), rise with the share of the mismatch that
-/// the name leaves and that still follows the recording, with what a freer shape of the name explains better beyond
-/// chance (`shape`, a share; 0: nothing; a fraction of a percent is a matter of form), and, of a name beside others, as the
-/// share of the mismatch that goes with it comes near what their own idealised form may leave (`share`; 1: it is the only
-/// one). Fitted to claims on made machines, the right names in the library and out of it
-/// (tests/bench/mismatch_reliability.py; figures in README.md there).
+/// Odds of "some other cause" against a claimed name.
+/// `gain`: log evidence by which the name wins, in independent rows; the odds fall with it, as a small effect looks like many.
+/// `left`: share of the mismatch that the name leaves and that still follows the recording; the odds rise with it.
+/// `shape`: share that a freer shape of the name explains better beyond chance; a fraction of a percent is a matter of form.
+/// `share`: share of the mismatch that goes with a name beside others, 1 for the only one. The odds rise as it comes near what
+/// the others' idealised form may leave. Fitted to claims on synthetic machines, the right names in the library and out of it
+/// (tests/bench/mismatch_reliability.py).
 double odds_of_another_cause(double gain, double left, double shape, double share);
 
-/// Odds that a relative of term `place` of the best model is meant, which may be in the library or not: what comes late by a
-/// lag or a delay, friction that slides at once or springs first, a sine that enters at the motor or the carriage.
+/// Odds that a relative of term `place` of the best model is meant, in the library or not. Relatives are a lag and a delay,
+/// friction that slides at once or springs first, a sine that enters at the motor or the carriage.
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding);
 
 /// Does an alternative say anything else than the finding? A term of equations that acts at the same place over a variable
@@ -27,12 +27,12 @@ bool is_another_cause(const Finding& finding, const Alternative& alternative);
 /// By a lag or by a delay: an instrument's latency is the name of either.
 bool comes_late(const physics::Term& term);
 
-/// Are they one effect whose place alone is open? What comes late before a model in one piece comes late behind it as well,
-/// a steady rate or a drag that acts at one state acts at the next in a chain, and so does a limit or a dead zone on the way.
+/// Are they one effect whose place alone is open? A delay before a model in one piece looks the same behind it. A steady rate or
+/// a drag at one state acts at the next in a chain, and so does a limit or a dead zone on the way.
 bool is_elsewhere(const physics::Term& one, const physics::Term& other);
 
-/// Of what the outputs that a name explains left beyond the noise without it (`won` and `excess`, by output, in the power of
-/// the noise), the share that they still leave: of the worst of those with at least a tenth of all that it explains.
+/// The share that a name leaves of the mismatch beyond noise. `won` and `excess`, by output, in the power of the noise: what
+/// the name explains and what is left. Returned is the worst output with at least a tenth of all that the name explains.
 double rest_beside(const std::vector<double>& won, const std::vector<double>& excess);
 
 /// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known, and

@@ -19,15 +19,15 @@ struct Lead {
 };
 Lead lead_of(const Case& data, const Left& one, const Left& other);
 
-/// log likelihood of `one` over `other` counted in independent rows of the residual that `one` leaves, less the price
-/// of the numbers that it has more: says which is right whatever the colour of the noise.
+/// Log likelihood of `one` over `other`, counted in independent rows of the residual of `one`, less the price of its further
+/// numbers. It says which is right whatever the colour of the noise.
 double lead(const Case& data, const Fit& one, const Fit& other);
 
 /// The evidence of `one` over `other`, both under `weighing`; where its filters could not be fitted (too few rows), not
 /// more of it than independent rows give.
 double advantage(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
 
-/// Of the evidence under the filters most counts in independent rows too: no noise that wanders is left.
+/// Does most of the evidence under the filters count in independent rows too? Then no noise that wanders is left.
 inline bool is_white(double evidence, double counted) { return counted > thresholds::white_share * evidence; }
 /// So many times the margin a further claim must gain that hardly moves the size of the residual.
 double margins_of_a_further(const Case& data, double evidence, double counted);

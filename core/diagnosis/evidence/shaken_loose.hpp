@@ -1,5 +1,5 @@
-// Friction, play or a dead zone so small that the noise of the loop shakes the machine across it all the time: a run without
-// noise sticks where the machine does not, and shows nothing of what it is.
+// Friction, play or a dead zone so small that the noise of the loop shakes the machine across it all the time. A run without
+// noise sticks where the machine does not, and shows nothing of the effect.
 #pragma once
 
 #include <optional>

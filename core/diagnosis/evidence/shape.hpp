@@ -17,8 +17,8 @@ struct OtherShape {
 /// has no memory.
 Eigen::MatrixXd second_times(const Case& data, const Fit& named, std::size_t term);
 
-/// log likelihood in independent rows by which the recording would show it, were the outputs off by this much: what the fit's
-/// other numbers cannot take up of it against what the fit leaves.
+/// Log likelihood in independent rows by which the recording would show outputs that are off by `shift`. Counted is the part
+/// that the fit's other numbers cannot take up, against the residual of the fit.
 double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd& shift);
 
 /// Freer shapes of named term `term` of `named.fit`: a course over its own variable beside it, and, of what comes late, a

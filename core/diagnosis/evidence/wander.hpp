@@ -17,7 +17,7 @@ Wander wander_of(const std::vector<std::vector<double>>& series, bool is_instrum
 /// Log likelihood of the numbers as such noise, of whatever scale; comparable between series over the same rows.
 double likelihood(const std::vector<std::vector<double>>& series, const Wander& wander);
 
-/// The evidence of `one` over `other`, both under `weighing`, were the noise to wander as it still does in what `one` leaves,
+/// The evidence of `one` over `other`, both under `weighing`. The noise is taken to wander as in the residual of `one`,
 /// and for as much longer as `one` would hide.
 double advantage_over_wander(const Case& data, const Weighing& weighing, const Fit& one, const Fit& other);
 

@@ -5,15 +5,15 @@
 
 namespace invar::diagnosis {
 
-/// By output, the share of the power of measured - simulated that a surface of second order over all inputs, their
-/// motion and their past, the named terms' own effects with numbers that change, or any course over one of the inputs
-/// explain beyond what they explain of the same series shifted against the recording: chance and the colour of the noise
-/// are in both. 0 where it is no more than chance.
+/// By output, the share of the power of measured - simulated that goes with the recording. It is what one of three shapes
+/// explains: a surface of second order over all inputs, their motion and their past; the named terms' own effects with numbers
+/// that change; any course over one of the inputs. Taken off is what the shape explains of the same series shifted against the
+/// recording: chance and the colour of the noise are in both. 0 where it is no more than chance.
 std::vector<double> followed_share(const Case& data, const Fit& fit);
 
-/// By output, the share of its power that is more than `times` the size of what cannot be told from the row before, where
-/// it is as large as that: noise that wanders for long is, and a model that misses the greater part. 0 where nothing is in
-/// proportion to what the output itself does. For plants that are simulated freely.
+/// By output, the share of its power in rows where it is more than `times` the size of what cannot be told from the row before.
+/// Noise that wanders for long is so large, and the residual of a model that misses the greater part. 0 where nothing is in
+/// proportion to the motion of the output itself. For plants that are simulated freely.
 std::vector<double> far_share(const Case& data, const Fit& fit, double times);
 
 /// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
@@ -23,13 +23,13 @@ bool is_louder_in_motion(const Case& data, const Fit& fit);
 /// related from row to row?
 bool is_above_noise(const Case& data, const Fit& fit);
 
-/// By output, how many times the power of the noise is left beyond it: beyond what the user gave and beyond what cannot be
-/// told from the row before. 0: no more than the colour of noise may do in a recording, he gave none, or a loop leads the noise
-/// of one reading to the others.
+/// By output, the residual beyond the noise, in times the power of the noise: that which the user gave, and that which cannot be
+/// told from the row before. 0: no more than the colour of noise may do in a recording, no given noise, or a loop that leads
+/// the noise of one reading to the others.
 std::vector<double> excess_over_noise(const Case& data, const Fit& fit);
 
-/// Noise that wanders does not know what was recorded: does `with` take most of what in the residual of `without` goes with
-/// that, beyond what a residual turned round against the recording would? Never in a loop, which moves with its own noise.
+/// Does `with` take most of what in the residual of `without` goes with the recording, beyond what a residual turned round would?
+/// Noise that wanders does not know what was recorded. Never in a loop, which moves with its own noise.
 bool goes_with_recording(const Case& data, const Fit& with, const Fit& without);
 
 }  // namespace invar::diagnosis

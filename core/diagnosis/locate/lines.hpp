@@ -13,8 +13,8 @@ std::vector<double> power_of(const Spectrum& spectrum, std::size_t bins);
 std::vector<double> peaks(const std::vector<double>& power, std::size_t from, std::size_t to,
                           std::size_t most);
 
-/// Waves that stand out of a series over time, of which `responses` are the answers to a push: sines best first by frequency
-/// [Hz], and square waves by frequency and phase at time zero [rad].
+/// Waves that stand out of a series over time; `responses` are its answers to a push. Sines come best first by frequency
+/// [Hz], square waves by frequency and phase at time zero [rad].
 struct Lines {
   std::vector<double> frequency;
   std::vector<std::pair<double, double>> squares;

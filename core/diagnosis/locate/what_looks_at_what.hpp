@@ -1,4 +1,4 @@
-// What looks at what in the user's own equations: read from his formulas alone.
+// Dependencies in the user's own equations, read from the formulas alone.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ bool is_speed(const physics::Equations& equations, const std::string& state);
 bool is_static(const physics::Equations& equations);
 /// Does the model look at this input? Else nothing at it can matter but what leads it elsewhere.
 bool is_used(const physics::Equations& equations, const std::string& symbol);
-/// The states of the machine. What only the control law looks at, a filter or a sum, is the controller's, which runs as it is
+/// The states of the machine. A filter or a sum that only the control law looks at is the controller's, which runs as it is
 /// written: no physics is missing there.
 std::vector<physics::Equations::State> states_of_machine(const physics::Equations& equations);
 

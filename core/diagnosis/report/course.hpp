@@ -10,7 +10,7 @@ struct Course {
   std::vector<std::vector<double>> values, power;  // by recording and row; power: square of what it does
 };
 
-/// Of a term in a thermal model or in own equations. No values where it remembers or where its variable is not known.
+/// The course of a term in a thermal model or in own equations. No values where it remembers or its variable is not known.
 Course course_of(const Case& data, const Diagnosis& d, const physics::Term& term);
 
 }  // namespace invar::diagnosis

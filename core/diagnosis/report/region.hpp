@@ -16,10 +16,10 @@ struct Region {
   bool is_part = false;  // of what was recorded; false: it shows nearly everywhere
 };
 
-/// For each recorded variable with which the finding goes, the lowest and the highest value at which the outputs with it
-/// and without it differ by more than a third of the most (RMS over cells). Of a curve, where it is more than a third of its
-/// peak. Heat and equations add up what acts on them, and show it long after: there by what the term itself does, if it does not
-/// remember.
+/// For each recorded variable with which the finding goes, the lowest and the highest value at which it acts. There the outputs
+/// with it and without it differ by more than a third of the most (RMS over cells); a curve is more than a third of its
+/// peak. Heat and equations add up what acts on them, and show it long after: there the effect of the term itself counts, if it
+/// does not remember.
 std::vector<Region> regions_of(const Case& data, const Diagnosis& d, std::size_t finding);
 
 /// "force on the carriage, at position 94 mm to 110 mm": its place, and the regions that are a part of what was recorded.

@@ -27,7 +27,7 @@ std::string sizes_of(const Case& data, const Diagnosis& diagnosis, const Finding
 std::string rows_read(const DataCount& count);
 /// Which part of a recording the fits did not run through, and why; empty where they saw all of it.
 std::string what_was_looked_at(const Case& data);
-/// What to do next, in a sentence.
+/// The next step for the user, in a sentence.
 std::string next_experiment(const Case& data, const Diagnosis& diagnosis);
 /// The verdict in one sentence.
 std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
@@ -35,8 +35,8 @@ std::string verdict_sentence(const Case& data, const Diagnosis& diagnosis);
 std::string why_ended(const Diagnosis& diagnosis);
 /// "not tried: this; that" of a search that ended before its end; empty of a whole one.
 std::string not_tried(const Diagnosis& diagnosis);
-/// What the verdict alone would hide, in a line: parameters that went far from what was believed, much that remains, and
-/// what in the files does not go together; empty where there is none.
+/// A line with all that the verdict alone would hide; empty where there is none. It names parameters that went far from what
+/// was believed, a large residual, and contradictions in the files.
 std::string beside_the_verdict(const Case& data, const Diagnosis& diagnosis);
 
 /// One line for a recording on which a model that is handed over errs more than a simpler one; empty where none does.
@@ -45,7 +45,7 @@ std::string worse_on(const Diagnosis& diagnosis, const OtherRun& run);
 std::string left_out_of(const Case& data, const Diagnosis& diagnosis, const OtherRun& run);
 /// An RMS in its unit; a run that diverged is said in words.
 std::string error_of(double value, const FitRow& row);
-/// What is said of a finding: its term's description, or what fits best in the place of a name.
+/// The description of a finding: that of its term, or of the term that fits best in the place of a name.
 std::string description_of(const Diagnosis& diagnosis, const Finding& finding);
 
 /// A number of the user's that a fit took away from what he believed.

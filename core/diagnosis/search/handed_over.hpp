@@ -1,11 +1,11 @@
-// What is handed over: nothing that simulates worse than what was given, and nothing that does nothing.
+// The model that is handed over simulates no worse than the given one, and holds no term without an effect.
 #pragma once
 
 #include "core/diagnosis/evidence/diagnosis.hpp"
 
 namespace invar::diagnosis {
 
-/// Of two RMS of one output: is `one` larger than `than` by more than chance and the noise allow?
+/// Is the RMS `one` of an output larger than its RMS `than` by more than chance and the noise allow?
 bool is_worse(double one, double than, double noise);
 
 /// Which models of a row are compared.

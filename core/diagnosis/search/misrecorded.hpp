@@ -1,4 +1,4 @@
-// What a recording shows of itself rather than of the machine: columns that a person should look at before any physics.
+// Columns that show a fault of the recording rather than of the machine; a person should look at them before any physics.
 #pragma once
 
 #include <filesystem>
@@ -10,9 +10,9 @@
 
 namespace invar::diagnosis {
 
-/// The recordings with each output moved that comes too early: that the retuned or the believed model meets far better
-/// some rows later, as no physics does, and better than the best model meets it as it stands; with a clause in `doubts` for
-/// each. Nothing where none comes too early.
+/// The recordings with each output moved that comes too early, and a clause in `doubts` for each. The retuned or the believed
+/// model meets such an output far better some rows later, as no physics does, and better than the best model meets it now.
+/// Nothing where none comes too early.
 std::optional<Case> with_columns_in_step(const Case& as_read, const Case& judged, const Diagnosis& d);
 
 /// Is an output said to come late that was moved since it came too early? Then it was not the column: what repeats is early by

@@ -17,7 +17,7 @@ inline constexpr const char* rivals_weighed = "other names in place of what was 
 
 void add_once(std::vector<std::string>& all, const std::string& one);
 
-/// Adds what was not tried. Whoever reads the verdict alone must not take half a search for a whole one that found nothing, nor
+/// Adds what was not tried. A reader of the verdict alone must not take half a search for a whole one that found nothing, nor
 /// a name for sure that was never held against its rivals.
 void say_not_tried(Diagnosis& d, const std::vector<std::string>& not_tried);
 

@@ -13,7 +13,7 @@
 
 namespace invar::diagnosis {
 
-/// What single names are sought in.
+/// The case in which single names are sought.
 struct Naming {
   const Case& data;
   const LoopNoise& noise;
@@ -40,7 +40,7 @@ struct OneName {
   double gain = 0.0;
 };
 
-/// Of the first few names of a short list, each followed to its end, the one that leads; nothing where none stands. Whether
+/// The leader of the first few names of a short list, each followed to its end; nothing where none stands. Whether
 /// its gain pays is for the caller to say.
 std::optional<OneName> leader(const Naming& naming, const Fit& base, const std::vector<Fit>& fits);
 

@@ -24,8 +24,8 @@ struct Pairs {
   /// The pair that explains most, where both terms stand, where neither does it alone, and where the evidence and the size
   /// of what is left both say so.
   std::optional<JointClaim> claim;
-  /// Of pairs that one of the two explains alone, that one: a search one by one, which goes by first order from numbers that
-  /// what is missing led astray, need not come upon it.
+  /// Single terms that explain as much as their pair. A search one by one need not come upon them: it goes by first order,
+  /// from numbers that the missing effect led astray.
   std::vector<physics::Model> alone;
 };
 

@@ -1,4 +1,4 @@
-// What the reference of a loop did between the rows, where not every cycle of the controller was recorded.
+// The course of a loop's reference between the rows, where not every cycle of the controller was recorded.
 #pragma once
 
 #include "core/diagnosis/dataset/case.hpp"

@@ -26,7 +26,7 @@ class Search {
  public:
   Search(Case& data, const Progress& progress, const Options& options)
       : data_{data},
-        // What is sought again from elsewhere does not go back on the bar.
+        // A search begun anew does not go back on the bar.
         progress_{[this, &progress](double share, const std::string& what) {
           progress(reached_ = std::max(reached_, share), what);
         }},
@@ -40,8 +40,8 @@ class Search {
   /// The model fitted to the readings without those that stand far from their neighbours.
   void begin();
   void prepare();
-  /// From where a name is sought: the best model under the filters of its residual, with every row alike, or, where what is
-  /// missing led the user's numbers astray, from what he believes.
+  /// The model from which a name is sought: the best one under the filters of its residual or with every row alike. Where the
+  /// missing effect led the user's numbers astray, the believed model.
   enum class From { coloured, plain, believed };
   struct Sought {
     Fit base;
@@ -56,7 +56,7 @@ class Search {
   /// the top)? Then the search goes on from there. Asked once.
   bool leads_out(const OneName& name);
   void claim(Sought sought);
-  /// In a window of its own friction looks like a motor without force, and from numbers that went far astray what is missing
+  /// In a window of its own friction looks like a motor without force. From numbers far astray the missing effect
   /// may look like its own opposite: from there no name is found.
   [[nodiscard]] bool may_lead_astray(const Fit& fit) const {
     return (data_.model.plant == physics::Plant::axis && data_.windows.count > 0) ||
@@ -71,7 +71,7 @@ class Search {
   bool take_shaken(const Fit& base, Fit* otherwise);
   /// Names one by one, weighed against each other, on top of what is claimed.
   void name(int first_round);
-  /// What has no name, what holds on held-out stretches, and the verdict.
+  /// Courses without a name, the test on held-out stretches, and the verdict.
   void finish();
   /// Where names one by one leave a rest or none is found: begins anew with two at once and keeps what explains more.
   void try_pairs(const Diagnosis& begun);
@@ -85,7 +85,7 @@ class Search {
   void begin_anew(const Diagnosis& begun, int next, Start start, Better better);
   /// Is most of what there is to explain that the machine's controller is another than the model's?
   bool is_another_controller();
-  /// What is said then: nothing of what lies behind it.
+  /// The verdict then says nothing of the physics behind the controller.
   void stop_at_the_law();
   void say_controller();
   /// Claims what stands in the recorded current beside the law; false: nothing does.

@@ -5,8 +5,8 @@
 
 namespace invar::diagnosis {
 
-/// The place at which a curve over any one variable, or a reading that comes late, would explain most of what is left
-/// under the present weights, enough to claim it or not.
+/// The place at which one curve, or a reading that comes late, would explain most of the residual under the present weights.
+/// The curve goes over any one variable; it need not explain enough for a claim.
 Suspect most_suspect(const Case& data, const Diagnosis& d);
 
 }  // namespace invar::diagnosis

@@ -1,7 +1,7 @@
-// Names that are not sure. One rule: a name is said as long as the odds of another cause (odds.hpp) leave it three chances in
-// ten; then free courses take its place where they do better, and it stays as the nearest that has a name. Where none does
-// better it stays, said with its probability, down to one chance in ten; below, what was fitted stays without its name. Where the
-// noise is known and the name plainly leaves more, that is three chances in ten.
+// Names that are not sure. A name is said as long as the odds of another cause (odds.hpp) leave it three chances in ten.
+// Below that, free courses take its place where they do better, and it stays as the nearest that has a name. Where none does
+// better it stays, said with its probability, down to one chance in ten; below, the fit stays without its name. Where the
+// noise is known and the name plainly leaves more, that bar is three chances in ten.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 namespace invar::diagnosis {
 
 /// Takes back names in whose place a free course over another variable leads by `claim_margin`: that alone leaves them no
-/// chance. Of the others it notes what a freer shape explains. `beside`: the courses beside the best model, where known.
+/// chance. For the others it notes how much a freer shape explains. `beside`: the courses beside the best model, where known.
 void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside);
 
 /// After `conclude`: puts courses in the place of names with odds against them above `unlikely_odds`, where these do better.

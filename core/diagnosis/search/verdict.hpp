@@ -6,8 +6,8 @@
 
 namespace invar::diagnosis {
 
-/// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them. What a
-/// model gains is asked of the readings that it was fitted to, what it leaves is told of those `recorded`.
+/// Fits without a third of the stretches in turn and compares there; takes findings back that do not help on them. The gain
+/// of a model counts on the readings that it was fitted to, its residual on those `recorded`.
 void hold_out(const Case& data, const Case& recorded, Diagnosis& d, Claims claims = Claims::checked);
 /// The findings' terms as the best model has them, with their sigmas.
 void give_sigmas(const Case& data, Diagnosis& d);

@@ -7,9 +7,9 @@
 
 namespace invar::diagnosis {
 
-/// Rows by recording from which on the states are unknown: behind a gap in which the inputs may have done what they do beside
-/// it, where the model would show that for long; and the first row of a further recording, unless its initial states are
-/// known exactly and its first rows do not contradict. Rows behind a gap that the model soon forgets, and rows
+/// Rows by recording from which on the states are unknown. One lies behind a gap in which the inputs may have done what they do
+/// beside it, where the model would show that for long. Another is the first row of a further recording, unless its initial
+/// states are known exactly and its first rows do not contradict. Rows behind a gap that the model soon forgets, and rows
 /// without an input, are marked as nothing to compare with instead and counted in `data.windows.forgetting`. At most so many
 /// rows.
 std::vector<std::vector<std::size_t>> begun_anew(Case& data, std::size_t most);

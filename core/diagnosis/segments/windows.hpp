@@ -9,14 +9,14 @@ namespace invar::diagnosis {
 
 /// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
 /// on a state goes on to grow to the end of the recording. An axis without controller always does. Each window begins at
-/// states of its own, parameters "<state>.start<k>" that every fit estimates beside the others, under a prior as wide as the state itself goes. A closed
-/// loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
+/// states of its own, parameters "<state>.start<k>", which every fit estimates beside the others. Their prior is as wide as the
+/// state itself goes. A closed loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
 /// (anew.hpp).
 void cut_into_windows(Case& data);
 /// The same where `near` lies nearer to the machine than what the user believes: does that forget?
 void cut_into_windows(Case& data, const physics::Model& near);
 
-/// The model with the numbers that fit it to short windows, whose states are known from what was measured: where one run from
+/// The model with the numbers that fit it to short windows, whose states are known from what was measured. Where one run from
 /// the first row goes another way than the machine (over the top, into another basin), no small step leads back. For a model
 /// in the user's own equations that is not cut into windows; nothing for others and for short recordings.
 std::optional<physics::Model> begun_in_windows(const Case& data);

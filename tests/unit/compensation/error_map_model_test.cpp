@@ -57,8 +57,9 @@ TEST(ErrorMapModel, SaysWhatItCannotCorrect) {
             "");  // the laser's: left out, the machine errs no less for it
   map.baseline.temperature.reset();
   EXPECT_THAT(why_not_corrected(map), ::testing::HasSubstr("range: {temperature"));
-  auto other = test::model_of(std::string{diagnosed} +
-                              "  - {term: backlash, width: {value: 1.0e-6, unit: m, sigma: 1e-8}}\n");
+  std::string with_backlash{diagnosed};
+  with_backlash += "  - {term: backlash, width: {value: 1.0e-6, unit: m, sigma: 1e-8}}\n";
+  auto other = test::model_of(with_backlash);
   EXPECT_THAT(std::string{why_not_corrected(other.terms.back())}, ::testing::HasSubstr("direction"));
   EXPECT_NEAR(thermal_error_of(other).value({0.07, 22.0, 0.0, {}}),
               thermal_error_of(test::model_of(diagnosed)).value({0.07, 22.0, 0.0, {}}), 1e-15);
