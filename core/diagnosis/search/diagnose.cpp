@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/diagnosis/checks/added_to_command.hpp"
+#include "core/diagnosis/search/longer_windows.hpp"
 #include "core/diagnosis/search/misrecorded.hpp"
 #include "core/diagnosis/search/quiet_inputs.hpp"
 #include "core/diagnosis/search/reference_hold.hpp"
@@ -100,6 +101,9 @@ Diagnosis diagnose(Case& data, const Progress& progress, const Options& options)
       best = std::move(found);
     }
   }
+  if (!best.is_partial)
+    take("the best model in longer windows",
+         [&] { return keep_to_longer_windows(as_read, data, best), true; });
   say_not_tried(best, not_tried);
   return best;
 }

@@ -78,8 +78,20 @@ TEST(Windows, TheAirsDragIsNamedWhereTheFreeRunDrifts) {
   ASSERT_EQ(d.findings.size(), 1U);
   EXPECT_EQ(d.findings[0].term.info->name, "quadratic");
   EXPECT_EQ(d.findings[0].term.on, "v");
+  EXPECT_EQ(d.verdict, Verdict::explained);
   EXPECT_NEAR(d.findings[0].term.values[0], -0.3, 0.03);
   EXPECT_LT(d.heldout[0].after, 0.2 * d.heldout[0].retuned);
+}
+
+/// A wind so slow that each short window takes it for a speed of its own.
+TEST(Windows, WhatShortOnesHideLeavesTheVerdictOpen) {
+  auto data = pushed_mass(0.3, 5e-4, 3000).with(model_of(mass));
+  const auto d = diagnose(data, [](double, const std::string&) {});
+  ASSERT_EQ(d.findings.size(), 1U);
+  EXPECT_EQ(d.findings[0].term.info->name, "quadratic");
+  EXPECT_LT(d.heldout[0].after, 2.0 * d.heldout[0].noise_floor);  // in the short windows nothing is left
+  EXPECT_EQ(d.verdict, Verdict::partly_explained);
+  EXPECT_THAT(summary(data, d), ::testing::HasSubstr("something slow is left"));
 }
 
 /// A pendulum let go from these angles, of which the first is near the top, damped by the air.
