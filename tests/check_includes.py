@@ -12,7 +12,7 @@ LIBRARIES = {
     "yaml-cpp/": "yaml-cpp", "Eigen/": "Eigen", "opencv2/": "OpenCV", "modbus.h": "libmodbus",
     "modbus/": "libmodbus", "fastdds/": "Fast DDS", "fastrtps/": "Fast DDS", "fastcdr/": "Fast DDS", "zlib.h": "compression",
     "zstd.h": "compression", "lz4": "compression", "CLI/": "CLI11", "nlohmann/": "nlohmann-json", "muParser": "muParser",
-    "spdlog/": "spdlog", "openssl/": "OpenSSL", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
+    "spdlog/": "spdlog", "prometheus/": "prometheus-cpp", "openssl/": "OpenSSL", "gtest/": "tests", "gmock/": "tests", "benchmark/": "tests", "dds/dds.h": "Cyclone DDS",
 }
 
 # The rooms of core/metrology know nothing of one another.

@@ -43,6 +43,7 @@ int run(int argc, char** argv) {
   invar::tools::add_latency_test(program);
   invar::tools::add_lifecycle(program);
   invar::tools::add_measure(program);
+  invar::tools::add_metrics(program);
   invar::tools::add_new(program);
   invar::tools::add_param(program);
   invar::tools::add_predict(program);

@@ -6,11 +6,14 @@
 
 namespace invar::recorder {
 
+namespace {
+constexpr std::uint64_t megabyte = 1'000'000;
+}
+
 void Recorder::configure() {
   make_folder(parameters_.out);
   recording::keep_earlier(file());
   const std::scoped_lock lock{mutex_};
-  constexpr std::uint64_t megabyte = 1'000'000;
   writer_ = std::make_unique<recording::RecordingWriter>(
       file(), recording::RecordingOptions{.reserve_bytes =
                                               megabyte * static_cast<std::uint64_t>(parameters_.reserve_mb)});
@@ -27,7 +30,7 @@ void Recorder::cleanup() noexcept {
 }
 
 void Recorder::activate() {
-  look_at_ = now();
+  look_at_ = status_at_ = now();
   told_lost_ = 0;
 }
 
@@ -44,8 +47,31 @@ void Recorder::step(const Tick& tick) noexcept {
         "the disk has its reserve for black boxes left and no more: the recording has ended; make room, "
         "then reset, configure and activate");
   }
+  if (tick.now >= status_at_ && !simulated_time) {
+    status_at_ = tick.now + Duration::seconds(1.0);
+    say_status();
+  }
   if (tick.now < look_at_) return;
   look_at_ = tick.now + Duration::seconds(10.0);
+  say_lost();
+}
+
+void Recorder::say_status() noexcept {
+  const recording::ChannelLedger total = writer_->ledger().total();
+  std::error_code none;
+  const auto disk = std::filesystem::space(parameters_.out, none);
+  RecorderStatus status;
+  stamp(status);
+  status.component_id(id);
+  status.file_bytes(writer_->status().bytes_written);
+  status.free_bytes(none ? 0 : disk.available);
+  status.reserve_bytes(megabyte * static_cast<std::uint64_t>(parameters_.reserve_mb));
+  status.samples(total.written);
+  status.lost(total.lost);
+  status_.write(status);
+}
+
+void Recorder::say_lost() noexcept {
   const std::uint64_t lost = writer_->ledger().total().lost;
   if (lost > told_lost_)
     notices_.say(event::SEVERITY_FAULT, (std::to_string(lost - told_lost_) +

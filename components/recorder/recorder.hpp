@@ -13,7 +13,9 @@
 #include "core/component/component.hpp"
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/port.hpp"
 #include "core/recording/recording_writer.hpp"
+#include "idl/recorder.h"
 
 namespace invar::recorder {
 
@@ -71,10 +73,14 @@ class Recorder final : public Component {
   void attach(const std::filesystem::path& file);
 
  private:
+  void say_status() noexcept;
+  void say_lost() noexcept;
+
   const Parameters& parameters_;
   Notices notices_{*this};
+  Output<RecorderStatus> status_{*this, "status", "state"};
   std::uint64_t told_lost_ = 0;
-  Instant look_at_;
+  Instant look_at_, status_at_;
   std::mutex mutex_;
   std::unique_ptr<recording::RecordingWriter> writer_;
   Instant newest_;                                                         // when the last sample was taken

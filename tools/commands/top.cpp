@@ -12,6 +12,7 @@
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/live_cell.hpp"
+#include "tools/live/silence.hpp"
 #include "tools/live/status_view.hpp"
 #include "tools/live/terminal.hpp"
 #include "tools/live/text_table.hpp"
@@ -22,8 +23,6 @@ namespace invar::tools {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   explicit Options(CLI::App& command) : call{command, {}} {}
   CellCall call;
@@ -31,26 +30,6 @@ struct Options {
   bool once = false;
   bool json = false;
   bool no_topics = false;
-};
-
-/// A process whose status does not get newer for three seconds is silent.
-class Silence {
- public:
-  std::set<std::string> of(const std::vector<lifecycle::ProcessStatus>& processes) {
-    std::set<std::string> silent;
-    const auto now = Clock::now();
-    for (const auto& process : processes) {
-      auto& last = last_[process.process_name().c_str()];
-      const std::pair stamp{process.at().time_ns(), process.cycles()};
-      // In simulated time the cell's clock may stand while its processes wait: cycles do not count there.
-      if (last.first != stamp || process.simulated()) last = {stamp, now};
-      if (now - last.second > std::chrono::seconds{3}) silent.insert(process.process_name().c_str());
-    }
-    return silent;
-  }
-
- private:
-  std::map<std::string, std::pair<std::pair<std::int64_t, std::uint64_t>, Clock::time_point>> last_;
 };
 
 /// Counts of one look and of the look before.

@@ -13,6 +13,7 @@ void add_echo(CLI::App& program);
 void add_hz(CLI::App& program);
 void add_latency_test(CLI::App& program);
 void add_lifecycle(CLI::App& program);
+void add_metrics(CLI::App& program);
 void add_param(CLI::App& program);
 void add_profiles(CLI::App& program);
 void add_record(CLI::App& program);

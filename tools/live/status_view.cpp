@@ -31,12 +31,6 @@ std::string clock_text(const lifecycle::ProcessStatus& process) {
   return process.realtime_granted() ? "granted" : "not granted";
 }
 
-std::string level_text(event::Severity level) {
-  constexpr std::array words{"note", "warning", "fault", "trip"};
-  const auto index = static_cast<std::size_t>(level);
-  return index < words.size() ? words[index] : "?";
-}
-
 /// UTC to the second; in simulated time the seconds since the start.
 std::string time_text(std::int64_t ns) {
   const std::time_t seconds = ns / 1'000'000'000;
@@ -151,6 +145,12 @@ bool is_inactive(lifecycle::ComponentState state) {
 std::string state_text(lifecycle::ComponentState state) {
   constexpr std::array words{"unconfigured", "inactive", "active", "finalized", "error"};
   const auto index = static_cast<std::size_t>(state);
+  return index < words.size() ? words[index] : "?";
+}
+
+std::string level_text(event::Severity level) {
+  constexpr std::array words{"note", "warning", "fault", "trip"};
+  const auto index = static_cast<std::size_t>(level);
   return index < words.size() ? words[index] : "?";
 }
 

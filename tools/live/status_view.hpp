@@ -37,5 +37,7 @@ void print(const CellStatus& status, std::ostream& out);
 [[nodiscard]] bool is_inactive(lifecycle::ComponentState state);
 /// "active"
 [[nodiscard]] std::string state_text(lifecycle::ComponentState state);
+/// "warning"
+[[nodiscard]] std::string level_text(event::Severity level);
 
 }  // namespace invar::tools
