@@ -52,21 +52,12 @@ SshAccess read_ssh(const Node& node) {
   return ssh;
 }
 
-/// An address that one PC can have: neither 0.x nor from 224.0.0.0 up (multicast, reserved, broadcast; RFC 1122, 3.2.1.3).
-bool is_unicast(in_addr address) {
-  const auto first = ntohl(address.s_addr) >> 24U;
-  return first != 0 && first < 224;
-}
-
 CellHost read_host(const Node& node) {
   CellHost host{node.key(), "", "", read_ssh(node["ssh"])};
-  in_addr address{};
   if (node.has("interface")) host.interface = node.text("interface");
   if (node.has("address") || !node.has("interface")) host.address = node.text("address");
-  if (node.has("address") && inet_pton(AF_INET, host.address.c_str(), &address) != 1)
-    node["address"].fault("`" + clipped(host.address) + "` is no IPv4 address", "write it as 10.0.0.11");
-  else if (node.has("address") && !is_unicast(address))
-    node["address"].fault("`" + clipped(host.address) + "` is no address of one PC", "write it as 10.0.0.11");
+  if (const std::string flaw = flaw_of_address(host.address); node.has("address") && !flaw.empty())
+    node["address"].fault("`" + clipped(host.address) + "` " + flaw, "write it as 10.0.0.11");
   check_name(node, host.name, In::files);
   return host;
 }
@@ -184,6 +175,13 @@ void check_key_names(const Node& node, const Cell& cell) {
 
 }  // namespace
 
+std::string flaw_of_address(const std::string& address) {
+  in_addr parsed{};
+  if (inet_pton(AF_INET, address.c_str(), &parsed) != 1) return "is no IPv4 address";
+  const auto first = ntohl(parsed.s_addr) >> 24U;
+  return first != 0 && first < 224 ? "" : "is no address of one PC";
+}
+
 std::string launcher_name(const std::string& host) { return "launcher-" + host; }
 
 std::string Cell::topic(const std::string& connection) const {
@@ -227,7 +225,8 @@ Cell read_cell(const Yaml& yaml) {
       node.fault("`" + clipped(node.as_text()) + "` is no folder",
                  "name a folder from which models may be loaded");
     else if (node.is_scalar() && !std::filesystem::canonical(path).has_relative_path())
-      node.fault("`" + clipped(node.as_text()) + "` is the whole disk", "name the folder that holds the models");
+      node.fault("`" + clipped(node.as_text()) + "` is the whole disk",
+                 "name the folder that holds the models");
     return path;
   };
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);

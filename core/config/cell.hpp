@@ -97,6 +97,10 @@ struct Cell {
   [[nodiscard]] const CellComponent* find(const std::string& component) const;
 };
 
+/// Why a text is no IPv4 address that one PC can have ("is no IPv4 address"): neither 0.x nor from 224.0.0.0 up (multicast, reserved,
+/// broadcast; RFC 1122, 3.2.1.3). Empty: it is one.
+[[nodiscard]] std::string flaw_of_address(const std::string& address);
+
 /// Whose key `invar run` has on a host.
 [[nodiscard]] std::string launcher_name(const std::string& host);
 

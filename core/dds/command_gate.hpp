@@ -17,12 +17,13 @@ namespace invar::dds {
 /// Between a reader and the receiver of its samples. Beside ownership it holds the lifespan, by the stamps of the middleware:
 /// Fast DDS would drop old samples in silence, and all commands of a PC whose clock is behind. A sender whose clock is
 /// ahead is obeyed, and so is one that was found within the lifespan, however old its sample seems: none is older than that.
-/// Late samples of both are known by the one that seemed youngest. Any thread.
+/// Late samples of both are known by the one that seemed youngest. Where somebody sets the clock of a sender back, its samples are
+/// refused for `clock_patience` and then taken, told so. Any thread.
 class CommandGate {
  public:
   /// `refused` is called for every sample that is not taken. The discovery must outlive it.
   CommandGate(std::string topic, const Profile& profile, Discovery& discovery,
-              std::function<void()> refused = {});
+              std::function<void()> refused = {}, Duration clock_patience = Duration::seconds(10.0));
 
   /// Is told of each sample that is obeyed, before it is handed over, and when its sender has gone.
   struct Follower {
@@ -44,13 +45,26 @@ class CommandGate {
   [[nodiscard]] std::uint64_t refused() const { return refusals_; }
 
  private:
+  struct Least {
+    Duration age;
+    Instant at;
+  };
+  using Leasts = std::map<std::string, Least>;  // by writer
+  struct Late {
+    Duration first, youngest;  // ages, which stay within the lifespan of one another
+    Instant since;
+  };
+
   bool is_too_late(const Claimant& who, Duration age, Sender sender);
+  [[nodiscard]] std::string too_far(Duration age) const;
+  Leasts::iterator take_clock(const Claimant& who, Duration age, Instant now);
+  bool was_set(const Claimant& who, Duration age, Instant now);
   void tell(const Claimant& who, const std::string& why);
   void raise(const std::string& text);
 
   std::string topic_;
   bool exclusive_;
-  Duration lifespan_;
+  Duration lifespan_, clock_patience_;
   Discovery& discovery_;
   std::function<void()> refused_;
   Follower follower_;
@@ -62,11 +76,8 @@ class CommandGate {
     std::uint64_t since = 0;  // refused without a word since then
   };
   std::map<std::string, Told> told_;  // by writer
-  struct Least {
-    Duration age;
-    Instant at;
-  };
-  std::map<std::string, Least> least_;  // of writers whose clock is further apart than the lifespan
+  Leasts least_;                      // of writers whose clock is further apart than the lifespan
+  std::map<std::string, Late> late_;  // by writer, of those that are refused
 };
 
 }  // namespace invar::dds

@@ -4,13 +4,15 @@
 #include <random>
 
 #include "core/base/clock.hpp"
+#include "core/base/name.hpp"
 #include "core/dds/clock_offset.hpp"
 
 namespace invar::dds {
 
 namespace {
-constexpr std::size_t most_peers = 64;                      // processes of a cell; as many echoes travel
-constexpr Duration silent_after = Duration::seconds(5.0);   // as the lease of a participant
+constexpr std::size_t most_peers = 64;                     // processes of a cell; as many echoes travel
+constexpr Duration silent_after = Duration::seconds(5.0);  // as the lease of a participant
+constexpr std::size_t most_strangers = 16;
 constexpr Duration longest_round = Duration::seconds(1.0);  // what took longer says nothing of a clock
 
 /// A stamp that no process of this cell could send would overflow a sum: 146 years of UTC, 36 of a monotonic clock.
@@ -39,9 +41,10 @@ std::uint64_t participant_key(std::span<const unsigned char, 12> prefix) noexcep
   return hash == 0 ? 1 : hash;
 }
 
-HostClocks::HostClocks(std::uint32_t cell, std::string host)
+HostClocks::HostClocks(std::uint32_t cell, std::string host, std::vector<std::string> hosts)
     : cell_{cell},
       host_{std::move(host)},
+      hosts_{std::move(hosts)},
       id_{(std::uint64_t{std::random_device{}()} << 32U) | std::random_device{}()} {}
 
 void HostClocks::add_participant(std::uint64_t key) {
@@ -82,6 +85,11 @@ const HostClocks::Measurement& HostClocks::best(const Peer& peer) {
 void HostClocks::heard(const clock::Beat& beat, const ClockReading& own) {
   if (beat.cell() != cell_ || beat.process_id() == id_ || !is_sane(beat)) return;
   const std::lock_guard lock{mutex_};
+  const std::string from = beat.host().to_string();
+  if (std::find(hosts_.begin(), hosts_.end(), from) == hosts_.end()) {
+    if (strangers_.size() < most_strangers && strangers_.insert(from).second) untold_.push_back(from);
+    return;
+  }
   std::erase_if(peers_,
                 [&](const auto& entry) { return own.monotonic - entry.second.heard > silent_after * 12; });
   if (peers_.size() >= most_peers && !peers_.contains(beat.process_id()))
@@ -89,7 +97,7 @@ void HostClocks::heard(const clock::Beat& beat, const ClockReading& own) {
       return a.second.heard < b.second.heard;
     }));
   Peer& peer = peers_[beat.process_id()];
-  peer.host = beat.host().to_string();
+  peer.host = from;
   peer.heard = own.monotonic;
   peer.sent_ns = beat.sent_ns();
   peer.system = {beat.system_ns()};
@@ -135,21 +143,46 @@ Duration HostClocks::stamps_ahead(std::uint64_t participant) const noexcept {
   return known == nullptr ? Duration{} : Duration{known->ahead_ns.load(std::memory_order_relaxed)};
 }
 
+std::string HostClocks::take_stranger() {
+  const std::lock_guard lock{mutex_};
+  if (untold_.empty()) return "";
+  const std::string name = printable(untold_.back());
+  untold_.pop_back();
+  return "a program compares clocks as host `" + name +
+         "`, which the cell does not have: it does not count; end it, or start it with this cell file";
+}
+
 std::string HostClocks::farther_than(Duration bound) const {
-  for (const HostClock& other : hosts(monotonic_now()))
-    if (magnitude(other.ahead) > bound)
-      return clocks_apart("host `" + other.host + "`", other.ahead, "`" + host_ + "`") +
+  std::map<std::string, Duration> nearest;
+  const Instant now = monotonic_now();
+  {
+    const std::lock_guard lock{mutex_};
+    for (const auto& [id, peer] : peers_) {
+      if (!is_heard(peer, now)) continue;
+      const Duration ahead = ahead_of_us(peer);
+      const auto [known, first] = nearest.try_emplace(peer.host, ahead);
+      if (!first && magnitude(ahead) < magnitude(known->second)) known->second = ahead;
+    }
+  }
+  for (const auto& [host, ahead] : nearest)
+    if (magnitude(ahead) > bound)
+      return clocks_apart("host `" + host + "`", ahead, "`" + host_ + "`") +
              "; `clock_bound` of the cell is " + seconds_text(bound);
   return "";
 }
+
+bool HostClocks::is_heard(const Peer& peer, Instant monotonic) const {
+  return peer.count > 0 && peer.host != host_ && monotonic - peer.heard <= silent_after;
+}
+
+Duration HostClocks::ahead_of_us(const Peer& peer) const { return best(peer).offset + peer.system - system_; }
 
 std::vector<HostClock> HostClocks::hosts(Instant monotonic) const {
   const std::lock_guard lock{mutex_};
   std::map<std::string, HostClock> found;
   for (const auto& [id, peer] : peers_) {
-    if (peer.count == 0 || peer.host == host_ || monotonic - peer.heard > silent_after) continue;
-    const Measurement& offset = best(peer);
-    const HostClock clock{peer.host, offset.offset + peer.system - system_, offset.round_trip / 2};
+    if (!is_heard(peer, monotonic)) continue;
+    const HostClock clock{peer.host, ahead_of_us(peer), best(peer).round_trip / 2};
     const auto [known, first] = found.try_emplace(peer.host, clock);
     if (!first && clock.error < known->second.error) known->second = clock;
   }

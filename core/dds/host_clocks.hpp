@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,7 +48,8 @@ class HostClocks {
  public:
   static constexpr Duration period = Duration::milliseconds(100);
 
-  HostClocks(std::uint32_t cell, std::string host);
+  /// `hosts`: all of the cell. A beat in another name changes nothing, and is told.
+  HostClocks(std::uint32_t cell, std::string host, std::vector<std::string> hosts);
   /// Set-up: one of this process.
   void add_participant(std::uint64_t key);
   [[nodiscard]] clock::Beat beat(const ClockReading& own);
@@ -59,10 +61,13 @@ class HostClocks {
   [[nodiscard]] Duration stamps_ahead(std::uint64_t participant) const noexcept;
   /// The other hosts that were heard in the last 5 s, each by its process with the shortest round trip.
   [[nodiscard]] std::vector<HostClock> hosts(Instant monotonic) const;
-  /// Names a host whose clock is further off than `bound`; empty: there is none. Stamps are turned whatever the clocks say, but one
-  /// that is far off is one that nobody keeps.
+  /// Names a host whose clock is further off than `bound`, by all of its processes; empty: there is none. Stamps are turned
+  /// whatever the clocks say, but one that is far off is one that nobody keeps. A program that takes the name of a host says nothing
+  /// against the processes that are there.
   [[nodiscard]] std::string farther_than(Duration bound) const;
   [[nodiscard]] const std::string& host() const { return host_; }
+  /// Once for each name, of the first few: a program that compares clocks as a host that the cell does not have. Empty: none.
+  [[nodiscard]] std::string take_stranger();
 
  private:
   struct Measurement {
@@ -82,11 +87,16 @@ class HostClocks {
   };
 
   [[nodiscard]] static const Measurement& best(const Peer& peer);
+  [[nodiscard]] bool is_heard(const Peer& peer, Instant monotonic) const;
+  [[nodiscard]] Duration ahead_of_us(const Peer& peer) const;
   [[nodiscard]] const Known* find(std::uint64_t participant) const noexcept;
   void know(std::uint64_t participant, Duration ahead) noexcept;
 
   std::uint32_t cell_;
   std::string host_;
+  std::vector<std::string> hosts_;
+  std::set<std::string> strangers_;
+  std::vector<std::string> untold_;
   std::uint64_t id_;
   mutable std::mutex mutex_;
   std::vector<std::uint64_t> participants_;

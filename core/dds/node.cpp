@@ -169,7 +169,7 @@ Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Par
   parts_->profiles = std::move(profiles);
   if (parts_->options.shared_memory) remove_shared_memory_leftovers();
   if (const auto& clocks = parts_->options.clocks)
-    parts_->clocks = std::make_unique<HostClocks>(clocks->cell, clocks->host);
+    parts_->clocks = std::make_unique<HostClocks>(clocks->cell, clocks->host, clocks->hosts);
   (void)parts_->participant(Traffic::general);  // discovery begins
   if (parts_->clocks) compare_clocks();
 }
@@ -238,6 +238,11 @@ void Node::send_heartbeats(std::uint32_t cell) {
 void Node::compare_clocks() {
   HostClocks& clocks = *parts_->clocks;
   const std::string topic = clock_topic(parts_->options.cell);
+  parts_->discovery.add_source([&clocks, topic]() -> std::optional<Alarm> {
+    const std::string stranger = clocks.take_stranger();
+    if (stranger.empty()) return std::nullopt;
+    return Alarm{topic, stranger, false};
+  });
   parts_->clock_beats = reader<clock::Beat>(topic, clock_profile(), [&clocks](const clock::Beat& beat) {
     clocks.heard(beat, ClockReading::now());
   });

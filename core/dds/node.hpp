@@ -34,7 +34,8 @@ struct PeerHost {
 /// A process that finds out how far the clocks of the other hosts are apart, and gives its own.
 struct ClockOptions {
   std::uint32_t cell = 0;
-  std::string host;  // of this process, as the cell file names it
+  std::string host;                // of this process, as the cell file names it
+  std::vector<std::string> hosts;  // all of the cell: others do not count
 };
 
 struct NodeOptions {

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The clock of one PC of a cell is 3 s ahead, then set back by 10 s while a job runs: its results are those of clocks in step, the
+# The clock of one PC of a cell is 3 s ahead, then set back by 10 s, and forward by 20 s, while a job runs: its results are those of clocks in step, the
 # offset is told within 0.2 ms, and a clock that is further off than the cell's bound begins no job.
 # host_clocks.sh INVAR SOURCE_DIR
 set -euo pipefail
@@ -85,6 +85,12 @@ followed "3 s ahead"
 followed "set back by 10 s in the job"
 wait $!
 told -7 || fail "the status does not tell the clock that was set"
+(sleep 3; set_clock "+13s") &
+followed "set forward by 20 s in the job"
+wait $!
+told 13 || fail "the status does not tell the clock that was set forward"
+on 0 "$invar" record cell.yaml --out tables/outside.mcap --topic trial.status --duration 1 >said 2>&1 || fail "nothing is recorded from outside"
+grep -q 'stamps of host `trial-pc` are [0-9.]* s ahead of those of .stage-pc.*as they were sent' said || fail "a recording from outside does not say that clocks are apart: $(cat said)"
 
 set_clock "-100s"
 sleep 1

@@ -1,7 +1,5 @@
 #include "tools/cell/bridge_file.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <set>
 
@@ -76,10 +74,9 @@ void check_one_way(const Node& node, const BridgeFile& bridge) {
 
 std::vector<std::string> addresses(const Node& node) {
   std::vector<std::string> all = node.as_texts();
-  in_addr parsed{};
   for (const std::string& address : all)
-    if (inet_pton(AF_INET, address.c_str(), &parsed) != 1)
-      node.fault("`" + clipped(address) + "` is no IPv4 address", "write it as 10.0.0.11");
+    if (const std::string flaw = config::flaw_of_address(address); !flaw.empty())
+      node.fault("`" + clipped(address) + "` " + flaw, "write it as 10.0.0.11");
   return all;
 }
 
@@ -103,6 +100,10 @@ BridgeFile read_bridge(const LoadedCell& loaded) {
   if (!node.has("out") && !node.has("in"))
     node.fault("names no topic", "add `out: [{port: stage_x.state, topic: plant/line1/stage_x}]`");
   check_one_way(node, bridge);
+  for (const auto& process : loaded.cell->processes)
+    if (process.name == bridge_name)
+      node.fault("would have the name of the process `" + process.name + "`",
+                 "give the process another name");
   return bridge;
 }
 

@@ -9,6 +9,9 @@
 
 namespace invar::tools {
 
+/// As which `invar bridge` takes part in the cell.
+inline constexpr const char* bridge_name = "bridge";
+
 enum class Direction { out, in };  // out: from the cell to the plant
 
 /// One topic on its way, one way alone.

@@ -64,6 +64,13 @@ std::vector<dds::PeerHost> peers_of(const config::Cell& cell) {
   return peers;
 }
 
+std::optional<dds::ClockOptions> clocks_on(const config::Cell& cell, const std::string& host) {
+  if (cell.hosts.size() < 2) return std::nullopt;
+  dds::ClockOptions options{cell.id, host, {}};
+  for (const auto& each : cell.hosts) options.hosts.push_back(each.name);
+  return options;
+}
+
 dds::NodeOptions node_on(const config::Cell& cell, const std::string& process, const std::string& host) {
   dds::NodeOptions options;
   options.cell = cell.name;

@@ -23,6 +23,9 @@ namespace invar::tools {
 /// The hosts of the cell as a node calls them.
 [[nodiscard]] std::vector<dds::PeerHost> peers_of(const config::Cell& cell);
 
+/// How a process on `host` compares clocks with the others; nothing: the cell has one host.
+[[nodiscard]] std::optional<dds::ClockOptions> clocks_on(const config::Cell& cell, const std::string& host);
+
 /// How a program takes part in the cell as `process`, on a host of the file that this PC is. Its address may come later.
 [[nodiscard]] dds::NodeOptions node_on(const config::Cell& cell, const std::string& process,
                                        const std::string& host);

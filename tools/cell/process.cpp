@@ -65,8 +65,7 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of,
       static_cast<std::size_t>(std::count_if(loaded.cell->processes.begin(), loaded.cell->processes.end(),
                                              [&](const auto& other) { return other.host == process.host; }));
   if (options.identity) options.identity->may_command = asks_others(of);
-  if (!simulated && loaded.cell->hosts.size() > 1)
-    options.clocks = dds::ClockOptions{loaded.cell->id, process.host};
+  if (!simulated) options.clocks = clocks_on(*loaded.cell, process.host);
   if (process.realtime) {
     options.realtime_priority = std::max(0, process.realtime->priority - 10);
     options.realtime_cpu = process.realtime->cpu;  // samples leave the moment the loop sleeps

@@ -6,6 +6,7 @@
 #include "tools/cell/bridge.hpp"
 #include "tools/cell/load_cell.hpp"
 #include "tools/cell/own_host.hpp"
+#include "tools/cell/process_claim.hpp"
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/text_table.hpp"
@@ -71,9 +72,10 @@ int run(const Options& options) {
   if (!own_hosts(*loaded.cell, "").contains(file.host))
     throw InputError{options.cell.string() + ": bridge.host",
                      "`" + file.host + "` is another PC than this one", "start the bridge there"};
+  const ProcessClaim claim{*loaded.cell, bridge_name};
   (void)interrupted();
-  dds::NodeOptions of_cell = node_on(*loaded.cell, "bridge", file.host);
-  if (loaded.cell->hosts.size() > 1) of_cell.clocks = dds::ClockOptions{loaded.cell->id, file.host};
+  dds::NodeOptions of_cell = node_on(*loaded.cell, bridge_name, file.host);
+  of_cell.clocks = clocks_on(*loaded.cell, file.host);
   dds::Node cell{of_cell, dds::load_profiles(loaded.cell->profiles)};
   dds::Node plant{plant_options(*loaded.cell, file), dds::load_profiles(loaded.cell->profiles)};
   Bridge bridge{file, loaded.cell->id, cell, plant};

@@ -1,13 +1,17 @@
 // `invar record`: the topics of a running cell into an MCAP file, with a ledger of what was lost.
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/base/clock.hpp"
+#include "core/base/name.hpp"
+#include "core/dds/clock_offset.hpp"
 #include "core/recording/recording_writer.hpp"
 #include "core/recording/type_book.hpp"
 #include "tools/live/commands.hpp"
@@ -99,6 +103,23 @@ void report(const recording::LossLedger& ledger, const Options& options) {
             << total.missing << " missing before they arrived\n";
 }
 
+/// Tools take no part in comparing clocks; the recorder of the cell does.
+void tell_clocks(LiveCell& cell) {
+  constexpr std::int64_t worth_a_word = 10'000'000;  // ns: less than a worker's period
+  std::set<std::string> told;
+  for (const auto& process : cell.client().processes()) {
+    const std::int64_t ahead = process.clock_ahead_ns() - process.stamps_behind_ns();
+    const std::string host = process.host().c_str();
+    if (process.clock_reference().size() == 0 || process.clock_error_ns() < 0 ||
+        std::abs(ahead) < worth_a_word || !told.insert(host).second)
+      continue;
+    std::cerr << "invar record: stamps of host `" << printable(host) << "` are "
+              << dds::seconds_text({std::abs(ahead)}) << (ahead < 0 ? " behind" : " ahead of")
+              << " those of `" << printable(process.clock_reference().c_str())
+              << "`: they are in the file as they were sent; the component `recorder` turns them\n";
+  }
+}
+
 int record(Options& options) {
   options.call.resolve();
   (void)interrupted();
@@ -143,6 +164,7 @@ int record(Options& options) {
       if (file.status().failed || file.status().at_reserve) break;
     }
   }
+  tell_clocks(cell);
   const bool at_reserve = file.status().at_reserve;
   disk_good = file.close();
   ledger = file.ledger();

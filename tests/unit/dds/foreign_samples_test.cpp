@@ -242,6 +242,56 @@ TEST(CommandGateClocks, ASenderThatWasJustFoundCannotBeLateSoThatItsClockIsBehin
   EXPECT_THAT(told, HasSubstr("is 3 s behind that of"));
 }
 
+// Its clock was right, or ahead, when somebody set it back: it shall not be refused for ever, and not before it is sure.
+TEST(CommandGateClocks, ASenderWhoseClockIsSetBackIsRefusedForAWhileToldAndThenObeyed) {
+  for (const double before : {0.0, 10.0}) {
+    Discovery discovery;
+    discovery.add_participant("p", "plant");
+    const Duration patience = Duration::milliseconds(400);
+    CommandGate gate{"cell/test/c", standard_profiles().at("command"), discovery, {}, patience};
+    EXPECT_TRUE(gate.passes("p|1", system_now() + Duration::seconds(before)));
+    const Instant set = monotonic_now();
+    const Duration back = Duration::seconds(before - 5.0);
+    bool passes = false;
+    while (!passes && monotonic_now() - set < Duration::seconds(5.0)) {
+      passes = gate.passes("p|1", system_now() + back);
+      std::this_thread::sleep_for(std::chrono::milliseconds{20});
+    }
+    EXPECT_TRUE(passes);
+    EXPECT_GE(monotonic_now() - set, patience);
+    EXPECT_TRUE(gate.passes("p|1", system_now() + back)) << "and from then on";
+    EXPECT_FALSE(gate.passes("p|1", system_now() + back - Duration::seconds(1.5))) << "1.5 s on its way";
+    std::string told;
+    for (const auto& alarm : discovery.take_alarms()) told += alarm.text + "\n";
+    EXPECT_THAT(told, HasSubstr("are taken from now on: somebody set its clock"));
+  }
+}
+
+TEST(CommandGateClocks, AQueueThatRunsEmptyIsNoClockThatWasSet) {
+  Discovery discovery;
+  CommandGate gate{
+      "cell/test/c", standard_profiles().at("command"), discovery, {}, Duration::milliseconds(200)};
+  // For a second, samples of the seconds before: each is younger than the one before.
+  for (int age_ms = 30'000; age_ms > 1'100; age_ms -= 1'200) {
+    EXPECT_FALSE(gate.passes("p|1", system_now() - Duration::milliseconds(age_ms)) && age_ms > 2'500)
+        << age_ms;
+    std::this_thread::sleep_for(std::chrono::milliseconds{40});
+  }
+  EXPECT_TRUE(gate.passes("p|1", system_now()));
+}
+
+TEST(CommandGateClocks, ASenderOfTheCellThatStampsInTheFutureIsToldSo) {
+  Discovery discovery;
+  CommandGate gate{"cell/test/c", standard_profiles().at("command"), discovery};
+  EXPECT_FALSE(gate.passes("p|1", utc_now() + Duration::seconds(4.0), CommandGate::Sender::of_cell));
+  EXPECT_FALSE(gate.passes("p|2", utc_now() - Duration::seconds(4.0), CommandGate::Sender::of_cell));
+  const auto alarms = discovery.take_alarms();
+  ASSERT_EQ(alarms.size(), 2U);
+  EXPECT_THAT(alarms[0].text,
+              AllOf(HasSubstr("lies 4 s in the future"), Not(HasSubstr("before it arrived"))));
+  EXPECT_THAT(alarms[1].text, HasSubstr("was sent 4 s before it arrived"));
+}
+
 // A command of a person is a client of its own: a cell that runs for years hears millions.
 TEST(Requests, EachClientIsHeardAndLeavesNoMemoryBehind) {
   Node server{local("server"), standard_profiles()}, clients{local("clients"), standard_profiles()};

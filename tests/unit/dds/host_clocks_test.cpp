@@ -51,8 +51,12 @@ class TwoPcs : public ::testing::Test {
   std::random_device::result_type seed = std::random_device{}();
   std::mt19937_64 random{seed};
   Instant now{100'000'000'000'000};  // true time since the first PC was switched on
-  Pc one{{1, "one"}, 11, Duration::seconds(100.0), {}, {}};
-  Pc other{{1, "other"}, 22, Duration::seconds(-4000.0), Duration::seconds(3.0), Duration::seconds(3.0)};
+  Pc one{{1, "one", {"one", "other"}}, 11, Duration::seconds(100.0), {}, {}};
+  Pc other{{1, "other", {"one", "other"}},
+           22,
+           Duration::seconds(-4000.0),
+           Duration::seconds(3.0),
+           Duration::seconds(3.0)};
 };
 
 TEST_F(TwoPcs, AnOffsetIsKnownWithinAFifthOfAMillisecondThoughBeatsAreLateByChance) {
@@ -106,9 +110,36 @@ TEST_F(TwoPcs, BeatsOfStrangersAndNonsenseChangeNothing) {
   EXPECT_LT(std::abs(stamps_error_ms()), 0.2) << "seed " << seed;
 }
 
+// Every program on the network of an unsecured cell may send beats; no job may wait for one of them.
+TEST_F(TwoPcs, AStrangersBeatsBlockNothingAndAreToldOnce) {
+  other.stamps = other.system = {};
+  Pc stranger{{1, "toaster", {"one", "other", "toaster"}},
+              99,
+              {},
+              Duration::seconds(900.0),
+              Duration::seconds(900.0)};
+  Pc false_name{{1, "other", {"one", "other"}}, 98, {}, Duration::seconds(900.0), Duration::seconds(900.0)};
+  stranger.clocks.add_participant(stranger.participant);
+  false_name.clocks.add_participant(false_name.participant);
+  for (int i = 0; i < 20; ++i) {
+    run(1, 0.2);
+    for (Pc* from : {&stranger, &false_name}) {
+      send(*from, one, 0.0);
+      send(one, *from, 0.0);
+    }
+  }
+  EXPECT_EQ(one.clocks.farther_than(Duration::seconds(60.0)), "");
+  EXPECT_EQ(one.clocks.hosts(one.at(now).monotonic).size(), 1U);
+  EXPECT_FALSE(one.clocks.knows(stranger.participant));
+  EXPECT_NE(one.clocks.take_stranger().find("host `toaster`, which the cell does not have"),
+            std::string::npos);
+  EXPECT_EQ(one.clocks.take_stranger(), "");
+}
+
 TEST_F(TwoPcs, AThousandRestartsLeaveTheLivingKnown) {
   for (std::uint64_t i = 0; i < 1000; ++i) {
-    Pc restarted{{1, "other"}, 1000 + i, {}, Duration::seconds(3.0), Duration::seconds(3.0)};
+    Pc restarted{
+        {1, "other", {"one", "other"}}, 1000 + i, {}, Duration::seconds(3.0), Duration::seconds(3.0)};
     restarted.clocks.add_participant(restarted.participant);
     for (int k = 0; k < 2; ++k) {
       send(restarted, one, 0.1);
