@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <mutex>
+#include <set>
 #include <thread>
 
 #include "core/base/contract.hpp"
@@ -14,6 +15,7 @@
 #include "core/dds/endpoint_id.hpp"
 #include "core/dds/guid_text.hpp"
 #include "core/dds/host_clocks.hpp"
+#include "core/dds/key_watch.hpp"
 #include "core/dds/local_exchange.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/promised_address.hpp"
@@ -114,6 +116,9 @@ struct Node::Parts {
   std::unique_ptr<HostClocks> clocks;
   std::unique_ptr<Connection> clock_beats;
   std::unique_ptr<Pulse> clock_pulse;
+  std::vector<HolderId> revoked;
+  std::unique_ptr<KeyWatch> key_watch;
+  std::unique_ptr<Pulse> key_pulse;  // last: it looks at the participants
 
   [[nodiscard]] std::string own_address() const {
     return options.addresses.empty() ? "127.0.0.1" : options.addresses.front();
@@ -137,7 +142,30 @@ struct Node::Parts {
   std::unique_ptr<Participant> made(const NodeOptions& of, Traffic traffic) {
     auto participant = std::make_unique<Participant>(of, traffic, profiles, discovery);
     if (clocks) clocks->add_participant(participant_key(participant->id().guidPrefix.value));
+    if (!revoked.empty()) (void)participant->revoke(revoked);
     return participant;
+  }
+  /// On the thread of the pulse.
+  void look_at_keys() {
+    KeyWatch::News news = key_watch->look();
+    for (Alarm& alarm : news.alarms) discovery.raise(std::move(alarm));
+    const std::lock_guard lock{mutex};
+    if (!news.revoked || *news.revoked == revoked) return;
+    revoked = std::move(*news.revoked);
+    std::set<std::string> hit;
+    for (const auto* participant : {&general, &raw})
+      if (*participant)
+        for (std::string& name : (*participant)->revoke(revoked)) hit.insert(std::move(name));
+    for (const std::string& name : hit) discovery.raise(revoked_alarm(name));
+  }
+  [[nodiscard]] Alarm revoked_alarm(const std::string& name) const {
+    if (name == "invar/" + options.cell + "/" + options.process)
+      return {"keys",
+              "the certificate of `" + options.identity->name +
+                  "` is revoked: other processes hear this one no more; `invar keys CELL --renew " +
+                  options.identity->name + "`, bring it to this PC, and start the process anew",
+              true};
+    return {"keys", "`" + name + "` is revoked: nothing that it sends is taken any more", false};
   }
   /// nullptr where samples of this profile have no way through shared memory.
   LocalExchange* exchange_of(const Profile& qos) {
@@ -172,9 +200,15 @@ Node::Node(NodeOptions options, Profiles profiles) : parts_{std::make_unique<Par
     parts_->clocks = std::make_unique<HostClocks>(clocks->cell, clocks->host, clocks->hosts);
   (void)parts_->participant(Traffic::general);  // discovery begins
   if (parts_->clocks) compare_clocks();
+  if (!parts_->options.identity) return;
+  parts_->key_watch = std::make_unique<KeyWatch>(*parts_->options.identity);
+  parts_->look_at_keys();
+  parts_->key_pulse = std::make_unique<Pulse>("invar-keys", Duration::seconds(1.0), 0,
+                                              [parts = parts_.get()] { parts->look_at_keys(); });
 }
 
 Node::~Node() {
+  parts_->key_pulse.reset();
   stop();
   // Who was killed while it wrote into our shared memory leaves a lock there. Fast DDS gives such a port up and makes another
   // one after a second; closing the port in that moment, it would use the memory of the old one when it is gone.

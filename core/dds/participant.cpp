@@ -352,19 +352,36 @@ bool Participant::has_dead_peer() const {
   return std::any_of(peers_.begin(), peers_.end(), [](const auto& peer) { return !is_alive(peer.second); });
 }
 
+std::vector<std::string> Participant::revoke(const std::vector<HolderId>& holders) {
+  reception_->revoke(holders);
+  const auto is_revoked = [&](HolderId holder) {
+    return std::binary_search(holders.begin(), holders.end(), holder);
+  };
+  std::vector<std::string> names;
+  if (is_revoked(holder_of(prefix_of(id())))) names.push_back(name_);
+  const std::lock_guard lock{peers_mutex_};
+  for (const auto& [holder, name] : holders_)
+    if (is_revoked(holder)) names.push_back(name);
+  return names;
+}
+
 void Participant::on_participant_discovery(fdds::DomainParticipant*, rtps::ParticipantDiscoveryInfo&& info) {
   const std::string id = guid_text(info.info.m_guid.guidPrefix);
   const bool is_gone = info.status == rtps::ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
                        info.status == rtps::ParticipantDiscoveryInfo::DROPPED_PARTICIPANT;
   const auto identity = memory_identity_from(info.info.m_userData.getValue());
+  const GuidPrefix prefix = prefix_of(info.info.m_guid);
   {
     const std::lock_guard lock{peers_mutex_};
     if (!is_gone && identity && is_reachable(*identity, identity_))
       peers_[id] = identity->process;
     else
       peers_.erase(id);
+    if (is_gone)
+      holders_.erase(holder_of(prefix));
+    else if (!owner_.empty())
+      holders_[holder_of(prefix)] = info.info.m_participantName.c_str();
   }
-  const GuidPrefix prefix = prefix_of(info.info.m_guid);
   is_gone ? reception_->guard().forget(prefix) : reception_->know_participant(prefix);
   if (is_gone) return discovery_.remove_participant(id);
   discovery_.add_participant(id, info.info.m_participantName.c_str(), addresses_of(info.info));

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "core/dds/discovery.hpp"
+#include "core/dds/holder_id.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/profile.hpp"
 #include "core/dds/reachable_memory.hpp"
@@ -51,6 +52,9 @@ class Participant final : private fdds::DomainParticipantListener {
   [[nodiscard]] bool has_dead_peer() const;
   /// What arrived and was not let through to the middleware. Any thread.
   [[nodiscard]] const Reception& reception() const { return *reception_; }
+  /// Nothing of these holders of certificates is taken any more. Names those that take part now; this participant's own is among
+  /// them where it is revoked itself. Any thread.
+  std::vector<std::string> revoke(const std::vector<HolderId>& holders);
 
  private:
   [[noreturn]] void refuse(const char* what, const std::string& topic) const;
@@ -75,6 +79,7 @@ class Participant final : private fdds::DomainParticipantListener {
   std::mutex mutex_;
   mutable std::mutex peers_mutex_;
   std::map<std::string, std::int32_t> peers_;  // their process ids on this PC, by participant
+  std::map<HolderId, std::string> holders_;    // names of those that were found
   std::map<std::vector<std::string>, fdds::Publisher*> publishers_;
   std::map<std::vector<std::string>, fdds::Subscriber*> subscribers_;
 };

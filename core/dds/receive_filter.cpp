@@ -4,6 +4,7 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <fastdds/rtps/common/LocatorsIterator.hpp>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -158,6 +159,7 @@ class Filter final : public transport::ChainingTransport {
     RtpsContent content;
     const Flaw flaw = examine(message, reception_->limits(), reception_->guard(), content);
     if (flaw != Flaw::none) return reception_->drop(flaw, remote);
+    if (reception_->is_revoked(content.source)) return reception_->drop_of_revoked();
     const bool copied = (content.has_fragments || content.hidden_count > 0) && size <= largest_datagram;
     if (copied) {
       std::memcpy(scratch(), data, content.size);
@@ -211,6 +213,17 @@ void Reception::know_participant(const GuidPrefix& prefix) {
   for (const std::uint32_t writer :
        {participant_writer, participant_message_writer, publication_writer, subscription_writer})
     guard_.know(prefix, writer);
+}
+
+void Reception::revoke(std::vector<HolderId> holders) {
+  const std::lock_guard lock{revoked_mutex_};
+  lists_.push_back(std::make_unique<const Holders>(std::move(holders)));
+  revoked_.store(lists_.back().get(), std::memory_order_release);
+}
+
+bool Reception::is_revoked(const GuidPrefix& source) const noexcept {
+  const Holders* revoked = revoked_.load(std::memory_order_acquire);
+  return revoked != nullptr && std::binary_search(revoked->begin(), revoked->end(), holder_of(source));
 }
 
 void Reception::wait_until_open() {

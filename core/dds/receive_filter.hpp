@@ -9,8 +9,10 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/base/time.hpp"
+#include "core/dds/holder_id.hpp"
 #include "core/dds/rtps_message.hpp"
 #include "core/dds/sequence_guard.hpp"
 
@@ -37,6 +39,13 @@ class Reception {
   /// Two threads that discover two participants at once overwrite it, and one of the two is never trusted.
   [[nodiscard]] std::mutex& acquaintance() { return acquaintance_; }
 
+  /// From now on nothing of these participants arrives, not even that they live; ascending. Any thread.
+  void revoke(std::vector<HolderId> holders);
+  /// Receiving threads, without locks.
+  [[nodiscard]] bool is_revoked(const GuidPrefix& source) const noexcept;
+  [[nodiscard]] std::uint64_t of_revoked() const { return of_revoked_.load(std::memory_order_relaxed); }
+  void drop_of_revoked() { of_revoked_.fetch_add(1, std::memory_order_relaxed); }
+
   /// Receiving threads, without locks.
   void drop(Flaw flaw, const eprosima::fastrtps::rtps::Locator_t& sender);
   /// Messages dropped since the start, of one cause or of all.
@@ -49,6 +58,11 @@ class Reception {
   RtpsLimits limits_;
   SequenceGuard guard_;
   std::mutex acquaintance_;
+  using Holders = std::vector<HolderId>;
+  std::mutex revoked_mutex_;
+  std::vector<std::unique_ptr<const Holders>> lists_;  // a receiving thread may still read an earlier one
+  std::atomic<const Holders*> revoked_{nullptr};
+  std::atomic<std::uint64_t> of_revoked_{0};
   std::atomic<bool> open_{false};
   std::array<std::atomic<std::uint64_t>, flaws> dropped_{};
   std::atomic<std::uint64_t> sender_{0};  // IPv4 address and port of the last one; 0: this PC's shared memory

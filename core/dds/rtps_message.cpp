@@ -97,7 +97,8 @@ Flaw check_builtin(const DataHead& head, const Submessage& sub, const RtpsBytes&
                    Context& context) {
   constexpr std::size_t least_liveliness = 24;  // encapsulation, prefix, kind, length
   const bool has_data = sub.has(2);
-  if (head.writer == participant_writer || head.writer == stateless_writer) context.content.makes_known = true;
+  if (head.writer == participant_writer || head.writer == stateless_writer)
+    context.content.makes_known = true;
   if (head.writer == participant_message_writer)
     return has_data && bytes.left() < least_liveliness ? Flaw::payload : Flaw::none;
   if (head.writer == stateless_writer && context.limits.secured)
@@ -220,6 +221,7 @@ Flaw check_heartbeat_frag(const Submessage& sub) {
 
 /// From here on the message speaks for another participant.
 Flaw check_info_source(const Submessage& sub, Context& context) {
+  if (context.limits.secured) return Flaw::kind;  // nobody vouches for it
   if (sub.body.size() != header_size) return Flaw::length;
   RtpsBytes bytes = sub.bytes();
   bytes.skip(8);  // unused, version, vendor
@@ -362,6 +364,7 @@ Flaw examine(std::span<const std::byte> message, const RtpsLimits& limits, Seque
   Context context{limits, guard, content};
   RtpsBytes header{message.first(std::min(message.size(), header_size)), false};
   if (!read_header(header, context)) return Flaw::header;
+  content.source = context.source;
   content.size = header_size;
   while (content.size < message.size()) {
     const auto sub = submessage_at(message, content.size);

@@ -54,6 +54,8 @@ struct RtpsLimits {
 struct RtpsContent {
   /// Up to here the middleware reads: a trailing statistics submessage of Fast DDS is not handed on.
   std::size_t size = 0;
+  /// The participant for which it speaks; in a secured cell none but its sender.
+  GuidPrefix source{};
   bool has_fragments = false;
   /// Participants get to know each other by it, or to trust each other.
   bool makes_known = false;

@@ -95,6 +95,9 @@ class Keys(unittest.TestCase):
             self.assertIn(f"<subject_name>{subject.removeprefix('subject=').strip()}</subject_name>",
                           self.document(self.keys / name / "permissions.p7s"))
             der = subprocess.run(["openssl", "x509", "-in", certificate, "-outform", "DER"], capture_output=True).stdout
+            # A list of the revoked has serial numbers alone: each tells the subject, and so the GUIDs of its holder.
+            to_be_signed = fields(fields(fields(der)[0][2])[0][2])
+            self.assertEqual(to_be_signed[1][2], b"\x49" + hashlib.sha256(to_be_signed[5][1]).digest()[:16])
             octet = guid_octet(der)
             self.assertTrue(octet < 0xA0 if name == "mes" else octet == 0xFF, f"{name} {octet:x}")
         self.assertEqual(len(subjects), len(names))
@@ -146,6 +149,20 @@ class Keys(unittest.TestCase):
         self.cell.write_text(self.cell.read_text().replace("[anna, ben]", "[anna]"))
         self.assertNotIn("ben", self.make("--revoke", "ben"))
         self.assertFalse(self.is_good("ben"))
+
+    def test_rights_of_an_earlier_invar_are_said_all_at_once(self):
+        self.make()
+        for name in ("heat", "motion"):
+            file = self.keys / name / "permissions.p7s"
+            file.write_bytes(re.sub(rb" *<topic>cell/xy_table/(clock|process/notices)</topic>\r?\n", b"", file.read_bytes()))
+        lines = self.run_it(INVAR, "run", self.cell, "--duration", "1", status=2).stderr.splitlines()
+        self.assertEqual(len(lines), 2, lines)
+        for name, line in zip(("motion", "heat"), lines):
+            self.assertIn(f"keys/{name}/permissions.p7s: does not permit to write `cell/xy_table/clock`, `cell/xy_table/process/notices`, "
+                          "and to read `cell/xy_table/clock`;", line)
+            self.assertIn("`invar keys CELL` signs all anew", line)
+        self.make()
+        self.assertIn("cell/xy_table/clock", self.topics("heat", "publish"))
 
     def test_works_without_the_section(self):
         self.cell.write_text(self.cell.read_text().replace(SECURITY, ""))

@@ -104,6 +104,8 @@ processes:
       thermal: {type: thermal, setpoint: 55, modbus: {host: 127.0.0.1, port: 1503, map: heater.yaml}}
 Y
 is 2 thief.log on "$a" "$invar" run thief.yaml --process watch
+says 'watch/permissions.p7s: does not permit to write `cell/guarded/thermal/state`' thief.log
+is 2 thief.log on "$a" "$invar" run thief.yaml --process watch --launcher $$  # without that look at the rights
 says 'topic `cell/guarded/thermal/.*the certificate of `watch` does not permit to (read|write) it' thief.log
 echo "another's component: passed"
 

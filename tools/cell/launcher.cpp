@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "core/base/temporary_folder.hpp"
+#include "core/dds/identity.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/children_watch.hpp"
@@ -85,6 +86,7 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
                                  std::to_string(getpid())};
   std::filesystem::remove(outcome_of(process, folder));  // of an earlier life
   std::filesystem::remove(progress_file(outcome_of(process, folder)));
+  std::filesystem::remove(rest_file(outcome_of(process, folder)));
   if (!options.job.empty()) words.insert(words.end(), {"--job", options.job});
   if (options.quiet) words.emplace_back("--quiet");
   if (restarts.count() > 0)
@@ -171,6 +173,15 @@ bool keep_alive(std::vector<Child>& children, const LaunchOptions& options, cons
   return true;
 }
 
+bool is_renewed(const Child& child, const config::Cell& cell) {
+  using FileClock = std::filesystem::file_time_type::clock;
+  const auto began = FileClock::now() - (Clock::now() - child.began);
+  std::error_code none;
+  const dds::KeyFolder keys{cell.security->keys};
+  const auto written = std::filesystem::last_write_time(keys.certificate(child.name), none);
+  return !none && written > began;
+}
+
 std::string text_of(const std::filesystem::path& file) {
   std::ifstream stream{file};
   return {std::istreambuf_iterator<char>{stream}, {}};
@@ -212,6 +223,32 @@ struct Beside {
     for (const pid_t hung : service.look(seen)) kill(hung, SIGKILL);
   }
 };
+
+/// One process after the other: its axes come to rest while all that they move on is still there, it ends in order, and it begins
+/// with the certificate that is there now.
+void renew(std::vector<Child>& children, const LaunchOptions& options, const config::Cell& cell,
+           const std::filesystem::path& folder, Beside& beside) {
+  if (options.renew == nullptr || !options.renew->exchange(false) || !cell.security) return;
+  const auto watched = [&](auto condition) {
+    return [&, condition] {
+      beside.look(children);
+      return condition();
+    };
+  };
+  for (Child& child : children) {
+    if (!child.running || !is_renewed(child, cell)) continue;
+    spdlog::warn("process `{}` has another certificate: it ends in order and starts anew", child.name);
+    kill(child.pid, SIGUSR1);
+    const auto rest = rest_file(outcome_of(child.name, folder));
+    wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 5.0);
+    if (child.running) kill(child.pid, SIGTERM);
+    wait_for(child, watched([] { return false; }));
+    if (child.running) kill(child.pid, SIGKILL);
+    child.poll(true);
+    child = spawn(options, child.name, false, folder, child.restarts, "another certificate");
+    wait_for(child, watched([] { return false; }), 3.0);  // the others are not away at the same time
+  }
+}
 
 /// Simulated time has one keeper in a cell: the launcher of the first process's PC. The others follow.
 bool keeps_time(const std::set<std::string>& hosts, const config::Cell& cell) {
@@ -330,6 +367,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
            (options.job.empty() ? keep_alive(children, options, cell, folder.path(), restart_news)
                                 : !any_ended(children))) {
       beside.look(children);
+      renew(children, options, cell, folder.path(), beside);
       (void)follow_utc();  // as its processes do, for those that it starts again
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }

@@ -19,6 +19,9 @@ struct LaunchOptions {
   double pace =
       0.0;  // simulated time runs no faster than so many times the wall clock; 0: as fast as it goes
   bool quiet = false;  // nothing on the error output but what is wrong
+  /// Set by the caller: processes of a secured cell whose certificate on the disk is newer than they are started anew, one after
+  /// the other, each brought to rest before. Null: never.
+  std::atomic<bool>* renew = nullptr;
   /// Called as the job goes on: how much of it is done (0 to 1), and what it does now.
   std::function<void(double fraction, const std::string& text)> progress;
 };

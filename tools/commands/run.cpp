@@ -12,16 +12,21 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "core/base/clock.hpp"
 #include "core/base/name.hpp"
 #include "core/base/temporary_folder.hpp"
+#include "core/dds/identity.hpp"
 #include "tools/cell/launcher.hpp"
+#include "tools/cell/load_cell.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/summary.hpp"
 #include "tools/command.hpp"
+#include "tools/keys/missing_rights.hpp"
 #include "tools/live/job_progress.hpp"
+#include "tools/live/live_cell.hpp"
 #include "tools/positive.hpp"
 
 namespace invar::tools {
@@ -30,7 +35,11 @@ namespace {
 
 ProcessOrders orders;
 
-void take_order(int signal) { (signal == SIGUSR1 ? orders.rest : orders.stop) = true; }
+std::atomic<bool> renew{false};
+
+void take_order(int signal) {
+  (signal == SIGUSR1 ? orders.rest : signal == SIGUSR2 ? renew : orders.stop) = true;
+}
 
 struct Options {
   LaunchOptions launch;
@@ -44,6 +53,26 @@ struct Options {
   bool real_time = false;
   bool json = false;
 };
+
+bool is_secured(const std::filesystem::path& file) {
+  try {
+    return read_structure(file)->security.has_value();
+  } catch (const InputError&) {
+    return false;  // said when the cell is loaded, with all that is wrong
+  }
+}
+
+/// In a secured cell: says at once all that the certificates here lack, where a process would end at the first topic.
+void check_rights(const std::filesystem::path& file, const std::string& process) {
+  if (!is_secured(file)) return;
+  LoadedCell loaded = load_cell(file);
+  std::set<std::string> names;
+  for (const auto& host : loaded.cell->hosts)
+    if (process.empty()) names.insert(config::launcher_name(host.name));
+  for (const auto& each : loaded.cell->processes)
+    if (process.empty() || each.name == process) names.insert({each.name, dds::second_name(each.name)});
+  if (const auto faults = missing_rights(loaded, names); !faults.empty()) throw InputError{faults};
+}
 
 /// One process, without a launcher.
 int run_one(const Options& options) {
@@ -92,18 +121,20 @@ int run(Options& options) {
   action.sa_handler = take_order;
   sigset_t taken;
   sigemptyset(&taken);
-  for (const int signal : {SIGINT, SIGTERM, SIGUSR1}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGUSR1, SIGUSR2}) {
     sigaction(signal, &action, nullptr);
     sigaddset(&taken, signal);
   }
   sigprocmask(SIG_UNBLOCK, &taken, nullptr);  // the launcher has us begin with them blocked
   if (options.simulated || options.real_time) options.launch.simulated = options.simulated;
+  if (options.launcher == 0) check_rights(options.launch.cell, options.process);
   if (!options.process.empty()) return run_one(options);
   JobProgress progress;
   if (!options.launch.quiet)
     options.launch.progress = [&](double fraction, const std::string& text) {
       progress.show(fraction, text);
     };
+  options.launch.renew = &renew;
   const LaunchOutcome outcome = launch(options.launch, orders.stop);
   progress.end();
   std::ostringstream unseen;
@@ -128,6 +159,8 @@ void add_run(CLI::App& program) {
       "change.\n"
       "Ctrl-C stops the cell: every axis makes a controlled stop, then the processes end in the order of the "
       "file.\n"
+      "SIGUSR2 starts the processes of a secured cell anew whose certificate was renewed, one after the "
+      "other.\n"
       "Notices of the cell, from warning up, go to the error output, a line each.\n"
       "Exit status: 0 all was well at the end; 2 the file has faults; 1 otherwise: a job failed, a process "
       "ended by\n"

@@ -152,6 +152,9 @@ std::string unit_text(const LoadedCell& loaded, const UnitPaths& paths, const Un
        << "\nWorkingDirectory=" << path_value(paths.data.string())
        << "\nExecStart=" << command_word(paths.program.string()) << " run "
        << command_word(paths.cell.string()) << " --host " << command_word(options.host) << " --real-time\n";
+  if (cell.security)
+    unit << "# `systemctl reload`: processes whose certificate was renewed start anew, one after the other.\n"
+         << "ExecReload=/bin/kill -USR2 $MAINPID\n";
   if (!paths.libraries.empty())
     unit << "Environment=" << command_word("LD_LIBRARY_PATH=" + paths.libraries.string()) << '\n';
   unit << "# Status 2: the file is wrong, which a restart does not mend.\n"

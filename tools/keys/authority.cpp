@@ -10,9 +10,11 @@
 #include <array>
 #include <cstdint>
 #include <ctime>
+#include <vector>
 
 #include "core/base/fault.hpp"
 #include "core/base/new_file.hpp"
+#include "core/dds/holder_id.hpp"
 
 namespace invar::tools {
 
@@ -44,12 +46,14 @@ OpensslName name_of(const std::string& organisation, const std::string& serial, 
   return name;
 }
 
-/// The first octet of the hash from which a secured GUID is made (DDS Security 1.1, 9.3.3).
-unsigned guid_octet(const X509_NAME* name) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
+using Hash = std::array<unsigned char, EVP_MAX_MD_SIZE>;
+
+/// From which a secured GUID is made (DDS Security 1.1, 9.3.3).
+Hash hash_of(const X509_NAME* name) {
+  Hash hash{};
   unsigned size = 0;
   require_openssl(X509_NAME_digest(name, EVP_sha256(), hash.data(), &size) == 1, "hash a subject's name");
-  return hash.front();
+  return hash;
 }
 
 /// A subject that nobody had before, whose GUID lies where it shall.
@@ -59,7 +63,7 @@ OpensslName subject_at(GuidPlace place, const std::string& cell, const std::stri
   require_openssl(RAND_bytes(reinterpret_cast<unsigned char*>(&serial), 3) == 1, "draw a number");
   while (true) {
     OpensslName name = name_of("Invar " + cell, std::to_string(++serial), owner);
-    const unsigned octet = guid_octet(name.get());
+    const unsigned octet = hash_of(name.get()).front();
     if (place == GuidPlace::high ? octet >= highest : octet < lowest) return name;
   }
 }
@@ -73,10 +77,8 @@ void add_extension(X509* certificate, int kind, const char* value) {
 
 OpensslCertificate certificate_for(const X509_NAME* subject, EVP_PKEY* key, int days) {
   OpensslCertificate certificate{X509_new()};
-  std::array<unsigned char, 8> serial{};
-  require_openssl(RAND_bytes(serial.data(), serial.size()) == 1, "draw a serial number");
-  serial.front() &= 0x7fU;
-  BIGNUM* number = BN_bin2bn(serial.data(), serial.size(), nullptr);
+  const std::vector<unsigned char> serial = dds::serial_of(hash_of(subject));
+  BIGNUM* number = BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr);
   BN_to_ASN1_INTEGER(number, X509_get_serialNumber(certificate.get()));
   BN_free(number);
   X509_set_version(certificate.get(), 2);

@@ -56,4 +56,17 @@ std::string permissions(int domain, const std::string& subject, const Rights& ri
          "      </allow_rule>\n      <default>DENY</default>\n    </grant>\n  </permissions>\n</dds>\n";
 }
 
+std::set<std::string> permitted_topics(const std::string& document, const std::string& kind) {
+  const std::string begin = "<" + kind + ">", end = "</" + kind + ">", open = "<topic>", close = "</topic>";
+  std::set<std::string> found;
+  for (auto at = document.find(begin); at != std::string::npos; at = document.find(begin, at + 1)) {
+    const auto last = document.find(end, at);
+    for (auto topic = document.find(open, at); topic < last; topic = document.find(open, topic + 1)) {
+      const auto from = topic + open.size();
+      found.insert(document.substr(from, document.find(close, from) - from));
+    }
+  }
+  return found;
+}
+
 }  // namespace invar::tools

@@ -15,4 +15,7 @@ namespace invar::tools {
 [[nodiscard]] std::string permissions(int domain, const std::string& subject, const Rights& rights,
                                       const std::string& from, const std::string& until);
 
+/// The topics of a document of `permissions`, which may be signed; `kind`: "publish" or "subscribe".
+[[nodiscard]] std::set<std::string> permitted_topics(const std::string& document, const std::string& kind);
+
 }  // namespace invar::tools
