@@ -160,6 +160,7 @@ void check_identities(const Node& root, const Cell& cell) {
 void check_key_names(const Node& node, const Cell& cell) {
   std::set<std::string> taken{"authority", "public"};
   for (const CellProcess& process : cell.processes) taken.insert(process.name);
+  if (cell.has_bridge) taken.insert(bridge_name);
   for (const CellHost& host : cell.hosts)
     if (!taken.insert(launcher_name(host.name)).second)
       node.fault("`" + launcher_name(host.name) + "` is the key of `invar run` on a host",
@@ -232,6 +233,7 @@ Cell read_cell(const Yaml& yaml) {
   if (root.required("profiles").exists()) cell.profiles = beside(root["profiles"]);
   for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
   for (const Node& folder : root["models"].list()) cell.models.push_back(folder_beside(folder));
+  cell.has_bridge = root.has("bridge");
   root["bridge"].accept_all();  // tools/cell/bridge_file.cpp reads it, which knows the ports
   const Node hosts = root["hosts"];
   for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));

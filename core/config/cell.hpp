@@ -87,6 +87,7 @@ struct Cell {
   std::vector<CellHost> hosts;
   std::vector<CellProcess> processes;
   std::map<std::string, std::string> jobs;  // job -> the component that runs it
+  bool has_bridge = false;                  // to a plant; tools/cell reads it
   std::optional<CellSecurity> security;     // none: every program on the network may command
 
   [[nodiscard]] std::string topic(const std::string& component, const std::string& port) const {
@@ -100,6 +101,9 @@ struct Cell {
 /// Why a text is no IPv4 address that one PC can have ("is no IPv4 address"): neither 0.x nor from 224.0.0.0 up (multicast, reserved,
 /// broadcast; RFC 1122, 3.2.1.3). Empty: it is one.
 [[nodiscard]] std::string flaw_of_address(const std::string& address);
+
+/// As which `invar bridge` takes part in the cell, and whose key it has.
+inline constexpr const char* bridge_name = "bridge";
 
 /// Whose key `invar run` has on a host.
 [[nodiscard]] std::string launcher_name(const std::string& host);

@@ -132,6 +132,7 @@ struct Node::Parts {
     return *participant;
   }
   Participant& raw_participant() {
+    if (options.raw_by_general) return participant(Traffic::general);
     const std::lock_guard lock{mutex};
     if (raw) return *raw;
     NodeOptions second = options;

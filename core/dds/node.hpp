@@ -60,6 +60,8 @@ struct NodeOptions {
   /// The core of the loop: the thread that publishes its samples then shares it and, with a lower priority, runs the
   /// moment the loop sleeps.
   std::optional<int> realtime_cpu;
+  /// Raw samples go by the general participant, too: no type is used here both raw and typed.
+  bool raw_by_general = false;
   /// In a secured cell the node has one participant for all traffic. None: each program that reaches the network may take part.
   std::optional<Identity> identity;
 };

@@ -95,13 +95,18 @@ BridgeFile read_bridge(const LoadedCell& loaded) {
     node["host"].fault("`" + clipped(bridge.host) + "` is no host of this cell", "name one of `hosts`");
   bridge.addresses = addresses(node["addresses"]);
   bridge.peers = addresses(node["peers"]);
+  if (const Node security = node["security"]; security.exists()) {
+    std::filesystem::path keys = security.text("keys");
+    if (keys.is_relative()) keys = loaded.cell->file.parent_path() / keys;
+    bridge.plant = dds::Identity{{keys}, security.text("name"), false};
+  }
   for (const Node& line : node["out"].list()) read_line(loaded, line, Direction::out, bridge);
   for (const Node& line : node["in"].list()) read_line(loaded, line, Direction::in, bridge);
   if (!node.has("out") && !node.has("in"))
     node.fault("names no topic", "add `out: [{port: stage_x.state, topic: plant/line1/stage_x}]`");
   check_one_way(node, bridge);
   for (const auto& process : loaded.cell->processes)
-    if (process.name == bridge_name)
+    if (process.name == config::bridge_name)
       node.fault("would have the name of the process `" + process.name + "`",
                  "give the process another name");
   return bridge;

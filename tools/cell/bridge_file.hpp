@@ -2,15 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/dds/identity.hpp"
 #include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
-
-/// As which `invar bridge` takes part in the cell.
-inline constexpr const char* bridge_name = "bridge";
 
 enum class Direction { out, in };  // out: from the cell to the plant
 
@@ -26,6 +25,8 @@ struct BridgeFile {
   std::string host;                    // of the cell, which runs the bridge
   std::vector<std::string> addresses;  // of that host in the plant's network; empty: all
   std::vector<std::string> peers;      // of programs of the plant, where multicast does not pass
+  std::optional<dds::Identity>
+      plant;  // of the bridge, where the plant's domain is secured, by an authority of the plant
   std::vector<BridgeLine> lines;
 };
 

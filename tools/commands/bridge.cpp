@@ -7,6 +7,7 @@
 #include "tools/cell/load_cell.hpp"
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
+#include "tools/cell/service_manager.hpp"
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/text_table.hpp"
@@ -17,6 +18,7 @@ namespace {
 
 struct Options {
   std::filesystem::path cell;
+  std::string host;
   double duration = 0.0;
   bool json = false;
 };
@@ -30,6 +32,8 @@ dds::NodeOptions plant_options(const config::Cell& cell, const BridgeFile& file)
   options.may_come_later = true;
   for (const std::string& peer : file.peers) options.peers.push_back({peer, 10});
   options.shared_memory = false;
+  options.raw_by_general = true;
+  options.identity = file.plant;
   return options;
 }
 
@@ -61,35 +65,37 @@ void tell_alarms(dds::Node& node) {
 }
 
 int run(const Options& options) {
+  ServiceManager manager = ServiceManager::from_environment();  // before any thread
   const LoadedCell loaded = load_cell(options.cell);
   const BridgeFile file = read_bridge(loaded);
   if (file.lines.empty())
     throw InputError{options.cell.string(), "has no `bridge`",
                      "add one: see `Keys of the bridge` in docs/reference/cell-file.md"};
-  if (loaded.cell->security)
-    throw InputError{options.cell.string() + ": bridge", "has no certificate in a secured cell",
-                     "let programs of the plant join the cell itself: `security.plant` names their topics"};
-  if (!own_hosts(*loaded.cell, "").contains(file.host))
+  if (!own_hosts(*loaded.cell, options.host).contains(file.host))
     throw InputError{options.cell.string() + ": bridge.host",
                      "`" + file.host + "` is another PC than this one", "start the bridge there"};
-  const ProcessClaim claim{*loaded.cell, bridge_name};
+  const ProcessClaim claim{*loaded.cell, config::bridge_name};
   (void)interrupted();
-  dds::NodeOptions of_cell = node_on(*loaded.cell, bridge_name, file.host);
+  dds::NodeOptions of_cell = node_on(*loaded.cell, config::bridge_name, file.host);
   of_cell.clocks = clocks_on(*loaded.cell, file.host);
+  of_cell.raw_by_general = true;  // one certificate
   dds::Node cell{of_cell, dds::load_profiles(loaded.cell->profiles)};
   dds::Node plant{plant_options(*loaded.cell, file), dds::load_profiles(loaded.cell->profiles)};
   Bridge bridge{file, loaded.cell->id, cell, plant};
   std::cerr << "bridge: cell `" << loaded.cell->name << "`, domain " << loaded.cell->domain
             << ", and the plant, domain " << file.domain << ": " << file.lines.size()
             << " topics; Ctrl-C ends it\n";
+  manager.ready();
   constexpr Duration period = Duration::milliseconds(2);
   const auto steps = static_cast<std::int64_t>(options.duration / period.in_seconds());
   for (std::int64_t step = 0; (steps == 0 || step < steps) && sleep_for(period); ++step) {
     bridge.pass();
+    manager.feed(static_cast<std::uint64_t>(step));
     if (step % 500 != 0) continue;
     tell_alarms(cell);
     tell_alarms(plant);
   }
+  manager.stopping();
   print(file, bridge, options.json);
   return 0;
 }
@@ -103,10 +109,14 @@ void add_bridge(CLI::App& program) {
       "Example: invar bridge cell.yaml\n"
       "The part `bridge` of the cell file names the plant's domain and the topics, each one way and at a "
       "bounded rate.\n"
+      "In a secured cell the bridge has a certificate of its own; `security` of the part is for a secured "
+      "plant.\n"
+      "`invar units` and `invar deploy` write its service.\n"
       "Only these pass. Ends with a table of what passed, was left out by the rate, and was refused.\n"
       "Exit status: 0; 1 the network failed; 2 a fault of the call or the file");
   auto options = std::make_shared<Options>();
   command->add_option("cell", options->cell, "the cell file")->required();
+  command->add_option("--host", options->host, "the host that this PC is, where its address may come later");
   command->add_option("--duration", options->duration, "end after so many seconds (0: at Ctrl-C)")
       ->check(CLI::Range(0.0, 1e9));
   command->add_flag("--json", options->json, "print the counts as JSON");

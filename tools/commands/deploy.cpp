@@ -44,6 +44,8 @@ void add_deploy(CLI::App& program) {
       "Contents that a PC has already are not sent again. When each PC has checked the whole, all switch to "
       "it and\n"
       "start the cell. A running cell stops in order first. Where one PC fails, all get back what they had.\n"
+      "In a secured cell each PC gets the keys of its own names, where the folder of the keys is on this "
+      "PC.\n"
       "After an aborted call each PC has one whole release. The next call goes on from there.\n"
       "ssh asks no questions: its keys and the keys of the PCs must be there. The user on a PC is root, or "
       "may use\n"

@@ -3,6 +3,8 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/base/new_file.hpp"
 #include "tools/cell/load_cell.hpp"
@@ -28,15 +30,19 @@ int units(const Options& options) {
   paths.program = options.program.empty() ? std::filesystem::read_symlink("/proc/self/exe") : options.program;
   paths.cell = absolute(options.cell);
   paths.data = options.data.empty() ? std::filesystem::current_path() : absolute(options.data);
-  const std::string text = unit_text(loaded, paths, options.unit);
-  if (options.out.empty()) {
-    std::cout << text;
-    return 0;
+  std::vector<std::pair<std::string, std::string>> units{
+      {unit_name(*loaded.cell), unit_text(loaded, paths, options.unit)}};
+  if (const auto bridge = bridge_unit_text(loaded, paths, options.unit))
+    units.emplace_back(bridge_unit_name(*loaded.cell), *bridge);
+  if (!options.out.empty()) std::filesystem::create_directories(options.out);
+  for (const auto& [name, text] : units) {
+    if (options.out.empty()) {
+      std::cout << (units.size() > 1 ? "# ---- " + name + "\n" : "") << text;
+      continue;
+    }
+    write_file(options.out / name, text);
+    std::cout << (options.out / name).string() << '\n';
   }
-  std::filesystem::create_directories(options.out);
-  const std::filesystem::path file = options.out / unit_name(*loaded.cell);
-  write_file(file, text);
-  std::cout << file.string() << '\n';
   return 0;
 }
 
@@ -51,6 +57,7 @@ void add_units(CLI::App& program) {
       "order.\n"
       "The service is ready when all components are up. systemd restarts it where `invar run` hangs.\n"
       "A process whose loop makes no cycle for half of --watchdog is ended and restarted by `invar run`.\n"
+      "The host that `bridge` of the file names has a second service, for `invar bridge`.\n"
       "`invar deploy` writes and installs the units of all hosts by itself.\n"
       "Exit status: 0 written, 2 the call or the file is wrong");
   auto options = std::make_shared<Options>();

@@ -19,6 +19,7 @@
 #include "core/base/shown.hpp"
 #include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"
+#include "tools/deploy/host_keys.hpp"
 #include "tools/deploy/scripts.hpp"
 #include "tools/deploy/unit.hpp"
 
@@ -126,7 +127,8 @@ class Hosts {
   HostFaults restore() const {
     return on_each([&](std::size_t i) {
       return why(ask(i, scripts::restore,
-                     {states_[i].current, states_[i].previous, service(), unit_, whole(options_.patience)}));
+                     {states_[i].current, states_[i].previous, service(), unit_, hosts_[i].name,
+                      whole(options_.patience)}));
     });
   }
 
@@ -226,6 +228,31 @@ HostFaults other_machines(const Hosts& hosts) {
   return faults;
 }
 
+/// Each PC gets the keys of its own names. `changed`: where some were others, the units that shall take them.
+HostFaults bring_keys(const Hosts& hosts, const LoadedCell& loaded, const DeployOptions& options,
+                      const Tell& tell, std::map<std::size_t, std::vector<std::string>>& changed) {
+  std::vector<std::string> archives;
+  for (std::size_t i = 0; i < hosts.size(); ++i) archives.push_back(keys_for(loaded, hosts.host(i).name));
+  std::vector<std::string> news(hosts.size());
+  HostFaults faults = hosts.on_each([&](std::size_t i) -> std::string {
+    if (archives[i].empty()) return "";
+    const Said said = hosts.ask(i, scripts::receive_keys, {hosts.service(), options.user}, archives[i]);
+    news[i] = said.out;
+    return why(said);
+  });
+  for (std::size_t i = 0; i < hosts.size(); ++i) {
+    const bool is_changed = news[i].find("changed ") != std::string::npos;
+    if (is_changed) changed[i] = {hosts.unit()};
+    if (news[i].find("changed bridge/certificate.pem") != std::string::npos)
+      changed[i].push_back(bridge_unit_name(*loaded.cell));
+    tell(hosts.host(i).name + ": " +
+         (archives[i].empty() ? "its keys are not on this PC, and stay as they are there"
+          : is_changed        ? "has other keys now"
+                              : "has its keys"));
+  }
+  return faults;
+}
+
 /// From here on there is something to take back.
 HostFaults make_current(Hosts& hosts, const std::string& release, const DeployOptions& options,
                         const Tell& tell) {
@@ -303,6 +330,16 @@ HostFaults deploy(const DeployOptions& options, const Tell& tell) {
     return faults;
   if (HostFaults faults = hosts.check(release.name); !faults.empty()) return faults;
   tell("whole and checked on " + counted_hosts(hosts) + " after " + seconds_since(began));
+  std::map<std::size_t, std::vector<std::string>> other_keys;
+  if (loaded.cell->security)
+    if (HostFaults faults = bring_keys(hosts, loaded, options, tell, other_keys); !faults.empty())
+      return faults;
+  if (hosts.all_have(release.name) && options.service && !other_keys.empty())
+    if (HostFaults faults = hosts.on_each([&](std::size_t i) {
+          return other_keys.contains(i) ? why(hosts.ask(i, scripts::take_keys, other_keys.at(i))) : "";
+        });
+        !faults.empty())
+      return faults;
   if (hosts.all_have(release.name) && (!options.service || hosts.status().empty())) {
     tell("it is current on all of them already");
     return {};

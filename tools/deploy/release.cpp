@@ -197,13 +197,14 @@ Release make_release(const LoadedCell& loaded, const ReleaseOptions& options) {
   std::set<std::string> hosts;
   for (const config::CellProcess& process : loaded.cell->processes) hosts.insert(process.host);
   for (const std::string& host : hosts) {
-    add_text("units/" + host + "/" + unit_name(*loaded.cell),
-             unit_text(loaded,
-                       {.program = current / "bin/invar",
-                        .cell = current / release.cell_file,
-                        .data = options.home / "data",
-                        .libraries = current / "lib"},
-                       {.host = host, .user = options.user}));
+    const UnitPaths paths{.program = current / "bin/invar",
+                          .cell = current / release.cell_file,
+                          .data = options.home / "data",
+                          .libraries = current / "lib"};
+    const UnitOptions unit{.host = host, .user = options.user};
+    add_text("units/" + host + "/" + unit_name(*loaded.cell), unit_text(loaded, paths, unit));
+    if (const auto bridge = bridge_unit_text(loaded, paths, unit))
+      add_text("units/" + host + "/" + bridge_unit_name(*loaded.cell), *bridge);
   }
   std::sort(release.files.begin(), release.files.end(),
             [](const auto& a, const auto& b) { return a.path < b.path; });

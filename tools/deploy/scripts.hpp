@@ -9,7 +9,7 @@ namespace invar::tools::scripts {
 //   store/SHA256        each content once, read-only; a program as SHA256.x
 //   releases/NAME/      hard links into the store, and MANIFEST; whole from the moment that it has its name
 //   current, previous   links to releases; `current` is what runs
-//   keys/               of a secured cell, brought there by hand; no part of a release
+//   keys/               of a secured cell, those of this PC alone; no part of a release
 //   data/               where the cell runs: recordings, state; of the service's user
 
 /// Said by a script that ends by itself: the deployment acts on the status.
@@ -29,6 +29,31 @@ point() {  # point LINK RELEASE: at once or not at all
   mv -T "$home/.$1.$$" "$home/$1"
 }
 root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi; }
+)sh";
+
+/// Units of the current release, for PCs with systemd.
+inline const std::string with_units = common + R"sh(
+units=/etc/systemd/system
+own() {  # the links of this cell's units
+  for link in "$units"/*.service; do
+    case $(readlink "$link" || true) in "$home/current/units/"*) echo "${link##*/}" ;; esac
+  done
+}
+drop() { root systemctl stop "$1" || true; root rm -f "$units/multi-user.target.wants/$1" "$units/$1"; }
+start() {  # start HOST UNIT PATIENCE: UNIT first, then the others of the host; those that the release does not have go
+  for name in $(own); do [ -e "$units/$name" ] || drop "$name"; done
+  root mkdir -p "$units/multi-user.target.wants"
+  for file in "$home/current/units/$1"/*.service; do
+    root ln -sfn "$file" "$units/${file##*/}"
+    root ln -sfn "../${file##*/}" "$units/multi-user.target.wants/${file##*/}"
+  done
+  root systemctl daemon-reload
+  for name in "$2" $(own); do
+    [ "$name" != "$2" ] || [ "${started:-no}" = no ] || continue
+    started=yes
+    root timeout "$3" systemctl restart "$name" || { root systemctl status --no-pager -n 20 "$name" >&2 || true; exit 6; }
+  done
+}
 )sh";
 
 /// Changes nothing. HOME
@@ -124,7 +149,7 @@ export LD_LIBRARY_PATH="$release/lib"
 
 /// Says that it is ready, and waits for the line `go`; without it nothing changes. Then the release is current, and its service
 /// starts anew. HOME RELEASE EXPECTED SERVICE UNIT HOST PATIENCE
-inline const std::string switch_over = common + R"sh(
+inline const std::string switch_over = with_units + R"sh(
 exec 9>"$home/lock"
 flock -w 10 9 || { echo "another deployment is at work there" >&2; exit 1; }
 [ "$(at current)" = "$2" ] || { echo "the current release there is $(at current), no longer $2" >&2; exit 5; }
@@ -137,37 +162,64 @@ if [ "$2" != "$1" ]; then
   point current "$1"
   sync -f "$home"
 fi
-[ "$3" = systemd ] || exit 0
-units=/etc/systemd/system
-root ln -sfn "$home/current/units/$5/$4" "$units/$4"
-root mkdir -p "$units/multi-user.target.wants"
-root ln -sfn "../$4" "$units/multi-user.target.wants/$4"
-root systemctl daemon-reload
-root timeout "$6" systemctl restart "$4" || { root systemctl status --no-pager -n 20 "$4" >&2 || true; exit 6; }
+[ "$3" != systemd ] || start "$5" "$4" "$6"
 )sh";
 
-/// As it was before. HOME CURRENT PREVIOUS SERVICE UNIT PATIENCE
-inline const std::string restore = common + R"sh(
+/// As it was before. HOME CURRENT PREVIOUS SERVICE UNIT HOST PATIENCE
+inline const std::string restore = with_units + R"sh(
 exec 9>"$home/lock"
 flock -w 60 9 || { echo "another deployment is at work there" >&2; exit 1; }
 point previous "$2"
 if [ "$1" = - ] && [ "$3" = systemd ]; then
-  root systemctl stop "$4" || true
-  root rm -f "/etc/systemd/system/multi-user.target.wants/$4" "/etc/systemd/system/$4"
+  for name in $(own); do drop "$name"; done
   root systemctl daemon-reload
 fi
 point current "$1"
 sync -f "$home"
 [ "$3" = systemd ] && [ "$1" != - ] || exit 0
-root systemctl daemon-reload
-root timeout "$5" systemctl restart "$4" || { root systemctl status --no-pager -n 20 "$4" >&2 || true; exit 6; }
+start "$5" "$4" "$6"
 )sh";
 
-/// HOME SECONDS
+/// In a secured cell by root, who reads the key of a viewer. HOME SECONDS
 inline const std::string status = common + R"sh(
 cd "$home/data" 2>/dev/null || cd "$home"
-export LD_LIBRARY_PATH="$home/current/lib"
-exec "$home/current/bin/invar" status "$home/current/$(cat "$home/current/CELL")" --wait "$1"
+by() { if [ -f "$home/current/KEYS" ]; then root "$@"; else "$@"; fi; }
+by env LD_LIBRARY_PATH="$home/current/lib" "$home/current/bin/invar" status "$home/current/$(cat "$home/current/CELL")" --wait "$1"
+)sh";
+
+/// Input: an archive of keys. Each file changes as a whole, and only where it is another; says which. HOME SERVICE USER
+inline const std::string receive_keys = common + R"sh(
+umask 077
+part=$home/.keys.$$
+trap 'rm -rf "$part"' EXIT
+mkdir -m 0700 "$part"
+tar -xf - -C "$part" --no-same-owner
+cd "$part"
+sha256sum -c --quiet --strict SHA256SUMS >/dev/null
+rm SHA256SUMS
+service=$1 user=$2
+by() { if [ "$service" = systemd ]; then root "$@"; else "$@"; fi; }
+own() { [ "$service" != systemd ] || root chown "$user:" "$@"; }
+folder() { if [ ! -d "$2" ]; then by mkdir -m "$1" "$2"; own "$2"; fi; }
+folder 0755 "$home/keys"
+folder 0755 "$home/keys/public"
+find . -mindepth 1 -type d | sort | while read -r name; do folder 0700 "$home/keys/$name"; done
+find . -type f | sort | while read -r name; do
+  to=$home/keys/$name mode=0600
+  case $name in ./public/*) mode=0644 ;; esac
+  by cmp -s "$name" "$to" && continue
+  by install -m "$mode" "$name" "$to.new"
+  own "$to.new"
+  by mv -f "$to.new" "$to"
+  echo "changed ${name#./}"
+done
+)sh";
+
+/// Processes with another certificate start anew; the list of the revoked is read again by itself. HOME UNIT...
+inline const std::string take_keys = common + R"sh(
+root systemctl reload "$1"
+shift
+for name in "$@"; do root systemctl restart "$name"; done
 )sh";
 
 /// An archive of what the cell has calibrated, as the output. HOME

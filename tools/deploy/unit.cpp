@@ -7,6 +7,7 @@
 
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
+#include "tools/cell/bridge_file.hpp"
 
 namespace invar::tools {
 
@@ -107,6 +108,39 @@ constexpr const char* confinement =
     "SystemCallErrorNumber=EPERM\n"
     "UMask=0027\n";
 
+void check(const config::Cell& cell, const UnitPaths& paths, const UnitOptions& options) {
+  check_host(cell, options.host);
+  if (const auto flaw = flaw_of_identifier(options.user, "-"))
+    throw InputError{"--user", "`" + printable(options.user) + "` is no user: it " + flaw->what, flaw->mend};
+  check_path("the program", paths.program);
+  check_path("the cell file", paths.cell);
+  check_path("the folder of the data", paths.data);
+  if (paths.data.string().find_first_of("\\ \"'") != std::string::npos)
+    throw InputError{"the folder of the data",
+                     "`" + paths.data.string() + "` has a blank, quote or backslash",
+                     "choose another folder"};
+  if (!paths.libraries.empty()) check_path("the folder of the libraries", paths.libraries);
+}
+
+/// To the program of ExecStart; `after`: further units.
+void begin(std::ostream& unit, const std::string& what, const std::string& after, const config::Cell& cell,
+           const UnitPaths& paths, const UnitOptions& options) {
+  unit << "# Written by `invar units` of version " INVAR_VERSION "; written anew by each `invar deploy`.\n"
+       << "[Unit]\nDescription=Invar cell " << cell.name << ", " << what
+       << "\nWants=network-online.target\nAfter=network-online.target time-sync.target" << after
+       << "\n# Restarts are bounded in rate, and never given up.\nStartLimitIntervalSec=0\n\n[Service]\n"
+       << "Type=notify\nNotifyAccess=main\nUser=" << options.user << "\nGroup=" << options.user
+       << "\nWorkingDirectory=" << path_value(paths.data.string())
+       << "\nExecStart=" << command_word(paths.program.string());
+}
+
+void environment_and_restarts(std::ostream& unit, const UnitPaths& paths) {
+  if (!paths.libraries.empty())
+    unit << "Environment=" << command_word("LD_LIBRARY_PATH=" + paths.libraries.string()) << '\n';
+  unit << "# Status 2: the file is wrong, which a restart does not mend.\n"
+       << "Restart=on-failure\nRestartPreventExitStatus=2\nRestartSec=5\n";
+}
+
 }  // namespace
 
 std::string command_word(const std::string& text) {
@@ -127,39 +161,23 @@ std::string listed_path(const std::string& text) {
 
 std::string unit_name(const config::Cell& cell) { return "invar-" + cell.name + ".service"; }
 
+std::string bridge_unit_name(const config::Cell& cell) { return "invar-" + cell.name + "-bridge.service"; }
+
 std::string unit_text(const LoadedCell& loaded, const UnitPaths& paths, const UnitOptions& options) {
   const config::Cell& cell = *loaded.cell;
-  check_host(cell, options.host);
-  if (const auto flaw = flaw_of_identifier(options.user, "-"))
-    throw InputError{"--user", "`" + printable(options.user) + "` is no user: it " + flaw->what, flaw->mend};
-  check_path("the program", paths.program);
-  check_path("the cell file", paths.cell);
-  check_path("the folder of the data", paths.data);
-  if (paths.data.string().find_first_of("\\ \"'") != std::string::npos)
-    throw InputError{"the folder of the data",
-                     "`" + paths.data.string() + "` has a blank, quote or backslash",
-                     "choose another folder"};
-  if (!paths.libraries.empty()) check_path("the folder of the libraries", paths.libraries);
+  check(cell, paths, options);
   const Needs needs = needs_of(cell, options.host);
   const double watchdog = options.watchdog > 0.0 ? options.watchdog : std::max(10.0, 8.0 * needs.slowest);
 
   std::ostringstream unit;
-  unit << "# Written by `invar units` of version " INVAR_VERSION "; written anew by each `invar deploy`.\n"
-       << "[Unit]\nDescription=Invar cell " << cell.name << ", host " << options.host
-       << "\nWants=network-online.target\nAfter=network-online.target time-sync.target\n"
-       << "# Restarts are bounded in rate, and never given up.\nStartLimitIntervalSec=0\n\n[Service]\n"
-       << "Type=notify\nNotifyAccess=main\nUser=" << options.user << "\nGroup=" << options.user
-       << "\nWorkingDirectory=" << path_value(paths.data.string())
-       << "\nExecStart=" << command_word(paths.program.string()) << " run "
-       << command_word(paths.cell.string()) << " --host " << command_word(options.host) << " --real-time\n";
+  begin(unit, "host " + options.host, "", cell, paths, options);
+  unit << " run " << command_word(paths.cell.string()) << " --host " << command_word(options.host)
+       << " --real-time\n";
   if (cell.security)
     unit << "# `systemctl reload`: processes whose certificate was renewed start anew, one after the other.\n"
          << "ExecReload=/bin/kill -USR2 $MAINPID\n";
-  if (!paths.libraries.empty())
-    unit << "Environment=" << command_word("LD_LIBRARY_PATH=" + paths.libraries.string()) << '\n';
-  unit << "# Status 2: the file is wrong, which a restart does not mend.\n"
-       << "Restart=on-failure\nRestartPreventExitStatus=2\nRestartSec=5\n"
-       << "# A PC may wait for its network address; the status line says what is not "
+  environment_and_restarts(unit, paths);
+  unit << "# A PC may wait for its network address; the status line says what is not "
           "up.\nTimeoutStartSec=infinity\n"
        << "# SIGTERM goes to `invar run` alone, which lets every axis stop before a process ends.\n"
        << "KillMode=mixed\nTimeoutStopSec=60\n"
@@ -173,6 +191,22 @@ std::string unit_text(const LoadedCell& loaded, const UnitPaths& paths, const Un
     unit << ' ' << listed_path("-" + folder);
   }
   unit << "\n\n[Install]\nWantedBy=multi-user.target\n";
+  return unit.str();
+}
+
+std::optional<std::string> bridge_unit_text(const LoadedCell& loaded, const UnitPaths& paths,
+                                            const UnitOptions& options) {
+  const config::Cell& cell = *loaded.cell;
+  check(cell, paths, options);
+  if (const BridgeFile bridge = read_bridge(loaded); bridge.lines.empty() || bridge.host != options.host)
+    return std::nullopt;
+  std::ostringstream unit;
+  begin(unit, "bridge to the plant", " " + unit_name(cell), cell, paths, options);
+  unit << " bridge " << command_word(paths.cell.string()) << " --host " << command_word(options.host) << '\n';
+  environment_and_restarts(unit, paths);
+  unit << "WatchdogSec=10s\nStandardOutput=journal\nStandardError=journal\nSyslogIdentifier=invar-"
+       << cell.name << "-bridge\n"
+       << confinement << "\n[Install]\nWantedBy=multi-user.target\n";
   return unit.str();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,12 @@ struct UnitOptions {
 
 /// "invar-xy_table.service"
 [[nodiscard]] std::string unit_name(const config::Cell& cell);
+
+/// "invar-xy_table-bridge.service": of the host that runs the bridge to the plant.
+[[nodiscard]] std::string bridge_unit_name(const config::Cell& cell);
+/// Nothing: the bridge runs on another host, or there is none. Throws as `unit_text`.
+[[nodiscard]] std::optional<std::string> bridge_unit_text(const LoadedCell& loaded, const UnitPaths& paths,
+                                                          const UnitOptions& options);
 
 /// The text of the unit: one service for all processes of the host. `invar run` starts, watches and stops them in order, and
 /// systemd watches `invar run`. Real-time rights follow from the file. Throws InputError for an unknown host, one without

@@ -10,6 +10,7 @@
 #include "core/dds/cell_client.hpp"
 #include "core/dds/identity.hpp"
 #include "core/dds/node.hpp"
+#include "tools/cell/bridge_file.hpp"
 
 namespace invar::tools {
 
@@ -109,6 +110,16 @@ Rights of_launcher(const config::Cell& cell, const std::string& host) {
   return rights;
 }
 
+/// The cell's end of each line, in its direction alone.
+Rights of_bridge(const LoadedCell& loaded) {
+  Rights rights{config::bridge_name, Role::bridge, {}, {}};
+  for (const BridgeLine& line : read_bridge(loaded).lines)
+    (line.direction == Direction::out ? rights.reads : rights.writes).insert(checked(line.cell_topic));
+  rights.reads.insert(dds::clock_topic(loaded.cell->name));
+  rights.writes.insert(dds::clock_topic(loaded.cell->name));
+  return rights;
+}
+
 Rights of_program(LoadedCell& loaded, const config::PlantProgram& program) {
   Rights rights{program.name, Role::plant, {}, {}};
   const auto add = [&](const std::vector<std::string>& connections, std::set<std::string>& topics) {
@@ -143,6 +154,8 @@ std::string text_of(Role role) {
       return "process";
     case Role::launcher:
       return "launcher";
+    case Role::bridge:
+      return "bridge";
     case Role::operator_:
       return "operator";
     case Role::viewer:
@@ -164,6 +177,7 @@ std::vector<Rights> rights_of(LoadedCell& loaded) {
     if (has_recorder(process)) all.push_back(second_of(loaded, all.back()));
   }
   for (const auto& host : loaded.cell->hosts) all.push_back(of_launcher(*loaded.cell, host.name));
+  if (loaded.cell->has_bridge) all.push_back(of_bridge(loaded));
   const auto add_people = [&](const std::vector<std::string>& names, Role role) {
     for (const std::string& name : names) {
       all.push_back(of_person(loaded, name, role));

@@ -9,9 +9,9 @@
 
 namespace invar::tools {
 
-enum class Role { process, launcher, operator_, viewer, plant };
+enum class Role { process, launcher, bridge, operator_, viewer, plant };
 
-/// "process", "launcher", "operator", "viewer", "plant"
+/// "process", "launcher", "bridge", "operator", "viewer", "plant"
 [[nodiscard]] std::string text_of(Role role);
 
 /// Permissions of one certificate.
