@@ -112,10 +112,16 @@ Snapshot Discovery::snapshot() const {
 }
 
 std::vector<Alarm> Discovery::take_alarms() {
-  const std::lock_guard lock{mutex_};
-  std::vector<Alarm> out{alarms_.begin(), alarms_.end()};
-  alarms_.clear();
-  for (const auto& source : sources_)
+  std::vector<Alarm> out;
+  std::vector<std::function<std::optional<Alarm>()>> sources;
+  {
+    const std::lock_guard lock{mutex_};
+    out.assign(alarms_.begin(), alarms_.end());
+    alarms_.clear();
+    sources = sources_;
+  }
+  const std::lock_guard turn{sources_mutex_};  // a source may ask this object
+  for (const auto& source : sources)
     if (auto alarm = source()) out.push_back(std::move(*alarm));
   return out;
 }

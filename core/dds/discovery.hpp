@@ -91,6 +91,7 @@ class Discovery {
   std::map<std::string, Endpoint> endpoints_;
   std::deque<Alarm> alarms_;
   std::vector<std::function<std::optional<Alarm>()>> sources_;
+  std::mutex sources_mutex_;                             // one asks them at a time
   std::set<std::pair<std::int32_t, std::string>> slow_;  // peers that were told
 };
 

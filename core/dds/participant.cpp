@@ -12,6 +12,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <algorithm>
+#include <set>
 #include <span>
 #include <string_view>
 
@@ -30,6 +31,7 @@
 #include "core/dds/raw_type.hpp"
 #include "core/dds/reachable_memory.hpp"
 #include "core/dds/rtps_bytes.hpp"
+#include "core/dds/type.hpp"
 #include "core/dds/writer_keys.hpp"
 
 namespace invar::dds {
@@ -187,6 +189,40 @@ fdds::DomainParticipantQos participant_qos(const NodeOptions& options, const std
   return qos;
 }
 
+/// Tells of samples of a type that did not decode, and who may have sent them; at most once in ten seconds.
+class Undecoded {
+ public:
+  Undecoded(fdds::TypeSupport support, const Decoding* decoding)
+      : support_{std::move(support)}, decoding_{decoding} {}
+
+  std::optional<Alarm> look(const Discovery& discovery) {
+    const std::uint64_t count = decoding_->undecoded();
+    const Instant now = monotonic_now();
+    if (count == told_ || now - told_at_ < Duration::seconds(10.0)) return std::nullopt;
+    const std::string type = support_.get_type_name();
+    std::set<std::string> writers;
+    for (const Endpoint& end : discovery.snapshot().endpoints)
+      if (end.is_writer && !end.is_local && end.type == type) writers.insert("`" + end.participant + "`");
+    std::string text = std::to_string(count - told_) + " samples of this type do not decode";
+    if (!writers.empty() && writers.size() <= most_named)
+      text += "; it is written by " + joined({writers.begin(), writers.end()});
+    told_ = count;
+    told_at_ = now;
+    return Alarm{type,
+                 text +
+                     ": a program has another version of the IDL, or sends nonsense; build it with "
+                     "the IDL of this Invar (`invar types`)",
+                 false};
+  }
+
+ private:
+  static constexpr std::size_t most_named = 4;
+  fdds::TypeSupport support_;  // keeps the counter alive
+  const Decoding* decoding_;
+  std::uint64_t told_ = 0;
+  Instant told_at_{INT64_MIN / 2};
+};
+
 }  // namespace
 
 Participant::Participant(const NodeOptions& options, Traffic traffic, const Profiles& profiles,
@@ -260,7 +296,13 @@ void Participant::call_peers() {
 fdds::Topic* Participant::topic(const std::string& name, fdds::TopicDataType* type) {
   const fdds::TypeSupport support{type};
   const std::string type_name = support.get_type_name();
-  if (participant_->find_type(type_name).empty()) support.register_type(participant_);
+  if (participant_->find_type(type_name).empty()) {
+    support.register_type(participant_);
+    if (const auto* decoding = dynamic_cast<const Decoding*>(type))
+      discovery_.add_source([report = Undecoded{support, decoding}, &discovery = discovery_]() mutable {
+        return report.look(discovery);
+      });
+  }
   if (auto* known = participant_->lookup_topicdescription(name)) {
     if (known->get_type_name() != type_name)
       throw InputError{"topic `" + name + "`", "is of type " + known->get_type_name() + ", not " + type_name,

@@ -78,6 +78,35 @@ TEST(Type, MalformedSamplesAreDroppedAndThoseBehindThemArrive) {
   ASSERT_TRUE(eventually([&] { return good > before; }));
 }
 
+// Built with the IDL of before `recent_compute` was appended: the reader must not starve in silence.
+TEST(Type, SamplesOfAnEarlierVersionAreRefusedInWordsThatNameTheirWriter) {
+  Node node{local("reader"), standard_profiles()}, old{local("earlier"), standard_profiles()};
+  std::atomic<int> good{0};
+  const auto reader = node.reader<lifecycle::ComponentStatus>("cell/test/process/components", "state",
+                                                              [&](const auto&) { ++good; });
+  const auto raw = old.raw_writer("cell/test/process/components", "invar::lifecycle::ComponentStatus",
+                                  standard_profiles().at("state"));
+  lifecycle::ComponentStatus sample;
+  auto bytes = bytes_of<lifecycle::ComponentStatusPubSubType>(sample);
+  const auto write = [&] {
+    const std::span<const std::byte> span{bytes};
+    return raw->write(&span);
+  };
+  ASSERT_TRUE(eventually([&] { return raw->matched() == 1; }));
+  ASSERT_TRUE(eventually([&] { return write(), good > 0; })) << "this version";
+  bytes.resize(bytes.size() - sizeof(std::int64_t) * 4);
+  std::string told;
+  ASSERT_TRUE(eventually([&] {
+    write();
+    for (const auto& alarm : node.take_alarms()) told += alarm.topic + ": " + alarm.text + "\n";
+    return !told.empty();
+  }));
+  EXPECT_THAT(told, ::testing::AllOf(::testing::HasSubstr("invar::lifecycle::ComponentStatus: "),
+                                     ::testing::HasSubstr("samples of this type do not decode"),
+                                     ::testing::HasSubstr("`invar/test/earlier`"),
+                                     ::testing::HasSubstr("another version of the IDL")));
+}
+
 TEST(Type, BoundsAreEnforcedOnWhatArrives) {
   Type<stage::AxisCommandPubSubType> type;
   stage::AxisCommand sample;
