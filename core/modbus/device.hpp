@@ -12,7 +12,7 @@
 // (takes a short lock, never held over I/O). A name that the map does not have is a broken contract: look
 // names that come from users up with `map().find` first.
 //
-// A write is sent once. It is repeated only where the device said that it has not carried it out: it was busy (exception
+// A write is sent once. It is repeated only where the device said that it has not carried it out. Then it was busy (exception
 // 6), or has no function for one value (exception 1, then by function 15 or 16). When an answer is lost nobody knows
 // whether the device did it: the write is `uncertain` until the read-back shows the value. The owner decides
 // what to do then.

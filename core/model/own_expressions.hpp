@@ -10,8 +10,8 @@
 
 namespace invar::model {
 
-/// Faults at their lines: a word that is no name, a name that stands for two things or for a function, an expression that
-/// assigns or is two, a loop without an input to close or that follows itself.
+/// Faults at their lines: a word that is no name, a name that stands for two things or for a function. Likewise an expression
+/// that assigns or is two, and a loop without an input to close or that follows itself.
 void check_own_expressions(const config::Node& root, const physics::Model& model);
 
 /// Where numbers that go together in an expression count in different units.

@@ -21,8 +21,8 @@ std::vector<std::string> columns_of(const physics::Model& model);
 /// stamp (`stage_x.state.at`): its cycles are the rows, one a period of the loop. A row holds the newest values of other
 /// topics at that time.
 ///
-/// Where the model's column of `feedforward` is `remainder`, in a CSV too, it is made here: the part of the recorded current
-/// that the law of the controller does not explain.
+/// Where the model's column of `feedforward` is `remainder`, in a CSV too, it is made here. It is the part of the recorded
+/// current that the law of the controller does not explain.
 ///
 /// Rows in which that topic says that its axis is not enabled are left out. Each stretch between is a table of its own,
 /// the longest first, and stretches under a twentieth of it are dropped. A stretch that was enabled before the recording

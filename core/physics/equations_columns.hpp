@@ -9,7 +9,7 @@
 
 namespace invar::physics {
 
-/// What a term at an output is `on`: its name, or `output.NAME` where a state has that name too.
+/// The place `on` of a term at an output: the output's name, or `output.NAME` where a state has that name too.
 std::string place_of_output(const Equations& equations, const std::string& output);
 
 /// Dry friction that names its own state under `with` acts against the rate of it, not against its sign. A state that is no
@@ -39,8 +39,8 @@ struct InputCourse {
 /// A term at an input or output, value by value in order of time: what a controller decides is only known as it comes.
 class Bending {
  public:
-  /// `held`: from row to row, as an input is. `has_changes`: there is a row at every instant at which what is held changes
-  /// late; without them what comes late by a part of a step counts with the mean over it.
+  /// `held`: from row to row, as an input is. `has_changes`: there is a row at every instant at which a held value changes
+  /// late. Without such rows a value that comes late by a part of a step counts with the mean over it.
   Bending(const Term& term, bool held, bool has_changes);
   /// Transformed value at `now` [s]; `step` [s] from the row before or, where it is held, to the next. `arch`: height of a value
   /// that is not held, halfway from the row before, above the straight line.
@@ -53,7 +53,7 @@ class Bending {
 
   /// Does a share arrive by way of a first-order store?
   [[nodiscard]] bool is_store() const { return share() > 0.0; }
-  /// Of a store: where a value `felt` at a row goes from there, when what comes in goes from `value` straight on by `rate`.
+  /// The course of a store from a value `felt` at a row, when its input goes from `value` straight on by `rate`.
   [[nodiscard]] InputCourse course(double value, double rate, double felt) const {
     const double aim = value - share() * rate * time_constant();
     return {aim, rate, felt - aim, time_constant()};
@@ -67,8 +67,8 @@ class Bending {
     if (!(time_constant() > 0.0)) return 0.0;
     return kind_ == EquationsMemory::lag ? 1.0 : kind_ == EquationsMemory::hidden_state ? first_ : 0.0;
   }
-  /// A share arrives by way of a first-order store, in balance at the start. What is held counts with the mean over its step,
-  /// as a machine feels it; what is smooth goes by a parabola from row to row.
+  /// A share arrives by way of a first-order store, in balance at the start. A held value counts with the mean over its step,
+  /// as a machine feels it; a smooth one goes by a parabola from row to row.
   double through_store(double step, double value, double arch);
   double late(double now, double value, double arch);
 
@@ -92,8 +92,8 @@ double step_about(const std::vector<double>& time, std::size_t row, bool held);
 /// `arches`: of what is not held, by how much it lies above the straight line halfway from the row before; empty: nowhere.
 void bend(const Model& model, const std::string& on, const std::vector<double>& time,
           std::vector<double>& values, bool held, const std::vector<double>& arches = {});
-/// The same of an input where the last thing that bends it is a store: the values as they are felt at the rows, and by row
-/// what they do until the next one. Empty, and nothing bent, where it is none.
+/// The same for an input whose last bend is a store. Values become those felt at the rows; returned is their course by row
+/// until the next one. Empty, and nothing bent, where the last bend is none.
 std::vector<InputCourse> bend_by_store(const Model& model, const std::string& on,
                                        const std::vector<double>& time, std::vector<double>& values,
                                        bool held);

@@ -8,7 +8,7 @@
 
 namespace invar::physics {
 
-/// Formulas over named numbers, read by muParser: + - * / ^, comparisons, && ||, if(condition, yes, no), sin cos tan asin acos atan sinh cosh tanh exp log ln log2
+/// Formulas over named numbers, read by muParser: + - * / ^, comparisons, && ||, if(condition, yes, no). Functions: sin cos tan asin acos atan sinh cosh tanh exp log ln log2
 /// log10 sqrt abs sign min max, pi. `-x^2` is -(x^2), `x^y^z` is x^(y^z). The root of what is negative is 0, the logarithm of
 /// what is not positive that of the smallest positive number, the sign of zero 0: an empty tank does not run.
 /// Equal parts of the formulas of one section are worked out once.

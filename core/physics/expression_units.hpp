@@ -25,8 +25,8 @@ struct UnitClash {
 };
 
 /// The first clash of a formula.
-/// The rule is that of dimensional analysis with the units' sizes carried along (ISO 80000-1, 5): what is added, compared
-/// or chosen between counts in one unit, an angle in rad, an exponent and what exp and log take in none. So a set of units that is not SI
+/// The rule is that of dimensional analysis with the units' sizes carried along (ISO 80000-1, 5). Values that are added, compared
+/// or chosen between count in one unit, an angle in rad, an exponent and an argument of exp and log in none. So a set of units that is not SI
 /// but goes together (cm, mL/s and cm2) is as good. A number that stands in a formula may have any unit, and with it all that it is
 /// multiplied by. Offsets (K and degC) are not looked at, nor are rad and counts told from pure numbers.
 /// `result`: the unit that the formula's value counts in; none: any. Throws InputError where the formula is none.

@@ -24,8 +24,8 @@ struct MissingForce {
   double motor_force = 0.0;
 };
 
-/// The change of momentum over a stretch of motion less the impulse of all the forces that the model knows, over its
-/// duration: no second derivative of a reading is taken. Stretches with standstill or reversal in them tell nothing, since
+/// The missing force: the change of momentum over a stretch of motion less the impulse of all known forces, over its
+/// duration. No second derivative of a reading is taken. Stretches with standstill or reversal in them tell nothing, since
 /// dry friction at rest may be anything. A difference within the model's own sigmas counts as agreement. Real-time.
 class ForceBalance {
  public:

@@ -97,7 +97,7 @@ struct Model {
   /// Where not every cycle of the controller has its row: whether the reference goes smoothly on between two rows or is held
   /// from one to the next. Nothing: not said, and held.
   std::optional<bool> reference_goes_on;
-  /// Of a loop: whether `current` is recorded behind what acts between controller and motor; false: the controller's command.
+  /// In a loop: is `current` recorded behind what acts between controller and motor? false: the controller's command.
   bool records_applied = false;
   ThermalLayout thermal;
   Baseline baseline;

@@ -18,8 +18,8 @@ struct RippleSamples {           // of a rotary axis in rad, rad/s
   [[nodiscard]] std::size_t size() const { return position.size(); }
 };
 
-/// The parts of a recording (signals `reference`, `position`, `current`) in which the reference moves at constant velocity for
-/// half a second or more, a quarter of a second after each such part began; rows averaged to about 6000.
+/// The parts of a recording (signals `reference`, `position`, `current`) in which the reference moves at constant velocity.
+/// Each lasts half a second or more and counts from a quarter of a second after its beginning; rows averaged to about 6000.
 RippleSamples constant_velocity_runs(const Record& record);
 
 struct RippleHarmonic {
@@ -49,8 +49,8 @@ struct RippleFit {
   double after = 0.0;      // ... with it
 };
 
-/// motor_constant u = damping v + friction sign(v) - constant - ripple(x), by least squares; each pitch by a scan of
-/// `pitches` and by Newton steps, further families in what those before leave, as long as one stands out by 5.5 sigmas
+/// motor_constant u = damping v + friction sign(v) - constant - ripple(x), by least squares. Each pitch comes from a scan of
+/// `pitches` and Newton steps. Further families come from the residual, as long as one stands out by 5.5 sigmas
 /// and runs held out are met better with it. Mass does not matter at constant velocity. Preconditions: the model is of an
 /// axis; at least two runs, 50 samples.
 RippleFit identify_ripple(const Model& axis, const RippleSamples& samples, Range pitches,
@@ -61,8 +61,8 @@ RippleFit identify_ripple(const Model& axis, const RippleSamples& samples);
 /// The ripple as terms of an axis, one `force_ripple` a harmonic of each family.
 std::vector<Term> ripple_terms(const RippleFit& fit);
 
-/// Ripple of the first family as a position sensor: how far the ways `travelled` since some start [m] were shifted, if `force` [N] was the
-/// ripple met on them: a start position in [0, pitch). Force alone knows no more: places one pitch apart feel alike.
+/// Ripple of the first family as a position sensor: the start position in [0, pitch) of the ways `travelled` since then [m], if
+/// `force` [N] was the ripple met on them. Force alone knows no more: places one pitch apart feel alike.
 /// `misfit` (may be null) gets the RMS of what the ripple does not explain [N].
 double position_from_ripple(const RippleFit& fit, const std::vector<double>& travelled,
                             const std::vector<double>& force, double* misfit = nullptr);

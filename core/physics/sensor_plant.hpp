@@ -26,7 +26,7 @@ class SensorPlant {
   SensorPlant(Quantity quantity, std::vector<SensorTerm> terms, double gain = 1.0);
   /// At rest there since ever. Real-time.
   void rest_at(double position) noexcept;
-  /// What it shows `dt` [s] after the step before, of a carriage that now is here and this fast. Real-time. A delay beyond
+  /// The reading `dt` [s] after the step before, of a carriage that now is here and this fast. Real-time. A delay beyond
   /// 250 steps shows the oldest that is remembered.
   [[nodiscard]] double step(double position, double velocity, double dt) noexcept;
 

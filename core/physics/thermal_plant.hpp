@@ -44,8 +44,8 @@ struct ThermalInputs {
 };
 
 /// The truth side of heater, slide and base: `world` steps one, `simulate` one for each recording. A term
-/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, at `exchange` a conductance [W/K] to the other node,
-/// at `storage` a capacity [J/K], elsewhere a heat [W] or, by power, a share of what the node's heaters give. Classical Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
+/// `unmodelled` at site `loss` is a loss [W/K] added over its variable, at `exchange` a conductance [W/K] to the other node.
+/// At `storage` it is a capacity [J/K], elsewhere a heat [W] or, by power, a share of the heat of the node's heaters. Classical Runge-Kutta in sub-steps short against the fastest node; sensor lags exactly for a straight temperature.
 /// Repeatable bit for bit.
 class ThermalPlant {
  public:

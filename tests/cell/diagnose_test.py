@@ -81,7 +81,7 @@ class Diagnose(unittest.TestCase):
         self.assertLess(fit["after"], 0.012)
         self.assertGreater(fit["retuned"], 3 * fit["after"])
         page = (self.folder / "d/report.html").read_text()
-        for words in ("missing<", "how sure", "what to do next", "Another recording, not used here: other.csv"):
+        for words in ("missing<", "how sure", "next step", "Another recording, not used here: other.csv"):
             self.assertIn(words, page)
         for model, said in (("model.yaml", "before"), ("d/retuned.yaml", "retuned"), ("d/patched.yaml", "after")):
             done = call(self.folder, "simulate", "--model", model, "--inputs", "other.csv", "--output", "s.csv")

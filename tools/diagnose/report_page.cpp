@@ -165,7 +165,7 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
     rows.push_back({"what is missing", "nothing that this recording shows"});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
   rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
-  rows.push_back({"what to do next", next_experiment(data, d)});
+  rows.push_back({"next step", next_experiment(data, d)});
   page.table({"in short", ""}, rows);
 }
 
@@ -225,7 +225,7 @@ Plot from_both_sides(const Case& data, const std::vector<double>& without, const
     return x;
   };
   Plot plot;
-  plot.title = "what is left of error, by the side of approach";
+  plot.title = "residual error, by the side of approach";
   plot.x_label = "position [m]";
   plot.y_label = "mean of measured - simulated [m]";
   plot.series = {averaged("without it, from below", from(1.0), without, 40),
@@ -274,7 +274,7 @@ void add_finding(report::Page& page, const Case& data, const Diagnosis& d, std::
       label += " within one period";
     }
     Plot plot;
-    plot.title = "what is left of " + data.outputs[shown] + ", over " + label;
+    plot.title = "residual of " + data.outputs[shown] + ", over " + label;
     if (!plots.empty() && plots.back().title == plot.title)
       return;  // direction and speed are both seen over velocity
     plot.x_label = label + in_brackets(unit_of_variable(data, variable));

@@ -9,8 +9,8 @@
 
 namespace invar::diagnosis {
 
-/// A wave in time, an offset, a limit, steps, a dead zone or a delay: the one that explains most of the recorded current beside
-/// the law, if that is more than half of the part beyond noise. Nothing where the rest goes with the motion by another law.
+/// The term that explains most of the recorded current beside the law, if that is more than half of the part beyond noise.
+/// Tried are a wave in time, an offset, a limit, steps, a dead zone and a delay. Nothing where the rest goes with the motion by another law.
 std::optional<Added> added_to_command(const Case& data, const std::vector<LawRows>& law);
 
 /// The share of the current beyond the law that the carriage feels: 1 where it acts, 0 where only the reading of the

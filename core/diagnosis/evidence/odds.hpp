@@ -1,5 +1,5 @@
-// Probability that a name is the right one. It stands against the other names that were tried, against its relatives, which
-// look the same where a recording does not set them apart, and against a cause that none of these is.
+// Probability that a name is the right one, against the other names that were tried and a cause that none of these is. It also
+// stands against the name's relatives, which look the same where a recording does not set them apart.
 #pragma once
 
 #include "core/diagnosis/evidence/diagnosis.hpp"

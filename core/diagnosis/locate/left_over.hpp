@@ -5,15 +5,15 @@
 
 namespace invar::diagnosis {
 
-/// By output, the share of the power of measured - simulated that goes with the recording. It is what one of three shapes
-/// explains: a surface of second order over all inputs, their motion and their past; the named terms' own effects with numbers
-/// that change; any course over one of the inputs. Taken off is what the shape explains of the same series shifted against the
-/// recording: chance and the colour of the noise are in both. 0 where it is no more than chance.
+/// By output, the share of the power of measured - simulated that goes with the recording. One of three shapes
+/// explains it. The first is a surface of second order over all inputs, their motion and their past, the second the named terms'
+/// own effects with numbers that change, the third any course over one of the inputs. Taken off is the share of the same series
+/// shifted against the recording: chance and the colour of the noise are in both. 0 where it is no more than chance.
 std::vector<double> followed_share(const Case& data, const Fit& fit);
 
 /// By output, the share of its power in rows where it is more than `times` the size of what cannot be told from the row before.
-/// Noise that wanders for long is so large, and the residual of a model that misses the greater part. 0 where nothing is in
-/// proportion to the motion of the output itself. For plants that are simulated freely.
+/// Noise that wanders for long is so large, and the residual of a model that misses the greater part. It is 0 where nothing is
+/// in proportion to the motion of the output itself. For plants that are simulated freely.
 std::vector<double> far_share(const Case& data, const Fit& fit, double times);
 
 /// Is what is left over far louder where the inputs say that more goes on? Noise does not know of them.
@@ -23,8 +23,8 @@ bool is_louder_in_motion(const Case& data, const Fit& fit);
 /// related from row to row?
 bool is_above_noise(const Case& data, const Fit& fit);
 
-/// By output, the residual beyond the noise, in times the power of the noise: that which the user gave, and that which cannot be
-/// told from the row before. 0: no more than the colour of noise may do in a recording, no given noise, or a loop that leads
+/// By output, the residual beyond the noise, in times the power of the noise. The noise is the user's, and the part that cannot
+/// be told from the row before. It is 0 where the colour of noise may do as much, without a given noise, and in a loop that leads
 /// the noise of one reading to the others.
 std::vector<double> excess_over_noise(const Case& data, const Fit& fit);
 

@@ -17,8 +17,8 @@ inline constexpr const char* rivals_weighed = "other names in place of what was 
 
 void add_once(std::vector<std::string>& all, const std::string& one);
 
-/// Adds what was not tried. A reader of the verdict alone must not take half a search for a whole one that found nothing, nor
-/// a name for sure that was never held against its rivals.
+/// Adds what was not tried. A reader of the verdict alone must not take half a search for a whole one that found
+/// nothing. A name that was never held against its rivals must not seem sure.
 void say_not_tried(Diagnosis& d, const std::vector<std::string>& not_tried);
 
 }  // namespace invar::diagnosis

@@ -18,10 +18,10 @@ void doubt(const Case& data, Diagnosis& d, std::optional<Beside>& beside);
 /// False: nothing changed.
 bool set_aside(const Case& data, Diagnosis& d);
 
-/// Leaves the name of what is nine times as likely another cause away. What is so in seven cases of ten goes as well where
-/// residuals far from the noise show that it is not the whole truth (`rests`, a share by finding; `is_far`,
-/// of the outputs), or where the names lead the numbers of a built-in plant far astray; in five, where these are ten times the
-/// noise.
+/// Leaves the name of a finding away where another cause is nine times as likely. Seven to three is enough where
+/// residuals far from the noise show that the name is not the whole truth (`rests`, a share by finding; `is_far`, by output).
+/// The same holds where the names lead the numbers of a built-in plant far astray. Even odds are enough where the residuals are
+/// ten times the noise.
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, double times_the_noise);
 
 /// Findings whose names were all left unsaid are held to what a curve without a name must do: an engineer sees the residual

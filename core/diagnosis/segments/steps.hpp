@@ -5,8 +5,8 @@
 
 namespace invar::diagnosis {
 
-/// Halves the steps until those of half their length change no output of the model `at` by more than a tenth of its noise,
-/// at most twice: the error of a coarse step looks like physics. The noise is RMS by output, or the user's if that is less.
+/// Halves the steps, at most twice, until half their length changes no output of the model `at` by a tenth of its noise.
+/// The error of a coarse step looks like physics. The noise is RMS by output, or the user's if that is less.
 /// False: they are fine enough as they are.
 bool step_finely(Case& data, const physics::Model& at, const std::vector<double>& noise);
 

@@ -10,8 +10,8 @@ namespace invar::diagnosis {
 /// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
 /// on a state goes on to grow to the end of the recording. An axis without controller always does. Each window begins at
 /// states of its own, parameters "<state>.start<k>", which every fit estimates beside the others. Their prior is as wide as the
-/// state itself goes. A closed loop, a model that forgets and a recording too short for windows stay as they are, but for what begins anew in any case
-/// (anew.hpp).
+/// state itself goes. A closed loop, a model that forgets and a recording too short for windows stay whole, but for rows at
+/// which the states begin anew in any case (anew.hpp).
 void cut_into_windows(Case& data);
 /// The same where `near` lies nearer to the machine than what the user believes: does that forget?
 void cut_into_windows(Case& data, const physics::Model& near);
