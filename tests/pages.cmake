@@ -19,6 +19,7 @@ set(pages
   docs/how-to/read-a-diagnosis-report.md
   docs/how-to/real-time-host.md
   docs/how-to/secure-a-cell.md
+  docs/how-to/standby.md
   docs/how-to/troubleshooting.md
   docs/how-to/use-a-camera.md
   docs/how-to/watch-a-cell.md

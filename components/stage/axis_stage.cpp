@@ -69,7 +69,9 @@ void Stage::activate() {
   without_correction_ = without_commander_ = in_vain_ = false;
   standing_current_ = 0.0;
   model_changed_ = false;
-  model_.announce();
+  unanswered_ = {};
+  standby_.activate();
+  if (standby_.leads()) model_.announce();
 }
 
 /// Why this model must not drive the axis; empty: nothing.
@@ -116,10 +118,12 @@ void Stage::deactivate() noexcept {
     notices_.say(event::SEVERITY_TRIP, text.data());
   }
   mode_ = AXIS_MODE_DISABLED;
+  standby_.resign();
 }
 
 bool Stage::wind_down() noexcept {
   leaving_ = true;
+  standby_.leave();
   return mode_ == AXIS_MODE_DISABLED || mode_ == AXIS_MODE_FAULT || mode_ == AXIS_MODE_HOLDING;
 }
 
@@ -346,13 +350,17 @@ void Stage::step(const Tick& tick) noexcept {
   const double forgiven = parameters_.feedback_timeout / tick.period;
   const bool fused_lost = fused_watch_.lost(fused_.received(), forgiven);
   const bool seeing = seen_ && tick.now - *seen_ <= patience && !fused_lost;
-  model_changed_ = model_.update();
+  if (standby_.leads())
+    model_changed_ = model_.update();
+  else
+    model_.stand_by();
   if (seeing && usable) read_position(*feedback, tick);
   // A correction that stays away is held where it was: no step.
   if (const auto* correction = correction_.latest(); correction != nullptr && bad == nullptr)
     correction_held_ = correction->correction();
   if (seeing && !primed_) prime(tick);
   look_for_correction(tick);
+  if (!leads(tick, seeing)) return stand_by(tick, seeing);
 
   AxisCommand command;
   while (command_.take(command)) {
@@ -405,6 +413,7 @@ void Stage::step(const Tick& tick) noexcept {
   motor.enabled(enabled);
   motor_.write(motor);
   publish(at);
+  standby_.tell(*this);
 }
 
 void Stage::publish(const MotionPoint& at) noexcept {

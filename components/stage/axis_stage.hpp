@@ -1,6 +1,7 @@
 // Stage: the servo of one axis - commands, trajectory, control law, limits and a controlled stop.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
 #include "core/component/staged_model.hpp"
+#include "core/component/standby.hpp"
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/axis_feedforward.hpp"
 #include "idl/commander.h"
@@ -34,7 +36,7 @@ namespace invar::stage {
 /// brakes the axis, and only moves away from the switch are taken. If the commander is lost, the axis brakes and stands. Following error and a fault of the drive trip it at once. A
 /// notice gives the reason. Before it is disabled or deactivated the axis brakes; if it still moves then, a notice states its
 /// speed.
-class Stage final : public Component {
+class Stage final : public Component, public Redundant {
  public:
   struct Control {
     std::string kind = "pid";
@@ -137,8 +139,40 @@ class Stage final : public Component {
   void deactivate() noexcept override;
   bool wind_down() noexcept override;
   void step(const Tick& tick) noexcept override;
+  [[nodiscard]] Standby& standby() noexcept override { return standby_; }
+  template <class W>
+  void warm(W& w) noexcept {
+    constexpr Range currents{-1e4, 1e4}, ways{-1e2, 1e2};
+    w(mode_, "mode", AXIS_MODE_FAULT);
+    w(homed_, "homed");
+    w(offset_, "offset", ways);
+    w(trajectory_start_, "trajectory_start");
+    trajectory_.warm(w);
+    w(following_error_, "following_error", ways);
+    w(in_vain_, "in_vain");
+    w(disabling_, "disabling");
+    w(correction_held_, "correction_held", ways);
+    w(current_, "current", currents);
+    w(standing_current_, "standing_current", currents);
+    w(fed_forward_.last, "fed_forward.last", currents);
+    w(fed_forward_.rest, "fed_forward.rest", currents);
+    w(reading_error_.last, "reading_error.last", ways);
+    w(reading_error_.rest, "reading_error.rest", ways);
+    std::uint64_t command = sample_.command_id();
+    bool done = sample_.command_done(), refused = sample_.command_refused();
+    w(command, "command");
+    w(done, "command_done");
+    w(refused, "command_refused");
+    if (!w.loads()) return;
+    sample_.command_id(command);
+    sample_.command_done(done);
+    sample_.command_refused(refused);
+  }
 
  private:
+  [[nodiscard]] bool leads(const Tick& tick, bool seeing) noexcept;
+  void stand_by(const Tick& tick, bool seeing) noexcept;
+  void go_on_for_other(const Tick& tick) noexcept;
   using Staged = StagedModel<physics::AxisFeedforward>;
   /// A number whose source may change: the step that would give fades away.
   struct Faded {
@@ -191,6 +225,13 @@ class Stage final : public Component {
   Output<MotorCommand> motor_{*this, "motor"};
   Output<AxisState> state_{*this, "state"};
   Notices notices_{*this};
+  Standby standby_{*this, notices_};
+  struct Unanswered {
+    AxisCommand command;
+    Instant at;
+  };
+  std::array<Unanswered, 4> unanswered_{};  // the latest commands that came while it stood by
+  std::size_t unanswered_next_ = 0;
   Staged model_;
   Faded fed_forward_, reading_error_;
   bool model_changed_ = false;

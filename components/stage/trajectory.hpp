@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 
+#include "core/base/range.hpp"
+
 namespace invar::stage {
 
 struct MotionLimits {
@@ -36,6 +38,30 @@ class Trajectory {
   [[nodiscard]] MotionPoint at(double time) const noexcept;
   [[nodiscard]] double duration() const noexcept { return duration_; }
   [[nodiscard]] double target() const noexcept { return at(duration_).position; }
+
+  /// The state that goes on in another process. `w(double&, name, Range)`.
+  template <class W>
+  void warm(W& w) noexcept {
+    constexpr Range places{-1e3, 1e3}, speeds{-1e2, 1e2}, accelerations{-1e4, 1e4}, jerks{-1e7, 1e7},
+        times{0.0, 1e6};
+    const auto point = [&](MotionPoint& p) {
+      w(p.position, "trajectory.position", places);
+      w(p.velocity, "trajectory.velocity", speeds);
+      w(p.acceleration, "trajectory.acceleration", accelerations);
+    };
+    double count = static_cast<double>(count_);
+    w(count, "trajectory.count", Range{0.0, static_cast<double>(pieces_.size())});
+    if (w.loads()) count_ = static_cast<std::size_t>(count);
+    for (Piece& piece : pieces_) {
+      w(piece.begin, "trajectory.begin", times);
+      w(piece.jerk, "trajectory.jerk", jerks);
+      point(piece.start);
+    }
+    point(end_);
+    w(amplitude_, "trajectory.amplitude", places);
+    w(frequency_, "trajectory.frequency", Range{0.0, 1e6});
+    w(duration_, "trajectory.duration", times);
+  }
 
  private:
   struct Piece {

@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "core/base/range.hpp"
 #include "core/base/time.hpp"
 
 namespace invar::thermal {
@@ -29,6 +30,20 @@ class HeatWatch {
   /// Once a step, after `trusts`: the power given over the coming period, and what was asked for.
   [[nodiscard]] Doubt look(const Settings& settings, std::optional<double> reading, double setpoint,
                            double power, Instant now, double period) noexcept;
+  /// The state that goes on in another process: the heat that was given so far.
+  template <class W>
+  void warm(W& w) noexcept {
+    constexpr Range any{-1e12, 1e12};
+    w(known_, "watch.known");
+    w(lowest_, "watch.lowest", any);
+    w(last_, "watch.last", any);
+    w(power_then_, "watch.power_then", any);
+    w(unanswered_, "watch.unanswered", any);
+    w(silent_, "watch.silent", any);
+    w(waited_, "watch.waited", any);
+    w(last_power_, "watch.last_power", any);
+    if (w.loads()) looked_at_.reset();
+  }
   /// Since the thermistor last proved to follow [s].
   [[nodiscard]] double waited() const noexcept { return waited_; }
 

@@ -110,6 +110,15 @@ std::vector<Component::Claim> Thermal::claims() const {
   return all;
 }
 
+/// Who stands by takes over only where the device shows that nobody commands it.
+std::optional<Component::Unfit> Thermal::without_standby() const {
+  if (map_.heartbeat && map_.registers[map_.heartbeat->reg].readable) return {};
+  return Unfit{
+      "its map has no heartbeat that can be read, by which the standby sees whether somebody commands the "
+      "device",
+      "modbus", "give the map a `heartbeat` whose register has `access: read_write`"};
+}
+
 void Thermal::configure() { client_.open(parameters_.modbus, map_, simulated_time); }
 
 void Thermal::cleanup() noexcept { client_.close(); }
@@ -123,12 +132,24 @@ void Thermal::activate() {
   told_unsound_ = told_undriven_ = told_stuck_ = false;
   unsound_since_.reset();
   stuck_since_.reset();
+  unanswered_.reset();
+  beat_changed_.reset();
+  unready_since_.reset();
+  standby_.activate();
 }
 
+bool Thermal::wind_down() noexcept {
+  standby_.leave();
+  return true;
+}
+
+/// What another one drives stays as it is.
 void Thermal::deactivate() noexcept {
-  if (!client_.is_open()) return;
-  (void)drive(0.0, false);
-  client_.send(now());
+  if (client_.is_open() && standby_.leads()) {
+    (void)drive(0.0, false);
+    client_.send(now());
+  }
+  standby_.resign();
 }
 
 /// Power [W] for this temperature. The integral stops where the output is at its limit and would be driven further.
@@ -297,6 +318,7 @@ void Thermal::look_at_response(std::optional<double> reading, const Tick& tick) 
 }
 
 void Thermal::step(const Tick& tick) noexcept {
+  if (!leads(tick)) return stand_by(tick);
   ThermalCommand command;
   while (command_.take(command)) obey(command);
   if (parameters_.setpoint != setpoint_parameter_) setpoint_ = setpoint_parameter_ = parameters_.setpoint;
@@ -334,6 +356,7 @@ void Thermal::step(const Tick& tick) noexcept {
   sample.stale(!sound);
   state_.write(sample);
   for (ZoneSensor& zone : zones_) publish_zone(zone);
+  standby_.tell(*this);
 }
 
 void Thermal::publish_zone(ZoneSensor& zone) noexcept {

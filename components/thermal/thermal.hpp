@@ -13,6 +13,7 @@
 #include "core/component/component.hpp"
 #include "core/component/notices.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/standby.hpp"
 #include "core/metrology/thermal/thermistor.hpp"
 #include "core/modbus/contract.hpp"
 #include "core/modbus/endpoint.hpp"
@@ -33,7 +34,7 @@ namespace invar::thermal {
 /// controller that delivers power though it was told to be off. Each of these is said once in a notice, and once when it is
 /// over. A command whose setpoint is no number, outside the parameter's range or not below `over_temperature` can only switch
 /// off. Not real-time (Modbus).
-class Thermal final : public Component {
+class Thermal final : public Component, public Redundant {
  public:
   struct Pid {
     double kp = 20.0;
@@ -128,9 +129,30 @@ class Thermal final : public Component {
   void activate() override;
   void deactivate() noexcept override;
   void cleanup() noexcept override;
+  bool wind_down() noexcept override;
   void step(const Tick& tick) noexcept override;
+  [[nodiscard]] Standby& standby() noexcept override { return standby_; }
+  [[nodiscard]] std::optional<Unfit> without_standby() const override;
+  template <class W>
+  void warm(W& w) noexcept {
+    constexpr Range any{-1e12, 1e12};
+    w(setpoint_, "setpoint", Parameters::setpoints);
+    w(wanted_, "wanted");
+    w(latched_, "latched");
+    w(integral_, "integral", any);
+    w(slope_, "slope", any);
+    w(previous_, "previous", any);
+    w(primed_, "primed");
+    w(power_, "power", Range{0.0, 1e4});
+    watch_.warm(w);
+  }
 
  private:
+  [[nodiscard]] bool leads(const Tick& tick) noexcept;
+  void stand_by(const Tick& tick) noexcept;
+  void watch_device(const Tick& tick) noexcept;
+  [[nodiscard]] const char* why_not_free(const Tick& tick) const noexcept;
+  [[nodiscard]] bool reaches_device() const noexcept;
   [[nodiscard]] double control(double temperature, double period) noexcept;
   void obey(const ThermalCommand& command) noexcept;
   /// A temperature that the device measures: by a thermistor's resistance, or as it converts it itself.
@@ -154,6 +176,12 @@ class Thermal final : public Component {
   Inbox<ThermalCommand> command_{*this, "command", {.optional = true, .profile = "command"}};
   Output<NodeTemperature> state_{*this, "state", "state"};
   Notices notices_{*this};
+  Standby standby_{*this, notices_};
+  std::optional<ThermalCommand> unanswered_;  // while it stands by: nobody may have heard it
+  Instant unanswered_at_;
+  double beat_ = 0.0;  // of the device's heartbeat register, seen while standing by
+  std::optional<Instant> beat_changed_;
+  std::optional<Instant> unready_since_;
   modbus::RegisterMap map_;
   Sensor slide_;
   struct ZoneSensor {

@@ -70,6 +70,8 @@ class StagedModel {
     while (command_.take(command)) changed = obey(command) || changed;
     return changed;
   }
+  /// Instead of `update`, where another component answers the commands meanwhile. Real-time.
+  void stand_by() noexcept { command_.discard(); }
   /// The model in use; nullptr: none. Real-time.
   [[nodiscard]] Model* active() noexcept { return active_; }
 

@@ -62,12 +62,34 @@ CellHost read_host(const Node& node) {
   return host;
 }
 
+/// All but its name, process and rate is that of the one that it stands by for: `take_from_leaders`.
+void read_standby(CellComponent& component) {
+  const Node node = component.node;
+  const Node standby = *(component.standby = node["standby"]);
+  component.type = node.text("type", "");
+  component.standby_of = standby.text("of");
+  if (standby.has("deadline"))
+    component.standby_deadline = Duration::seconds(standby["deadline"].as_number("s", {1e-3, 60.0}));
+  for (const Node& other : node.map())
+    if (const std::string key = other.key(); key != "type" && key != "standby" && key != "every") {
+      other.accept_all();
+      other.fault(
+          "stands beside `standby`",
+          "leave it out: a standby has the parameters and connections of the one that it stands by for");
+    }
+}
+
 CellComponent read_component(const Node& node, std::uint32_t id) {
-  CellComponent component{node.key(), node.text("type"), id, 1, {}, {}, {}, {}, node};
+  const bool stands_by = node.has("standby");
+  CellComponent component{node.key(), stands_by ? "" : node.text("type"), id, 1, {}, {}, {}, {}, node};
   check_name(node, component.name, In::topics);
   if (component.name == "all")
     node.fault("`all` is no name for a component: `invar lifecycle all` means every one", "choose another");
   component.every = node.integer("every", 1, 1'000'000, 1);
+  if (stands_by) {
+    read_standby(component);
+    return component;
+  }
   for (const Node& port : node["connect"].map()) component.connections[port.key()] = port.as_text();
   for (const Node& port : node["qos"].map()) component.profiles[port.key()] = port.as_text();
   for (const Node& port : node["publish"].map())
@@ -154,6 +176,52 @@ void check_identities(const Node& root, const Cell& cell) {
         component.node.fault("component `" + component.name + "` stands twice in this cell",
                              "rename one of them");
   }
+}
+
+/// Why `standby` cannot stand by for `leader`; empty: it can.
+Fault why_no_standby(const Cell& cell, const CellProcess& process, const CellComponent& standby,
+                     const CellComponent* leader) {
+  const std::string of = "`" + clipped(standby.standby_of) + "`";
+  if (leader == nullptr) {
+    std::vector<std::string> names;
+    for (const CellProcess& each : cell.processes)
+      for (const CellComponent& component : each.components) names.push_back(component.name);
+    const std::string near = nearest(standby.standby_of, names);
+    return {"", of + " is no component of this cell",
+            near.empty() ? "name the component that it stands by for" : "did you mean `" + near + "`?"};
+  }
+  if (leader->standby) return {"", of + " stands by itself", "name the component that leads"};
+  if (std::any_of(process.components.begin(), process.components.end(),
+                  [&](const CellComponent& each) { return &each == leader; }))
+    return {"", of + " is in the same process, and both would be lost with it",
+            "put the standby into another process, best on another PC"};
+  for (const CellProcess& each : cell.processes)
+    for (const CellComponent& other : each.components)
+      if (other.standby && other.standby_of == leader->name && other.id < standby.id)
+        return {"", "`" + other.name + "` stands by for " + of + " already", "keep one of them"};
+  if (!standby.type.empty() && standby.type != leader->type)
+    return {"", "is a `" + clipped(standby.type) + "`, but " + of + " is a `" + clipped(leader->type) + "`",
+            "leave `type` out: the standby has that of the other"};
+  return {};
+}
+
+/// A standby is the one that it stands by for, in another process.
+void take_from_leaders(Cell& cell) {
+  for (CellProcess& process : cell.processes)
+    for (CellComponent& standby : process.components) {
+      if (!standby.standby) continue;
+      const CellComponent* leader = cell.find(standby.standby_of);
+      const Fault fault = why_no_standby(cell, process, standby, leader);
+      if (!fault.what.empty()) (*standby.standby)["of"].fault(fault.what, fault.mend);
+      if (leader == nullptr || leader->standby) continue;
+      standby.type = leader->type;
+      standby.connections = leader->connections;
+      standby.profiles = leader->profiles;
+      standby.publish_rates = leader->publish_rates;
+      standby.latencies = leader->latencies;
+      standby.node = leader->node;
+      check_publish_rates(standby, process.period);
+    }
 }
 
 /// Each process has a key, and each host one for its `invar run`.
@@ -258,6 +326,7 @@ Cell read_cell(const Yaml& yaml) {
     processes.fault("has " + std::to_string(cell.processes.size()) + " processes",
                     "use at most " + std::to_string(most_processes) + ": several components fit in one");
   check_identities(root, cell);
+  take_from_leaders(cell);
   if (const Node security = root["security"]; security.exists()) {
     cell.security = read_security(security, cell.file.parent_path());
     check_key_names(security, cell);

@@ -26,7 +26,14 @@ struct CellComponent {
   std::map<std::string, double>
       publish_rates;  // output -> highest rate on the wire [Hz]; in the process it is full
   std::map<std::string, Duration> latencies;  // input -> how old its sample may be when a step reads it
-  Node node;                                  // for its parameters and for faults
+  Node node;  // for its parameters and for faults; of a standby: that of the other
+  /// Stands by for this one, with its parameters and connections; empty: for nobody.
+  std::string standby_of{};
+  std::optional<Duration> standby_deadline{};  // of the other's beats; none: by its period
+  std::optional<Node> standby{};               // where it says so
+
+  /// Whose topics its ports have.
+  [[nodiscard]] const std::string& topics_of() const { return standby_of.empty() ? name : standby_of; }
 };
 
 /// The loop that a process asks the system for.

@@ -11,6 +11,7 @@
 
 #include "core/base/clock.hpp"
 #include "core/base/shown.hpp"
+#include "core/component/standby.hpp"
 #include "core/dds/clock_offset.hpp"
 #include "core/dds/host_clocks.hpp"
 #include "core/dds/simulated_clock.hpp"
@@ -222,6 +223,10 @@ void ProcessService::publish_late(const ProcessStatus& status) {
               milliseconds(input.limit, 3) + "; the oldest so far was of " + milliseconds(input.age.max, 3));
 }
 
+Standby* ProcessService::standby_of(std::size_t component) const {
+  return options_.standby_of ? options_.standby_of(component) : nullptr;
+}
+
 /// How far the clock of this host is ahead of that of the reference, where both are measured.
 void ProcessService::tell_clock(lifecycle::ProcessStatus& process) const {
   const ClockReading own = ClockReading::now();
@@ -278,7 +283,7 @@ void ProcessService::publish_status() {
     const auto& from = status.components[i];
     lifecycle::ComponentStatus out;
     out.cell(options_.cell);
-    out.component_id(control_.executor().component(i).id);
+    out.component_id(options_.id_of ? options_.id_of(i) : control_.executor().component(i).id);
     out.at(process.at());
     out.component_name(from.name);
     out.component_type(from.type);
@@ -298,6 +303,7 @@ void ProcessService::publish_status() {
       out.inputs().push_back(age);
     }
     if (options_.fault_of) out.fault(options_.fault_of(i));
+    if (const Standby* standby = standby_of(i); standby != nullptr) out.role(standby->role());
     out.recent_compute(on_wire(recent.steps[i]));
     component_.write(out);
   }
@@ -333,7 +339,12 @@ void ProcessService::serve(const lifecycle::LifecycleRequest& request, Duration 
   } else if (const auto transition = from_wire(request.wanted())) {
     // Repeated requests are known by their id and not carried out again.
     const std::uint64_t id = request.client() ^ (request.request() * 0x9E3779B97F4A7C15U);
-    const Outcome outcome = control_.request(request.component_name().c_str(), *transition, id);
+    const std::string component = request.component_name().c_str();
+    const Outcome outcome = control_.request(component, *transition, id);
+    // To activate the one that stands by has it lead.
+    if (const auto index = control_.executor().find(component);
+        index && *transition == Transition::activate && outcome.verdict == Verdict::already)
+      if (Standby* standby = standby_of(*index); standby != nullptr) (void)standby->ask();
     reply.done(outcome.ok());
     reply.state(on_wire(outcome.state));
     reply.text(outcome.reason);

@@ -20,6 +20,10 @@
 #include "core/executor/process_control.hpp"
 #include "core/executor/recent.hpp"
 
+namespace invar {
+class Standby;
+}
+
 namespace invar::dds {
 
 /// Has a thread of its own; nothing of it runs on the loop's.
@@ -35,6 +39,10 @@ class ProcessService {
     std::function<void()> stop_process;
     /// What is wrong with the component of this index though it is stepped; empty: nothing. Any thread.
     std::function<std::string(std::size_t component)> fault_of;
+    /// Number of the component in its cell file, by which its status is known; none: that of its samples.
+    std::function<std::uint32_t(std::size_t component)> id_of{};
+    /// The one of two components, of which one stands by for the other; nullptr: nobody does.
+    std::function<Standby*(std::size_t component)> standby_of{};
     /// Every notice in this process's name, once; on the thread that publishes it.
     std::function<void(const event::Notice&)> on_notice;
     /// How often the process was started again, and how its last life ended.
@@ -62,6 +70,7 @@ class ProcessService {
   };
   void enqueue(Request request);
   void run();
+  [[nodiscard]] Standby* standby_of(std::size_t component) const;
   void publish_news();
   void follow_clock();
   void tell_clock(lifecycle::ProcessStatus& process) const;

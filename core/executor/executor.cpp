@@ -57,6 +57,8 @@ std::size_t Executor::add(std::unique_ptr<Component> component, Placement placem
       age.limit = limit->second;
     }
   }
+  if (auto* redundant = dynamic_cast<Redundant*>(slot->component.get()))
+    slot->standby = &redundant->standby();
   slots_.push_back(std::move(slot));
   return slots_.size() - 1;
 }
@@ -279,8 +281,9 @@ void Executor::deactivate(Slot& slot, Instant now) noexcept {
   component.set_now(now, count_.cycle);
   const bool clock_is_over = options_.simulated && !is_stepped();
   const bool moves = !clock_is_over && !component.wind_down();
+  const bool commands = slot.commands();
   component.deactivate();
-  for (OutputPort* output : slot.outputs) output->write_safe_value();
+  if (commands) slot.write_safe_values();
   constexpr std::string_view why =
       "it was deactivated while it still moved: its time to come to rest was over";
   change_state(loop_changes_, slot, LifecycleState::inactive, now, moves ? why : std::string_view{});
@@ -288,7 +291,7 @@ void Executor::deactivate(Slot& slot, Instant now) noexcept {
 }
 
 void Executor::go_to_error(Slot& slot, std::string_view why, Instant now) noexcept {
-  for (OutputPort* output : slot.outputs) output->write_safe_value();
+  if (slot.commands()) slot.write_safe_values();
   change_state(loop_changes_, slot, LifecycleState::error, now, why);
   box_.trip(slot.error_prefix, why, now, count_.cycle);
 }

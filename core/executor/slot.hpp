@@ -12,6 +12,7 @@
 
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/component/standby.hpp"
 #include "core/executor/histogram.hpp"
 #include "core/executor/snapshot.hpp"
 
@@ -25,6 +26,12 @@ inline FailureText failure_text(std::string_view text) noexcept {
 }
 
 struct Slot {
+  /// A standby writes nothing: its safe values would switch off what the other drives.
+  void write_safe_values() const noexcept {
+    for (OutputPort* output : outputs) output->write_safe_value();
+  }
+  [[nodiscard]] bool commands() const noexcept { return standby == nullptr || standby->leads(); }
+
   std::shared_ptr<void> storage;  // the parameters; the component refers to them and goes first
   std::unique_ptr<Component> component;
   std::string type;
@@ -48,7 +55,8 @@ struct Slot {
   };
   std::deque<Age> ages;  // inputs whose latency is declared
   std::vector<OutputPort*> outputs;
-  std::string error_prefix;  // "stage: ", for the black box
+  const Standby* standby = nullptr;  // where another component can stand by for it
+  std::string error_prefix;          // "stage: ", for the black box
 
   // Written by the thread that steps while active, by the caller of a transition otherwise; read by anybody.
   std::atomic<LifecycleState> state{LifecycleState::unconfigured};

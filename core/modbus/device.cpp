@@ -79,6 +79,15 @@ WriteReport Device::last_write(std::size_t reg) const {
   return writes_[reg].report;
 }
 
+void Device::forget_writes() {
+  const std::lock_guard lock{mutex_};
+  for (Pending& slot : writes_) {
+    slot = Pending{};
+    slot.report.number = ++written_;  // one that is on its way is none of these
+  }
+  has_queued_ = false;
+}
+
 void Device::refresh() {
   const std::lock_guard lock{mutex_};
   refreshed_ = true;

@@ -121,6 +121,8 @@ class Device {
   [[nodiscard]] WriteReport last_write(std::size_t reg) const;
   [[nodiscard]] WriteReport last_write(std::string_view name) const { return last_write(index(name)); }
 
+  /// Writes that were not sent yet never are, and none is looked for in the read-backs: somebody else commands the device now.
+  void forget_writes();
   /// The owner lives: the heartbeat goes on for another `heartbeat.refresh_within`.
   void refresh();
 

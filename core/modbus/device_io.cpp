@@ -192,7 +192,8 @@ Outcome DeviceIo::write_next(Link& link, const Clock& clock) {
   {
     const std::lock_guard lock{device_.mutex_};
     auto& slot = device_.writes_[index];
-    slot.report.state = WriteState::uncertain;  // what it is if we hear no more of it
+    if (slot.report.state != WriteState::queued) return std::nullopt;  // forgotten since
+    slot.report.state = WriteState::uncertain;                         // what it is if we hear no more of it
     slot.stamped = false;
     report = slot.report;
     ++device_.counters_.writes;

@@ -210,7 +210,10 @@ void Link::note_late(std::uint16_t transaction) {
   if (asked != answered) counters_.latest = std::max(counters_.latest, monotonic_now() - asked);
 }
 
+/// What the device has not got yet it gets no more: when the link is back, somebody else may command it.
 Outcome Link::lost(Cause cause, Flaw flaw) {
+  const linger at_once{1, 0};
+  if (is_open()) (void)setsockopt(socket_, SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
   close();
   return Failure{cause, 0, flaw};
 }

@@ -11,6 +11,7 @@
 #include "core/dds/cell_client.hpp"
 #include "core/dds/wire_type.hpp"
 #include "idl/event.h"
+#include "idl/standby.h"
 #include "tools/cell/drives.hpp"
 #include "tools/cell/loaded_cell.hpp"
 
@@ -60,8 +61,9 @@ void connect_port(LoadedCell& loaded, const LoadedComponent& member, Port& port)
   const auto found = connections.find(port.name());
   if (const auto qos = member.file->profiles.find(port.name()); qos != member.file->profiles.end())
     port.profile = qos->second;
+  if (port.type() == typeid(standby::WarmState)) return;  // joined where two stand by for each other
   if (port.direction() != Port::Direction::input)
-    port.topic = loaded.cell->topic(member.file->name, port.name());
+    port.topic = loaded.cell->topic(member.file->topics_of(), port.name());
   if (found == connections.end()) {
     if (port.type() == typeid(event::Notice) && port.direction() == Port::Direction::output)
       port.topic =
@@ -108,7 +110,7 @@ void check_owners(const LoadedCell& loaded) {
   for (const LoadedProcess& process : loaded.processes)
     for (const LoadedComponent& member : process.components)
       for (const auto& [port, target] : member.file->connections) {
-        if (!member.component || target.empty() || target.starts_with('/')) continue;
+        if (!member.component || member.file->standby || target.empty() || target.starts_with('/')) continue;
         const Port* output = member.component->find_port(port);
         if (output == nullptr || output->direction() != Port::Direction::output ||
             output->profile != "command")
@@ -138,7 +140,16 @@ void check_claims(const LoadedCell& loaded) {
             owner.emplace(pc + " " + claim.what, Owner{member.file->name, process.file});
         const Owner& first = known->second;
         if (added || (claim.shared_in_process && (told || first.process == process.file))) continue;
+        // Of two that stand by for each other one alone commands; the connection is another matter.
+        const bool stands_by = member.file->standby && member.file->standby_of == first.component;
+        if (stands_by && !claim.shared_in_process) continue;
         told = true;
+        if (stands_by) {
+          (*member.file->standby)["of"].fault(
+              "needs a connection of its own to the device of `" + first.component + "`",
+              "say `several_masters: true` in `" + first.component + "` where the device allows it");
+          continue;
+        }
         const Node at = member.file->node;
         if (claim.shared_in_process) {
           (at.has(claim.parameter) ? at[claim.parameter] : at)
@@ -264,6 +275,11 @@ Port* named_port(const LoadedCell& loaded, const std::string& connection, const 
     for (const auto& process : loaded.cell->processes)
       for (const auto& candidate : process.components) names.push_back(candidate.name);
     at.fault("`" + clipped(component) + "` is no component of this cell", mend_name(component, names));
+    return nullptr;
+  }
+  if (const auto* named = loaded.cell->find(component); named->standby) {
+    at.fault("`" + component + "` stands by for `" + named->standby_of + "`",
+             "name `" + named->standby_of + "." + port + "`, which is written by the one that leads");
     return nullptr;
   }
   Port* found = loaded.port(component, port);

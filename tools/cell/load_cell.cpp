@@ -10,6 +10,7 @@
 #include "tools/cell/plugins.hpp"
 #include "tools/cell/qos.hpp"
 #include "tools/cell/reach.hpp"
+#include "tools/cell/standbys.hpp"
 
 namespace invar::tools {
 
@@ -111,7 +112,9 @@ LoadedCell load_cell(const std::filesystem::path& file) {
     loaded.processes.push_back({&process, {}});
     for (const config::CellComponent& component : process.components) prepare(loaded, component, types_known);
   }
+  pair_standbys(loaded);
   connect_ports(loaded);
+  check_standbys(loaded);
   check_qos(loaded);
   check_jobs(loaded);
   check_reach(loaded);

@@ -18,8 +18,10 @@
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "core/base/clock.hpp"
+#include "core/component/standby.hpp"
 #include "core/dds/cell_client.hpp"
 #include "core/dds/host_clocks.hpp"
+#include "core/dds/live_process.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
 #include "core/dds/segment_size.hpp"
@@ -39,6 +41,7 @@
 #include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
 #include "tools/cell/service_manager.hpp"
+#include "tools/cell/standbys.hpp"
 
 namespace invar::tools {
 
@@ -90,6 +93,7 @@ class RunningProcess {
         node_{node_options(loaded, process, options.simulated), dds::load_profiles(loaded.cell->profiles)} {
     CellFolders::Places models = loaded.model_places;
     models.emplace_back(received_models);
+    shared_topics_ = shared_topics(loaded);
     const auto folders = std::make_shared<const CellFolders>(std::move(models), loaded.result_places);
     for (LoadedComponent& member : process.components) {
       member.component->courier = &courier_;
@@ -101,6 +105,8 @@ class RunningProcess {
         found->refuse_while([this] {
           return node_.clocks() == nullptr ? "" : node_.clocks()->farther_than(loaded_.cell->clock_bound);
         });
+      auto* redundant = dynamic_cast<Redundant*>(member.component.get());
+      members_.push_back({member.file->id, redundant == nullptr ? nullptr : &redundant->standby()});
       executor_.add(std::move(member.component), {.type = member.file->type,
                                                   .parameters = std::move(member.prepared.infos),
                                                   .storage = member.prepared.parameters,
@@ -122,7 +128,9 @@ class RunningProcess {
             .host = file_.host,
             .models = received_models,
             .stop_process = [this] { asked_to_stop_ = true; },
-            .fault_of = [this](std::size_t index) { return faults_.of(index, executor_.now()); },
+            .fault_of = [this](std::size_t index) { return fault_of(index); },
+            .id_of = [this](std::size_t index) { return members_.at(index).id; },
+            .standby_of = [this](std::size_t index) { return members_.at(index).standby; },
             .on_notice = [this](const event::Notice& notice) { log_.write(notice); },
             .restarts = options.restarts,
             .last_end = options.last_end,
@@ -143,11 +151,24 @@ class RunningProcess {
         if (!port->topic.empty()) visit(i, *port);
   }
 
-  /// Joins signals of one process directly. Commands (inboxes) travel by DDS, also within a process, so that every
+  /// What is wrong with a component though it is stepped.
+  std::string fault_of(std::size_t index) {
+    const std::string fault = faults_.of(index, executor_.now());
+    const Standby* standby = members_.at(index).standby;
+    if (standby == nullptr || executor_.state(index) != LifecycleState::active) return fault;
+    return standby->leads() ? fault : standby->fault();
+  }
+
+  void look_for_others() {
+    for (const Member& member : members_)
+      if (member.standby != nullptr) member.standby->look_for_process(&dds::is_alive);
+  }
+
+  /// Joins signals of one process directly, but for those that another process writes when it leads. Commands (inboxes) travel by DDS, also within a process, so that every
   /// sender takes the same way.
   void join_directly() {
     each_port([&](std::size_t, Port& output) {
-      if (output.direction() != Port::Direction::output) return;
+      if (output.direction() != Port::Direction::output || shared_topics_.contains(output.topic)) return;
       each_port([&](std::size_t, Port& input) {
         if (input.direction() == Port::Direction::input && input.topic == output.topic)
           static_cast<OutputPort&>(output).connect(static_cast<InputPort&>(input));
@@ -156,6 +177,7 @@ class RunningProcess {
   }
 
   bool is_written_here(const std::string& topic) {
+    if (shared_topics_.contains(topic)) return false;
     bool found = false;
     each_port([&](std::size_t, Port& port) {
       found = found || (port.direction() == Port::Direction::output && port.topic == topic);
@@ -205,7 +227,7 @@ class RunningProcess {
       const ComponentStatus& component = status.components[i];
       if (component.state == LifecycleState::error)
         lines.push_back(component.name + ": in error: " + component.failure);
-      if (const std::string fault = faults_.of(i, executor_.now()); !fault.empty())
+      if (const std::string fault = fault_of(i); !fault.empty())
         lines.push_back(component.name + ": " + fault);
     }
     return lines;
@@ -286,6 +308,7 @@ class RunningProcess {
                             (!job_.has_ended() || resting_);) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (const std::string refused = memory_.look(); !refused.empty()) say(event::SEVERITY_WARNING, refused);
+      look_for_others();
       if (is_orphan(over) || orders.rest.load()) come_to_rest();
       manager_.feed(executor_.counters().executed);
       leave_progress();
@@ -370,7 +393,9 @@ class RunningProcess {
       each_port([&](std::size_t index, const Port& port) { visit(executor_.component(index).name, port); });
     };
     each([&](const std::string& component, const Port& port) {
-      if (port.direction() == Port::Direction::output) writer[port.topic] = component;
+      // What two write is lost only with both.
+      if (port.direction() == Port::Direction::output && !shared_topics_.contains(port.topic))
+        writer[port.topic] = component;
     });
     each([&](const std::string& component, const Port& port) {
       if (port.direction() != Port::Direction::input ||
@@ -462,6 +487,8 @@ class RunningProcess {
 
   void record_topic(const Port& port) {
     if (port.direction() != Port::Direction::output || !recorder_->is_wanted(port.topic)) return;
+    if (port.type() == typeid(standby::WarmState))
+      return;  // what two tell each other, and the loop's rate of it
     const auto* type = dds::WireTypes::all().find(port.type());
     // Notices of several components go by one topic: one reader has them all.
     if (type == nullptr || !recorded_.insert(port.topic).second) return;
@@ -493,6 +520,13 @@ class RunningProcess {
   ComponentFaults faults_;  // before the executor, whose components write into these three
   NoticeLog log_{options_.simulated};
   JobFollower job_;
+  /// Of each component, by its index.
+  struct Member {
+    std::uint32_t id = 0;  // number in the cell file
+    Standby* standby = nullptr;
+  };
+  std::vector<Member> members_;
+  std::set<std::string> shared_topics_;  // written by two components, whichever leads
   Executor executor_;
   ProcessControl control_;
   dds::Node node_;

@@ -7,6 +7,7 @@
 #include "core/base/shown.hpp"
 #include "core/component/port.hpp"
 #include "core/dds/profile.hpp"
+#include "idl/standby.h"
 #include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
@@ -28,6 +29,12 @@ struct End {
 
 void check_profile(const End& end, const dds::Profiles& profiles) {
   if (profiles.contains(end.port->profile)) return;
+  if (end.port->type() == typeid(standby::WarmState)) {
+    end.member->file->node.fault(
+        "another component stands by for it, and the file of `profiles` has no `" + end.port->profile + "`",
+        "take it from the profiles that ship with Invar");
+    return;
+  }
   std::vector<std::string> names;
   std::string list;
   for (const auto& [name, profile] : profiles) {
@@ -64,6 +71,8 @@ void check_qos(LoadedCell& loaded) {
       if (!member.component) continue;
       for (const Port* port : member.component->ports()) {
         const End end{&member, process.file, port};
+        // A file of profiles from before is right as long as nobody stands by.
+        if (port->topic.empty() && port->type() == typeid(standby::WarmState)) continue;
         check_profile(end, profiles);
         if (port->topic.empty()) continue;
         auto& side = port->direction() == Port::Direction::output ? writers : readers;

@@ -154,6 +154,13 @@ std::string level_text(event::Severity level) {
   return index < words.size() ? words[index] : "?";
 }
 
+std::string state_and_role(const lifecycle::ComponentStatus& component) {
+  const std::string role = component.role().c_str();
+  const std::string state = state_text(component.state());
+  return role.empty() || component.state() != lifecycle::STATE_ACTIVE || role == state ? state
+                                                                                       : state + ", " + role;
+}
+
 void print(const CellStatus& status, std::ostream& out) {
   print_wrapped("cell " + status.cell + ": " + status.security(), 2, out);
   out << '\n';
@@ -172,7 +179,7 @@ void print(const CellStatus& status, std::ostream& out) {
   TextTable components{{"component", "process", "type", "state", "steps>", "lost>"}};
   for (const auto& c : status.components)
     components.add({c.component_name().c_str(), c.process_name().c_str(), c.component_type().c_str(),
-                    state_text(c.state()), std::to_string(c.steps()), std::to_string(c.lost())});
+                    state_and_role(c), std::to_string(c.steps()), std::to_string(c.lost())});
   out << '\n';
   components.print(out);
   print_clocks(status, out);
@@ -251,6 +258,8 @@ nlohmann::ordered_json json_of(const lifecycle::ComponentStatus& c) {
           {"process", c.process_name().c_str()},
           {"type", c.component_type().c_str()},
           {"state", state_text(c.state())},
+          {"role", c.role().to_string().empty() ? nlohmann::ordered_json{}
+                                                : nlohmann::ordered_json(c.role().c_str())},
           {"failure", c.failure().c_str()},
           {"fault", c.fault().c_str()},
           {"every", c.every()},

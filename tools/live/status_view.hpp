@@ -39,5 +39,7 @@ void print(const CellStatus& status, std::ostream& out);
 [[nodiscard]] std::string state_text(lifecycle::ComponentState state);
 /// "warning"
 [[nodiscard]] std::string level_text(event::Severity level);
+/// "active", "active, standby", "active, took over".
+[[nodiscard]] std::string state_and_role(const lifecycle::ComponentStatus& component);
 
 }  // namespace invar::tools

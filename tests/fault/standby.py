@@ -1,0 +1,130 @@
+#!/usr/bin/env python3
+"""A component stands by for another one in another process, and goes on in its place: killed (-9), stopped and continued, asked,
+deactivated. Who writes to the heater is told by a witness between the masters and the device; what the axis does, by a recording.
+
+Usage: standby.py INVAR SOURCE_FOLDER DOMAIN PORT heat|motion
+"""
+import pathlib
+import signal
+import sys
+import tempfile
+import time
+
+from standby_cells import HeatCell, MotionCell, column
+
+INVAR, SOURCE, DOMAIN, PORT, WHAT = (pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3],
+                                     int(sys.argv[4]), sys.argv[5])
+RANGE = 100.0  # W
+
+
+def fail(text):
+    sys.exit(f"FAILED: {text}")
+
+
+def check_takeover(cell, at, what, longest):
+    gap, step = cell.takeover(at)
+    print(f"{what}: {gap * 1e3:.0f} ms from the last power of the one to the first of the other, a step of {step:.2f} W")
+    if gap > longest or step > 0.01 * RANGE:
+        fail(f"{what}: {gap:.3f} s (at most {longest} s), {step:.2f} W (at most {0.01 * RANGE} W)")
+
+
+def heat(cell):
+    cell.wait_for_roles(thermal="active", thermal_spare="standby")
+    time.sleep(4.0)  # the sum of the controller is now far from that of one which begins
+    if not 5.0 < cell.powers()[-1][2] < 95.0:
+        fail(f"the heater is at its limit: {cell.powers()[-1]}")
+    if len(cell.masters(0.0, time.time())) != 1:
+        fail("the standby wrote to the device")
+
+    at = time.time()
+    cell.kill("heat")
+    cell.wait_for_roles(thermal="standby", thermal_spare="took over")
+    check_takeover(cell, at, "killed", 1.0)
+    settled = time.time()
+    time.sleep(1.0)
+    if len(cell.masters(settled, time.time())) != 1:
+        fail("the one that came back writes to the device")
+
+    at = time.time()
+    cell.kill("spare", signal.SIGSTOP)
+    cell.wait("the first to take over", lambda: cell.has_taken_over(at))
+    time.sleep(0.5)
+    goes_on = time.time()
+    cell.kill("spare", signal.SIGCONT)
+    cell.wait_for_roles(thermal="active", thermal_spare="standby")
+    check_takeover(cell, at, "stopped", 3.0)
+    leader = cell.powers()[-1][1]
+    late = [write for write in cell.witness.writes if write[0] >= goes_on and write[1] != leader]
+    if len({address for _, _, _, address, _ in late}) < len(late):
+        fail(f"the one that was stopped goes on commanding: {late}")
+    print(f"continued: {len(late)} writes of the step in which it was stopped")
+
+    at = time.time()
+    if cell.call("lifecycle", cell.file, "thermal_spare", "activate").returncode != 0:
+        fail("the standby cannot be asked to lead")
+    cell.wait_for_roles(thermal="standby", thermal_spare="took over")
+    check_takeover(cell, at, "asked", 1.0)
+
+    cell.call("lifecycle", cell.file, "thermal_spare", "deactivate")
+    time.sleep(1.0)
+    if cell.powers()[-1][2] != 0.0:
+        fail("the heater is on though a person deactivated the one that led")
+    said = cell.call("status", cell.file)
+    if said.returncode != 1 or "lifecycle CELL thermal activate" not in " ".join(said.stdout.split()):
+        fail(f"the status does not say what to do: {said.stdout}")
+    cell.call("lifecycle", cell.file, "thermal", "activate")
+    cell.call("lifecycle", cell.file, "thermal_spare", "activate")
+    cell.wait_for_roles(thermal="active", thermal_spare="standby")
+    cell.end()
+    log = (cell.folder / "log").read_text()
+    for words in ("took over from `thermal` in process `heat` on pc (its process has ended), and goes on from its state",
+                  "took over from `thermal_spare` in process `spare` on pc (its beats stay away)",
+                  "stands by: `thermal` in process `heat` on pc leads by now"):
+        if words not in log:
+            print(log)
+            fail(f"nobody says `{words}`")
+
+
+def motion(cell):
+    cell.wait_for_roles(stage_x="active", spare_x="standby")
+    job = cell.call("job", "run", cell.file, "move", "--detach")
+    if job.returncode != 0:
+        fail(job.stdout + job.stderr)
+    kills = []
+    cell.wait_for_motion()
+    kills.append(time.time())
+    cell.kill("servo")
+    cell.wait_for_roles(stage_x="standby", spare_x="took over")
+    cell.wait_for_motion()
+    kills.append(time.time())
+    cell.kill("spare", signal.SIGSTOP)
+    cell.wait("the first to take over", lambda: cell.roles().get("stage_x") == "active")
+    cell.kill("spare", signal.SIGCONT)
+    cell.wait_for_roles(stage_x="active", spare_x="standby")
+    time.sleep(1.0)
+    cell.call("job", "cancel", cell.file, "move")
+    cell.end()
+    for what, (gap, step, error, mode) in zip(("killed", "stopped"), cell.takeovers(kills)):
+        print(f"{what}: {gap:.1f} ms between two states, a step of {step:.2f} A, following error at most {error * 1e6:.0f} um, then {mode}")
+        if gap > 100.0 or error > 2e-3 or "FAULT" in mode or "DISABLED" in mode:
+            fail(f"{what}: the motion did not go on")
+    positions = [column(row, "position") for row in cell.table("stage_x.state")]
+    if min(positions) < -1e-3 or max(positions) > 0.201:
+        fail(f"the axis left its travel: {min(positions)} to {max(positions)} m")
+
+
+def main():
+    with tempfile.TemporaryDirectory(prefix="invar-standby-") as name:
+        cell = (HeatCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, PORT) if WHAT == "heat" else
+                MotionCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN))
+        try:
+            {"heat": heat, "motion": motion}[WHAT](cell)
+        except SystemExit:
+            print((cell.folder / "log").read_text()[-6000:])
+            raise
+        finally:
+            cell.end()
+    print("passed")
+
+
+main()
