@@ -42,7 +42,7 @@ void Standby::write() noexcept {
   if (!leads()) owner_.stamp(own_);  // times of a leader's state are against the stamp that it had
   own_.component_id(owner_.id);
   own_.leads(leads());
-  own_.asks(asked_.load(std::memory_order_relaxed));
+  own_.asks(own_.fit() && asked_.load(std::memory_order_relaxed));
   own_.knows(leads() || has_state_);
   own_.process_id(static_cast<std::uint32_t>(pair_->process));
   out_.write(own_);
@@ -156,12 +156,12 @@ Standby::Duty Standby::beside_one_that_does_not_lead(const Tick& tick) noexcept 
   const auto& other = *in_.latest();
   if (asked_)
     return found_missing(unfit_steps_ > 0 ? "it did not reach its device" : "it was asked to lead", true);
-  nobody_ = other.resigned();
+  if (!nobody_since_) nobody_since_ = tick.now;
+  nobody_ = other.resigned() || tick.now - *nobody_since_ > start_wait;
   if (other.resigned() || other.asks()) return Duty::stand_by;
   if (has_state_ && !other.knows()) return found_missing("it began anew", true);
   if (!has_state_ && !other.knows() && !pair_->is_spare) return found_missing("", true);
   // Both know and neither leads: as when one hands over and the other dies in that moment.
-  if (!nobody_since_) nobody_since_ = tick.now;
   if (!pair_->is_spare && has_state_ && tick.now - *nobody_since_ > pair_->deadline * 3)
     return found_missing("it does not lead either", true);
   return Duty::stand_by;
@@ -236,7 +236,7 @@ const char* Standby::role() const noexcept {
 std::string Standby::fault() const {
   if (!pair_ || leads()) return {};
   if (nobody_)
-    return "nobody leads: " + pair_->other + " was deactivated, or was never heard; " + pair_->command;
+    return "nobody leads: " + pair_->other + " was deactivated, never heard, or cannot; " + pair_->command;
   const char* why = unready_.load(std::memory_order_acquire);
   return why == nullptr ? "" : std::string{"could not take over: "} + why;
 }

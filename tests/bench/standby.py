@@ -88,15 +88,17 @@ def motion():
 
 
 def row(what, gaps, steps, bar):
-    print(f"| {what} | {len(gaps)} | {statistics.median(gaps):.0f} | {max(gaps):.0f} | {statistics.median(steps):.2g} | {max(steps):.2g} | {bar} |")
+    print(f"| {what} | {len(gaps)} | {statistics.median(gaps):.0f} | {max(gaps):.0f} | {statistics.median(steps):.2g} | {max(steps):.2g} | {bar} |", flush=True)
 
 
 def main():
-    beside, alone, axis = heat(HeatCell), heat(Alone), motion()
     print("| what | kills | gap, median [ms] | gap, longest [ms] | step, median [% of range] | step, largest [% of range] | bar |\n"
           "| --- | --- | --- | --- | --- | --- | --- |")
+    beside = heat(HeatCell)
     row("heater, loop of 10 Hz, standby of 20 Hz", [1e3 * gap for gap, _ in beside], [step for _, step in beside], "200 ms, 1 %")
+    alone = heat(Alone)
     row("heater, process started again (no standby)", [1e3 * gap for gap, _ in alone], [step for _, step in alone], "-")
+    axis = motion()
     row("axis at 50 mm/s, loops of 1 kHz", [gap for gap, _, _, _ in axis], [10.0 * step for _, step, _, _ in axis], "20 ms")
     print(f"\nFollowing error of the axis in the 50 ms after: median {1e6 * statistics.median(error for _, _, error, _ in axis):.0f} um, "
           f"largest {1e6 * max(error for _, _, error, _ in axis):.0f} um.")

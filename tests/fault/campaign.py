@@ -34,6 +34,7 @@ name: campaign
 domain: 15
 profiles: profiles.yaml
 hosts: {stage-pc: {address: 10.81.0.11}, heat-pc: {address: 10.81.0.12}, office-pc: {address: 10.81.0.13}}
+# The room is near the setpoint: a heater that begins anew must not seem to have a thermistor that leaps.
 processes:
   motion:
     host: stage-pc
@@ -51,7 +52,7 @@ processes:
   device:
     host: heat-pc
     rate: 20
-    components: {heater: {type: simulated_heater, map: heater.yaml, host: 10.81.0.12, port: 1502}}
+    components: {heater: {type: simulated_heater, map: heater.yaml, host: 10.81.0.12, port: 1502, ambient: 27}}
   heat:
     host: heat-pc
     rate: 10
@@ -258,6 +259,8 @@ def main():
                 if number % 2 == 0:
                     campaign.set_in_motion()
                 campaign.kill() if what == "kill" else campaign.cut(what)
+                if number % 20 == 19:
+                    print(f"{number + 1} of {len(order)}", flush=True)
             campaign.tell()
             campaign.stop()
             campaign.look_at_safety()

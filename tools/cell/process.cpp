@@ -9,6 +9,7 @@
 #include <deque>
 #include <filesystem>
 #include <fstream>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -80,6 +81,29 @@ dds::NodeOptions node_options(const LoadedCell& loaded, const LoadedProcess& of,
 
 /// Where models go that `invar job apply` sends, beside the black boxes.
 constexpr const char* received_models = "out/models";
+
+/// Whether the loop makes no cycle any more: a step hangs. Any thread but the loop's.
+class HungLoop {
+ public:
+  static constexpr const char* text = "its loop makes no cycle any more: a step hangs; end the process";
+  bool look(const Executor& executor) {
+    const std::lock_guard lock{mutex_};
+    const Instant now = monotonic_now();
+    const std::uint64_t cycles = executor.counters().executed;
+    // A process that was stopped itself has not looked, and begins anew.
+    const bool was_away = now - looked_ > Duration::seconds(1.0);
+    looked_ = now;
+    if (cycles != cycles_ || was_away) since_ = now;
+    cycles_ = cycles;
+    const Duration longest = Duration::seconds(2.0) + executor.options().period * 4;
+    return executor.is_running() && now - since_ > longest;
+  }
+
+ private:
+  std::mutex mutex_;
+  Instant looked_, since_;
+  std::uint64_t cycles_ = 0;
+};
 
 /// What one process is made of while it runs.
 class RunningProcess {
@@ -153,7 +177,7 @@ class RunningProcess {
 
   /// What is wrong with a component though it is stepped.
   std::string fault_of(std::size_t index) {
-    const std::string fault = faults_.of(index, executor_.now());
+    const std::string fault = hung_.look(executor_) ? HungLoop::text : faults_.of(index, executor_.now());
     const Standby* standby = members_.at(index).standby;
     if (standby == nullptr || executor_.state(index) != LifecycleState::active) return fault;
     return standby->leads() ? fault : standby->fault();
@@ -526,6 +550,7 @@ class RunningProcess {
     Standby* standby = nullptr;
   };
   std::vector<Member> members_;
+  HungLoop hung_;
   std::set<std::string> shared_topics_;  // written by two components, whichever leads
   Executor executor_;
   ProcessControl control_;

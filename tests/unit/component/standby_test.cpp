@@ -32,7 +32,9 @@ class Counter final : public Component, public Redundant {
   void deactivate() noexcept override { standby_.resign(); }
   void step(const Tick& tick) noexcept override {
     commanded.reset();
+    standby_.fit(reaches);
     const auto duty = standby_.look(tick);
+    if (duty == Standby::Duty::lead && standby_.is_in_doubt(tick) && !reaches) standby_.yield();
     if (duty == Standby::Duty::missing && device_is_free) standby_.take_over(*this);
     if (duty == Standby::Duty::missing && !device_is_free && !standby_.is_certain())
       standby_.wait_for_device(", but the device is commanded");
@@ -44,7 +46,7 @@ class Counter final : public Component, public Redundant {
   }
 
   double count = 0.0;
-  bool flag = false, has_more = false, device_is_free = true;
+  bool flag = false, has_more = false, device_is_free = true, reaches = true;
   Mode mode = Mode::off;
   std::uint64_t number = 0;
   Instant began;
@@ -252,6 +254,56 @@ TEST(Standby, ADeviceThatIsCommandedIsNotTakenOver) {
   EXPECT_FALSE(pair.spare.commanded);
   EXPECT_THAT(pair.said, testing::ElementsAre(
                              "spare: does not lead: not heard is `first`, but the device is commanded"));
+}
+
+TEST(Standby, OneThatReachesItsDeviceTakesThePlaceOfOneThatDoesNot) {
+  Pair pair;
+  pair.begin();
+  pair.first.reaches = false;
+  pair.steps(900);
+  EXPECT_TRUE(pair.first.commanded) << "a moment is no reason";
+  pair.steps(200);
+  EXPECT_FALSE(pair.first.commanded);
+  EXPECT_TRUE(pair.spare.commanded);
+  EXPECT_THAT(pair.said,
+              testing::ElementsAre(
+                  "first: stands by: `spare` reaches the device",
+                  "spare: took over from `first` (it did not reach its device), and goes on from its state"));
+  pair.spare.reaches = false;
+  pair.steps(3000);
+  EXPECT_TRUE(pair.spare.commanded) << "the other does not reach it either";
+}
+
+TEST(Standby, OneThatReachesNeitherDeviceNorOtherCommandsNoMoreUntilItHearsOne) {
+  Pair pair;
+  pair.begin();
+  pair.linked = false;
+  pair.first.reaches = false;
+  pair.first.device_is_free = false;
+  pair.steps(13);
+  EXPECT_FALSE(pair.first.commanded);
+  EXPECT_TRUE(pair.spare.commanded);
+  pair.first.reaches = true;  // the cable is back, and the device comes before the other
+  pair.steps(20);
+  EXPECT_FALSE(pair.first.commanded) << "the device shows that it is commanded";
+  pair.linked = true;
+  pair.steps(50);
+  EXPECT_FALSE(pair.first.commanded);
+  EXPECT_THAT(pair.said.back(), "first: stands by: `spare` leads by now");
+}
+
+TEST(Standby, OneThatYieldedForNothingLeadsAgain) {
+  Pair pair;
+  pair.begin();
+  pair.linked = false;
+  pair.first.reaches = pair.first.device_is_free = false;
+  pair.steps(30, true, false);
+  EXPECT_FALSE(pair.first.commanded);
+  const double before = pair.first.count;
+  pair.first.reaches = pair.first.device_is_free = true;
+  pair.steps(20, true, false);
+  EXPECT_TRUE(pair.first.commanded);
+  EXPECT_NEAR(*pair.first.commanded, before + 20.0, 2.0);
 }
 
 TEST(Standby, AProcessThatHasEndedNeedsNeitherDeadlineNorDevice) {
