@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
+#include <charconv>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 #include <utility>
 
 #include "core/base/fault.hpp"
@@ -39,6 +43,24 @@ bool has_memory(std::uint32_t port) {
 
 }  // namespace
 
+std::set<std::uint32_t> ports_in_memory() {
+  constexpr std::string_view begin = "/dev/shm/fastrtps_port";
+  std::set<std::uint32_t> ports;
+  std::error_code error;
+  for (const auto& process : std::filesystem::directory_iterator{"/proc", error}) {
+    if (std::isdigit(static_cast<unsigned char>(process.path().filename().string().front())) == 0) continue;
+    std::ifstream maps{process.path() / "maps"};
+    for (std::string line; std::getline(maps, line);) {
+      const auto at = line.find(begin);
+      if (at == std::string::npos) continue;
+      const char* digits = line.data() + at + begin.size();
+      std::uint32_t port = 0;
+      if (std::from_chars(digits, line.data() + line.size(), port).ec == std::errc{}) ports.insert(port);
+    }
+  }
+  return ports;
+}
+
 std::int32_t DomainPorts::participants() const {
   if (discovery(0) + 1 > last_port) return 0;
   return std::min(most_participants, static_cast<std::int32_t>((last_port - discovery(0) + 1) / 2));
@@ -59,20 +81,23 @@ std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window) 
   const DomainPorts ports{domain};
   const std::int32_t numbers = ports.participants();
   const std::int32_t first = getpid() % most_participants * 4 + made++;
-  const auto is_taken = [](std::uint32_t port, bool memory_counts) {
-    return is_bound(port) || (memory_counts && has_memory(port));
+  static const std::set<std::uint32_t> held = ports_in_memory();
+  enum class Avoid { bound, left, held };  // each what is before it, too
+  const auto is_taken = [](std::uint32_t port, Avoid avoid) {
+    return is_bound(port) || (avoid != Avoid::bound && has_memory(port)) ||
+           (avoid == Avoid::held && held.contains(port));
   };
-  const auto find = [&](std::int32_t below, bool memory_counts) {
+  const auto find = [&](std::int32_t below, Avoid avoid) {
     for (std::int32_t tried = 0; tried < below; ++tried) {
       const std::int32_t number = (first + tried) % below;
-      if (!is_taken(ports.discovery(number), memory_counts) && !is_taken(ports.data(number), memory_counts))
-        return number;
+      if (!is_taken(ports.discovery(number), avoid) && !is_taken(ports.data(number), avoid)) return number;
     }
     return -1;
   };
-  for (const auto& [below, memory_counts] :
-       {std::pair{std::min(window, numbers), true}, std::pair{numbers, true}, std::pair{numbers, false}})
-    if (const std::int32_t number = find(below, memory_counts); number >= 0) return number;
+  for (const auto& [below, avoid] :
+       {std::pair{std::min(window, numbers), Avoid::held}, std::pair{numbers, Avoid::held},
+        std::pair{numbers, Avoid::left}, std::pair{numbers, Avoid::bound}})
+    if (const std::int32_t number = find(below, avoid); number >= 0) return number;
   throw InputError{"domain " + std::to_string(domain),
                    numbers == 0 ? "has no ports below 65536"
                                 : "all " + std::to_string(numbers) + " participants of this PC are taken",

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 
 namespace invar::dds {
@@ -22,6 +23,10 @@ struct DomainPorts {
   /// For a firewall: "7400, 7410-7629".
   [[nodiscard]] std::string text() const;
 };
+
+/// Ports in shared memory that a process of this PC has open, also where their file is gone. It goes on writing there, and a new
+/// participant with such a port would not hear it. Processes that this user may not look at are left out. Set-up only.
+[[nodiscard]] std::set<std::uint32_t> ports_in_memory();
 
 /// Ports follow from this number. By default Fast DDS takes the lowest free one, so that a killed and restarted process
 /// has its earlier ports. Other processes then go on writing into the shared memory of the dead one, and are not heard.
