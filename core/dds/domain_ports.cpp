@@ -81,11 +81,11 @@ std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window) 
   const DomainPorts ports{domain};
   const std::int32_t numbers = ports.participants();
   const std::int32_t first = getpid() % most_participants * 4 + made++;
-  static const std::set<std::uint32_t> held = ports_in_memory();
+  static const std::set<std::uint32_t> in_memory = ports_in_memory();
   enum class Avoid { bound, left, held };  // each what is before it, too
   const auto is_taken = [](std::uint32_t port, Avoid avoid) {
     return is_bound(port) || (avoid != Avoid::bound && has_memory(port)) ||
-           (avoid == Avoid::held && held.contains(port));
+           (avoid == Avoid::held && in_memory.contains(port));
   };
   const auto find = [&](std::int32_t below, Avoid avoid) {
     for (std::int32_t tried = 0; tried < below; ++tried) {
