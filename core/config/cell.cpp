@@ -302,7 +302,6 @@ Cell read_cell(const Yaml& yaml) {
   for (const Node& plugin : root["plugins"].list()) cell.plugins.push_back(beside(plugin));
   for (const Node& folder : root["models"].list()) cell.models.push_back(folder_beside(folder));
   cell.has_bridge = root.has("bridge");
-  root["bridge"].accept_all();  // tools/cell/bridge_file.cpp reads it, which knows the ports
   const Node hosts = root["hosts"];
   for (const Node& host : hosts.map()) cell.hosts.push_back(read_host(host));
   if (hosts.is_map() && cell.hosts.empty())
