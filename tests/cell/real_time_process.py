@@ -13,6 +13,9 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from cell_processes import children  # noqa: E402
+
 INVAR, SOURCE, DOMAIN, PORT = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
 
 MOST_MEMORY = 64 * 1024  # kB, resident, and locked
@@ -31,16 +34,6 @@ def status_of(pid):
 def libraries_of(pid):
     maps = pathlib.Path(f"/proc/{pid}/maps").read_text()
     return sorted(set(re.findall(r"(/\S+\.so\S*)", maps)))
-
-
-def children_of(pid):
-    """Process name in the cell -> process id."""
-    found = {}
-    for child in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        words = pathlib.Path(f"/proc/{child}/cmdline").read_text().split("\0")
-        if "--process" in words:
-            found[words[words.index("--process") + 1]] = int(child)
-    return found
 
 
 def loop_of(pid, name):
@@ -108,7 +101,7 @@ def main():
         file.write_text(text)
         cell = subprocess.Popen([INVAR, "run", file, "--real-time", "--quiet"], cwd=folder)
         try:
-            pid = wait_for(lambda: children_of(cell.pid).get("motion"), "its process")
+            pid = wait_for(lambda: children(cell.pid).get("motion"), "its process")
             task = wait_for(lambda: loop_of(pid, "motion"), "its loop")
             time.sleep(SETTLE)
             look_at_motion(pid, task)

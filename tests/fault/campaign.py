@@ -22,7 +22,8 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-from three_hosts import Hosts, children  # noqa: E402
+from cell_processes import children  # noqa: E402
+from three_hosts import Hosts  # noqa: E402
 
 PATIENCE = 120.0  # s: pauses before a start are up to 30 s, and this PC is busy
 TRAVEL, MARGIN = (0.0, 0.2), 1e-3  # m

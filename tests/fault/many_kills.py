@@ -18,6 +18,9 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from cell_processes import children  # noqa: E402
+
 INVAR, SOURCE, DOMAIN, PORT = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3], sys.argv[4]
 KILLS = int(os.environ.get("INVAR_KILLS", "6"))
 SEED = int(sys.argv[5]) if len(sys.argv) > 5 else random.SystemRandom().randrange(1 << 31)
@@ -51,15 +54,7 @@ class Cell:
 
     def children(self):
         """Process name in the cell -> process id."""
-        found = {}
-        for child in pathlib.Path(f"/proc/{self.run.pid}/task/{self.run.pid}/children").read_text().split():
-            try:
-                words = pathlib.Path(f"/proc/{child}/cmdline").read_text().split("\0")
-            except OSError:
-                continue
-            if "--process" in words:
-                found[words[words.index("--process") + 1]] = int(child)
-        return found
+        return children(self.run.pid)
 
     def call(self, *words):
         return subprocess.run([INVAR, *words], cwd=self.folder, capture_output=True, text=True)

@@ -3,14 +3,8 @@
 # and nothing ends. The same with the cell started anew. Lifespan and numbers of samples refuse such a plain repetition in an unsecured
 # cell, too; there a forger may change them. replayed.sh INVAR SOURCE_DIR
 set -euo pipefail
-if [[ -z ${INVAR_ALONE:-} ]]; then exec env INVAR_ALONE=1 unshare --map-root-user --net bash -c 'ip link set lo up; ip link set lo multicast on; exec "$0" "$@"' "$0" "$@"; fi
-invar=$1 source=$2
-folder=$(mktemp -d)
-pids=()
-leave() { for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done; wait; rm -rf "$folder"; }
-trap leave EXIT
-cp "$source/deployment/profiles.yaml" "$source/deployment/maps/heater.yaml" "$folder"
-cd "$folder"
+source "$(dirname "$0")/../support/alone.sh"
+alone "$@"
 cat >cell.yaml <<'Y'
 invar_cell: 1
 name: guarded

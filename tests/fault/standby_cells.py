@@ -6,9 +6,13 @@ import pathlib
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 from modbus_witness import Witness
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from cell_processes import children  # noqa: E402
 
 HEAT = """invar_cell: 1
 name: standby
@@ -79,15 +83,7 @@ class Cell:
 
     def pids(self):
         """Process name in the cell -> process id."""
-        found = {}
-        for child in pathlib.Path(f"/proc/{self.run.pid}/task/{self.run.pid}/children").read_text().split():
-            try:
-                words = pathlib.Path(f"/proc/{child}/cmdline").read_text().split("\0")
-            except OSError:
-                continue
-            if "--process" in words:
-                found[words[words.index("--process") + 1]] = int(child)
-        return found
+        return children(self.run.pid)
 
     def call(self, *words):
         return subprocess.run([self.invar, *map(str, words)], cwd=self.folder, capture_output=True, text=True)

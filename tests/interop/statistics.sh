@@ -2,14 +2,8 @@
 # The statistics of Fast DDS, for its monitor: switched on by its own variable, they appear in a running cell, whose participants have
 # readable names; a cell without the variable has none. statistics.sh INVAR SOURCE_DIR
 set -euo pipefail
-if [[ -z ${INVAR_ALONE:-} ]]; then exec env INVAR_ALONE=1 unshare --map-root-user --net bash -c 'ip link set lo up; ip link set lo multicast on; exec "$0" "$@"' "$0" "$@"; fi
-invar=$1 source=$2
-folder=$(mktemp -d)
-pids=()
-leave() { for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done; wait; rm -rf "$folder"; }
-trap leave EXIT
-cp "$source/deployment/profiles.yaml" "$folder"
-cd "$folder"
+source "$(dirname "$0")/../support/alone.sh"
+alone "$@"
 cat >cell.yaml <<'Y'
 invar_cell: 1
 name: seen

@@ -1,6 +1,5 @@
 """Three PCs, each a network namespace at a switch, with addresses 10.81.0.11 to .13 and a /dev/shm of its own. Needs root."""
 import os
-import pathlib
 import subprocess
 import time
 
@@ -51,20 +50,3 @@ class Hosts:
     def end(self):
         for space in (*self.space.values(), self.switch):
             subprocess.run(["ip", "netns", "del", space], capture_output=True)
-
-
-def children(launcher):
-    """Process name in the cell -> process id, of an `invar run`."""
-    found = {}
-    try:
-        pids = pathlib.Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split()
-    except OSError:
-        return found
-    for child in pids:
-        try:
-            words = pathlib.Path(f"/proc/{child}/cmdline").read_text().split("\0")
-        except OSError:
-            continue
-        if "--process" in words:
-            found[words[words.index("--process") + 1]] = int(child)
-    return found
