@@ -69,7 +69,7 @@ class Watch {
     std::erase_if(status.components, [&](const auto& c) { return is_foreign(c.component_name().c_str()); });
     if (!status.processes.empty()) cell_number_ = status.processes.front().cell();
     status.silent = silence_.of(status.processes);
-    find_missing();
+    if (cell_.file() != nullptr) status.missing = not_heard(*cell_.file(), status.processes);
     count_notices();
     if (!all_topics_) find_devices();
     topics_.look();
@@ -81,14 +81,6 @@ class Watch {
  private:
   [[nodiscard]] bool is_foreign(const std::string& name) const {
     return !names_.empty() && !names_.contains(name);
-  }
-  void find_missing() {
-    look_.status.missing.clear();
-    if (cell_.file() == nullptr) return;
-    for (const auto& process : cell_.file()->processes)
-      if (std::none_of(look_.status.processes.begin(), look_.status.processes.end(),
-                       [&](const auto& p) { return process.name == p.process_name().c_str(); }))
-        look_.status.missing.push_back(process.name);
   }
   void count_notices() {
     for (const auto& notice : cell_.client().take_notices()) {

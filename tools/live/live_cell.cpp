@@ -194,15 +194,20 @@ LiveCell::LiveCell(const CellCall& call, Need need) : patience_{Duration::second
   client_ = std::make_unique<dds::CellClient>(*node_, name_);
 }
 
+std::vector<std::string> not_heard(const config::Cell& cell,
+                                   const std::vector<lifecycle::ProcessStatus>& heard) {
+  std::vector<std::string> missing;
+  for (const auto& process : cell.processes)
+    if (std::none_of(heard.begin(), heard.end(),
+                     [&](const auto& status) { return process.name == status.process_name().c_str(); }))
+      missing.push_back(process.name);
+  return missing;
+}
+
 std::vector<std::string> LiveCell::wait_for_processes() {
   std::vector<std::string> missing;
   const auto all_heard = [&] {
-    const auto heard = client_->processes();
-    missing.clear();
-    for (const auto& process : cell_->processes)
-      if (std::none_of(heard.begin(), heard.end(),
-                       [&](const auto& status) { return process.name == status.process_name().c_str(); }))
-        missing.push_back(process.name);
+    missing = not_heard(*cell_, client_->processes());
     return missing.empty();
   };
   if (cell_) {

@@ -118,6 +118,10 @@ class LiveCell {
 [[nodiscard]] dds::Profile reader_profile(const std::vector<dds::Endpoint>& writers,
                                           std::int64_t depth = 1000);
 
+/// Processes of the cell that none of these statuses is of.
+[[nodiscard]] std::vector<std::string> not_heard(const config::Cell& cell,
+                                                 const std::vector<lifecycle::ProcessStatus>& heard);
+
 /// Data topics, not those by which processes are watched and kept in step.
 [[nodiscard]] bool is_service_topic(const std::string& topic);
 
