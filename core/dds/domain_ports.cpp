@@ -6,13 +6,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <filesystem>
-#include <fstream>
-#include <string_view>
-#include <utility>
 
 #include "core/base/fault.hpp"
 
@@ -43,24 +38,6 @@ bool has_memory(std::uint32_t port) {
 
 }  // namespace
 
-std::set<std::uint32_t> ports_in_memory() {
-  constexpr std::string_view begin = "/dev/shm/fastrtps_port";
-  std::set<std::uint32_t> ports;
-  std::error_code error;
-  for (const auto& process : std::filesystem::directory_iterator{"/proc", error}) {
-    if (std::isdigit(static_cast<unsigned char>(process.path().filename().string().front())) == 0) continue;
-    std::ifstream maps{process.path() / "maps"};
-    for (std::string line; std::getline(maps, line);) {
-      const auto at = line.find(begin);
-      if (at == std::string::npos) continue;
-      const char* digits = line.data() + at + begin.size();
-      std::uint32_t port = 0;
-      if (std::from_chars(digits, line.data() + line.size(), port).ec == std::errc{}) ports.insert(port);
-    }
-  }
-  return ports;
-}
-
 std::int32_t DomainPorts::participants() const {
   if (discovery(0) + 1 > last_port) return 0;
   return std::min(most_participants, static_cast<std::int32_t>((last_port - discovery(0) + 1) / 2));
@@ -81,23 +58,20 @@ std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window) 
   const DomainPorts ports{domain};
   const std::int32_t numbers = ports.participants();
   const std::int32_t first = getpid() % most_participants * 4 + made++;
-  static const std::set<std::uint32_t> in_memory = ports_in_memory();
-  enum class Avoid { bound, left, held };  // each what is before it, too
-  const auto is_taken = [](std::uint32_t port, Avoid avoid) {
-    return is_bound(port) || (avoid != Avoid::bound && has_memory(port)) ||
-           (avoid == Avoid::held && in_memory.contains(port));
+  const auto is_taken = [](std::uint32_t port, bool memory_counts) {
+    return is_bound(port) || (memory_counts && has_memory(port));
   };
-  const auto find = [&](std::int32_t below, Avoid avoid) {
+  const auto find = [&](std::int32_t below, bool memory_counts) {
     for (std::int32_t tried = 0; tried < below; ++tried) {
       const std::int32_t number = (first + tried) % below;
-      if (!is_taken(ports.discovery(number), avoid) && !is_taken(ports.data(number), avoid)) return number;
+      if (!is_taken(ports.discovery(number), memory_counts) && !is_taken(ports.data(number), memory_counts))
+        return number;
     }
     return -1;
   };
-  for (const auto& [below, avoid] :
-       {std::pair{std::min(window, numbers), Avoid::held}, std::pair{numbers, Avoid::held},
-        std::pair{numbers, Avoid::left}, std::pair{numbers, Avoid::bound}})
-    if (const std::int32_t number = find(below, avoid); number >= 0) return number;
+  for (const std::int32_t below : {std::min(window, numbers), numbers})
+    for (const bool memory_counts : {true, false})
+      if (const std::int32_t number = find(below, memory_counts); number >= 0) return number;
   throw InputError{"domain " + std::to_string(domain),
                    numbers == 0 ? "has no ports below 65536"
                                 : "all " + std::to_string(numbers) + " participants of this PC are taken",

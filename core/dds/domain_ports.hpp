@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <set>
 #include <string>
 
 namespace invar::dds {
@@ -24,15 +23,12 @@ struct DomainPorts {
   [[nodiscard]] std::string text() const;
 };
 
-/// Ports in shared memory that a process of this PC has open, also where their file is gone. It goes on writing there, and a new
-/// participant with such a port would not hear it. Processes that this user may not look at are left out. Set-up only.
-[[nodiscard]] std::set<std::uint32_t> ports_in_memory();
-
-/// Ports follow from this number. By default Fast DDS takes the lowest free one, so that a killed and restarted process
-/// has its earlier ports. Other processes then go on writing into the shared memory of the dead one, and are not heard.
-/// The number chosen here left no trace, and nobody on this network uses its ports: a container may share the network and
-/// not the memory. Where another process takes it in the same moment, the library shifts the ports. Throws InputError when
-/// all are taken. A free number below `window` comes first: others call those without multicast. Set-up only.
+/// Ports follow from this number. By default Fast DDS takes the lowest free one, so that a killed and restarted process has
+/// its earlier ports. It has the shared memory of the dead one with them, which others first give up (port_memory.hpp).
+/// A number that left no trace on this PC comes first. Nobody on this network uses its ports: a container may share the
+/// network and not the memory. Where another process takes it in the same moment, the library shifts the ports. Throws
+/// InputError when all are taken. A free number below `window` comes before all others: others call those without multicast.
+/// Set-up only.
 [[nodiscard]] std::int32_t free_participant_number(std::uint32_t domain, std::int32_t window = 0);
 
 /// How many participant numbers are called on a PC with so many processes of the cell. A process has two participants, or

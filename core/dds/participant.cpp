@@ -31,6 +31,7 @@
 #include "core/dds/raw_type.hpp"
 #include "core/dds/reachable_memory.hpp"
 #include "core/dds/rtps_bytes.hpp"
+#include "core/dds/shared_memory_calls.hpp"
 #include "core/dds/type.hpp"
 #include "core/dds/writer_keys.hpp"
 
@@ -235,6 +236,13 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   MemoryPlan memory;
   if (options.shared_memory) memory = plan_memory(traffic, options.segment_size, options.processes);
   if (!memory.sizes.any()) identity_.folder = 0;
+  // Asked here also so that every program with a participant has those calls: nothing else refers to them.
+  if (memory.sizes.any() && !shared_memory_calls_are_ours())
+    discovery_.raise({"shared memory",
+                      "a preloaded library answers `shm_open` or `ftruncate` in the place of Invar: a peer "
+                      "that is killed may "
+                      "leave this process deaf or spinning; start it without LD_PRELOAD",
+                      false});
   if (!memory.shortage.empty()) discovery_.raise({"shared memory", memory.shortage, false});
   if (traffic == Traffic::realtime) name_ += "/realtime";
   keep_middleware_log();

@@ -1,5 +1,4 @@
 #include "core/dds/reachable_memory.hpp"
-#include "core/dds/one_sender.hpp"
 
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
@@ -12,6 +11,9 @@
 #include <fstream>
 #include <memory>
 #include <string_view>
+
+#include "core/dds/one_sender.hpp"
+#include "core/dds/port_memory.hpp"
 
 namespace invar::dds {
 
@@ -103,6 +105,7 @@ class Transport final : public transport::ChainingTransport {
       return false;
     if (!low_level_transport_->transform_remote_locator(remote, result)) return false;
     turn_host(result);
+    give_up_replaced_port(remote.port);
     return true;
   }
 

@@ -14,6 +14,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/dds/port_memory.hpp"
+
 namespace {
 
 constexpr std::string_view prefix = "/fastrtps_";
@@ -56,6 +58,7 @@ int shm_open(const char* name, int flags, mode_t mode) {
   using Call = int (*)(const char*, int, mode_t);
   static const auto call = reinterpret_cast<Call>(dlsym(RTLD_NEXT, "shm_open"));
   const int file = call(name, flags, mode);
+  if (file >= 0) invar::dds::note_opened_port(name, file);
   if (file >= 0 || (flags & O_CREAT) != 0 || (errno != ENOENT && errno != EACCES) || !is_segment(name))
     return file;
   return open_empty_segment();

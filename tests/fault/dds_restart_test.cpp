@@ -1,14 +1,16 @@
-// A writing process is killed (SIGKILL) and started again, over shared memory: readers go on. This program is also the
-// writing process.
+// A process is killed (SIGKILL) and started again, over shared memory: its peers go on. This program is also that process.
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <netinet/in.h>
 #include <sys/file.h>
+#include <sys/socket.h>
 
 #include <atomic>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 
+#include "core/dds/domain_ports.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/shared_memory.hpp"
 #include "idl/types.hpp"
@@ -61,6 +63,94 @@ TEST(Restart, ReadersGoOnAfterTheirWriterWasKilledAndStartedAgain) {
   }
 }
 
+/// Answers the first question. When its answer has arrived it handles one more, which never ends, as with a process that is
+/// killed in the midst of it.
+int answer_once(std::uint32_t domain, std::uint64_t life) {
+  NodeOptions options = local("answering");
+  options.domain = domain;
+  Node node{options, standard_profiles()};
+  auto answer = node.writer<thermal::NodeTemperature>("cell/test/answer", "state");
+  std::atomic<bool> asked{false}, answered{false};
+  const auto question =
+      node.reader<thermal::NodeTemperature>("cell/test/question", "state", [&](const auto&) {
+        asked = true;
+        while (answered) pause();
+      });
+  while (!asked || answer.connection().matched() == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds{1});
+  thermal::NodeTemperature sample;
+  sample.at().cycle(life);
+  answer.write(sample);
+  answered = answer.connection().wait_for_acknowledgments(Duration::milliseconds(20'000));
+  for (;;) pause();
+}
+
+/// Holds the ports of every number of a participant but one, as other programs would.
+class OneNumberLeft {
+ public:
+  explicit OneNumberLeft(std::uint32_t domain) {
+    const DomainPorts ports{domain};
+    bool is_left = false;
+    for (std::int32_t number = 0; number < ports.participants(); ++number) {
+      const int one = hold(ports.discovery(number)), other = hold(ports.data(number));
+      const bool leave = !is_left && one >= 0 && other >= 0;
+      is_left = is_left || leave;
+      for (const int end : {one, other})
+        if (end >= 0 && leave)
+          close(end);
+        else if (end >= 0)
+          ends_.push_back(end);
+    }
+  }
+  ~OneNumberLeft() {
+    for (const int end : ends_) close(end);
+  }
+  OneNumberLeft(const OneNumberLeft&) = delete;
+  OneNumberLeft& operator=(const OneNumberLeft&) = delete;
+
+ private:
+  static int hold(std::uint32_t port) {
+    const int end = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    if (bind(end, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return end;
+    close(end);
+    return -1;
+  }
+  std::vector<int> ends_;
+};
+
+std::uint64_t lives = 10;
+
+TEST(Restart, AProcessThatDiesWhileItHandlesASampleIsHeardAgainWithTheSamePorts) {
+  Node node{local("asking"), standard_profiles()};
+  std::atomic<std::uint64_t> answered{0};
+  auto question = node.writer<thermal::NodeTemperature>("cell/test/question", "state");
+  const auto answer = node.reader<thermal::NodeTemperature>(
+      "cell/test/answer", "state", [&](const auto& t) { answered = t.at().cycle(); });
+  const OneNumberLeft others{testing::test_domain()};
+  double slowest = 0.0;
+  for (std::uint64_t life = 1; life <= lives; ++life) {
+    invar::testing::Child peer{
+        {"/proc/self/exe", "--answer", std::to_string(testing::test_domain()), std::to_string(life)}};
+    const auto begin = std::chrono::steady_clock::now();
+    ASSERT_TRUE(eventually([&] {
+      question.write({});
+      std::this_thread::sleep_for(std::chrono::milliseconds{10});
+      return answered == life;
+    })) << "life "
+        << life;
+    slowest =
+        std::max(slowest, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    question.write({});  // in whose midst it dies
+    std::this_thread::sleep_for(std::chrono::milliseconds{50});
+    kill(peer.pid(), SIGKILL);
+    ASSERT_TRUE(eventually([&] { return peer.has_ended(); }));
+  }
+  std::cout << lives << " lives, the slowest was heard after " << slowest << " s\n";
+}
+
 TEST(SharedMemory, OnlyWhatNobodyHoldsAndIsNotYoungIsRemoved) {
   const invar::testing::TemporaryFolder temporary;
   const auto& folder = temporary.path();
@@ -90,6 +180,9 @@ TEST(SharedMemory, OnlyWhatNobodyHoldsAndIsNotYoungIsRemoved) {
 int main(int argc, char** argv) {
   if (argc == 4 && std::string{argv[1]} == "--write")
     return invar::dds::write_for_ever(static_cast<std::uint32_t>(std::stoul(argv[2])), std::stoull(argv[3]));
+  if (argc == 4 && std::string{argv[1]} == "--answer")
+    return invar::dds::answer_once(static_cast<std::uint32_t>(std::stoul(argv[2])), std::stoull(argv[3]));
   ::testing::InitGoogleTest(&argc, argv);
+  if (argc == 3 && std::string{argv[1]} == "--lives") invar::dds::lives = std::stoull(argv[2]);
   return RUN_ALL_TESTS();
 }

@@ -1,8 +1,5 @@
 // What participants of one PC share: ports by number, memory by identity.
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include "core/dds/domain_ports.hpp"
 #include "core/dds/reachable_memory.hpp"
@@ -31,20 +28,6 @@ TEST(DomainPorts, ANumberIsTakenOnceOnlyWhileItsPortsAreBound) {
   const std::int32_t one = free_participant_number(232), other = free_participant_number(232);
   EXPECT_NE(one, other);
   EXPECT_LT(std::max(one, other), 63);
-}
-
-TEST(DomainPorts, APortThatSomebodyStillHoldsInMemoryIsSeenAfterItsFileIsGone) {
-  const char* file = "/dev/shm/fastrtps_port70001";  // beyond all ports
-  const int end = open(file, O_RDWR | O_CREAT, 0600);
-  ASSERT_GE(end, 0);
-  ASSERT_EQ(ftruncate(end, 4096), 0);
-  void* memory = mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, end, 0);
-  close(end);
-  unlink(file);
-  ASSERT_NE(memory, MAP_FAILED);
-  EXPECT_TRUE(ports_in_memory().contains(70001));
-  munmap(memory, 4096);
-  EXPECT_FALSE(ports_in_memory().contains(70001));
 }
 
 TEST(ReachableMemory, IsThatOfOneUserInOneFolderOfOneBoot) {
