@@ -224,11 +224,13 @@ int main(int argc, char** argv) {
     for (const auto& finding : row.claims) {
       // A twin that nothing tells from the right name is marked as right; but it is as probable as it is said to be.
       const std::string name{finding.term.info->name};
-      const auto& unlisted = row.machine.unlisted;
-      if (std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
-        continue;  // neither right nor wrong
-      const double right = ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
-      claims.add(finding, row.still_follows, std::min(right, credit(row.machine, name)),
+      const auto &unlisted = row.machine.unlisted, &crowd = row.machine.crowd;
+      const bool is_of_crowd = std::find(crowd.begin(), crowd.end(), name) != crowd.end();
+      if (!is_of_crowd && std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
+        continue;  // a relative of one of the crowd is neither right nor wrong
+      const double right =
+          is_of_crowd || ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
+      claims.add(finding, row.still_follows, is_of_crowd ? 1.0 : std::min(right, credit(row.machine, name)),
                  plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),
                  row.claims.size() > 1);
     }

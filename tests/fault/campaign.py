@@ -28,6 +28,7 @@ from three_hosts import Hosts  # noqa: E402
 PATIENCE = 120.0  # s: pauses before a start are up to 30 s, and this PC is busy
 TRAVEL, MARGIN = (0.0, 0.2), 1e-3  # m
 FASTEST, AT_REST = 0.06, 0.01  # m/s: what the file allows and the servo's overshoot; of an axis that nobody moves
+SHOWN = ("time", "cycle", "mode", "position", "velocity", "setpoint")  # columns that tell how it came to move so
 HOTTEST = 45.0  # degC: of a slide that is held at 30
 
 CELL = """invar_cell: 1
@@ -195,7 +196,10 @@ class Campaign:
         if max(speeds) < 0.04:
             fail("the axis never moved")
         if min(places) < TRAVEL[0] - MARGIN or max(places) > TRAVEL[1] + MARGIN or max(speeds) > FASTEST or max(unordered) > AT_REST:
-            fail("unsafe motion")
+            fastest = speeds.index(max(speeds))
+            for row in rows[max(0, fastest - 300):fastest + 100:10]:
+                print(*(f"{name}={value[:20]}" for name, value in row.items() if name.startswith(SHOWN)))
+            fail("unsafe motion; the samples about the fastest one stand above")
         if not hottest < HOTTEST:
             fail("the slide is too hot")
 
@@ -221,6 +225,20 @@ class Campaign:
             print(f"{what}: {len(times)} times, all active again after {sorted(times)[len(times) // 2]:.2f} s at the median, "
                   f"{max(times):.2f} s at most")
         print(f"{self.jobs} jobs; by hand, as the status said: {len(self.by_hand)}", *self.by_hand, sep="\n  ")
+
+    def run(self, order):
+        self.start()
+        self.chance.shuffle(order)
+        for number, what in enumerate(order):
+            if number % 2 == 0:
+                self.set_in_motion()
+            self.kill() if what == "kill" else self.cut(what)
+            if number % 20 == 19:
+                print(f"{number + 1} of {len(order)}", flush=True)
+        self.tell()
+        self.stop()
+        self.look_at_safety()
+        self.look_at_records()
 
     def end(self):
         for run in (*self.runs.values(), getattr(self, "witness", None)):
@@ -251,23 +269,16 @@ def main():
                               'mount -t tmpfs tmpfs /run && exec "$0" "$@"', sys.executable, *sys.argv])
     print(f"seed {given.seed}", flush=True)
     order = ["kill"] * given.kills + [given.seconds[i % len(given.seconds)] for i in range(given.cuts)]
-    with tempfile.TemporaryDirectory(prefix="invar-campaign-") as name:
-        campaign = Campaign(given, pathlib.Path(name))
-        try:
-            campaign.start()
-            campaign.chance.shuffle(order)
-            for number, what in enumerate(order):
-                if number % 2 == 0:
-                    campaign.set_in_motion()
-                campaign.kill() if what == "kill" else campaign.cut(what)
-                if number % 20 == 19:
-                    print(f"{number + 1} of {len(order)}", flush=True)
-            campaign.tell()
-            campaign.stop()
-            campaign.look_at_safety()
-            campaign.look_at_records()
-        finally:
-            campaign.end()
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-campaign-"))
+    campaign = Campaign(given, folder)
+    try:
+        campaign.run(order)
+    except BaseException:
+        print(f"logs and recordings stay in {folder}")
+        raise
+    finally:
+        campaign.end()
+    shutil.rmtree(folder)
     print("passed")
 
 

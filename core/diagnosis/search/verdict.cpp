@@ -133,12 +133,13 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
 }
 
 /// Does another cause at the same place explain as well as one of the findings? A small one beside the chief effect has
-/// its rivals in the list, and leaves the verdict on the chief effect as it is.
+/// its rivals in the list, and leaves the verdict on the chief effect as it is. Sizes are shares of the whole mismatch: the
+/// user's numbers, retuned, may take most of a chief effect upon themselves, and nothing of a small one.
 bool is_ambiguous(const Diagnosis& d) {
   double chief = 0.0;
-  for (const auto& finding : d.findings) chief = std::max(chief, finding.share_of_rest);
+  for (const auto& finding : d.findings) chief = std::max(chief, finding.share);
   return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
-    return finding.share_of_rest >= thresholds::small_beside_chief * chief &&
+    return finding.share >= thresholds::small_beside_chief * chief &&
            std::any_of(finding.alternatives.begin(), finding.alternatives.end(), [&](const Alternative& a) {
              return a.explains_as_well() && is_another_cause(finding, a) &&
                     !is_elsewhere(finding.term, a.term);

@@ -67,7 +67,8 @@ struct Machine {
   recording::Table test_inputs, test_outputs;        // another motion, outputs without noise
   std::vector<TrueTerm> missing;
   bool parameter_is_off = false;
-  std::vector<std::string> unlisted;            // of a crowd beside: neither right nor false
+  std::vector<std::string> crowd;               // the small effects beside the chief one
+  std::vector<std::string> unlisted;            // these and their relatives: none of them is a false claim
   std::map<std::string, double> left_by_crowd;  // mean square on the test run that the crowd makes, by column
   std::map<std::string, double> verdicts;  // accepted where the effect is large enough to be seen, by credit
 };

@@ -117,12 +117,39 @@ double fit_on_test(const Machine& machine, const physics::Model& believed, const
   return n > 0.0 ? sum / n : 1.0;
 }
 
+namespace {
+
+/// Does a model foretell the run that no fit saw to the noise of the instruments? It is whole then, whatever its names.
+bool foretells_to_noise(const Machine& machine, const physics::Model& believed,
+                        const physics::Model& patched) {
+  physics::Outputs after;
+  physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
+      ->run(patched, after);
+  const auto names = believed.outputs();
+  for (std::size_t o = 0; o < names.size(); ++o) {
+    const auto& signal = *believed.signal(names[o]);
+    const auto truth = machine.test_outputs.in(signal.column, signal.unit);
+    const auto& noise = machine.noise.at(signal.column);
+    double off = 0.0, squares = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i) off += std::pow(truth[i] - after[o][i], 2);
+    for (const double v : noise) squares += v * v;
+    if (!(off / static_cast<double>(truth.size()) <= squares / static_cast<double>(noise.size())))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
 Marks mark(const Machine& machine, const diagnosis::Case& data, const diagnosis::Diagnosis& d, double win,
            const std::vector<double>& beside) {
   Marks marks;
   const auto verdict = diagnosis::name_of(d.verdict);
   if (const auto at = machine.verdicts.find(verdict); at != machine.verdicts.end())
     marks.verdict = at->second;
+  if (!machine.crowd.empty() && verdict == "explained" &&
+      foretells_to_noise(machine, data.model, d.best.model))
+    marks.verdict = 1.0;
   const bool modest = verdict == "no_mismatch" || verdict == "parameters_only";
   if (machine.missing.empty() && modest && win < plain) marks.verdict = 1.0;
   if (!machine.missing.empty() && win < plain && modest) marks.verdict = 1.0;
