@@ -134,8 +134,8 @@ inline constexpr double waves_seen_on_axis = 1.5;
 inline constexpr double waves_seen = 2.0;
 /// Rows at a limit: a limit that fewer touch is an outlier. Judgement.
 inline constexpr std::size_t rows_at_a_limit = 5;
-/// Odds of another cause with which a name is right in three cases of ten.
-inline constexpr double unlikely_odds = 7.0 / 3.0;
+/// Odds of another cause with which a name is rather wrong than right.
+inline constexpr double unlikely_odds = 1.0;
 /// Share of the mismatch beyond noise: a name that leaves more is unlikely by that alone. Judgement.
 inline constexpr double plain_rest = 0.08;
 /// Ratio of stiffnesses: such bristles cannot be told from sliding at once. Judgement.
@@ -153,9 +153,13 @@ inline constexpr double other_cause_by_shape = 0.285;
 /// Share of the squares up to which such a shape is a matter of form.
 inline constexpr double other_cause_form = 0.005;
 /// Share that the idealised form of other names may leave.
-inline constexpr double other_cause_ideal = 1.5e-4;
+inline constexpr double other_cause_ideal = 5e-4;
 /// Most odds that numbers led astray add: a sigma that is too small alone takes no name away. Judgement.
 inline constexpr double other_cause_by_excursion = 3.0;
+/// Correlation from which on two inputs run alike. Judgement: four fifths of the one's power go with the other.
+inline constexpr double runs_alike = 0.9;
+/// Odds that an effect is none whose size is zero within its sigma. Judgement: 3 to 1.
+inline constexpr double odds_of_zero = 3.0;
 /// Share of a name's gain that an output must have to judge its rest. Judgement.
 inline constexpr double part_of_gain = 0.1;
 /// Highest probability of a name: 1 in 200 is left for causes that nobody thought of. Judgement.
@@ -222,11 +226,11 @@ inline constexpr double pair_adds = 0.8;
 /// Ratio to the noise where a name must be likelier than not. Judgement.
 inline constexpr double very_far_above_noise = 10.0;
 /// Least probability of a name that is said there,
-inline constexpr double said_very_far = 0.5;
+inline constexpr double said_very_far = 0.65;
 /// where the model is far off or the user's numbers went astray,
-inline constexpr double said_far = 0.3;
+inline constexpr double said_far = 0.45;
 /// and anywhere. Judgement: a name that is less likely misleads.
-inline constexpr double said_at_all = 0.1;
+inline constexpr double said_at_all = 0.2;
 /// Margins that a curve without a name needs, since it is tried over many variables. Judgement.
 inline constexpr double nameless_margins = 2.0;
 /// Share of the noise from row to row that a median must take off an input. Judgement.
@@ -275,8 +279,10 @@ inline constexpr double map_astray = 5.0;
 
 // --- report: what is said
 
-/// Probability that something is missing at a place which has neither name nor curve. Judgement.
+/// Probability that something is missing at the controller, where the current is not what its law makes. Judgement.
 inline constexpr double sure_of_its_place = 0.9;
+/// Probability of a place where neither a name nor a curve explains anything. Measured: right in two of five public recordings.
+inline constexpr double place_alone = 0.4;
 /// Sigmas of the user beyond which the model has become another. Judgement.
 inline constexpr double far_moved = 10.0;
 /// Ratio to the noise that is said beside the verdict. Judgement.

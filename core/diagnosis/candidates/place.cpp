@@ -61,13 +61,39 @@ std::vector<std::string> recorded_as(const Case& data, const std::string& variab
   return names;
 }
 
+namespace {
+
+/// A unit divided by another one; nothing is divided by what has none.
+std::string per(const std::string& unit, const std::string& of, int power = 1) {
+  if (power == 0 || of.empty() || of == "1") return unit;
+  const bool joined = of.find_first_of("/ ") != std::string::npos;
+  if (of == "s" && power == 1 && unit.ends_with("/s")) return unit + "2";
+  return unit + "/" + (joined ? "(" + of + ")" : of) + (power > 1 ? std::to_string(power) : "");
+}
+
+/// Of what is added to a place of the user's own equations: to the rate of a state in its unit per second.
+std::string unit_of_added(const Case& data, const physics::Term& term, const std::string& of_place) {
+  const auto& states = data.model.equations.states;
+  const bool is_rate =
+      std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == term.on; });
+  return per(is_rate ? per(of_place, "s") : of_place, unit_of_variable(data, physics::goes_over(term)),
+             term.info->power);
+}
+
+}  // namespace
+
 std::string unit_of(const Case& data, const physics::Term& term, std::size_t parameter) {
   const auto unit = physics::unit_of_parameter(data.model, term, parameter);
   if (unit != "*") return unit;
   const auto is = [&](std::string_view name) { return parameter == term.info->index_of(name); };
   if (is("delay") || is("time_constant") || (is("period") && term.with == "t")) return "s";
+  const auto unit_or_one = [](std::string text) { return text.empty() ? std::string{"1"} : text; };
+  if (is("period")) return unit_or_one(unit_of_variable(data, physics::goes_over(term)));
   const auto* signal = data.model.signal(term.on);
-  return signal != nullptr && !signal->unit.empty() ? signal->unit : "1";
+  const std::string of_place = unit_or_one(signal != nullptr ? signal->unit : "");
+  return term.info->lateness == physics::Lateness::none && term.info->cut == physics::Cut::nothing
+             ? unit_of_added(data, term, of_place)
+             : of_place;
 }
 
 std::string unit_of_variable(const Case& data, const std::string& variable) {

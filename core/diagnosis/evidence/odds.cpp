@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/diagnosis/dataset/alike_inputs.hpp"
 #include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/evidence/other_cause.hpp"
 #include "core/diagnosis/evidence/shape.hpp"
@@ -73,6 +74,14 @@ double odds_of_another_cause(double gain, double left, double shape, double shar
          (share < 1.0 ? thresholds::other_cause_ideal / std::max(share, 1e-6) : 0.0);
 }
 
+double odds_of_nothing(const Finding& finding) {
+  double surest = -1.0;
+  for (std::size_t i = 0; i < finding.sigmas.size(); ++i)
+    if (finding.term.info->parameters[i].role == physics::Role::amplitude && finding.sigmas[i] > 0.0)
+      surest = std::max(surest, std::abs(finding.term.values[i]) / finding.sigmas[i]);
+  return surest < 0.0 ? 0.0 : thresholds::odds_of_zero * std::exp(-0.5 * surest * surest);
+}
+
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding) {
   // Where the current is recorded behind what acts on it, a force does not stand in it.
   return (data.model.records_applied ? 0.0 : odds_of_other_site(finding)) +
@@ -112,10 +121,14 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
                               d.findings.size() > 1 ? finding.share_of_rest : 1.0);
     finding.other_cause += std::clamp(d.parameter_excursion / thresholds::far_astray - 1.0, 0.0,
                                       thresholds::other_cause_by_excursion);
+    finding.other_cause += odds_of_nothing(finding);
     sum += finding.relatives + finding.other_cause;
   }
   // A course over time follows anything slow and foretells nothing: another place is as likely.
   if (is_over_time(finding.term)) sum += 1.0;
+  // A free course takes after any of the inputs that run alike.
+  if (!finding.term.curve.knots.empty())
+    sum += static_cast<double>(inputs_like(data, finding.term.curve.over));
   finding.probability = std::min(thresholds::surest, 1.0 / sum);
 }
 

@@ -16,6 +16,10 @@ namespace invar::diagnosis {
 /// (tests/bench/mismatch_reliability.py).
 double odds_of_another_cause(double gain, double left, double shape, double share);
 
+/// Odds that the effect is none: the likelihood of zero over that of the value, for the best known of its amplitudes. Sigmas
+/// come from the spread between blocks; evidence that one stretch alone brings does not make an effect.
+double odds_of_nothing(const Finding& finding);
+
 /// Odds that a relative of term `place` of the best model is meant, in the library or not. Relatives are a lag and a delay,
 /// friction that slides at once or springs first, a sine that enters at the motor or the carriage.
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding);

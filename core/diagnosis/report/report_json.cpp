@@ -144,19 +144,22 @@ void add_finding(json& report, const Case& data, const Diagnosis& d, const Findi
   report["findings"].push_back(entry);
 }
 
-/// What has neither a name nor a curve is said with its place alone. That something is missing at all is as good as sure.
+/// What has neither a name nor a curve is said with its place alone. That something is missing at all is as good as sure; that
+/// it is there is not.
 void add_suspect(json& report, const Diagnosis& d) {
   if (!d.suspect) return;
+  const bool off_law = d.off_law && d.off_law->is_chief();
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) {
-    report["findings"].push_back({{"term", "unmodelled"},
-                                  {"site", d.suspect->site},
-                                  {"probability", thresholds::sure_of_its_place},
-                                  {"share", d.still_follows},
-                                  {"parameters", json::object()},
-                                  {"alternatives", json::array()},
-                                  {"description",
-                                   "What no known term describes, nor a curve over what was recorded; "
-                                   "patched.yaml is the retuned model."}});
+    report["findings"].push_back(
+        {{"term", "unmodelled"},
+         {"site", d.suspect->site},
+         {"probability", off_law ? thresholds::sure_of_its_place : thresholds::place_alone},
+         {"share", d.still_follows},
+         {"parameters", json::object()},
+         {"alternatives", json::array()},
+         {"description",
+          "What no known term describes, nor a curve over what was recorded; "
+          "patched.yaml is the retuned model."}});
   }
   report["location"].push_back(
       {{"site", d.suspect->site},
@@ -164,7 +167,7 @@ void add_suspect(json& report, const Diagnosis& d) {
        {"where", json::object()},
        {"share", d.still_follows},
        {"why",
-        d.off_law && d.off_law->is_chief()
+        off_law
             ? "the recorded current is not what the controller makes of the recorded reference and position"
             : "what is left over follows what was recorded, most of all by way of the " + d.suspect->place}});
 }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "core/diagnosis/candidates/kin.hpp"
+#include "core/diagnosis/dataset/alike_inputs.hpp"
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
@@ -111,6 +112,35 @@ TEST(Names, ASmallShareBesideOthersIsDoubted) {
   EXPECT_LT(odds_of_another_cause(1000.0, 0.0, 0.0, 1.0), 0.1);
   EXPECT_GT(odds_of_another_cause(1000.0, 0.0, 0.0, 2e-4), thresholds::unlikely_odds);
   EXPECT_GT(odds_of_another_cause(20.0, 0.0, 0.0, 1.0), odds_of_another_cause(1000.0, 0.0, 0.0, 1.0));
+}
+
+TEST(Names, InputsThatRunAlikeAreCounted) {
+  recording::Table table;
+  std::vector<double> time, speed, pressure, other, output;
+  for (int i = 0; i < 400; ++i) {
+    const double t = 0.01 * i;
+    time.push_back(t), speed.push_back(std::sin(t)), pressure.push_back(300.0 - 5.0 * std::sin(t));
+    other.push_back(std::cos(7.0 * t)), output.push_back(t);
+  }
+  table.add("t", "s", time), table.add("v", "1", speed), table.add("p", "1", pressure);
+  table.add("q", "1", other), table.add("y", "1", output);
+  const auto data =
+      make_case(model_of("invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {v: v, p: p, q: q}\n"
+                         "outputs: {y: {column: y, expression: 'v + p + q'}}\nparameters: {}\n"),
+                {table});
+  EXPECT_EQ(inputs_like(data, "v"), 1U);
+  EXPECT_EQ(inputs_like(data, "p"), 1U);
+  EXPECT_EQ(inputs_like(data, "q"), 0U);
+  EXPECT_EQ(inputs_like(data, "t"), 0U);
+}
+
+TEST(Names, AnEffectThatIsNothingWithinItsSigmaIsDoubted) {
+  Finding finding;
+  finding.term.info = physics::find_term(physics::Plant::equations, "lag");
+  finding.term.values[0] = 0.335, finding.sigmas = {0.934};
+  EXPECT_GT(odds_of_nothing(finding), thresholds::unlikely_odds);
+  finding.sigmas = {0.1};  // exp(-0.5 * 3.35^2) = 0.0037
+  EXPECT_LT(odds_of_nothing(finding), 0.02);
 }
 
 TEST(Names, WhatLeavesMuchBeyondTheNoiseIsDoubtedWhereItActsItself) {

@@ -203,6 +203,12 @@ TEST(OwnLoop, ATermAtAStateIsThereThoughAnOutputBearsItsName) {
   drag.on = "x";
   EXPECT_EQ(site_of(data, drag), "equations.x");
   EXPECT_EQ(place_of(data, drag), "state x");
+  for (auto& signal : data.model.signals) signal.unit = "m";
+  EXPECT_EQ(unit_of(data, drag, 0), "m/s/m2");  // of a rate, over the square of x
+  drag.info = physics::find_term(physics::Plant::equations, "constant");
+  EXPECT_EQ(unit_of(data, drag, 0), "m/s");
+  drag.info = physics::find_term(physics::Plant::equations, "periodic");
+  EXPECT_EQ(unit_of(data, drag, 1), "m");
   drag.info = physics::find_term(physics::Plant::equations, "lag");
   drag.on = "output.x";
   EXPECT_EQ(site_of(data, drag), "equations.output");
