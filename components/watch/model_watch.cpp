@@ -75,9 +75,8 @@ void ModelWatch::judge() noexcept {
     char text[400];
     std::snprintf(
         text, sizeof text,
-        "axis and model part: %.3g N RMS over %.3g s of motion, %.2g times what noise and sigmas allow; %s, "
-        "goes "
-        "with %s (%.3g %s, %.0f %%)%s%s%s%s; record and diagnose",
+        "axis and model part: %.3g N RMS over %.3g s of motion, %.2g times the bound of noise and sigmas. "
+        "Missing: %s, goes with %s (%.3g %s, %.0f %%)%s%s%s%s; record and diagnose",
         force, parameters_.time, over_noise_, found.site.data(), found.depends_on.data(), found.strength,
         found.unit.data(), 100.0 * found.share, found.rival.empty() ? "" : "; cannot be told from ",
         found.rival_site.data() != nullptr ? found.rival_site.data() : "",

@@ -100,7 +100,7 @@ class RawWriterConnection final : public Connection {
   std::atomic<std::uint64_t> refused_{0};
 };
 
-/// What a raw reader does with what arrives.
+/// The answer of a raw reader to each sample.
 [[nodiscard]] ReaderConnection::Receive raw_receiver(std::function<void(const RawSample&)> take);
 
 }  // namespace invar::dds

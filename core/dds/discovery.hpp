@@ -46,15 +46,15 @@ struct Alarm {
   bool fault = true;  // otherwise a warning
 };
 
-/// What the participants of one node know. Any thread.
+/// The knowledge of one node's participants. Any thread.
 class Discovery {
  public:
   /// `addresses`: where it hears discovery.
   void add_participant(const std::string& id, const std::string& name,
                        std::vector<PeerAddress> addresses = {});
   void remove_participant(const std::string& id);
-  /// A new endpoint of ours or a foreign one. Every pair of one of ours and one of anybody on the same topic
-  /// is checked; one that cannot match raises an alarm that names both ends and the policy, once.
+  /// A new endpoint of ours or a foreign one. Each of ours is checked against all others of its topic. A pair
+  /// that cannot match raises one alarm, which names both ends and the policy.
   void add_endpoint(Endpoint endpoint);
   void remove_endpoint(const std::string& id);
   void raise(Alarm alarm);

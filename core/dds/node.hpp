@@ -51,9 +51,9 @@ struct NodeOptions {
   /// Only of a cell on several hosts in real time.
   std::optional<ClockOptions> clocks;
   bool shared_memory = true;
-  /// Of the cell on this PC; they share /dev/shm.
+  /// Processes of the cell on this PC; they share /dev/shm.
   std::size_t processes = 1;
-  /// Of the general participant [bytes]; a sample may take half of it.
+  /// Shared memory of the general participant [bytes]; a sample may take half of it.
   std::uint32_t segment_size = 16U << 20U;
   /// SCHED_FIFO priority of the middleware's threads that carry real-time traffic; 0: the usual scheduling.
   int realtime_priority = 0;
@@ -147,8 +147,8 @@ class Node {
   void bind(InputPort& port, Clock clock = utc_now);
   /// Starts the publishing threads of ports bound with a period. Discovery and receiving begin with `bind`.
   void start();
-  /// At the end of each cycle of the loop, on its thread: wakes the threads, here and in other processes of this PC, that
-  /// wait for a sample of this cycle. *Real-time*: one FUTEX_WAKE a thread that sleeps.
+  /// Called at the end of each cycle, on the loop's thread. Wakes the threads that wait for a sample of this cycle, also in
+  /// other processes of this PC. *Real-time*: one FUTEX_WAKE a thread that sleeps.
   void cycle_ended() noexcept;
   /// Publishes what is left and stops the threads. Readers of ports are removed: nothing arrives any more.
   void stop();
@@ -195,7 +195,7 @@ class Node {
 
   /// nullptr without `clocks` in its options.
   [[nodiscard]] const HostClocks* clocks() const;
-  /// What was discovered so far; a full picture takes about a second after the node was made.
+  /// The endpoints discovered so far; a full picture takes about a second after the node was made.
   [[nodiscard]] Snapshot snapshot() const;
   /// The alarms since the last call.
   [[nodiscard]] std::vector<Alarm> take_alarms();

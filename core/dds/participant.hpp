@@ -50,7 +50,7 @@ class Participant final : private fdds::DomainParticipantListener {
   /// A process of this PC that takes part in the cell ended without taking leave (it was killed, or crashed), and its lease
   /// has not run out yet. Any thread.
   [[nodiscard]] bool has_dead_peer() const;
-  /// What arrived and was not let through to the middleware. Any thread.
+  /// Messages that arrived and were kept from the middleware. Any thread.
   [[nodiscard]] const Reception& reception() const { return *reception_; }
   /// Nothing of these holders of certificates is taken any more. Names those that take part now; this participant's own is among
   /// them where it is revoked itself. Any thread.

@@ -37,7 +37,7 @@ class ProcessService {
     std::filesystem::path models;
     /// Called when somebody asks the process to stop; on the service's thread.
     std::function<void()> stop_process;
-    /// What is wrong with the component of this index though it is stepped; empty: nothing. Any thread.
+    /// The fault of the component of this index although it is stepped; empty: none. Any thread.
     std::function<std::string(std::size_t component)> fault_of;
     /// Number of the component in its cell file, by which its status is known; none: that of its samples.
     std::function<std::uint32_t(std::size_t component)> id_of{};

@@ -13,9 +13,9 @@
 
 namespace invar::dds {
 
-/// By default Fast DDS 2.9 drops a sample of a writer that does not own its instance without a word. For ten seconds it takes
-/// a writer that is gone for the owner: it does not understand how Cyclone DDS takes its leave (a serialized key without a
-/// key hash), and any sign of life renews the lease of all writers. Between equals the lower GUID wins, so that a
+/// By default Fast DDS 2.9 drops a sample of a writer that does not own its instance without a word. For ten seconds a writer
+/// that is gone still counts as the owner. Cyclone DDS takes its leave by a serialized key without a key hash, which Fast DDS
+/// does not understand, and any sign of life renews the lease of all writers. Between equals the lower GUID wins, so that a
 /// successor is heard or not by chance. Writers that send a key hash with every sample keep that arbitration.
 ///
 /// A part of a type support. The history of a reader computes keys in an object that it has the type create; that object

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <set>
-#include <sstream>
 
 #include "core/base/unit.hpp"
 #include "core/physics/expression.hpp"
@@ -49,9 +49,9 @@ std::optional<UnitClash> difference(const Unit& a, const Unit& b) {
   if (!a.same_quantity(b)) return UnitClash{"measures something else than", false};
   const double ratio = a.factor / b.factor;
   if (std::abs(ratio - 1.0) < 1e-6) return std::nullopt;
-  std::ostringstream text;
-  text << "counts in " << ratio << " of the unit of";
-  return UnitClash{text.str(), true};
+  char text[64];
+  std::snprintf(text, sizeof text, "counts in %g of the unit of", ratio);
+  return UnitClash{text, true};
 }
 
 /// One formula, from its names to its value.
@@ -89,7 +89,7 @@ class Reader {
       all +=
           (all.empty() ? "`" : ", `") + name + "`" + (at != units_.end() ? " [" + at->second.text + "]" : "");
     }
-    return known.names.size() > 1 ? "what is made of " + all : all;
+    return known.names.size() > 1 ? "the combination of " + all : all;
   }
 
   /// Both must be one; the unit of either.

@@ -95,7 +95,8 @@ constexpr std::array<Candidate, 5> straight{{
     {"axis.force", "velocity", "N s/m", [](const MissingForce& m) { return m.velocity; }},
     {"axis.force", "nothing: it is constant", "N", [](const MissingForce&) { return 1.0; }},
     {"axis.force", "acceleration", "kg", [](const MissingForce& m) { return -m.acceleration; }},
-    {"axis.actuator", "current", "of the motor's force", [](const MissingForce& m) { return m.motor_force; }},
+    {"axis.actuator", "current", "times the motor's force",
+     [](const MissingForce& m) { return m.motor_force; }},
 }};
 
 }  // namespace

@@ -119,8 +119,8 @@ void write_omg_end(const dds::Profile& p, const char* end, std::ostream& out) {
 
 void write_omg(const dds::Profiles& profiles, std::ostream& out) {
   out << "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
-         "<!-- QoS profiles of an Invar cell in the OMG's DDS-XML, as the QoS provider of Cyclone DDS reads "
-         "it. -->\n"
+         "<!-- QoS profiles of an Invar cell in the OMG's DDS-XML, for the QoS provider of Cyclone DDS. "
+         "-->\n"
          "<dds xmlns=\"http://www.omg.org/spec/DDS-XML\">\n"
          "  <qos_library name=\"invar\">\n";
   for (const auto& [name, profile] : profiles) {

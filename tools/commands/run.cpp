@@ -162,9 +162,10 @@ void add_run(CLI::App& program) {
       "SIGUSR2 starts the processes of a secured cell anew whose certificate was renewed, one after the "
       "other.\n"
       "Notices of the cell, from warning up, go to the error output, a line each.\n"
-      "Exit status: 0 all was well at the end; 2 the file has faults; 1 otherwise: a job failed, a process "
-      "ended by\n"
-      "itself, an axis was in fault, a heater latched, a device silent, a model refused, or a recording cut");
+      "Exit status: 0 all was well at the end; 2 the file has faults; 1 otherwise. Cases of 1: a job failed, "
+      "a\n"
+      "process ended by itself, an axis was in fault, a heater latched, a device silent, a model refused, or "
+      "a recording cut");
   auto options = std::make_shared<Options>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");

@@ -6,8 +6,8 @@
 namespace invar::diagnosis {
 
 /// By output, the share of the power of measured - simulated that goes with the recording. One of three shapes
-/// explains it. The first is a surface of second order over all inputs, their motion and their past, the second the named terms'
-/// own effects with numbers that change, the third any course over one of the inputs. Taken off is the share of the same series
+/// explains it. The first is a surface of second order over all inputs, their motion and their past. The second is the named
+/// terms' effects with numbers that change, the third any course over one input. Taken off is the share of the same series
 /// shifted against the recording: chance and the colour of the noise are in both. 0 where it is no more than chance.
 std::vector<double> followed_share(const Case& data, const Fit& fit);
 

@@ -6,9 +6,9 @@
 
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/report/report.hpp"
-#include "core/physics/temperatures.hpp"
 #include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
+#include "core/physics/temperatures.hpp"
 
 namespace invar::diagnosis {
 
@@ -110,9 +110,9 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
   if (d.is_partial)
     return d.budget > 0.0 ? "Run it again with a longer --budget." : "Let the diagnosis run to its end.";
   if (d.off_law && d.off_law->is_chief())
-    return "Compare the controller block of the model's file with the drive: gains and their units, the "
-           "filter, the rate, "
-           "what is differentiated; invar diagnose --example axis says the law that is meant.";
+    return "Compare the controller block of the model's file with the drive: gains and their units, filter, "
+           "rate, and the signal that is differentiated. The comments of invar diagnose --example axis give "
+           "the control law.";
   std::string apart;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
@@ -139,8 +139,7 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
                "back.";
       if (over == "history")
         return "Record again with one input alone in steps, each held until all is at rest, and then in "
-               "quick changes: "
-               "what has no name yet goes with what was before, and this shows for how long.";
+               "quick changes. The part without a name depends on the past; this shows for how long.";
       return "Record again with " + (over.empty() ? "one input" : over) +
              " varied on its own and all else held: what has no name yet goes with it, or with something "
              "that "

@@ -158,7 +158,7 @@ void add_suspect(json& report, const Diagnosis& d) {
          {"parameters", json::object()},
          {"alternatives", json::array()},
          {"description",
-          "What no known term describes, nor a curve over what was recorded; "
+          "Neither a known term nor a curve over a recorded column describes it; "
           "patched.yaml is the retuned model."}});
   }
   report["location"].push_back(
@@ -169,7 +169,7 @@ void add_suspect(json& report, const Diagnosis& d) {
        {"why",
         off_law
             ? "the recorded current is not what the controller makes of the recorded reference and position"
-            : "what is left over follows what was recorded, most of all by way of the " + d.suspect->place}});
+            : "the residual follows the recording, most of all by way of the " + d.suspect->place}});
 }
 
 json corrections_json(const Case& data, const Diagnosis& d) {

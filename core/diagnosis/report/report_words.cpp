@@ -52,7 +52,7 @@ std::string nearest_of(const Diagnosis& d, const Finding& finding) {
 
 std::string description_of(const Diagnosis& d, const Finding& finding) {
   if (finding.stand_in == nullptr) return std::string{finding.term.info->description};
-  return "Of the known terms " + nearest_of(d, finding) + "; patched.yaml has it. " +
+  return "Nearest known term: " + nearest_of(d, finding) + "; patched.yaml has it. " +
          std::string{finding.stand_in->description};
 }
 
@@ -119,9 +119,9 @@ std::string what_was_looked_at(const Case& data) {
         std::to_string(data.quiet_rows) + " rows stands in their place";
   if (const auto lone = data.count.lone_inputs; lone > 0)
     cut += (cut.empty() ? "" : "; ") +
-           (lone == 1 ? std::string{"one number"} : std::to_string(lone) + " numbers") +
-           " of the inputs far beyond all others, which the machine did not feel, " +
-           (lone == 1 ? "is" : "are") + " left out";
+           (lone == 1 ? std::string{"one input value"} : std::to_string(lone) + " input values") +
+           " far beyond all others, which the machine did not feel, " + (lone == 1 ? "is" : "are") +
+           " left out";
   for (const auto& one : data.taken_in_si)
     cut += (cut.empty() ? "`" : "; `") + one.column + "` in " + one.unit + " is taken in SI, times " +
            number(one.factor, 4);
@@ -254,7 +254,7 @@ std::string names_of_rivals(const Case& data, const Diagnosis& d) {
 std::string sentence_of_unknown(const Case& data, const Diagnosis& d) {
   if (d.off_law && d.off_law->is_chief())
     return "Unknown physics: the recorded current is not what the model's controller makes of the recorded "
-           "reference and position. What goes with the motion differs by " +
+           "reference and position. The part that goes with the motion differs by " +
            si(d.off_law->off, "A") + " RMS, and the current moves by " + si(d.off_law->all, "A") +
            ". Nothing behind the loop is judged.";
   if (d.findings.empty())
@@ -269,8 +269,8 @@ std::string sentence_of_unknown(const Case& data, const Diagnosis& d) {
     for (const auto& f : d.findings)
       if (const auto place = place_of(data, f.term); places.find(place) == std::string::npos)
         places += (places.empty() ? "" : " and the ") + place;
-    return "Unknown physics: something is missing, most likely at the " + places + ". Of the known terms " +
-           nearest_of(d, first) + ".";
+    return "Unknown physics: something is missing, most likely at the " + places +
+           ". Nearest known term: " + nearest_of(d, first) + ".";
   }
   return "Unknown physics: something is missing at the " + place_of(data, first.term) + " (" +
          site_of(data, first.term) + ") that goes with " +

@@ -105,8 +105,8 @@ bool Search::add_named(double round) {
     if (from == From::coloured && take_shaken(sought.base, pays ? &sought.best->with : nullptr)) return true;
     if (!pays) {
       for (const auto& f : sought.fits)
-        d_.reject(std::string{f.model.terms.back().info->name},
-                  "what it explains is no more than chance would", f.evidence - sought.base.evidence);
+        d_.reject(std::string{f.model.terms.back().info->name}, "it explains no more than chance would",
+                  f.evidence - sought.base.evidence);
       continue;
     }
     const auto rather = [&](From other_base, double leaves) {
@@ -186,7 +186,7 @@ bool Search::take_shaken(const Fit& base, Fit* otherwise) {
   rivals_.emplace_back();
   if (otherwise != nullptr)
     d_.reject(std::string{otherwise->model.terms.back().info->name},
-              "what the noise shakes loose explains the same better", found->gain);
+              "dither by the noise explains the same better", found->gain);
   return true;
 }
 

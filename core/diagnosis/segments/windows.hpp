@@ -7,8 +7,8 @@
 
 namespace invar::diagnosis {
 
-/// Cuts the recordings of a model in the user's own equations into windows where the model forgets no disturbance: a push
-/// on a state goes on to grow to the end of the recording. An axis without controller always does. Each window begins at
+/// Cuts the recordings of a model in the user's own equations into windows if the model forgets no disturbance. A push
+/// on a state then grows to the end of the recording; an axis without controller is always so. Each window begins at
 /// states of its own, parameters "<state>.start<k>", which every fit estimates beside the others. Their prior is as wide as the
 /// state itself goes. A closed loop, a model that forgets and a recording too short for windows stay whole, but for rows at
 /// which the states begin anew in any case (anew.hpp).

@@ -188,7 +188,7 @@ TEST(OwnUnits, NumbersOfAFormulaThatCountInUnitsOfTwoSizesAreRefused) {
   EXPECT_THAT(pendulum("mN m", "N m s"), HasSubstr("model.yaml:7: states.w.derivative: "));
   EXPECT_THAT(
       pendulum("mN m", "N m s"),
-      HasSubstr("what is made of `g` [mN m], `q` [rad] counts in 0.001 of the unit of what is made of "
+      HasSubstr("the combination of `g` [mN m], `q` [rad] counts in 0.001 of the unit of the combination of "
                 "`b` [N m s], `w` [rad/s]"));
 }
 

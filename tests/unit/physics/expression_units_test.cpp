@@ -53,7 +53,7 @@ TEST(UnitsOfFormulas, SizesAndKindsThatClashAreTold) {
   EXPECT_EQ(clash("a + b", {{"a", "mm"}, {"b", "m"}}),
             "size: `a` [mm] counts in 0.001 of the unit of `b` [m], beside which it stands");
   EXPECT_THAT(clash("a*c - b", {{"a", "N"}, {"b", "W"}, {"c", "m"}}),
-              HasSubstr("kind: what is made of `a` [N], `c` [m] measures something else than `b` [W]"));
+              HasSubstr("kind: the combination of `a` [N], `c` [m] measures something else than `b` [W]"));
   EXPECT_THAT(clash("sin(q)", {{"q", "deg"}}), HasSubstr("size: `q` [deg] counts in 0.0174533"));
   EXPECT_THAT(clash("exp(-t/tau)", {{"t", "s"}, {"tau", "min"}}), HasSubstr("size: "));
   EXPECT_THAT(clash("exp(-t/tau)", {{"t", "s"}, {"tau", "V"}}), HasSubstr("kind: "));
