@@ -151,13 +151,13 @@ False claims are counted. Seconds are wall time beside other load (see each sect
 PROBABILITY = """## Probabilities
 
 A name that is stated with 0.8 should be right eight times of ten. The diagram has all names of all sets; a bar is the 95 % interval of the share.
-Curves without a name are no names. Names of effects that belong to the crowd are left out.
+Curves without a name are no names. Relatives of effects that belong to a crowd are left out.
 """
 NOTES = {
     "dev": "Forty-two machines of five plants, each with no effect, one or two; the truth models are no code of Invar.",
     "crowd": "Twenty machines. The chief effect has 80 to 95 % of the mismatch; four to six unlisted effects have 0.5 to 4 % each.",
     "second_crowd": """Machines of all six plants and all effects, each beside three to six unlisted effects of 0.5 to 4 %.
-Noise of five colours; a third of the files have gaps and outliers. `ambiguous` counts half here, also where the right pair is listed.""",
+Noise of five colours; a third of the files have gaps and outliers. `explained` counts half unless the model foretells to the noise, `ambiguous` half unless the chief effect has a twin.""",
     "real": "Recordings with known answers that the engine was developed beside.",
     "fresh": """Recordings that nobody tuned on. The model is a plain first model.
 The answer of the publication was written down before the run, and each set was looked at once.
