@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the diagnosis on every set of machines and writes figures alone to tests/bench/results/SET.json.
 
-    tests/bench/how_reliable_measure.py --bin build/bin [--only dev crowd second_crowd real fresh fresh_second] [--fresh DIR] [--budget 300]
+    tests/bench/how_reliable_measure.py --bin build/bin [--only dev crowd second_crowd real fresh fresh_second fresh_third] [--fresh DIR] [--budget 300]
 
 dev, crowd, real: the scorers of the folder INVAR_SHARED (else `shared` beside the checkout). second_crowd: bench_mismatch --crowd.
 fresh: a folder with one folder a set: model.yaml and set.json (tests/bench/fresh), train*.csv, held*_inputs.csv, held*_outputs.csv. In set.json
@@ -29,7 +29,7 @@ PLAIN = 120.0    # gain from which on an effect is plain: tests/support/mismatch
 FALSE = 0.5      # a name with this probability or more is a claim
 GAIN = 0.98      # a curve that takes less than this off the error on other runs is none
 WORSE = 1.05     # a model handed over that errs more than this beside the retuned one on other runs is wrong, whatever was said
-SETS = ("dev", "crowd", "second_crowd", "real", "fresh", "fresh_second")
+SETS = ("dev", "crowd", "second_crowd", "real", "fresh", "fresh_second", "fresh_third")
 SECOND_CROWD = "--crowd --each 1 --seed 61 --size 2"
 
 
