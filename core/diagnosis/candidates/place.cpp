@@ -90,7 +90,8 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   const auto unit_or_one = [](std::string text) { return text.empty() ? std::string{"1"} : text; };
   if (is("period")) return unit_or_one(unit_of_variable(data, physics::goes_over(term)));
   const auto* signal = data.model.signal(term.on);
-  const std::string of_place = unit_or_one(signal != nullptr ? signal->unit : "");
+  if (signal == nullptr) return "1";  // a state that nobody measures has the unit of the user's equations
+  const std::string of_place = unit_or_one(signal->unit);
   return term.info->lateness == physics::Lateness::none && term.info->cut == physics::Cut::nothing
              ? unit_of_added(data, term, of_place)
              : of_place;
