@@ -141,6 +141,16 @@ MotionPoint Stage::setpoint(const Tick& tick) const noexcept {
   return trajectory_.at((tick.now - trajectory_start_).in_seconds());
 }
 
+/// A drive lets go of a carriage whose loop stands still. The setpoint waits meanwhile, or the carriage would run after it.
+void Stage::wait_out_stall(const Tick& tick) noexcept {
+  constexpr double periods = 8.0;  // as many as the overrun policy `degrade` leaves out
+  const Duration one = Duration::seconds(tick.period);
+  if (const Duration gone = last_step_ ? tick.now - *last_step_ : one;
+      gone > Duration::seconds(periods * tick.period))
+    trajectory_start_ = trajectory_start_ + (gone - one);
+  last_step_ = tick.now;
+}
+
 /// Setpoint := measured, so that nothing moves on activation or enabling.
 void Stage::prime(const Tick& tick) noexcept {
   controller_ = physics::AxisController{controller_settings(tick.period)};
@@ -339,6 +349,7 @@ void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
 }
 
 void Stage::step(const Tick& tick) noexcept {
+  wait_out_stall(tick);
   const auto* feedback = feedback_.latest();
   const Duration patience = Duration::seconds(parameters_.feedback_timeout);
   // What is no number has not come: one is bridged, more of them are a loss.

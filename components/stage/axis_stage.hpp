@@ -213,6 +213,7 @@ class Stage final : public Component, public Redundant {
   void publish(const MotionPoint& setpoint) noexcept;
   [[nodiscard]] bool moves() const noexcept;
   [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
+  void wait_out_stall(const Tick& tick) noexcept;
   [[nodiscard]] double feedforward(const Tick& tick) noexcept;
 
   const Parameters& parameters_;
@@ -239,6 +240,7 @@ class Stage final : public Component, public Redundant {
   physics::AxisController controller_{{}};
   Trajectory trajectory_ = Trajectory::rest(0.0);
   Instant trajectory_start_;
+  std::optional<Instant> last_step_;
   AxisMode mode_ = AXIS_MODE_DISABLED;
   AxisState sample_;     // what was published last; answers to commands are kept in it
   bool primed_ = false;  // the controller knows the loop's rate

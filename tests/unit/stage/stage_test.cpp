@@ -342,6 +342,26 @@ std::string trip_of(Bench& bench) {
   return notice != nullptr ? notice->text().c_str() : "";
 }
 
+TEST(Stage, ALoopThatStoodStillAsksForNoLeap) {
+  Bench bench;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  const double cruise = bench.parameters.limits.velocity;
+  ASSERT_TRUE(bench.run_until([&](const AxisState& s) { return s.setpoint_velocity() > 0.99 * cruise; }));
+  const double before = bench.state.latest()->setpoint_position();
+  bench.cycle += 90;      // 90 ms, in which the drive lets go
+  bench.velocity *= 0.5;  // and friction brakes
+  const AxisState after = bench.cycle_once();
+  EXPECT_LT(after.setpoint_position() - before, 2.1 * cruise * Bench::period);
+  double fastest = 0.0;
+  ASSERT_TRUE(bench.run_until([&](const AxisState& s) {
+    fastest = std::max(fastest, bench.velocity);
+    return s.settled() && s.command_done();
+  }));
+  EXPECT_LT(fastest, 1.5 * cruise);  // 1.37: the servo makes up for the lost velocity
+  EXPECT_NEAR(bench.position, 0.15, 1e-4);
+}
+
 TEST(Stage, AnEncoderThatGivesNoNumberIsLostFeedback) {
   Bench bench;
   bench.enable();
