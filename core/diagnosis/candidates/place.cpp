@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
@@ -66,7 +67,8 @@ namespace {
 /// A unit divided by another one; nothing is divided by what has none.
 std::string per(const std::string& unit, const std::string& of, int power = 1) {
   if (power == 0 || of.empty() || of == "1") return unit;
-  const bool joined = of.find_first_of("/ ") != std::string::npos;
+  const bool joined = of.find_first_of("/ ^") != std::string::npos ||
+                      std::isdigit(static_cast<unsigned char>(of.back())) != 0;
   if (of == "s" && power == 1 && unit.ends_with("/s")) return unit + "2";
   return unit + "/" + (joined ? "(" + of + ")" : of) + (power > 1 ? std::to_string(power) : "");
 }

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "core/diagnosis/candidates/kin.hpp"
@@ -122,6 +123,7 @@ TEST(Names, InputsThatRunAlikeAreCounted) {
     time.push_back(t), speed.push_back(std::sin(t)), pressure.push_back(300.0 - 5.0 * std::sin(t));
     other.push_back(std::cos(7.0 * t)), output.push_back(t);
   }
+  speed.front() = std::numeric_limits<double>::quiet_NaN();  // an empty cell
   table.add("t", "s", time), table.add("v", "1", speed), table.add("p", "1", pressure);
   table.add("q", "1", other), table.add("y", "1", output);
   const auto data =
