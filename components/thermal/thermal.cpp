@@ -308,9 +308,9 @@ void Thermal::look_at_response(std::optional<double> reading, const Tick& tick) 
   else
     std::snprintf(
         text.data(), text.size(),
-        "the heat of %.4g W for %.4g s, given in %.4g s, has not %s (it reads %.4g degC). A thermistor is "
-        "off "
-        "or frozen, or a pad is dead or too weak. The heater is off until a command resets the latch",
+        "the heat of %.4g W for %.4g s, given in %.4g s, has not %s (it reads %.4g degC). "
+        "A thermistor is off or frozen, or a pad is dead or too weak. The heater is off until a command "
+        "resets the latch",
         parameters_.power_limit, within, std::max(before + tick.period, within),
         doubt == Doubt::frozen ? "changed the slide's reading at all" : "warmed the slide as `response` says",
         temperature_);

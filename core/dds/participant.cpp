@@ -238,11 +238,11 @@ Participant::Participant(const NodeOptions& options, Traffic traffic, const Prof
   if (!memory.sizes.any()) identity_.folder = 0;
   // Asked here also so that every program with a participant has those calls: nothing else refers to them.
   if (memory.sizes.any() && !shared_memory_calls_are_ours())
-    discovery_.raise({"shared memory",
-                      "a preloaded library answers `shm_open` or `ftruncate` in the place of Invar: a peer "
-                      "that is killed may "
-                      "leave this process deaf or spinning; start it without LD_PRELOAD",
-                      false});
+    discovery_.raise(
+        {"shared memory",
+         "a preloaded library answers `shm_open` or `ftruncate` in the place of Invar: "
+         "a peer that is killed may leave this process deaf or spinning; start it without LD_PRELOAD",
+         false});
   if (!memory.shortage.empty()) discovery_.raise({"shared memory", memory.shortage, false});
   if (traffic == Traffic::realtime) name_ += "/realtime";
   keep_middleware_log();

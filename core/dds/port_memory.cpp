@@ -48,7 +48,7 @@ std::optional<std::uint32_t> port_of(std::string_view name) {
 
 FileNumber number_of(const struct stat& status) { return {status.st_dev, status.st_ino}; }
 
-/// What a port's memory holds about it in Fast DDS 2.9 (PortNode in SharedMemGlobal.hpp).
+/// The state of a port in its memory: PortNode in SharedMemGlobal.hpp of Fast DDS 2.9.
 struct PortState {
   std::uint32_t port, listeners, check_ms, wait_ms, capacity, waiting;
   std::uint32_t flags;  // good, opened by one reader, opened for reading
@@ -94,21 +94,21 @@ void note_opened_port(std::string_view name, int file) {
   if (is_new) place->second = fcntl(file, F_DUPFD_CLOEXEC, 0);
 }
 
-bool give_up_replaced_port(std::uint32_t port) {
+void give_up_replaced_port(std::uint32_t port) {
   Opened& all = opened();
   const std::lock_guard lock{all.mutex};
   const auto found = all.ports.find(port);
-  if (found == all.ports.end()) return false;
+  if (found == all.ports.end()) return;
   struct stat status {};
-  if (stat(("/dev/shm" + std::string{prefix} + std::to_string(port)).c_str(), &status) != 0) return false;
-  return std::erase_if(found->second, [&](const auto& file) {
-           if (file.first == number_of(status)) return false;
-           if (file.second >= 0) {
-             mark_as_not_good(file.second, port);
-             close(file.second);
-           }
-           return true;
-         }) > 0;
+  if (stat(("/dev/shm" + std::string{prefix} + std::to_string(port)).c_str(), &status) != 0) return;
+  std::erase_if(found->second, [&](const auto& file) {
+    if (file.first == number_of(status)) return false;
+    if (file.second >= 0) {
+      mark_as_not_good(file.second, port);
+      close(file.second);
+    }
+    return true;
+  });
 }
 
 }  // namespace invar::dds

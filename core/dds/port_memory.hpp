@@ -15,8 +15,7 @@ namespace invar::dds {
 void note_opened_port(std::string_view name, int file);
 
 /// Called with each port that a peer of this PC announces. Memory that this process has open for it and that is no longer its
-/// file is marked as not good: Fast DDS opens the file at the next message. Returns whether there was such memory. Any
-/// thread, not in the loop.
-bool give_up_replaced_port(std::uint32_t port);
+/// file is marked as not good: Fast DDS opens the file at the next message. Any thread, not in the loop.
+void give_up_replaced_port(std::uint32_t port);
 
 }  // namespace invar::dds

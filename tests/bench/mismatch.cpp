@@ -228,8 +228,7 @@ int main(int argc, char** argv) {
       const bool is_of_crowd = std::find(crowd.begin(), crowd.end(), name) != crowd.end();
       if (!is_of_crowd && std::find(unlisted.begin(), unlisted.end(), name) != unlisted.end())
         continue;  // a relative of one of the crowd is neither right nor wrong
-      const double right =
-          is_of_crowd || ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
+      const double right = ('+' + effect + '+').find('+' + name + '+') != std::string::npos ? 1.0 : 0.5;
       claims.add(finding, row.still_follows, is_of_crowd ? 1.0 : std::min(right, credit(row.machine, name)),
                  plant + "-" + effect + "-" + std::to_string(number) + (leave_out ? "-left-out" : ""),
                  row.claims.size() > 1);

@@ -73,7 +73,7 @@ std::string per(const std::string& unit, const std::string& of, int power = 1) {
   return unit + "/" + (joined ? "(" + of + ")" : of) + (power > 1 ? std::to_string(power) : "");
 }
 
-/// Of what is added to a place of the user's own equations: to the rate of a state in its unit per second.
+/// The unit of an effect's number at a place of the user's own equations; an effect on a state is added to its rate.
 std::string unit_of_added(const Case& data, const physics::Term& term, const std::string& of_place) {
   const auto& states = data.model.equations.states;
   const bool is_rate =

@@ -123,12 +123,11 @@ void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double 
                                       thresholds::other_cause_by_excursion);
     finding.other_cause += odds_of_nothing(finding);
     sum += finding.relatives + finding.other_cause;
+  } else {  // a free course takes after any of the inputs that run alike
+    sum += static_cast<double>(inputs_like(data, finding.term.curve.over));
   }
   // A course over time follows anything slow and foretells nothing: another place is as likely.
   if (is_over_time(finding.term)) sum += 1.0;
-  // A free course takes after any of the inputs that run alike.
-  if (!finding.term.curve.knots.empty())
-    sum += static_cast<double>(inputs_like(data, finding.term.curve.over));
   finding.probability = std::min(thresholds::surest, 1.0 / sum);
 }
 

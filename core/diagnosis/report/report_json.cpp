@@ -144,8 +144,7 @@ void add_finding(json& report, const Case& data, const Diagnosis& d, const Findi
   report["findings"].push_back(entry);
 }
 
-/// What has neither a name nor a curve is said with its place alone. That something is missing at all is as good as sure; that
-/// it is there is not.
+/// A mismatch without name and curve is said with its place alone. The mismatch itself is as good as sure, its place is not.
 void add_suspect(json& report, const Diagnosis& d) {
   if (!d.suspect) return;
   const bool off_law = d.off_law && d.off_law->is_chief();

@@ -29,8 +29,7 @@ double power_between(const Machine& of, const std::vector<recording::Table>& one
                      const std::vector<recording::Table>& other) {
   double power = 0.0;
   for (const auto& [column, noise] : of.noise) {
-    double squares = 0.0;
-    for (const double v : noise) squares += v * v / static_cast<double>(noise.size());
+    const double squares = noise_power(noise);
     if (!(squares > 0.0)) continue;
     for (std::size_t r = 0; r < one.size(); ++r) {
       const auto &a = one[r].find(column)->values, &b = other[r].find(column)->values;
@@ -45,14 +44,13 @@ double power_between(const Machine& of, const std::vector<recording::Table>& one
 bool is_seen(const Machine& machine, const std::vector<recording::Table>& bare) {
   constexpr double beyond = 3.0;  // of the noise's power, on top of it
   for (const auto& [column, noise] : machine.noise) {
-    double squares = 0.0, power = 0.0, rows = 0.0;
-    for (const double v : noise) squares += v * v / static_cast<double>(noise.size());
+    double power = 0.0, rows = 0.0;
     for (std::size_t r = 0; r < bare.size(); ++r) {
       const auto &a = machine.quiet[r].find(column)->values, &b = bare[r].find(column)->values;
       for (std::size_t i = 0; i < std::min(a.size(), b.size()); ++i)
         power += std::pow(a[i] - b[i], 2), rows += 1.0;
     }
-    if (power > beyond * squares * rows) return true;
+    if (power > beyond * noise_power(noise) * rows) return true;
   }
   return false;
 }

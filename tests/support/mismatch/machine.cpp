@@ -12,6 +12,12 @@ namespace invar::test::mismatch {
 
 double Draw::log_between(double low, double high) { return std::exp(between(std::log(low), std::log(high))); }
 
+double noise_power(const std::vector<double>& noise) {
+  double squares = 0.0;
+  for (const double v : noise) squares += v * v / static_cast<double>(noise.size());
+  return squares;
+}
+
 double Noise::operator()() {
   switch (colour_) {
     case Colour::memory:

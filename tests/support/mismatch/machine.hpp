@@ -84,6 +84,9 @@ struct Trouble {
   std::string muted;                    // an effect of which the machine has nothing; all else is as with it
 };
 
+/// Mean square of the noise of an output, in the unit of its column.
+double noise_power(const std::vector<double>& noise);
+
 /// The effects that the machines of a plant can have: "none", "parameter", each term, "unknown:..." for what no term
 /// describes.
 std::vector<std::string> effects(const std::string& plant);

@@ -80,25 +80,31 @@ double credit(const Machine& machine, const std::string& term) {
   return most;
 }
 
-double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched) {
-  physics::Outputs after;
+namespace {
+
+/// Outputs of a model on the run that no fit saw, read as the believed model reads its inputs.
+physics::Outputs on_test(const Machine& machine, const physics::Model& believed,
+                         const physics::Model& model) {
+  physics::Outputs outputs;
   physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
-      ->run(patched, after);
-  return fit_on_test(machine, believed, after);
+      ->run(model, outputs);
+  return outputs;
+}
+
+}  // namespace
+
+double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Model& patched) {
+  return fit_on_test(machine, believed, on_test(machine, believed, patched));
 }
 
 double fit_on_test(const Machine& machine, const physics::Model& believed, const physics::Outputs& after) {
-  physics::Outputs before;
-  physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
-      ->run(believed, before);
+  const auto before = on_test(machine, believed, believed);
   double sum = 0.0, n = 0.0;
   const auto names = believed.outputs();
   for (std::size_t o = 0; o < names.size(); ++o) {
     const auto& signal = *believed.signal(names[o]);
     const auto truth = machine.test_outputs.in(signal.column, signal.unit);
-    double noise = 0.0, was = 0.0, is = 0.0;
-    for (double v : machine.noise.at(signal.column))
-      noise += v * v / static_cast<double>(machine.noise.at(signal.column).size());
+    double noise = noise_power(machine.noise.at(signal.column)), was = 0.0, is = 0.0;
     if (const auto at = machine.left_by_crowd.find(signal.column); at != machine.left_by_crowd.end())
       noise += at->second;
     for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -122,18 +128,14 @@ namespace {
 /// Does a model foretell the run that no fit saw to the noise of the instruments? It is whole then, whatever its names.
 bool foretells_to_noise(const Machine& machine, const physics::Model& believed,
                         const physics::Model& patched) {
-  physics::Outputs after;
-  physics::prepare(believed, model::to_record(machine.test_inputs, believed, false).record)
-      ->run(patched, after);
+  const auto after = on_test(machine, believed, patched);
   const auto names = believed.outputs();
   for (std::size_t o = 0; o < names.size(); ++o) {
     const auto& signal = *believed.signal(names[o]);
     const auto truth = machine.test_outputs.in(signal.column, signal.unit);
-    const auto& noise = machine.noise.at(signal.column);
-    double off = 0.0, squares = 0.0;
+    double off = 0.0;
     for (std::size_t i = 0; i < truth.size(); ++i) off += std::pow(truth[i] - after[o][i], 2);
-    for (const double v : noise) squares += v * v;
-    if (!(off / static_cast<double>(truth.size()) <= squares / static_cast<double>(noise.size())))
+    if (!(off / static_cast<double>(truth.size()) <= noise_power(machine.noise.at(signal.column))))
       return false;
   }
   return true;
