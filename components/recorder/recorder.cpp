@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <utility>
 
 namespace invar::recorder {
 
 namespace {
 constexpr std::uint64_t megabyte = 1'000'000;
-}
+constexpr std::size_t most_early_bytes = 16'000'000;
+}  // namespace
 
 void Recorder::configure() {
   make_folder(parameters_.out);
@@ -18,6 +20,8 @@ void Recorder::configure() {
       file(), recording::RecordingOptions{.reserve_bytes =
                                               megabyte * static_cast<std::uint64_t>(parameters_.reserve_mb)});
   channels_.clear();
+  for (const Early& sample : std::exchange(early_, {})) write(sample.origin, sample.cdr);
+  was_open_ = true;
 }
 
 /// Writes what waits, the ledger and the summary.
@@ -90,17 +94,24 @@ bool Recorder::is_wanted(const std::string& topic) const {
 void Recorder::record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant sent,
                       Instant received, std::span<const std::byte> cdr) {
   const std::scoped_lock lock{mutex_};
-  if (!writer_) return;
-  newest_ = std::max(newest_, received);  // of two threads the later may come first
-  auto [channel, is_new] = channels_.try_emplace({source.topic, writer}, std::uint16_t{0});
+  const Origin origin{source, writer, sequence, sent, received};
+  if (writer_) return write(origin, cdr);
+  if (was_open_ || early_bytes_ + cdr.size() > most_early_bytes) return;
+  early_bytes_ += cdr.size();
+  early_.push_back({origin, {cdr.begin(), cdr.end()}});
+}
+
+void Recorder::write(const Origin& origin, std::span<const std::byte> cdr) {
+  newest_ = std::max(newest_, origin.received);  // of two threads the later may come first
+  auto [channel, is_new] = channels_.try_emplace({origin.source.topic, origin.writer}, std::uint16_t{0});
   if (is_new)
-    channel->second = writer_->add_channel({.topic = source.topic,
-                                            .type = source.type,
-                                            .idl = source.idl,
-                                            .qos = source.profile,
+    channel->second = writer_->add_channel({.topic = origin.source.topic,
+                                            .type = origin.source.type,
+                                            .idl = origin.source.idl,
+                                            .qos = origin.source.profile,
                                             .partitions = "",
-                                            .more = {{"writer", writer}}});
-  writer_->write(channel->second, static_cast<std::uint32_t>(sequence), newest_, sent,
+                                            .more = {{"writer", origin.writer}}});
+  writer_->write(channel->second, static_cast<std::uint32_t>(origin.sequence), newest_, origin.sent,
                  {reinterpret_cast<const std::uint8_t*>(cdr.data()), cdr.size()});
 }
 

@@ -65,7 +65,8 @@ class Recorder final : public Component {
     return std::filesystem::path{parameters_.out} / parameters_.name;
   }
   [[nodiscard]] bool is_wanted(const std::string& topic) const;
-  /// Any thread: one sample of one writer. `sequence` counts that writer's samples from 1. Nothing is written unless the
+  /// Any thread: one sample of one writer. `sequence` counts that writer's samples from 1. Readers hear what others have kept for
+  /// them before the component is configured for the first time: up to 16 MB wait for it. Later, nothing is written unless the
   /// component is configured.
   void record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant sent,
               Instant received, std::span<const std::byte> cdr);
@@ -73,6 +74,17 @@ class Recorder final : public Component {
   void attach(const std::filesystem::path& file);
 
  private:
+  struct Origin {
+    Source source;
+    std::string writer;
+    std::uint64_t sequence = 0;
+    Instant sent, received;
+  };
+  struct Early {
+    Origin origin;
+    std::vector<std::byte> cdr;
+  };
+  void write(const Origin& origin, std::span<const std::byte> cdr);
   void say_status() noexcept;
   void say_lost() noexcept;
 
@@ -83,6 +95,9 @@ class Recorder final : public Component {
   Instant look_at_, status_at_;
   std::mutex mutex_;
   std::unique_ptr<recording::RecordingWriter> writer_;
+  std::vector<Early> early_;  // before it was configured for the first time
+  std::size_t early_bytes_ = 0;
+  bool was_open_ = false;
   Instant newest_;                                                         // when the last sample was taken
   std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;  // by topic and writer
 };

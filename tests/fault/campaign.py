@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A cell on three PCs (network namespaces) is broken again and again at random moments: one of its processes is killed (-9), or
 the cable of one PC is cut. After each: all that the file wants is active again by itself, or `status` ends with 1 and names the
-command. At the end recordings say whether anything unsafe happened, and whether a notice of a kill was lost.
+command. At the end a job runs, and recordings say whether anything unsafe happened, and whether a notice of a kill was lost.
 
 Usage: campaign.py INVAR SOURCE_FOLDER [--kills N] [--cuts N] [--seconds 0.5,3,10,60] [--seed S]
 """
@@ -151,6 +151,16 @@ class Campaign:
         self.jobs += 1
         time.sleep(self.chance.uniform(0.0, 2.0))
 
+    def work(self):
+        """After all of it the cell does what it is for."""
+        self.wait("the whole cell", self.is_well)
+        for _ in range(3):  # one that was set in motion before may still run
+            answer = self.call("stage-pc", "job", "run", self.file, "move", "--wait", "10")
+            if answer.returncode == 0:
+                return
+            time.sleep(5.0)
+        fail(f"the job does not run any more: {answer.stdout}{answer.stderr}")
+
     def kill(self):
         name, pid = self.chance.choice(sorted(self.pids().items()))
         os.kill(pid, signal.SIGKILL)
@@ -235,6 +245,7 @@ class Campaign:
             self.kill() if what == "kill" else self.cut(what)
             if number % 20 == 19:
                 print(f"{number + 1} of {len(order)}", flush=True)
+        self.work()
         self.tell()
         self.stop()
         self.look_at_safety()

@@ -109,9 +109,14 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   sigemptyset(&orders);
   for (const int signal : {SIGTERM, SIGUSR1}) sigaddset(&orders, signal);
   posix_spawnattr_setsigmask(&attributes, &orders);
+  // Fast DDS does not close its sockets on exec: a child would hold the launcher's ports.
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  posix_spawn_file_actions_addclosefrom_np(&files, STDERR_FILENO + 1);
   Child child{process};
   child.restarts = restarts;
-  const int error = posix_spawn(&child.pid, program.c_str(), nullptr, &attributes, arguments.data(), environ);
+  const int error = posix_spawn(&child.pid, program.c_str(), &files, &attributes, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
   posix_spawnattr_destroy(&attributes);
   if (error != 0) throw std::runtime_error{"process `" + process + "` cannot be started"};
   return child;

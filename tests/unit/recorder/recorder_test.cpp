@@ -19,6 +19,7 @@
 namespace invar::recorder {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 struct FullDisk {
@@ -82,6 +83,35 @@ void feed_noise(Recorder& recorder, std::size_t samples) {
     recorder.step({Instant{static_cast<std::int64_t>(i) * 20'000'000}, 0.02, i});
     std::this_thread::sleep_for(std::chrono::milliseconds{1});
   }
+}
+
+TEST(Recorder, SamplesThatCameBeforeItsFileWasOpenAreRecordedAndLaterOnesOfAClosedOneAreNot) {
+  const invar::testing::TemporaryFolder folder;
+  const Recorder::Parameters parameters{.out = folder.path().string(), .topics = {}};
+  Recorder recorder{parameters};
+  const std::vector<std::byte> bytes(8);
+  const auto take = [&](std::uint64_t number) {
+    const Instant at{static_cast<std::int64_t>(number)};
+    recorder.record({"a", "t", "state", ""}, "writer", number, at, at, bytes);
+  };
+  const auto recorded = [&] {
+    std::vector<std::uint32_t> numbers;
+    const auto recording = recording::Recording::open(recorder.file());
+    for (auto messages = recording.messages(); const auto message = messages.next();)
+      numbers.push_back(message->sequence);
+    return numbers;
+  };
+  take(1);
+  take(2);
+  recorder.configure();
+  take(3);
+  recorder.cleanup();
+  EXPECT_THAT(recorded(), ElementsAre(1, 2, 3));
+  take(4);
+  recorder.configure();
+  take(5);
+  recorder.cleanup();
+  EXPECT_THAT(recorded(), ElementsAre(5));
 }
 
 TEST(Recorder, EndsWholeAtTheReserveThatIsLeftForBlackBoxes) {
