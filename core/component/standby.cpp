@@ -140,7 +140,7 @@ void Standby::step_down(event::Severity level, const char* why) noexcept {
 Standby::Duty Standby::stand_by(const Tick& tick) noexcept {
   if (leaving_) return Duty::stand_by;
   const auto* other = in_.latest();
-  const bool heard = other != nullptr && silent_steps_ == 0;
+  const bool heard = other != nullptr && silent_steps_ == 0 && !has_ended();  // its last beats say nothing
   if (heard && other->leads()) {
     if (std::exchange(is_unsure_, false)) say(event::SEVERITY_NOTE, "stands by: ", " leads by now");
     nobody_ = false;
@@ -167,9 +167,13 @@ Standby::Duty Standby::beside_one_that_does_not_lead(const Tick& tick) noexcept 
   return Duty::stand_by;
 }
 
-Standby::Duty Standby::beside_nobody(const Tick& tick) noexcept {
+bool Standby::has_ended() const noexcept {
   const std::int32_t process = other_process_.load(std::memory_order_acquire);
-  const bool ended = process != 0 && ended_process_.load(std::memory_order_acquire) == process;
+  return process != 0 && ended_process_.load(std::memory_order_acquire) == process;
+}
+
+Standby::Duty Standby::beside_nobody(const Tick& tick) noexcept {
+  const bool ended = has_ended();
   const bool silent = is_silent(tick);
   if (!ended && !silent) return Duty::stand_by;
   if (asked_) return found_missing("it was asked to lead", ended);
@@ -247,6 +251,11 @@ void Standby::look_for_process(bool (*is_alive)(std::int32_t process)) {
   if (is_alive(process))
     seen_process_ = process;
   else if (seen_process_ == process)  // one that this process cannot see says nothing
+    ended_process_.store(process, std::memory_order_release);
+}
+
+void Standby::hear_of_end(std::int32_t process) noexcept {
+  if (process != 0 && process == other_process_.load(std::memory_order_acquire))
     ended_process_.store(process, std::memory_order_release);
 }
 

@@ -102,10 +102,11 @@ class Standby {
   Standby(Component& owner, Notices& notices) : owner_{owner}, notices_{notices} {}
 
   struct Pair {
-    std::string other;      // in words: "`thermal` in process `heat` on heat-pc"
-    std::string command;    // by which a person has this one lead
-    bool is_spare = false;  // the file says that it stands by
-    Duration deadline;      // of the other's beats
+    std::string other;            // in words: "`thermal` in process `heat` on heat-pc"
+    std::string other_process{};  // its name
+    std::string command;          // by which a person has this one lead
+    bool is_spare = false;        // the file says that it stands by
+    Duration deadline;            // of the other's beats
     bool is_same_pc = false;
     std::int32_t process = 0;  // own process id
   };
@@ -184,6 +185,8 @@ class Standby {
   [[nodiscard]] std::string fault() const;
   /// Not real-time, now and then: looks whether the process of the other, on this PC, has ended.
   void look_for_process(bool (*is_alive)(std::int32_t process));
+  /// The one that started the process of the other, on whatever PC, says that it has ended.
+  void hear_of_end(std::int32_t process) noexcept;
 
  private:
   void begin_to_lead(bool with_state) noexcept;
@@ -193,6 +196,7 @@ class Standby {
   [[nodiscard]] bool has_listened(const Tick& tick, bool heard) const noexcept;
   [[nodiscard]] Duty stand_by(const Tick& tick) noexcept;
   [[nodiscard]] Duty beside_one_that_does_not_lead(const Tick& tick) noexcept;
+  [[nodiscard]] bool has_ended() const noexcept;  // the process of the other
   [[nodiscard]] Duty beside_nobody(const Tick& tick) noexcept;
   [[nodiscard]] Duty found_missing(const char* why, bool is_certain) noexcept;
   void step_down(event::Severity level, const char* why) noexcept;

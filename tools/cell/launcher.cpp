@@ -29,6 +29,7 @@
 #include "tools/cell/process_claim.hpp"
 #include "tools/cell/restart_news.hpp"
 #include "tools/cell/restarts.hpp"
+#include "tools/cell/standbys.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
 
@@ -170,7 +171,8 @@ bool keep_alive(std::vector<Child>& children, const LaunchOptions& options, cons
       child.next_start = child.ended + std::chrono::nanoseconds{pause.ns};
       for (const auto& process : cell.processes)
         if (process.name == child.name)
-          news.tell(process, {.how = how, .restarts = child.restarts.count(), .pause = pause});
+          news.tell(process,
+                    {.how = how, .restarts = child.restarts.count(), .pause = pause, .process = child.pid});
     }
     if (Clock::now() >= *child.next_start)
       child = spawn(options, child.name, false, folder, child.restarts, how);
@@ -358,6 +360,10 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   const TemporaryFolder folder{"invar-run"};  // where the processes leave their last words
   Beside beside{{options, cell, folder.path()}, {ServiceManager::from_environment(), folder.path()}};
   RestartNews restart_news{cell};
+  if (!outcome.simulated)
+    for (const auto& process : cell.processes)
+      if (hosts.contains(process.host) && has_partner_on_another_pc(loaded, process.name))
+        restart_news.be_ready(process);
   std::vector<Child> children;
   for (const auto& process : cell.processes)
     if (hosts.contains(process.host))

@@ -118,6 +118,7 @@ class RunningProcess {
     CellFolders::Places models = loaded.model_places;
     models.emplace_back(received_models);
     shared_topics_ = shared_topics(loaded);
+    const bool hears_of_ends = !options.simulated && has_partner_on_another_pc(loaded, file_.name);
     const auto folders = std::make_shared<const CellFolders>(std::move(models), loaded.result_places);
     for (LoadedComponent& member : process.components) {
       member.component->courier = &courier_;
@@ -160,6 +161,7 @@ class RunningProcess {
             .last_end = options.last_end,
             .clock_reference = loaded.cell->hosts.front().name});
     if (supervisor_ != nullptr) supervisor_->connect(view_of_cell());
+    if (hears_of_ends) hear_of_ends();
   }
 
   int run(const ProcessOrders& orders) {
@@ -181,6 +183,19 @@ class RunningProcess {
     const Standby* standby = members_.at(index).standby;
     if (standby == nullptr || executor_.state(index) != LifecycleState::active) return fault;
     return standby->leads() ? fault : standby->fault();
+  }
+
+  /// Of processes on other PCs, from the `invar run` that started them.
+  void hear_of_ends() {
+    ends_ = node_.reader<lifecycle::ProcessStatus>(
+        dds::ServiceTopics{loaded_.cell->name}.process_status, "state",
+        [this](const lifecycle::ProcessStatus& status) {
+          if (status.pid() != 0) return;
+          for (const Member& member : members_)
+            if (member.standby != nullptr && member.standby->paired() &&
+                member.standby->paired()->other_process == status.process_name().c_str())
+              member.standby->hear_of_end(static_cast<std::int32_t>(status.ended_pid()));
+        });
   }
 
   void look_for_others() {
@@ -560,6 +575,7 @@ class RunningProcess {
   std::vector<std::string> faults_at_end_;
   std::deque<stage::AxisState> axes_;  // newest state of each, the loop's; addresses stay
   std::unique_ptr<dds::ProcessService> service_;
+  std::unique_ptr<dds::Connection> ends_;    // of processes on other PCs
   std::unique_ptr<dds::CellClient> client_;  // the supervisor's
   std::map<std::string, std::int64_t> last_status_;
   std::atomic<bool> asked_to_stop_{false};

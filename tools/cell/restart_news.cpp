@@ -41,25 +41,29 @@ struct RestartNews::Parts {
 RestartNews::RestartNews(const config::Cell& cell) : cell_{cell} {}
 RestartNews::~RestartNews() = default;
 
+template <class Act>
+void RestartNews::with_parts(const config::CellProcess& process, Act act) noexcept {
+  if (failed_) return;
+  try {
+    if (!parts_) parts_ = std::make_unique<Parts>(cell_, process);
+    act(*parts_);
+  } catch (const std::exception& error) {
+    failed_ = true;  // this log goes on
+    spdlog::warn("the cell cannot be told of restarts: {}", error.what());
+  }
+}
+
+void RestartNews::be_ready(const config::CellProcess& process) noexcept {
+  with_parts(process, [](Parts&) {});
+}
+
 void RestartNews::tell(const config::CellProcess& process, const End& end) noexcept {
   const std::string start = end.pause.ns == 0
                                 ? "starting it again"
                                 : "starting it again in " + shown(end.pause.in_seconds()) + " s";
-  spdlog::warn("process `{}` ended with {}; {} (restart {})", process.name, end.how, start, end.restarts);
-  if (failed_) return;
-  try {
-    if (!parts_) parts_ = std::make_unique<Parts>(cell_, process);
-    base::Stamp at;
-    at.time_ns(utc_now().ns);
-    event::Notice notice;
-    notice.cell(cell_.id);
-    notice.component_id(dds::name_number(process.name));
-    notice.at(at);
-    notice.level(event::SEVERITY_WARNING);
-    notice.source(process.name);
-    notice.text("ended with " + end.how + "; " + start + " (restart " + std::to_string(end.restarts) + ")");
-    parts_->notice.write(notice);
-    if (end.pause.ns == 0) return;
+  base::Stamp at;
+  at.time_ns(utc_now().ns);
+  with_parts(process, [&](Parts& parts) {
     lifecycle::ProcessStatus status;
     status.cell(cell_.id);
     status.process_id(dds::name_number(process.name));
@@ -67,14 +71,21 @@ void RestartNews::tell(const config::CellProcess& process, const End& end) noexc
     status.process_name(process.name);
     status.host(process.host);
     status.pid(0);
+    status.ended_pid(static_cast<std::uint32_t>(end.process));
     status.rate(1.0 / process.period.in_seconds());
     status.restarts(end.restarts);
     status.last_end(end.how + "; " + start);
-    parts_->status.write(status);
-  } catch (const std::exception& error) {
-    failed_ = true;  // this log goes on
-    spdlog::warn("the cell cannot be told of restarts: {}", error.what());
-  }
+    parts.status.write(status);
+    event::Notice notice;
+    notice.cell(cell_.id);
+    notice.component_id(dds::name_number(process.name));
+    notice.at(at);
+    notice.level(event::SEVERITY_WARNING);
+    notice.source(process.name);
+    notice.text("ended with " + end.how + "; " + start + " (restart " + std::to_string(end.restarts) + ")");
+    parts.notice.write(notice);
+  });
+  spdlog::warn("process `{}` ended with {}; {} (restart {})", process.name, end.how, start, end.restarts);
 }
 
 }  // namespace invar::tools

@@ -57,6 +57,7 @@ void join(const LoadedCell& loaded, const Member& one, const Member& other, cons
   const bool is_spare = one.component == two.spare.component;
   one.standby()->pair(
       {.other = other.words(),
+       .other_process = other.process->file->name,
        .command = "`invar lifecycle CELL " + one.component->file->name + " activate` has it lead",
        .is_spare = is_spare,
        .deadline = deadline_of(two),
@@ -118,6 +119,17 @@ std::set<std::string> shared_topics(const LoadedCell& loaded) {
           port->name() != "warm" && !port->topic.empty())
         topics.insert(port->topic);
   return topics;
+}
+
+bool has_partner_on_another_pc(const LoadedCell& loaded, const std::string& process) {
+  const auto two_pcs = [](const Two& two) {
+    return two.leader.process->file->host != two.spare.process->file->host;
+  };
+  for (const Two& two : pairs(loaded))
+    if (two_pcs(two) &&
+        (two.leader.process->file->name == process || two.spare.process->file->name == process))
+      return true;
+  return false;
 }
 
 void check_standbys(const LoadedCell& loaded) {

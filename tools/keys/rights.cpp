@@ -11,6 +11,7 @@
 #include "core/dds/identity.hpp"
 #include "core/dds/node.hpp"
 #include "tools/cell/bridge_file.hpp"
+#include "tools/cell/standbys.hpp"
 
 namespace invar::tools {
 
@@ -75,6 +76,8 @@ Rights of_process(const LoadedCell& loaded, const LoadedProcess& process) {
     (writes ? rights.writes : rights.reads).insert(checked(port.topic));
     if (writes && port.profile == "command") rights.writes.insert(dds::heartbeat_topic(cell.name));
   });
+  if (has_partner_on_another_pc(loaded, process.file->name))  // it hears there that the other's process ended
+    rights.reads.insert(dds::ServiceTopics{cell.name}.process_status);
   if (has_supervisor(process) || has<calibration::JobComponent>(process)) add_client(cell, rights);
   if (has_supervisor(process)) add_requests(cell, rights);
   // It brings the model that it found to a component on another PC.

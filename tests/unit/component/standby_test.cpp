@@ -323,6 +323,22 @@ TEST(Standby, AProcessThatHasEndedNeedsNeitherDeadlineNorDevice) {
                   "spare: took over from `first` (its process has ended), and goes on from its state"));
 }
 
+TEST(Standby, ThatAProcessOfAnotherPcHasEndedIsTakenFromItsLauncherThoughItsLastBeatCameSince) {
+  Pair pair;
+  pair.spare.device_is_free = false;
+  pair.begin();
+  pair.spare.standby().hear_of_end(7);  // of an earlier life
+  pair.step();
+  EXPECT_FALSE(pair.spare.commanded);
+  pair.spare.standby().hear_of_end(1);
+  pair.two_may_command = true;  // its last beat, by a step that was before its end
+  pair.step();
+  EXPECT_TRUE(pair.spare.commanded);
+  EXPECT_THAT(
+      pair.said,
+      testing::Contains("spare: took over from `first` (its process has ended), and goes on from its state"));
+}
+
 TEST(Standby, AProcessThatWasNeverSeenIsNotTakenForDead) {
   Pair pair;
   auto same_pc = *pair.spare.standby().paired();
