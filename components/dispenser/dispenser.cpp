@@ -160,7 +160,10 @@ void Dispenser::obey(const PressureCommand& command) noexcept {
   if (command.purge() && !purge_)
     notices_.say(event::SEVERITY_WARNING,
                  "a command to purge is refused: the controller's map has no `purge_pressure`");
-  if (!command.reset_alarms()) return;
+  if (command.reset_alarms()) reset_latch();
+}
+
+void Dispenser::reset_latch() noexcept {
   latched_ = false;
   reset_at_ = now();
   (void)client_.write(reset_alarms_, 1.0);

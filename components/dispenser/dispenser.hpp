@@ -65,6 +65,8 @@ class Dispenser final : public Component {
   void deactivate() noexcept override;
   void cleanup() noexcept override;
   void step(const Tick& tick) noexcept override;
+  [[nodiscard]] bool has_latch() const noexcept override { return true; }
+  void reset_latch() noexcept override;  // and that of the device
 
  private:
   using Staged = StagedModel<metrology::DropletTrajectory>;  // none: targets stay as they are
@@ -107,7 +109,7 @@ class Dispenser final : public Component {
   bool wanted_ = false;
   bool purge_ = false;
   bool driven_ = false;   // told to hold its pressure
-  bool latched_ = false;  // by an alarm, until a command resets it
+  bool latched_ = false;  // by an alarm, until a person resets it
   Instant reset_at_;
   std::uint64_t next_droplet_ = 1;
 };

@@ -181,17 +181,20 @@ bool Thermal::drive(double power, bool enable) noexcept {
   return taken;
 }
 
+void Thermal::reset_latch() noexcept {
+  if (!standby_.leads()) return;  // one that stands by writes nothing: its latch is that of the leader
+  latched_ = false;
+  watch_.reset();
+  reset_at_ = now();
+  (void)client_.write(reset_alarms_, 1.0);
+}
+
 void Thermal::obey(const ThermalCommand& command) noexcept {
   const double setpoint = command.setpoint();
   if (Parameters::setpoints.contains(setpoint) && setpoint < parameters_.over_temperature) {
     setpoint_ = setpoint;
     wanted_ = command.enabled();
-    if (command.reset_latch()) {
-      latched_ = false;
-      watch_.reset();
-      reset_at_ = now();
-      (void)client_.write(reset_alarms_, 1.0);
-    }
+    if (command.reset_latch()) reset_latch();
     return;
   }
   wanted_ = wanted_ && command.enabled();
@@ -245,13 +248,13 @@ void Thermal::latch(bool sound, const Tick& tick) noexcept {
   std::array<char, 200> text{};
   if (hot)
     std::snprintf(text.data(), text.size(),
-                  "%.4g degC is above `over_temperature`: the heater is off until a command resets the latch",
+                  "%.4g degC is above `over_temperature`: the heater is off until a person resets the latch",
                   temperature_);
   else
     std::snprintf(text.data(), text.size(),
                   "the controller has switched the heater off at its own limit, the slide at %.4g degC: it "
                   "is off until a "
-                  "command resets the latch",
+                  "person resets the latch",
                   temperature_);
   notices_.say(event::SEVERITY_TRIP, text.data());
 }
@@ -303,13 +306,13 @@ void Thermal::look_at_response(std::optional<double> reading, const Tick& tick) 
     std::snprintf(
         text.data(), text.size(),
         "the slide's reading leapt by more than %.4g K within a second, from %.4g degC: a thermistor that is "
-        "loose; the heater is off until a command resets the latch",
+        "loose; the heater is off until a person resets the latch",
         leap, temperature_);
   else
     std::snprintf(
         text.data(), text.size(),
         "the heat of %.4g W for %.4g s, given in %.4g s, has not %s (it reads %.4g degC). "
-        "A thermistor is off or frozen, or a pad is dead or too weak. The heater is off until a command "
+        "A thermistor is off or frozen, or a pad is dead or too weak. The heater is off until a person "
         "resets the latch",
         parameters_.power_limit, within, std::max(before + tick.period, within),
         doubt == Doubt::frozen ? "changed the slide's reading at all" : "warmed the slide as `response` says",

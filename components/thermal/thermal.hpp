@@ -30,10 +30,10 @@ namespace invar::thermal {
 /// - the latch trips when the heat given, however interrupted, does not show in the temperature (`response`): a thermistor
 ///   that came off or froze, a pad that is dead or too weak.
 ///
-/// The latch holds until a command resets it, and the device with it (register `reset_alarms`). A notice also names a
-/// controller that delivers power though it was told to be off. Each of these is said once in a notice, and once when it is
-/// over. A command whose setpoint is no number, outside the parameter's range or not below `over_temperature` can only switch
-/// off. Not real-time (Modbus).
+/// The latch holds until a person resets it (`invar lifecycle`, or `reset_latch` of a command), and the device with it (register
+/// `reset_alarms`). A notice also names a controller that delivers power though it was told to be off. Each of these is said once
+/// in a notice, and once when it is over. A command whose setpoint is no number, outside the parameter's range or not below
+/// `over_temperature` can only switch off. Not real-time (Modbus).
 class Thermal final : public Component, public Redundant {
  public:
   struct Pid {
@@ -131,6 +131,8 @@ class Thermal final : public Component, public Redundant {
   void cleanup() noexcept override;
   bool wind_down() noexcept override;
   void step(const Tick& tick) noexcept override;
+  [[nodiscard]] bool has_latch() const noexcept override { return true; }
+  void reset_latch() noexcept override;  // and that of the device
   [[nodiscard]] Standby& standby() noexcept override { return standby_; }
   [[nodiscard]] std::optional<Unfit> without_standby() const override;
   template <class W>

@@ -59,6 +59,10 @@ class Component {
   /// True: the component deals with it itself (the stage stops under control); false: it goes to error at
   /// once.
   virtual bool input_lost(const InputPort& input, const Tick& tick) noexcept;
+  /// Whether it has a protection that, once tripped, holds until a person resets it. Set-up.
+  [[nodiscard]] virtual bool has_latch() const noexcept { return false; }
+  /// A person resets that protection while the component is active, on the thread that steps. Real-time.
+  virtual void reset_latch() noexcept {}
   /// A parameter declared `while_running` was changed, on the thread that steps, between two steps.
   /// Real-time.
   virtual void parameters_changed() noexcept {}

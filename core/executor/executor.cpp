@@ -185,6 +185,10 @@ void Executor::obey(Instant now) noexcept {
         slot.values[command.parameter].store(command.value, std::memory_order_relaxed);
         slot.parameters_dirty = true;
         break;
+      case Command::Kind::reset_latch:
+        slot.component->set_now(now, count_.cycle);
+        slot.component->reset_latch();
+        break;
       case Command::Kind::clear_histograms:
         wake_up_.clear();
         compute_.clear();

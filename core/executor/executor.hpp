@@ -175,6 +175,7 @@ class Executor {
       deactivate,
       wind_down,
       set_parameter,
+      reset_latch,
       clear_histograms,
       clear_trip
     };

@@ -134,6 +134,10 @@ Outcome Executor::transition(std::size_t index, Transition transition) {
   Slot& slot = *slots_.at(index);
   Component& component = *slot.component;
   const LifecycleState state = slot.state.load(std::memory_order_acquire);
+  if (transition == Transition::reset && state == LifecycleState::active && component.has_latch())
+    return carry_out({Command::Kind::reset_latch, static_cast<std::uint32_t>(index), 0, 0.0})
+               ? Outcome{0, Verdict::done, state, ""}
+               : Outcome{0, Verdict::failed, state, "the loop does not answer; it may hang in a step"};
   const Decision decision = decide(state, transition);
   if (decision.kind == Decision::Kind::already) return {0, Verdict::already, state, ""};
   if (decision.kind == Decision::Kind::refused) {

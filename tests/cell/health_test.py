@@ -125,6 +125,25 @@ class Warm(unittest.TestCase):
         self.assertRegex(" ".join(ended["faults"]), "thermal: the heater is latched off")
         self.assertRegex(run.stderr, r"\[critical\] at [0-9.]+ s: thermal: .*over_temperature")
 
+    def poll(self, reference, *values):
+        subprocess.run(["mbpoll", "-m", "tcp", "-p", str(self.port), "-t", "4", "-r", str(reference), "-1", "127.0.0.1",
+                        *[str(value) for value in values]], check=True, capture_output=True)
+
+    def test_a_latch_holds_until_a_person_resets_it(self):
+        run = self.run_cell("--real-time")
+        self.wait_for("a cell that is well", lambda: self.status() and self.status()[1]["healthy"])
+        self.poll(4, 100)  # the device's own limit: 10 degC, which the pad is above
+        self.wait_for("the latch", lambda: "latched off" in " ".join(self.status()[1]["faults"]))
+        self.poll(4, 800)
+        time.sleep(1.0)
+        self.assertIn("`invar lifecycle CELL COMPONENT reset`", " ".join(self.status()[1]["faults"]))
+        reset = subprocess.run([INVAR, "lifecycle", self.file, "thermal", "reset"], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(reset.returncode, 0, reset.stdout + reset.stderr)
+        self.wait_for("a cell that is well again", lambda: self.status()[1]["healthy"], 10)
+        other = subprocess.run([INVAR, "lifecycle", self.file, "heater", "reset"], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(other.returncode, 1, "a component without a latch that is active has nothing to reset")
+        self.assertEqual(self.end(run), 0)
+
     def test_one_that_cannot_live_is_started_again_after_pauses_and_the_rest_goes_on(self):
         taken = socket.socket()
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

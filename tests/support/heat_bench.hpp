@@ -96,7 +96,7 @@ struct HeatBench final : Component {
     sample.enabled(enabled);
     command.write(sample);
   }
-  void reset_latch(double setpoint = 30.0) {
+  void send_reset(double setpoint = 30.0) {
     ThermalCommand reset;
     reset.setpoint(setpoint);
     reset.enabled(true);

@@ -14,7 +14,8 @@ ComponentFaults::Sign ComponentFaults::sign_of(const stage::AxisState& state) {
 }
 
 ComponentFaults::Sign ComponentFaults::sign_of(const thermal::NodeTemperature& node) {
-  if (node.over_temperature()) return {"the heater is latched off: mend the cause, then reset the latch"};
+  if (node.over_temperature())
+    return {"the heater is latched off: mend the cause, then `invar lifecycle CELL COMPONENT reset`"};
   if (node.watchdog_tripped())
     return {"the controller's watchdog has switched the heater off", answer_patience};
   if (node.stale())
@@ -23,7 +24,8 @@ ComponentFaults::Sign ComponentFaults::sign_of(const thermal::NodeTemperature& n
 }
 
 ComponentFaults::Sign ComponentFaults::sign_of(const dispensing::PressureState& state) {
-  if (state.over_pressure()) return {"the pressure is latched off: mend the cause, then reset the alarms"};
+  if (state.over_pressure())
+    return {"the pressure is latched off: mend the cause, then `invar lifecycle CELL COMPONENT reset`"};
   if (state.sensor_fault()) return {"the pressure sensor is at fault"};
   if (state.comm_lost())
     return {"the pressure controller missed its heartbeat and switched off", answer_patience};

@@ -203,6 +203,29 @@ TEST(Executor, AComponentDoesNotObeyWhatItWasToldWhileItWasNotActive) {
   EXPECT_THAT(component.obeyed, ElementsAre(3U));
 }
 
+struct Fuse final : Component {
+  bool blown = true;
+  void step(const Tick&) noexcept override {}
+  [[nodiscard]] bool has_latch() const noexcept override { return true; }
+  void reset_latch() noexcept override { blown = false; }
+};
+
+TEST(Executor, ALatchIsResetWhileItsComponentIsActiveAndOneWithoutALatchRefuses) {
+  Executor executor{simulated()};
+  auto owned = std::make_unique<Fuse>();
+  const Fuse& fuse = *owned;
+  executor.add(std::move(owned), {"fuse", {}, nullptr, 1});
+  executor.add(std::make_unique<Obedient>(), {"obedient", {}, nullptr, 1});
+  for (const std::size_t each : {0U, 1U})
+    for (const Transition transition : {Transition::configure, Transition::activate})
+      ASSERT_TRUE(executor.transition(each, transition).ok());
+  const Outcome outcome = executor.transition(0, Transition::reset);
+  EXPECT_EQ(outcome.verdict, Verdict::done) << outcome.reason;
+  EXPECT_EQ(outcome.state, LifecycleState::active);
+  EXPECT_FALSE(fuse.blown);
+  EXPECT_EQ(executor.transition(1, Transition::reset).verdict, Verdict::refused);
+}
+
 TEST(Executor, WhatMovesIsSteppedUntilItRestsAndKeepsWhatItReads) {
   Track track{simulated()};
   track.executor.advance_to(at_ms(10));

@@ -115,7 +115,7 @@ TEST(Thermal, LatchesAtOverTemperatureUntilItIsReset) {
   state = bench.run_for(600.0);
   EXPECT_TRUE(state.over_temperature());
   EXPECT_EQ(state.heater_power(), 0.0);
-  bench.reset_latch(24.0);
+  bench.send_reset(24.0);
   EXPECT_FALSE(bench.cycle_once().over_temperature());
 }
 
@@ -132,7 +132,7 @@ TEST(Thermal, DeviceThatLatchesAtItsOwnLimitIsSaidAndResetWithTheLoopsLatch) {
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("switched the heater off at its own limit")));
   for (int i = 0; i < 6000; ++i) ASSERT_FALSE(bench.cycle_once().enabled()) << i;
   EXPECT_THAT(bench.said(), IsEmpty());
-  bench.reset_latch(30.0);
+  bench.send_reset(30.0);
   double power = 0.0;
   for (int i = 0; i < 20 && power == 0.0; ++i) {
     bench.cycle_once();
@@ -177,7 +177,7 @@ TEST(Thermal, FullPowerThatDoesNotShowInTheTemperatureLatches) {
   EXPECT_THAT(bench.said(), ElementsAre(HasSubstr("the heat of 120 W for 60 s, given in 60 s, has not")));
   EXPECT_FALSE(bench.run_for(5.0).enabled());
   EXPECT_EQ(bench.heater_power(), 0.0);
-  bench.reset_latch();
+  bench.send_reset();
   EXPECT_TRUE(bench.run_for(5.0).enabled());  // and tries anew
   EXPECT_THAT(bench.said(), IsEmpty());
 }
