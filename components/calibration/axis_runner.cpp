@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "components/calibration/deliver.hpp"
+#include "components/calibration/wait.hpp"
 
 namespace invar::calibration {
 
@@ -30,66 +31,28 @@ std::string micrometres(double value) {
 void AxisRunner::make_safe() {
   stage::AxisCommand stop;
   stop.kind(stage::AXIS_COMMAND_STOP);
-  send(stop);
-}
-
-void AxisRunner::send(stage::AxisCommand& command) {
-  stamp(command);
-  command.axis(static_cast<std::uint32_t>(axis_));
-  command.id(next_command_id());
-  command_.write(command);
-}
-
-Task AxisRunner::wait(double seconds) {
-  const Instant until = now() + Duration::seconds(seconds);
-  while (now() < until) co_await NextStep{};
+  axis_.send(stop, next_command_id());
 }
 
 /// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
 Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* record) {
-  send(command);
-  loop_.reset();
-  link_.reset();
-  bool taken = false;
-  const std::string axis_said = axis_name(state_.topic, axis_);
+  axis_.send(command, next_command_id());
+  const std::string refused = axis_.said() + " refused a motion of the job";
   const Instant started = now();
   for (;;) {
     co_await NextStep{};
     if (record != nullptr) take_down(*record);
-    const auto* state = state_.latest();
-    if (state != nullptr) {
-      loop_.take(*state);
-      link_.look(state_.age(now()));
-    }
-    const bool answered = state != nullptr && state->command_id() == command.id();
-    if (state != nullptr && state->mode() == stage::AXIS_MODE_FAULT)
-      throw std::runtime_error{axis_said + " tripped while moving" + loop_.figures()};
-    if (answered && state->command_refused())
-      throw std::runtime_error{taken ? link_.stopped(axis_said, name)
-                                     : axis_said + " refused a motion of the job"};
-    if (const auto fault = link_.fault(axis_said, name)) throw std::runtime_error{*fault};
-    taken = taken || answered;
-    if (answered && state->command_done()) {
-      if (const auto fault = loop_.fault()) throw std::runtime_error{axis_said + ": " + *fault};
-      co_return;
-    }
-    if (!answered && now() - started > Duration::seconds(5.0))
+    const JobAxis::Motion motion = axis_.follow(refused);
+    if (motion.done) co_return;
+    if (!motion.answered && now() - started > Duration::seconds(5.0))
       throw std::runtime_error{"the axis does not answer: is its stage active?"};
   }
 }
 
 Task AxisRunner::enable() {
-  const Instant give_up = now() + Duration::seconds(10.0);
-  while (state_.latest() == nullptr || !state_.latest()->enabled()) {  // processes come up in any order
-    stage::AxisCommand command;
-    command.kind(stage::AXIS_COMMAND_ENABLE);
-    send(command);
-    co_await wait(0.5);
-    const auto* state = state_.latest();
-    const bool tripped = state != nullptr && state->mode() == stage::AXIS_MODE_FAULT;
-    if (tripped || now() > give_up)
-      throw std::runtime_error{AxisLink::not_enabled(axis_name(state_.topic, axis_), state)};
-  }
+  std::vector<JobAxis*> axes{&axis_};
+  CommandIds ids = [this] { return next_command_id(); };
+  co_await enable_axes(axes, ids, Duration::seconds(10.0));
 }
 
 Task AxisRunner::move(double target, double velocity, recording::Table* record) {
@@ -104,11 +67,11 @@ Task AxisRunner::align(double from) {
   sensing::BeamCommand beam;
   stamp(beam);
   beam.id(next_command_id());
-  beam.beam_start()[static_cast<std::size_t>(axis_)] = from;
-  beam.beam_direction()[static_cast<std::size_t>(axis_)] = 1.0;
+  beam.beam_start()[static_cast<std::size_t>(number_)] = from;
+  beam.beam_direction()[static_cast<std::size_t>(number_)] = 1.0;
   beam_.write(beam);
   beam_from_ = from;
-  co_await wait(0.1);
+  co_await wait(*this, 0.1);
   sensing::DisplacementReading before;
   while (reading_.take(before)) {  // of another beam
   }

@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "components/calibration/axis_link.hpp"
+#include "components/calibration/job_axis.hpp"
 #include "components/calibration/job_component.hpp"
-#include "components/calibration/loop_watch.hpp"
 #include "core/recording/table.hpp"
 #include "idl/compensation.h"
 #include "idl/sensing.h"
@@ -47,7 +46,7 @@ class AxisRunner : public JobComponent {
   [[nodiscard]] virtual std::vector<Reach> reaches() const = 0;
 
  protected:
-  explicit AxisRunner(const std::int64_t& axis) : axis_{axis} {}
+  explicit AxisRunner(const std::int64_t& axis) : number_{axis}, axis_{*this, number_, "state", "command"} {}
   /// Adds the row of a step to the record of a motion.
   virtual void take_down(recording::Table& record) = 0;
 
@@ -55,13 +54,13 @@ class AxisRunner : public JobComponent {
   /// A command to its end; nullptr: nothing is taken down. A loop that is at its current limit or trips fails the job.
   Task command_axis(stage::AxisCommand command, recording::Table* record);
   Task move(double target, double velocity, recording::Table* record);
-  Task wait(double seconds);
   /// Zeroes the laser where the tool stands, which is called `from` [m].
   Task align(double from);
   Task use_model(const std::filesystem::path& model);
   Task roll_back_model();
 
-  Input<stage::AxisState> state_{*this, "state"};
+  const std::int64_t& number_;
+  JobAxis axis_;
   Inbox<sensing::DisplacementReading> reading_{
       *this, "reading", {.optional = true, .profile = "calibration"}, 4096};
   double beam_from_ = 0.0;  // where the laser was zeroed [m]
@@ -69,12 +68,7 @@ class AxisRunner : public JobComponent {
  private:
   void make_safe() override;
   Task command_model(compensation::ModelCommandKind kind, const std::string& path);
-  void send(stage::AxisCommand& command);
 
-  const std::int64_t& axis_;
-  LoopWatch loop_;  // of the motion under way
-  AxisLink link_;
-  Output<stage::AxisCommand> command_{*this, "command", "command"};
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};
   Input<compensation::ModelStatus> model_status_{

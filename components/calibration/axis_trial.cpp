@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "components/calibration/wait.hpp"
 #include "core/base/new_file.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/ripple_identification.hpp"
@@ -77,7 +78,7 @@ std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
 
 /// The newest state and what the laser says into the record; the setpoint of the laser's instant is known exactly.
 void AxisTrial::take_down(recording::Table& record) {
-  const auto* state = state_.latest();
+  const auto* state = axis_.state.latest();
   double laser = std::numeric_limits<double>::quiet_NaN();
   sensing::DisplacementReading reading;
   while (reading_.take(reading)) {
@@ -114,7 +115,7 @@ Task AxisTrial::run(const RippleJob& job) {
   if (model.plant != physics::Plant::axis) throw std::runtime_error{"the model is none of an axis"};
   co_await enable();
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(settle);
+  co_await wait(*this, settle);
 
   recording::Table before = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, before);
@@ -149,7 +150,7 @@ Task AxisTrial::run(const RippleJob& job) {
   co_await use_model(patched);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the ripple is fed forward; verifying");
-  co_await wait(2.0);  // it fades in
+  co_await wait(*this, 2.0);  // it fades in
 
   recording::Table after = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, after);
@@ -176,7 +177,7 @@ Task AxisTrial::run(const TrackingJob& job) {
   std::string found = "tracking error by the laser, RMS:";
   for (const double period : job.periods) {
     co_await move(job.from, 0.0, nullptr);
-    co_await wait(settle);
+    co_await wait(*this, settle);
     co_await align(job.from);
     recording::Table record = record_table();
     stage::AxisCommand sine;
@@ -208,11 +209,11 @@ Task AxisTrial::run(const TrackingJob& job) {
 
 Task AxisTrial::move_at_all_speeds(const MotionJob& job, recording::Table& record) {
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(settle);
+  co_await wait(*this, settle);
   for (const double velocity : job.velocities)
     for (std::int64_t pass = 0; pass < job.passes; ++pass)
       for (const double target : {job.to, job.from}) co_await move(target, velocity, &record);
-  co_await wait(settle);
+  co_await wait(*this, settle);
 }
 
 Task AxisTrial::run(const MotionJob& job) {
@@ -243,7 +244,7 @@ Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
   progress_ = 0.5;
   report(job::JOB_RUNNING, "giving the model to the stage");
   co_await use_model(file);
-  co_await wait(2.0);  // it fades in
+  co_await wait(*this, 2.0);  // it fades in
   recording::Table after = record_table();
   co_await move_at_all_speeds(job, after);
   after.write(folder / "motion_after.csv");

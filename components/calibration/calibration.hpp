@@ -1,34 +1,25 @@
-// Calibration: runs the measuring jobs of a cell - moves, settles, reads, identifies, activates, verifies.
+// Calibration: the component that runs the measuring jobs of a cell - geometric, thermal, print - one at a time.
 #pragma once
 
-#include <Eigen/Core>
 #include <algorithm>
-#include <array>
-#include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
-#include "components/calibration/axis_link.hpp"
+#include "components/calibration/axis_group.hpp"
+#include "components/calibration/geometric_calibration.hpp"
 #include "components/calibration/job_component.hpp"
 #include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
-#include "components/calibration/loop_watch.hpp"
+#include "components/calibration/line_laser.hpp"
+#include "components/calibration/model_transaction.hpp"
 #include "components/calibration/printing.hpp"
 #include "components/calibration/task.hpp"
+#include "components/calibration/thermal_calibration.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
-#include "core/metrology/thermal/heat_trace.hpp"
-#include "core/metrology/thermal/thermal_identification.hpp"
-#include "core/recording/table.hpp"
-#include "idl/compensation.h"
-#include "idl/job.h"
-#include "idl/sensing.h"
-#include "idl/stage.h"
-#include "idl/thermal.h"
 
 namespace invar::calibration {
 
@@ -70,91 +61,27 @@ class Calibration final : public JobComponent, private JobHost {
   void activate() override;
 
  private:
-  using Point = Eigen::Vector3d;
-  struct Axis {
-    Axis(Calibration& owner, std::size_t number)
-        : state{owner, std::string{"state_"} + "xyz"[number]},
-          command{owner, std::string{"command_"} + "xyz"[number], "command"} {}
-    Input<stage::AxisState> state;
-    Output<stage::AxisCommand> command;
-    std::uint64_t last_command = 0;
-    LoopWatch loop;  // of the motion under way
-    AxisLink link;
-    bool taken = false;  // it is under way
-  };
-
-  // calibration.cpp: jobs, and what all of them are made of.
   std::optional<Job> find(const std::string& wanted) override;
   void make_safe() override;
   void tend(bool job_runs) override;
-  void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const Pace& pace = {});
-  Task run(const PrintJob& job);
+  Task print(const PrintJob& job);
+  Task to_its_end(Task job);
+
+  // JobHost
+  Task enable_axes() override { return axes_.enable(); }
+  Task move_to(Eigen::Vector3d target, Pace pace) override { return axes_.move_to(target, pace); }
   void tell(const std::string& text, double progress) override;
+  void advance(double progress) override { progress_ = progress; }
   std::uint64_t next_id() override { return next_command_id(); }
-  Task enable_axes() override;
-  Task move_to(Point target, Pace pace) override;
-  Task wait(double seconds);
-  Task align(Point from, Point to);
-  Task average_reading(std::int64_t count, double& mean);
-
-  // transaction.cpp: the compensation's models.
-  Task clear_models(const std::string& layers);
-  Task use_model(const std::filesystem::path& model);
-  Task keep_models();
-  Task roll_back(const std::string& why);
-  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
-  std::uint64_t send_model(compensation::ModelCommandKind kind, const std::string& path);
-  void watch_transaction();
-  void abandon_transaction();
-
-  // geometric_job.cpp
-  Task run(const GeometricJob& job);
-  Task calibrate(const GeometricJob& job);
-  Task measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
-               double share, recording::Table& table);
-
-  // thermal_job.cpp
-  struct Pass {
-    const ThermalJob& job;
-    bool between = false;  // at points in the middle between those that are fitted
-    double number = 0.0;
-    std::string model;  // in use meanwhile; empty: none
-  };
-  Task run(const ThermalJob& job);
-  Task reach(const ThermalJob& job, double temperature);
-  Task pass(const Pass& what, recording::Table& table);  // `what` outlives it
-  Task compare(const ThermalJob& job, const TraceSpec* trace,
-               const std::array<std::filesystem::path, 2>& files, recording::Table& table);
-  [[nodiscard]] recording::Table heat_table(bool with_models) const;
-  void set_heater(double setpoint);
-  void follow_heat();
 
   const Parameters& parameters_;
-  Inbox<sensing::DisplacementReading> reading_{*this, "reading", {.profile = "calibration"}, 4096};
-  Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
-  Output<compensation::ModelCommand> model_{*this, "model", "command"};
-  Input<compensation::ModelStatus> model_status_{
-      *this, "model_status", {.optional = true, .profile = "state"}};
-  Input<thermal::NodeTemperature> temperature_{*this, "temperature", {.optional = true, .profile = "state"}};
-  Output<thermal::ThermalCommand> heater_{*this, "heater", "command"};
-  std::vector<std::unique_ptr<Input<thermal::NodeTemperature>>> zones_;
-  std::vector<std::unique_ptr<Axis>> axes_;
+  JobHost& host_{*this};
+  LineLaser laser_{*this, host_, parameters_.settle_timeout};
+  ModelTransaction models_{*this, host_};
+  ThermalCalibration thermal_{*this, host_, laser_, models_, parameters_.zones};
+  GeometricCalibration geometric_{host_, laser_, models_};
+  AxisGroup axes_{*this, host_, {parameters_.axes, parameters_.settle_timeout, parameters_.velocity}};
   std::unique_ptr<Printing> printing_;  // only where there are print jobs: its ports must be connected
-
-  std::uint64_t transaction_ = 0;   // ours on the compensation; 0: none
-  bool transaction_known_ = false;  // the compensation has confirmed it
-  Instant kept_at_;
-
-  metrology::HeatTrace heat_;
-  metrology::ThermalReadings::History heat_history_;
-  const TraceSpec* trace_ = nullptr;  // that the heater follows
-  Instant trace_start_;
-  Instant began_;  // the thermal job; times in its files count from here
-  Instant set_at_;
-  std::optional<double> setpoint_before_;  // of the heater, before the job
-
- public:
-  ~Calibration() override;
 };
 
 }  // namespace invar::calibration

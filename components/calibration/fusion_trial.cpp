@@ -7,6 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "components/calibration/wait.hpp"
 #include "core/compensation/fusion_file.hpp"
 #include "core/numerics/sure_gain.hpp"
 
@@ -142,14 +143,14 @@ void FusionTrial::take_down(recording::Table&) {
           sources_[i]->is_position ? reading.position() : reading.velocity();
   sensing::FusedPosition fused;
   while (fused_.take(fused)) rows_[fused.at().time_ns()].fused = fused.position();
-  if (const auto* state = state_.latest(); state != nullptr)
+  if (const auto* state = axis_.state.latest(); state != nullptr)
     rows_[state->at().time_ns()].setpoint = state->setpoint_position();
 }
 
 /// One sinusoid from rest; what was read stands in `rows_` afterwards.
 Task FusionTrial::swing(const FusionJob& job, double period) {
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(settle);
+  co_await wait(*this, settle);
   recording::Table unused;
   take_down(unused);  // what waited
   rows_.clear();
@@ -221,7 +222,7 @@ Task FusionTrial::run(const FusionJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   co_await enable();
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(settle);
+  co_await wait(*this, settle);
   co_await align(job.from);
   Verified before, after;
   co_await verify(job, "before", before);
@@ -249,7 +250,7 @@ Task FusionTrial::run(const FusionJob& job) {
   const auto file = folder / "compensation.yaml";
   text.write(file);
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(settle);
+  co_await wait(*this, settle);
   co_await use_model(file);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the model is in use; verifying");

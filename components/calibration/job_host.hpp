@@ -25,6 +25,8 @@ class JobHost {
   virtual Task move_to(Eigen::Vector3d target, Pace pace) = 0;
   /// Reports the present activity of the job and its share of the whole.
   virtual void tell(const std::string& text, double progress) = 0;
+  /// The job's share that is done, for its next report.
+  virtual void advance(double progress) = 0;
   /// A number for a command, never given before.
   virtual std::uint64_t next_id() = 0;
 };

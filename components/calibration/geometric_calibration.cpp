@@ -1,11 +1,11 @@
-// The geometric calibration: lines, the fit, and whether it helps on lines that were not fitted.
+#include "components/calibration/geometric_calibration.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
-#include "components/calibration/calibration.hpp"
 #include "components/calibration/identify.hpp"
 #include "core/base/fault.hpp"
 #include "core/base/shown.hpp"
@@ -67,76 +67,71 @@ void check_travel(const GeometricJob& job, const config::Node& node) {
   check("verify", job.verify);
 }
 
-Task Calibration::measure(const LineSpec& line, double interval, std::int64_t cycles, std::int64_t readings,
-                          double share, recording::Table& table) {
-  const Point from = line.start();
-  const Point to = line.end();
+Task GeometricCalibration::measure(const LineSpec& line, const Way& how, recording::Table& table) {
+  const Eigen::Vector3d from = line.start();
+  const Eigen::Vector3d to = line.end();
   const double length = (to - from).norm();
-  const auto intervals = std::max<std::int64_t>(1, std::llround(length / interval));
-  co_await move_to(from, {});
-  co_await align(from, to);
+  const auto intervals = std::max<std::int64_t>(1, std::llround(length / how.interval));
+  co_await host_.move_to(from, {});
+  co_await laser_.align(from, to);
   const double begin = progress_;
-  for (std::int64_t cycle = 0; cycle < cycles; ++cycle) {
+  for (std::int64_t cycle = 0; cycle < how.cycles; ++cycle) {
     for (std::int64_t k = 0; k <= 2 * intervals + 1; ++k) {
       const bool forth = k <= intervals;
       const auto index = forth ? k : 2 * intervals + 1 - k;
-      const Point target = from + (to - from) * (static_cast<double>(index) / static_cast<double>(intervals));
-      co_await move_to(target, {});
+      const Eigen::Vector3d target =
+          from + (to - from) * (static_cast<double>(index) / static_cast<double>(intervals));
+      co_await host_.move_to(target, {});
       double mean = 0.0;
-      co_await average_reading(readings, mean);
+      co_await laser_.average(how.readings, mean);
       append(table, line.name, target, mean, static_cast<double>(cycle + 1), forth ? 1.0 : -1.0);
-      progress_ = begin + share *
+      progress_ = begin + how.share *
                               (static_cast<double>(cycle) +
                                static_cast<double>(k) / static_cast<double>(2 * intervals + 2)) /
-                              static_cast<double>(cycles);
+                              static_cast<double>(how.cycles);
+      host_.advance(progress_);
     }
   }
-  progress_ = begin + share;
-  report(job::JOB_RUNNING, "measured line " + line.name);
+  progress_ = begin + how.share;
+  host_.tell("measured line " + line.name, progress_);
 }
 
-Task Calibration::run(const GeometricJob& job) {
-  co_await calibrate(job);
-  progress_ = 1.0;
-  report(job::JOB_DONE, "done");
-}
-
-Task Calibration::calibrate(const GeometricJob& job) {
+Task GeometricCalibration::run(const GeometricJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   const double share = 1.0 / static_cast<double>(job.lines.size() + 2 * job.verify.size() + 1);
-  co_await enable_axes();
-  co_await clear_models("");
+  const Way fitted{job.interval, job.cycles, job.readings, share};
+  const Way verified{job.verify_interval, 1, job.readings, share};
+  progress_ = 0.0;
+  co_await host_.enable_axes();
+  co_await models_.clear("");
 
   recording::Table before = lines_table();
-  for (const LineSpec& line : job.verify)
-    co_await measure(line, job.verify_interval, 1, job.readings, share, before);
+  for (const LineSpec& line : job.verify) co_await measure(line, verified, before);
   if (before.rows() > 0) before.write(folder / "verify_before.csv");
   const double was = metrology::line_errors(readings_of(before)).rms;
 
   recording::Table lines = lines_table();
-  for (const LineSpec& line : job.lines)
-    co_await measure(line, job.interval, job.cycles, job.readings, share, lines);
+  for (const LineSpec& line : job.lines) co_await measure(line, fitted, lines);
   lines.write(folder / "lines.csv");
 
-  report(job::JOB_RUNNING, "identifying the error");
+  host_.tell("identifying the error", progress_);
   const IdentifiedGeometry found = identify_geometric(job.machine, lines, folder);
   if (metrology::line_errors(readings_of(before), found.model).rms > was)
     throw std::runtime_error{
         "the model would make the error larger on lines that were not fitted; it was not activated"};
-  co_await use_model(found.file);
+  co_await models_.use(found.file);
   progress_ += share;
-  report(job::JOB_RUNNING, "compensation active; verifying");
+  host_.tell("compensation active; verifying", progress_);
 
   recording::Table after = lines_table();
-  for (const LineSpec& line : job.verify)
-    co_await measure(line, job.verify_interval, 1, job.readings, share, after);
+  for (const LineSpec& line : job.verify) co_await measure(line, verified, after);
   if (after.rows() > 0) {
     after.write(folder / "verify_after.csv");
     if (metrology::line_errors(readings_of(after)).rms > was)
-      co_await roll_back(
+      co_await models_.roll_back(
           "the compensation makes the error larger on lines that were not fitted; rolled back");
   }
-  co_await keep_models();
+  co_await models_.keep();
 }
 
 }  // namespace invar::calibration

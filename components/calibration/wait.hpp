@@ -1,0 +1,15 @@
+// wait: a job lets time pass.
+#pragma once
+
+#include "components/calibration/task.hpp"
+#include "core/component/component.hpp"
+
+namespace invar::calibration {
+
+/// `seconds` on the clock of `owner`, whose job this is.
+inline Task wait(const Component& owner, double seconds) {
+  const Instant until = owner.now() + Duration::seconds(seconds);
+  while (owner.now() < until) co_await NextStep{};
+}
+
+}  // namespace invar::calibration
