@@ -280,6 +280,7 @@ def main():
                               'mount -t tmpfs tmpfs /run && exec "$0" "$@"', sys.executable, *sys.argv])
     print(f"seed {given.seed}", flush=True)
     order = ["kill"] * given.kills + [given.seconds[i % len(given.seconds)] for i in range(given.cuts)]
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # its hosts and processes end with it
     folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-campaign-"))
     campaign = Campaign(given, folder)
     try:

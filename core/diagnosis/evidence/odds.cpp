@@ -91,7 +91,8 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
 
 bool is_another_cause(const Finding& finding, const Alternative& alternative) {
   const auto &one = finding.term, &other = alternative.term;
-  return one.info != other.info || one.on != other.on || one.info->plant != Plant::equations;
+  return one.info != other.info || one.on != other.on || one.with != other.with ||
+         one.info->plant != Plant::equations;
 }
 
 bool is_elsewhere(const Term& one, const Term& other) {

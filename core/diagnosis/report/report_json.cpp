@@ -118,12 +118,21 @@ json curve_json(const physics::Curve& curve) {
   return one;
 }
 
+void add_place(json& entry, const physics::Term& term) {
+  if (!term.on.empty()) entry["on"] = term.on;
+  if (!term.with.empty()) entry["with"] = term.with;
+}
+
 void add_finding(json& report, const Case& data, const Diagnosis& d, const Finding& finding) {
   const auto& term = finding.term;
   json alternatives = json::array();
   for (const auto& a : finding.alternatives) {
     const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
-    if (p > 1e-4) alternatives.push_back({{"term", a.term.info->name}, {"probability", p}});
+    if (p > 1e-4) {
+      json other = {{"term", a.term.info->name}, {"site", site_of(data, a.term)}, {"probability", p}};
+      add_place(other, a.term);
+      alternatives.push_back(std::move(other));
+    }
     if (a.explains_as_well())
       report["ambiguity"].push_back(
           {{"between", {name_beside(data, term, a.term), name_beside(data, a.term, term)}},
@@ -138,8 +147,7 @@ void add_finding(json& report, const Case& data, const Diagnosis& d, const Findi
                 {"alternatives", alternatives},
                 {"description", description_of(d, finding)}};
   if (finding.stand_in != nullptr) entry["stand_in"] = finding.stand_in->name;
-  if (!term.on.empty()) entry["on"] = term.on;
-  if (!term.with.empty()) entry["with"] = term.with;
+  add_place(entry, term);
   if (!term.curve.knots.empty()) entry["curve"] = curve_json(term.curve);
   report["findings"].push_back(entry);
 }
