@@ -73,12 +73,25 @@ std::string per(const std::string& unit, const std::string& of, int power = 1) {
   return unit + "/" + (joined ? "(" + of + ")" : of) + (power > 1 ? std::to_string(power) : "");
 }
 
+bool is_state(const Case& data, const std::string& place) {
+  const auto& states = data.model.equations.states;
+  return std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == place; });
+}
+
+/// The unit of a place of the user's own equations: of the column that records it under whatever name, or of a state's start.
+std::string unit_at(const Case& data, const std::string& place) {
+  if (const auto unit = unit_of_variable(data, place); !unit.empty()) return unit;
+  for (const auto& output : data.model.equations.outputs)
+    if (const auto unit = unit_of_variable(data, output.name); output.expression == place && !unit.empty())
+      return unit;
+  for (const auto& parameter : data.model.parameters)
+    if (parameter.name == place + ".initial" && parameter.unit != "1") return parameter.unit;
+  return "";
+}
+
 /// The unit of an effect's number at a place of the user's own equations; an effect on a state is added to its rate.
 std::string unit_of_added(const Case& data, const physics::Term& term, const std::string& of_place) {
-  const auto& states = data.model.equations.states;
-  const bool is_rate =
-      std::any_of(states.begin(), states.end(), [&](const auto& state) { return state.name == term.on; });
-  return per(is_rate ? per(of_place, "s") : of_place, unit_of_variable(data, physics::goes_over(term)),
+  return per(is_state(data, term.on) ? per(of_place, "s") : of_place, unit_at(data, physics::goes_over(term)),
              term.info->power);
 }
 
@@ -91,9 +104,12 @@ std::string unit_of(const Case& data, const physics::Term& term, std::size_t par
   if (is("delay") || is("time_constant") || (is("period") && term.with == "t")) return "s";
   const auto unit_or_one = [](std::string text) { return text.empty() ? std::string{"1"} : text; };
   if (is("period")) return unit_or_one(unit_of_variable(data, physics::goes_over(term)));
-  const auto* signal = data.model.signal(term.on);
-  if (signal == nullptr) return "1";  // a state that nobody measures has the unit of the user's equations
-  const std::string of_place = unit_or_one(signal->unit);
+  if (is("coefficient") && term.info->lateness == physics::Lateness::store)
+    return is_state(data, term.on) ? "1/s" : "1";  // of a difference of two of one unit
+  const std::string known = unit_at(data, term.on);
+  if (known.empty() && data.model.signal(term.on) == nullptr)
+    return "1";  // of a state nobody measures: the user's own
+  const std::string of_place = unit_or_one(known);
   return term.info->lateness == physics::Lateness::none && term.info->cut == physics::Cut::nothing
              ? unit_of_added(data, term, of_place)
              : of_place;

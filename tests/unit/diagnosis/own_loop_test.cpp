@@ -1,6 +1,7 @@
 // Loops that the user wrote down, against a cart made here: its controller reads with noise, and the noise goes round.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -214,6 +215,29 @@ TEST(OwnLoop, ATermAtAStateIsThereThoughAnOutputBearsItsName) {
   EXPECT_EQ(site_of(data, drag), "equations.output");
   EXPECT_EQ(place_of(data, drag), "output x");
   EXPECT_EQ(unit_of(data, drag, 0), "s");
+}
+
+TEST(OwnLoop, NumbersHaveTheUnitOfAStateThatIsRecordedUnderAnotherNameOrByNobody) {
+  Case data;
+  data.model = test::model_of(
+      "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: u}\n"
+      "states:\n  v: {derivative: 'u - v', initial: {value: 0, unit: m/s}}\n"
+      "  hidden: {derivative: 'v - hidden', initial: {value: 0, unit: K}}\n"
+      "outputs: {speed: {column: w, expression: v}}\nparameters: {}\n");
+  physics::Term term;
+  term.info = physics::find_term(physics::Plant::equations, "quadratic");
+  for (const auto& [place, quadratic, constant] :
+       {std::array{"v", "m/s2/(m/s)2", "m/s2"}, std::array{"hidden", "K/s/K2", "K/s"}}) {
+    term.on = place;
+    term.info = physics::find_term(physics::Plant::equations, "quadratic");
+    EXPECT_EQ(unit_of(data, term, 0), quadratic);
+    term.info = physics::find_term(physics::Plant::equations, "constant");
+    EXPECT_EQ(unit_of(data, term, 0), constant);
+    term.info = physics::find_term(physics::Plant::equations, "hidden_state");
+    EXPECT_EQ(unit_of(data, term, 0), "1/s");  // the rate of a difference of two alike
+  }
+  term.on = "u";
+  EXPECT_EQ(unit_of(data, term, 0), "1");
 }
 
 }  // namespace
