@@ -42,7 +42,7 @@ class Bench:
         return self.machines.at_the_switch(INVAR, "deploy", self.cell, "--ssh-config", self.machines.folder / "ssh_config", *more)
 
     def forget(self):
-        for name in self.machines.NAMES:
+        for name in self.machines.names:
             self.machines.on(name, "systemctl stop invar-plant; rm -rf /opt/invar /etc/systemd/system/*invar*; systemctl daemon-reload")
 
     def by_tar(self):
@@ -57,7 +57,7 @@ class Bench:
                         "'mkdir -p /opt/copy && tar -C /opt/copy -xf - && sync -f /opt/copy' & copies=\"$copies $!\""
                         for address in self.machines.address.values())
         took = timed(*self.machines.at_the_switch("bash", "-ec", f"copies=; {one}; for c in $copies; do wait $c; done"))
-        for name in self.machines.NAMES:
+        for name in self.machines.names:
             self.machines.on(name, "rm -rf /opt/copy")
         return took
 
@@ -79,7 +79,7 @@ class Bench:
         def one(name):
             said = self.machines.on(name, "cd /opt/killed/plant/current/ && sha256sum -c --quiet --strict MANIFEST && sha256sum <MANIFEST", check=False)
             return said.stdout[:16] if said.returncode == 0 else None
-        return [one(name) for name in self.machines.NAMES]
+        return [one(name) for name in self.machines.names]
 
     def kills(self):
         files_only = ("--service", "none", "--prefix", "/opt/killed")

@@ -53,7 +53,7 @@ class Deployed(unittest.TestCase):
     def releases(self):
         """What is current on each PC; each is whole, file by file."""
         current = {}
-        for name in PCS.NAMES:
+        for name in PCS.names:
             said = PCS.on(name, f"cd {self.home()}/current && sha256sum -c --quiet --strict MANIFEST && readlink ../../current && "
                                 "sha256sum <MANIFEST && find . -type f ! -name MANIFEST | wc -l && wc -l <MANIFEST", check=False)
             self.assertEqual(said.returncode, 0, said.stdout + said.stderr)
@@ -69,10 +69,10 @@ class Deployed(unittest.TestCase):
 
 class WithSystemd(Deployed):
     def pids(self):
-        return [PCS.on(name, "systemctl show -P MainPID invar-plant").stdout.strip() for name in PCS.NAMES]
+        return [PCS.on(name, "systemctl show -P MainPID invar-plant").stdout.strip() for name in PCS.names]
 
     def assert_well(self):
-        for name in PCS.NAMES:
+        for name in PCS.names:
             shown = PCS.on(name, "systemctl show -p ActiveState,SubState,User,Type,StatusText,WatchdogUSec invar-plant").stdout
             for line in ("ActiveState=active", "SubState=running", "User=invar", "StatusText=1 of 1 processes up", "WatchdogUSec=10s"):
                 self.assertIn(line, shown, name)
@@ -123,7 +123,7 @@ class WithSystemd(Deployed):
         self.deploy("--patience", "4", status=1)
         self.cell.write_text(self.text)
         self.assertEqual(self.deploy("--show").stdout.count(": current -, before -\n"), 3)
-        for name in PCS.NAMES:
+        for name in PCS.names:
             self.assertEqual(PCS.on(name, f"ls {self.home()}/current /etc/systemd/system/invar-plant.service; pgrep invar", check=False).stdout, "")
 
     def calibrations_come_back(self):
@@ -199,7 +199,7 @@ class FilesOnly(Deployed):
             started.wait()
             time.sleep(0.3)  # what was told to go goes
             after = self.releases()
-            for name in PCS.NAMES:
+            for name in PCS.names:
                 if after[name] not in known:
                     changed += 1
             known |= set(after.values())
@@ -270,7 +270,7 @@ class FilesOnly(Deployed):
         self.cell.write_text(self.text + "security: {keys: secrets}\n")
         subprocess.run([INVAR, "keys", self.cell], check=True, stdout=subprocess.DEVNULL)
         self.deploy()
-        for name in PCS.NAMES:
+        for name in PCS.names:
             self.assertEqual(PCS.on(name, f"readlink {self.home()}/current/cell/cells/secrets").stdout.strip(), f"{self.home()}/keys")
             found = PCS.on(name, f"ls {self.home()}/current/cell/cells; grep -rlI 'PRIVATE KEY' {self.home()}/store", check=False)
             self.assertEqual(found.stdout.split("\n"), ["plant cell.yaml", "profiles.yaml", "secrets", ""])

@@ -7,72 +7,27 @@ Real processes in real time over loopback, a Modbus device and a heater loop in 
 import json
 import os
 import pathlib
-import random
 import re
-import shutil
 import signal
 import socket
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
 INVAR = sys.argv.pop(1)
 SOURCE = pathlib.Path(sys.argv.pop(1))
 
-CELL = """
-invar_cell: 1
-name: warm
-domain: {domain}
-profiles: {source}/deployment/profiles.yaml
-hosts: {{pc: {{address: 127.0.0.1}}}}
-processes:
-  device:
-    host: pc
-    rate: 20
-    components:
-      heater: {{type: simulated_heater, map: {source}/deployment/maps/heater.yaml, port: {port}}}
-  heat:
-    host: pc
-    rate: 20
-    components:
-      thermal:
-        type: thermal
-        modbus: {{port: {port}, map: {source}/deployment/maps/heater.yaml}}
-        setpoint: 30
-        power_limit: 100
-"""
+sys.path.insert(0, str(SOURCE / "tests" / "support"))
+import warm_cell  # noqa: E402
 
 
-class Warm(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-health-"))
-        self.started = []
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            self.port = s.getsockname()[1]
-        self.domain = random.SystemRandom().randrange(100, 200)
-        print("domain", self.domain, file=sys.stderr)
-        self.file = self.folder / "cell.yaml"
-        self.file.write_text(CELL.format(domain=self.domain, source=SOURCE, port=self.port))
-
-    def tearDown(self):
-        for one in self.started:
-            if one.poll() is None:
-                one.kill()
-            one.wait()
-        shutil.rmtree(self.folder)
+class Warm(warm_cell.InFolder):
+    INVAR, SOURCE = INVAR, SOURCE
 
     def run_cell(self, *words):
-        log = open(self.folder / "log", "a")
-        self.started.append(subprocess.Popen([INVAR, "run", self.file, *words], cwd=self.folder, stdout=log, stderr=log))
-        log.close()
-        return self.started[-1]
-
-    def log(self):
-        return (self.folder / "log").read_text()
+        return self.start("run", self.file, *words)
 
     def status(self):
         end = subprocess.run([INVAR, "status", self.file, "--json", "--wait", "5"], cwd=self.folder, capture_output=True,
@@ -117,7 +72,7 @@ class Warm(unittest.TestCase):
         text = self.file.read_text().replace("setpoint: 30", "setpoint: 26\n        over_temperature: 26.5")
         self.file.write_text(text.replace("rate: 20", "rate: 10"))
         # The plant warms beyond the limit: what the simulated heater takes is a warm room.
-        self.file.write_text(self.file.read_text().replace("port: %d}" % self.port, "port: %d, ambient: 40}" % self.port, 1))
+        self.file.write_text(self.file.read_text().replace("port: %d}" % self.device_port, "port: %d, ambient: 40}" % self.device_port, 1))
         run = subprocess.run([INVAR, "run", self.file, "--simulated", "--duration", "30", "--json"], cwd=self.folder,
                              capture_output=True, text=True, timeout=120)
         ended = json.loads(run.stdout)
@@ -126,7 +81,7 @@ class Warm(unittest.TestCase):
         self.assertRegex(run.stderr, r"\[critical\] at [0-9.]+ s: thermal: .*over_temperature")
 
     def poll(self, reference, *values):
-        subprocess.run(["mbpoll", "-m", "tcp", "-p", str(self.port), "-t", "4", "-r", str(reference), "-1", "127.0.0.1",
+        subprocess.run(["mbpoll", "-m", "tcp", "-p", str(self.device_port), "-t", "4", "-r", str(reference), "-1", "127.0.0.1",
                         *[str(value) for value in values]], check=True, capture_output=True)
 
     def test_a_latch_holds_until_a_person_resets_it(self):
@@ -147,7 +102,7 @@ class Warm(unittest.TestCase):
     def test_one_that_cannot_live_is_started_again_after_pauses_and_the_rest_goes_on(self):
         taken = socket.socket()
         taken.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        taken.bind(("127.0.0.1", self.port))
+        taken.bind(("127.0.0.1", self.device_port))
         taken.listen()
         run = self.run_cell("--real-time")
         self.wait_for("pauses that grow", lambda: "starting it again in 2 s" in self.log())

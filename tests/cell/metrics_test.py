@@ -14,64 +14,25 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 import urllib.request
 
 INVAR, SOURCE, PROMTOOL = sys.argv.pop(1), pathlib.Path(sys.argv.pop(1)), sys.argv.pop(1)
 
-CELL = """
-invar_cell: 1
-name: warm
-domain: {domain}
-profiles: {source}/deployment/profiles.yaml
-hosts: {{pc: {{address: 127.0.0.1}}}}
-processes:
-  device:
-    rate: 20
-    components:
-      heater: {{type: simulated_heater, map: {source}/deployment/maps/heater.yaml, port: {port}}}
-  heat:
-    rate: 20
-    components:
-      thermal:
-        type: thermal
-        modbus: {{port: {port}, map: {source}/deployment/maps/heater.yaml}}
-        setpoint: 30
-        power_limit: 100
-  tape: {{rate: 10, components: {{recorder: {{type: recorder, out: out}}}}}}
-"""
+sys.path.insert(0, str(SOURCE / "tests" / "support"))
+from warm_cell import InFolder, free_port  # noqa: E402
+
 SERIES = re.compile(r'^(\w+)(?:\{(.*)\})? (\S+)$')
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+class Metrics(InFolder):
+    INVAR, SOURCE = INVAR, SOURCE
+    MORE = "  tape: {rate: 10, components: {recorder: {type: recorder, out: out}}}\n"
 
-
-class Metrics(unittest.TestCase):
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-metrics-"))
-        self.started = []
-        self.file = self.folder / "cell.yaml"
-        self.port = free_port()
-        domain = random.SystemRandom().randrange(100, 200)
-        print("domain", domain, file=sys.stderr)
-        self.file.write_text(CELL.format(domain=domain, source=SOURCE, port=free_port()))
-
-    def tearDown(self):
-        for one in self.started:
-            if one.poll() is None:
-                one.kill()
-            one.wait()
-        shutil.rmtree(self.folder)
-
-    def start(self, *words):
-        with open(self.folder / "log", "a") as log:
-            self.started.append(subprocess.Popen([INVAR, *map(str, words)], cwd=self.folder, stdout=log, stderr=log))
-        return self.started[-1]
+        super().setUp()
+        self.port = free_port()  # of the page of metrics
 
     def export(self, *words):
         return self.start("metrics", self.file, "--listen", f"127.0.0.1:{self.port}", *words)

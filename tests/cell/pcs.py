@@ -3,8 +3,12 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from three_hosts import Cables, run  # noqa: E402
 
 BOOT = pathlib.Path(__file__).resolve().parent.parent / "support" / "systemd_pc.sh"
 
@@ -45,42 +49,21 @@ def plant(folder, source, domain):
     return cell, folder / "maps" / "heater.yaml"
 
 
-def run(*words, **more):
-    return subprocess.run([str(word) for word in words], check=True, capture_output=True, text=True, **more)
-
-
-class Pcs:
+class Pcs(Cables):
     NAMES = ("pc-a", "pc-b", "pc-c")
 
     def __init__(self, names=NAMES, keep_libraries=False):
-        self.NAMES = names
+        super().__init__(names)
         self.environment = dict(os.environ, KEEP_LIBRARIES="1" if keep_libraries else "")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-pcs-"))
-        self.switch = f"invar-switch-{os.getpid()}"
         self.started = []
-        self.address = {name: f"10.81.0.{11 + i}" for i, name in enumerate(self.NAMES)}
-        self.space = {name: f"invar-{name}-{os.getpid()}" for name in self.NAMES}
         try:
-            self.cables()
+            self.lay("10.81.0.1/24")  # this program's own calls stand at the switch, too
             self.keys()
             self.boot()
         except BaseException:
             self.end()
             raise
-
-    def cables(self):
-        """A switch, at which this program's own calls stand too (10.81.0.1)."""
-        run("ip", "netns", "add", self.switch)
-        run("ip", "-n", self.switch, "link", "add", "name", "bridge", "type", "bridge", "mcast_snooping", "0")
-        run("ip", "-n", self.switch, "address", "add", "10.81.0.1/24", "dev", "bridge")
-        run("ip", "-n", self.switch, "link", "set", "bridge", "up")
-        for name, space in self.space.items():
-            run("ip", "netns", "add", space)
-            run("ip", "-n", space, "link", "add", "cable", "type", "veth", "peer", "name", name, "netns", self.switch)
-            run("ip", "-n", self.switch, "link", "set", name, "master", "bridge", "up")
-            run("ip", "-n", space, "address", "add", f"{self.address[name]}/24", "dev", "cable")
-            run("ip", "-n", space, "link", "set", "cable", "up")
-            run("ip", "-n", space, "link", "set", "lo", "up")
 
     def keys(self):
         keys = self.folder / "keys"
@@ -93,7 +76,7 @@ class Pcs:
             f"User root\nIdentityFile {keys}/key\nIdentitiesOnly yes\nUserKnownHostsFile {self.folder}/known\n")
 
     def boot(self):
-        for name in self.NAMES:
+        for name in self.names:
             pc = self.folder / name
             pc.mkdir()
             shutil.copytree(self.folder / "keys", pc / "keys")
@@ -101,7 +84,7 @@ class Pcs:
                 self.started.append(subprocess.Popen([BOOT, pc, self.space[name], self.address[name]], stdout=log, stderr=log,
                                                      stdin=subprocess.DEVNULL, env=self.environment))
         end = time.monotonic() + 60
-        for name in self.NAMES:
+        for name in self.names:
             while self.on(name, "systemctl is-active pc.target", check=False).stdout.strip() != "active":
                 if time.monotonic() > end:
                     raise SystemExit(f"{name} does not boot: {(self.folder / name / 'log').read_text()}")
@@ -128,8 +111,7 @@ class Pcs:
             pc.kill()
         for pc in self.started:
             pc.wait()
-        for space in (*self.space.values(), self.switch):
-            subprocess.run(["ip", "netns", "del", space], capture_output=True)
+        self.take_away()
         groups = pathlib.Path(next(line.split()[1] for line in pathlib.Path("/proc/mounts").read_text().splitlines()
                                    if line.split()[2] == "cgroup2"))
         for pc in self.started:

@@ -1,16 +1,12 @@
 #!/usr/bin/env bash
 # A program of the plant on Cyclone DDS orders a calibration of the shipped cell, by the wall clock, and hears its readings, its
 # progress and the model that the loop then uses. What it heard is what the cell's own recorder has: each reading, and the checksum.
-# cyclone_job.sh INVAR CYCLONE_JOB SOURCE_DIR
+# cyclone_job.sh INVAR SOURCE_DIR CYCLONE_JOB
 set -euo pipefail
-if [[ -z ${INVAR_ALONE:-} ]]; then exec env INVAR_ALONE=1 unshare --map-root-user --net bash -c 'ip link set lo up; ip link set lo multicast on; exec "$0" "$@"' "$0" "$@"; fi
-invar=$1 program=$2 source=$3
-folder=$(mktemp -d)
-pids=()
-leave() { for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done; wait; rm -rf "$folder"; }
-trap leave EXIT
-cp -r "$source"/deployment/* "$folder"
-cd "$folder"
+source "$(dirname "$0")/../support/alone.sh"
+alone "$@"
+program=$3
+cp -r "$source"/deployment/* .
 fail() { echo "$*"; tail -n 20 ./*.log; exit 1; }
 {
   sed 's/^domain: .*/domain: 77/; s/^time: .*/time: real/; /^          - name: calibrate-geometry/,/steep/d' xy-table.yaml |

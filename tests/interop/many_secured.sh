@@ -1,12 +1,10 @@
 #!/usr/bin/env bash
 # Ten secured participants that start at once all find one another, each time. Without the filter's lock some pair of ten never
-# does: Fast DDS 2.9 overwrites the endpoints of one handshake with those of another. many_secured.sh INVAR BENCH SOURCE_DIR [RUNS]
+# does: Fast DDS 2.9 overwrites the endpoints of one handshake with those of another. many_secured.sh INVAR SOURCE_DIR BENCH [RUNS]
 set -euo pipefail
-if [[ -z ${INVAR_ALONE:-} ]]; then exec env INVAR_ALONE=1 unshare --map-root-user --net bash -c 'ip link set lo up; ip link set lo multicast on; exec "$0" "$@"' "$0" "$@"; fi
-invar=$1 bench=$2 source=$3 runs=${4:-3}
-folder=$(mktemp -d); trap 'rm -rf "$folder"' EXIT
-cd "$folder"
-cp "$source/deployment/profiles.yaml" .
+source "$(dirname "$0")/../support/alone.sh"
+alone "$@"
+bench=$3 runs=${4:-3}
 {
   printf 'invar_cell: 1\nname: bench\ndomain: 88\nprofiles: profiles.yaml\nprocesses:\n'
   for n in {0..9}; do echo "  p$n: {rate: 10, components: {s$n: {type: supervisor}}}"; done

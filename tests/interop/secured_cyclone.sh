@@ -1,17 +1,13 @@
 #!/usr/bin/env bash
 # A program of the plant on Cyclone DDS, with the plugins of Debian and the certificate that `invar keys` made for it, reads loop and
 # status of a secured cell and commands it; the same program without certificate gets nothing.
-# secured_cyclone.sh INVAR CYCLONE_PEER SOURCE_DIR
+# secured_cyclone.sh INVAR SOURCE_DIR CYCLONE_PEER
 set -euo pipefail
-if [[ -z ${INVAR_ALONE:-} ]]; then exec env INVAR_ALONE=1 unshare --map-root-user --net bash -c 'ip link set lo up; ip link set lo multicast on; exec "$0" "$@"' "$0" "$@"; fi
-invar=$1 peer=$2 source=$3
+source "$(dirname "$0")/../support/alone.sh"
+alone "$@"
+peer=$3
 plugins=$(dirname "$(find /usr/lib -name libdds_security_auth.so | head -n 1)")
-folder=$(mktemp -d)
-pids=()
-leave() { for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done; wait; rm -rf "$folder"; }
-trap leave EXIT
-cp -r "$source"/deployment/* "$folder"
-cd "$folder"
+cp -r "$source"/deployment/* .
 # The peer knows a cell `test` with an axis `axis`.
 sed 's/^name: .*/name: test/; s/stage_x/axis/g; s/^domain: .*/domain: 77/; s/^time: .*/time: real/' xy-table.yaml >cell.yaml
 cat >>cell.yaml <<'Y'

@@ -8,15 +8,21 @@ def run(*words):
     subprocess.run([str(word) for word in words], check=True, capture_output=True)
 
 
-class Hosts:
+class Cables:
+    """A network namespace for each name, at one switch, with addresses from 10.81.0.11 on."""
+
     def __init__(self, names):
         self.names = list(names)
         self.space = {name: f"invar-{name}-{os.getpid()}" for name in self.names}
         self.switch = f"invar-switch-{os.getpid()}"
         self.address = {name: f"10.81.0.{11 + i}" for i, name in enumerate(self.names)}
-        self.is_cut = set()
+
+    def lay(self, own_address=None):
+        """`own_address`: of the switch itself, for calls of the test from there."""
         run("ip", "netns", "add", self.switch)
         run("ip", "-n", self.switch, "link", "add", "name", "bridge", "type", "bridge", "mcast_snooping", "0")
+        if own_address:
+            run("ip", "-n", self.switch, "address", "add", own_address, "dev", "bridge")
         run("ip", "-n", self.switch, "link", "set", "bridge", "up")
         for name, space in self.space.items():
             run("ip", "netns", "add", space)
@@ -25,6 +31,17 @@ class Hosts:
             run("ip", "-n", space, "address", "add", f"{self.address[name]}/24", "dev", "cable")
             run("ip", "-n", space, "link", "set", "cable", "up")
             run("ip", "-n", space, "link", "set", "lo", "up")
+
+    def take_away(self):
+        for space in (*self.space.values(), self.switch):
+            subprocess.run(["ip", "netns", "del", space], capture_output=True)
+
+
+class Hosts(Cables):
+    def __init__(self, names):
+        super().__init__(names)
+        self.is_cut = set()
+        self.lay()
         time.sleep(2.0)  # the kernel says "up" before the first packets pass
 
     def words(self, name, *words):
@@ -48,5 +65,4 @@ class Hosts:
         self.is_cut.discard(name)
 
     def end(self):
-        for space in (*self.space.values(), self.switch):
-            subprocess.run(["ip", "netns", "del", space], capture_output=True)
+        self.take_away()
