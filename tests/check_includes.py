@@ -28,6 +28,7 @@ ROOMS = {
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
+    "core/job": ["core/base", "core/config", "core/component", "idl", "Eigen"],
     "core/executor": ["core/base", "core/config", "core/component", "idl"],
     "core/dds": ["core/base", "core/config", "core/component", "core/executor", "idl", "Fast DDS", "OpenSSL"],
     "core/modbus": ["core/base", "core/config", "libmodbus"],
@@ -37,8 +38,10 @@ ROOMS = {
 for subject in METROLOGY:
     ROOMS[subject] = ["core/base", "core/numerics", "Eigen"]
 COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", *METROLOGY, "core/machine", "core/compensation",
-             "core/physics", "core/modbus", "idl", "Eigen", "yaml-cpp"]
-MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "core/recording"],
+             "core/physics", "core/modbus", "core/job", "idl", "Eigen", "yaml-cpp"]
+# The print job is no component: calibration runs it.
+MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "core/recording", "components/printing"],
+            "printing": ["core/recording"],
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "compensation": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
 

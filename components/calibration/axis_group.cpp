@@ -13,7 +13,7 @@ constexpr const char* letters[] = {"x", "y", "z"};
 
 }  // namespace
 
-AxisGroup::AxisGroup(Component& owner, JobHost& host, const Settings& settings)
+AxisGroup::AxisGroup(Component& owner, job::JobHost& host, const Settings& settings)
     : owner_{owner}, host_{host}, settings_{settings} {
   for (std::size_t i = 0; i < static_cast<std::size_t>(settings.axes); ++i) {
     const std::string letter = letters[i];
@@ -21,7 +21,7 @@ AxisGroup::AxisGroup(Component& owner, JobHost& host, const Settings& settings)
   }
 }
 
-void AxisGroup::send(std::size_t axis, stage::AxisCommandKind kind, double position, const Pace& pace) {
+void AxisGroup::send(std::size_t axis, stage::AxisCommandKind kind, double position, const job::Pace& pace) {
   stage::AxisCommand command;
   command.kind(kind);
   command.position(position);
@@ -35,14 +35,14 @@ void AxisGroup::stop() {
   for (std::size_t i = 0; i < axes_.size(); ++i) send(i, stage::AXIS_COMMAND_STOP);
 }
 
-Task AxisGroup::enable() {
+job::Task AxisGroup::enable() {
   std::vector<JobAxis*> all;
   for (const auto& axis : axes_) all.push_back(axis.get());
   CommandIds ids = [this] { return host_.next_id(); };
   co_await enable_axes(all, ids, Duration::seconds(10.0) + Duration::seconds(settings_.settle_timeout));
 }
 
-void AxisGroup::begin_move(const Eigen::Vector3d& target, const Pace& pace) {
+void AxisGroup::begin_move(const Eigen::Vector3d& target, const job::Pace& pace) {
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < axes_.size(); ++i)
     if (const auto* state = axes_[i]->state.latest(); state != nullptr)
@@ -65,13 +65,13 @@ std::string AxisGroup::unsettled() const {
   return which;
 }
 
-Task AxisGroup::move_to(Eigen::Vector3d target, Pace pace) {
+job::Task AxisGroup::move_to(Eigen::Vector3d target, job::Pace pace) {
   begin_move(target, pace);
   std::optional<Instant> arrived;
   const Instant started = owner_.now();
   const Duration patience = Duration::seconds(settings_.settle_timeout);
   for (;;) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     bool done = true;
     bool settled = true;
     for (std::size_t i = 0; i < axes_.size(); ++i) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "components/calibration/job_axis.hpp"
-#include "components/calibration/job_host.hpp"
+#include "core/job/job_host.hpp"
 
 namespace invar::calibration {
 
@@ -19,23 +19,23 @@ class AxisGroup {
     const double& settle_timeout;  // s
     const double& velocity;        // of the moves [m/s]; 0: the stage's own
   };
-  AxisGroup(Component& owner, JobHost& host, const Settings& settings);
+  AxisGroup(Component& owner, job::JobHost& host, const Settings& settings);
 
   /// Every axis enabled, or std::runtime_error.
-  Task enable();
+  job::Task enable();
   /// All axes, each with its share of the pace, so that the path is straight; until they have settled there, or
   /// std::runtime_error.
-  Task move_to(Eigen::Vector3d target, Pace pace);
+  job::Task move_to(Eigen::Vector3d target, job::Pace pace);
   /// Every axis is told to stop.
   void stop();
 
  private:
-  void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const Pace& pace = {});
-  void begin_move(const Eigen::Vector3d& target, const Pace& pace);
+  void send(std::size_t axis, stage::AxisCommandKind kind, double position = 0.0, const job::Pace& pace = {});
+  void begin_move(const Eigen::Vector3d& target, const job::Pace& pace);
   [[nodiscard]] std::string unsettled() const;
 
   Component& owner_;
-  JobHost& host_;
+  job::JobHost& host_;
   Settings settings_;
   std::vector<std::unique_ptr<JobAxis>> axes_;
 };

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "components/calibration/deliver.hpp"
-#include "components/calibration/wait.hpp"
+#include "core/job/deliver.hpp"
+#include "core/job/wait.hpp"
 
 namespace invar::calibration {
 
@@ -35,12 +35,12 @@ void AxisRunner::make_safe() {
 }
 
 /// Sends a command and waits until it has ended; what happens meanwhile goes into the record, where there is one.
-Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* record) {
+job::Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* record) {
   axis_.send(command, next_command_id());
   const std::string refused = axis_.said() + " refused a motion of the job";
   const Instant started = now();
   for (;;) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     if (record != nullptr) take_down(*record);
     const JobAxis::Motion motion = axis_.follow(refused);
     if (motion.done) co_return;
@@ -49,13 +49,13 @@ Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table* reco
   }
 }
 
-Task AxisRunner::enable() {
+job::Task AxisRunner::enable() {
   std::vector<JobAxis*> axes{&axis_};
   CommandIds ids = [this] { return next_command_id(); };
   co_await enable_axes(axes, ids, Duration::seconds(10.0));
 }
 
-Task AxisRunner::move(double target, double velocity, recording::Table* record) {
+job::Task AxisRunner::move(double target, double velocity, recording::Table* record) {
   stage::AxisCommand command;
   command.kind(stage::AXIS_COMMAND_MOVE);
   command.position(target);
@@ -63,7 +63,7 @@ Task AxisRunner::move(double target, double velocity, recording::Table* record) 
   co_await command_axis(command, record);
 }
 
-Task AxisRunner::align(double from) {
+job::Task AxisRunner::align(double from) {
   sensing::BeamCommand beam;
   stamp(beam);
   beam.id(next_command_id());
@@ -71,22 +71,22 @@ Task AxisRunner::align(double from) {
   beam.beam_direction()[static_cast<std::size_t>(number_)] = 1.0;
   beam_.write(beam);
   beam_from_ = from;
-  co_await wait(*this, 0.1);
+  co_await job::wait(*this, 0.1);
   sensing::DisplacementReading before;
   while (reading_.take(before)) {  // of another beam
   }
 }
 
-Task AxisRunner::use_model(const std::filesystem::path& model) {
+job::Task AxisRunner::use_model(const std::filesystem::path& model) {
   std::string path;
-  co_await deliver(*this, model_, model, path);
+  co_await job::deliver(*this, model_, model, path);
   co_await command_model(compensation::MODEL_STAGE, path);
   co_await command_model(compensation::MODEL_ACTIVATE, path);
 }
 
-Task AxisRunner::roll_back_model() { co_await command_model(compensation::MODEL_ROLLBACK, ""); }
+job::Task AxisRunner::roll_back_model() { co_await command_model(compensation::MODEL_ROLLBACK, ""); }
 
-Task AxisRunner::command_model(compensation::ModelCommandKind kind, const std::string& path) {
+job::Task AxisRunner::command_model(compensation::ModelCommandKind kind, const std::string& path) {
   compensation::ModelCommand command;
   stamp(command);
   command.id(next_command_id());
@@ -95,7 +95,7 @@ Task AxisRunner::command_model(compensation::ModelCommandKind kind, const std::s
   model_.write(command);
   const Instant give_up = now() + Duration::seconds(5.0);
   for (;;) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     const auto* status = model_status_.latest();
     if (status != nullptr && status->command_id() == command.id()) {
       if (status->state() == compensation::MODEL_REFUSED)

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "components/calibration/job_axis.hpp"
-#include "components/calibration/job_component.hpp"
+#include "core/job/job_component.hpp"
 #include "core/recording/table.hpp"
 #include "idl/compensation.h"
 #include "idl/sensing.h"
@@ -40,7 +40,7 @@ Reach reach_of(std::string list, std::size_t place, const Job& job) {
 
 /// Its stage on `state` and `command`, a laser along the axis on `reading` and `beam`, and on `model` what uses the model that
 /// a job makes. Not real-time.
-class AxisRunner : public JobComponent {
+class AxisRunner : public job::JobComponent {
  public:
   /// The ways of all its jobs.
   [[nodiscard]] virtual std::vector<Reach> reaches() const = 0;
@@ -50,14 +50,14 @@ class AxisRunner : public JobComponent {
   /// Adds the row of a step to the record of a motion.
   virtual void take_down(recording::Table& record) = 0;
 
-  Task enable();
+  job::Task enable();
   /// A command to its end; nullptr: nothing is taken down. A loop that is at its current limit or trips fails the job.
-  Task command_axis(stage::AxisCommand command, recording::Table* record);
-  Task move(double target, double velocity, recording::Table* record);
+  job::Task command_axis(stage::AxisCommand command, recording::Table* record);
+  job::Task move(double target, double velocity, recording::Table* record);
   /// Zeroes the laser where the tool stands, which is called `from` [m].
-  Task align(double from);
-  Task use_model(const std::filesystem::path& model);
-  Task roll_back_model();
+  job::Task align(double from);
+  job::Task use_model(const std::filesystem::path& model);
+  job::Task roll_back_model();
 
   const std::int64_t& number_;
   JobAxis axis_;
@@ -67,7 +67,7 @@ class AxisRunner : public JobComponent {
 
  private:
   void make_safe() override;
-  Task command_model(compensation::ModelCommandKind kind, const std::string& path);
+  job::Task command_model(compensation::ModelCommandKind kind, const std::string& path);
 
   Output<sensing::BeamCommand> beam_{*this, "beam", "command"};
   Output<compensation::ModelCommand> model_{*this, "model", "command"};

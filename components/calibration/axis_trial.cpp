@@ -7,8 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "components/calibration/wait.hpp"
 #include "core/base/new_file.hpp"
+#include "core/job/wait.hpp"
 #include "core/model/model_file.hpp"
 #include "core/physics/ripple_identification.hpp"
 
@@ -65,14 +65,14 @@ std::vector<Reach> AxisTrial::reaches() const {
   return all;
 }
 
-std::optional<JobComponent::Job> AxisTrial::find(const std::string& wanted) {
+std::optional<job::JobComponent::Job> AxisTrial::find(const std::string& wanted) {
   const auto begin = [&](const auto& job) {
     began_ = now();
     return Job{run(job), job.out};
   };
-  if (const auto* ripple = named(parameters_.ripple, wanted)) return begin(*ripple);
-  if (const auto* tracking = named(parameters_.tracking, wanted)) return begin(*tracking);
-  if (const auto* motion = named(parameters_.motion, wanted)) return begin(*motion);
+  if (const auto* ripple = job::named(parameters_.ripple, wanted)) return begin(*ripple);
+  if (const auto* tracking = job::named(parameters_.tracking, wanted)) return begin(*tracking);
+  if (const auto* motion = job::named(parameters_.motion, wanted)) return begin(*motion);
   return std::nullopt;
 }
 
@@ -99,15 +99,15 @@ void AxisTrial::take_down(recording::Table& record) {
   for (std::size_t i = 0; i < record.columns.size(); ++i) record.columns[i].values.push_back(row[i]);
 }
 
-Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64_t passes,
-                               recording::Table& record) {
+job::Task AxisTrial::there_and_back(const RippleJob& job, double velocity, std::int64_t passes,
+                                    recording::Table& record) {
   for (std::int64_t pass = 0; pass < passes; ++pass) {
     co_await move(job.to, velocity, &record);
     co_await move(job.from, velocity, &record);
   }
 }
 
-Task AxisTrial::run(const RippleJob& job) {
+job::Task AxisTrial::run(const RippleJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   const auto yaml = config::Yaml::load(job.model);
   physics::Model model = model::read(yaml);
@@ -115,7 +115,7 @@ Task AxisTrial::run(const RippleJob& job) {
   if (model.plant != physics::Plant::axis) throw std::runtime_error{"the model is none of an axis"};
   co_await enable();
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
 
   recording::Table before = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, before);
@@ -150,7 +150,7 @@ Task AxisTrial::run(const RippleJob& job) {
   co_await use_model(patched);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the ripple is fed forward; verifying");
-  co_await wait(*this, 2.0);  // it fades in
+  co_await job::wait(*this, 2.0);  // it fades in
 
   recording::Table after = record_table();
   co_await there_and_back(job, job.verify_velocity, 1, after);
@@ -169,7 +169,7 @@ Task AxisTrial::run(const RippleJob& job) {
                             micrometres(was.rms) + " to " + micrometres(is.rms) + " RMS");
 }
 
-Task AxisTrial::run(const TrackingJob& job) {
+job::Task AxisTrial::run(const TrackingJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   co_await enable();
   recording::Table all = record_table();
@@ -177,7 +177,7 @@ Task AxisTrial::run(const TrackingJob& job) {
   std::string found = "tracking error by the laser, RMS:";
   for (const double period : job.periods) {
     co_await move(job.from, 0.0, nullptr);
-    co_await wait(*this, settle);
+    co_await job::wait(*this, settle);
     co_await align(job.from);
     recording::Table record = record_table();
     stage::AxisCommand sine;
@@ -207,16 +207,16 @@ Task AxisTrial::run(const TrackingJob& job) {
   report(job::JOB_DONE, found);
 }
 
-Task AxisTrial::move_at_all_speeds(const MotionJob& job, recording::Table& record) {
+job::Task AxisTrial::move_at_all_speeds(const MotionJob& job, recording::Table& record) {
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
   for (const double velocity : job.velocities)
     for (std::int64_t pass = 0; pass < job.passes; ++pass)
       for (const double target : {job.to, job.from}) co_await move(target, velocity, &record);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
 }
 
-Task AxisTrial::run(const MotionJob& job) {
+job::Task AxisTrial::run(const MotionJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   co_await enable();
   recording::Table before = record_table();
@@ -233,7 +233,7 @@ Task AxisTrial::run(const MotionJob& job) {
          "following error " + micrometres(size.rms) + " RMS, at most " + micrometres(size.largest));
 }
 
-Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
+job::Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   const auto file = std::filesystem::absolute(job.apply);
   if (says_the_same(model::load(job.model), model::load(file))) {
@@ -244,7 +244,7 @@ Task AxisTrial::compare(const MotionJob& job, recording::Table before) {
   progress_ = 0.5;
   report(job::JOB_RUNNING, "giving the model to the stage");
   co_await use_model(file);
-  co_await wait(*this, 2.0);  // it fades in
+  co_await job::wait(*this, 2.0);  // it fades in
   recording::Table after = record_table();
   co_await move_at_all_speeds(job, after);
   after.write(folder / "motion_after.csv");

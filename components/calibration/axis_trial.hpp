@@ -16,7 +16,7 @@ namespace invar::calibration {
 
 /// Slow runs forth and back, the ripple identified from current and position, given to the stage, and faster runs that were
 /// not fitted before and after.
-struct RippleJob : JobSpec {
+struct RippleJob : job::JobSpec {
   std::filesystem::path model;
   double from = 0.0;
   double to = 0.0;
@@ -24,7 +24,7 @@ struct RippleJob : JobSpec {
   double verify_velocity = 0.03;
   std::int64_t passes = 2;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(model, "model", "model.yaml of the axis without ripple");
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
@@ -35,13 +35,13 @@ struct RippleJob : JobSpec {
 };
 
 /// Sinusoids, followed by the servo and watched by the laser.
-struct TrackingJob : JobSpec {
+struct TrackingJob : job::JobSpec {
   double from = 0.0;
   double amplitude = 0.1;
   std::vector<double> periods{3.0, 4.0, 5.0, 1.05};
   std::int64_t cycles = 2;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
     p(periods, "periods", "s", Range{1e-2, 1e4}, "one sinusoid each");
@@ -51,7 +51,7 @@ struct TrackingJob : JobSpec {
 
 /// Forth and back at several speeds, the same each time: what a diagnosis records, and what tells whether it was right.
 /// With `apply`, once more after that model was given to the stage - unless it says nothing that `model` does not.
-struct MotionJob : JobSpec {
+struct MotionJob : job::JobSpec {
   double from = 0.0;
   double to = 0.0;
   std::vector<double> velocities{0.02, 0.05, 0.1};
@@ -59,7 +59,7 @@ struct MotionJob : JobSpec {
   std::filesystem::path model;
   std::string apply;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "one end of the runs");
     p(to, "to", "m", Range{-10.0, 10.0}, "the other end");
     p(velocities, "velocities", "m/s", Range{1e-4, 10.0}, "one after the other");
@@ -84,9 +84,9 @@ class AxisTrial final : public AxisRunner {
       p(motion, "motion", "jobs that move forth and back, to record and to compare");
       if constexpr (requires { p.node(); }) {
         std::set<std::string> names;
-        check_names(p.node()["ripple"], ripple, names);
-        check_names(p.node()["tracking"], tracking, names);
-        check_names(p.node()["motion"], motion, names);
+        job::check_names(p.node()["ripple"], ripple, names);
+        job::check_names(p.node()["tracking"], tracking, names);
+        job::check_names(p.node()["motion"], motion, names);
       }
     }
   };
@@ -96,12 +96,13 @@ class AxisTrial final : public AxisRunner {
  private:
   std::optional<Job> find(const std::string& wanted) override;
   void take_down(recording::Table& record) override;
-  Task run(const RippleJob& job);
-  Task run(const TrackingJob& job);
-  Task run(const MotionJob& job);
-  Task move_at_all_speeds(const MotionJob& job, recording::Table& record);
-  Task compare(const MotionJob& job, recording::Table before);
-  Task there_and_back(const RippleJob& job, double velocity, std::int64_t passes, recording::Table& record);
+  job::Task run(const RippleJob& job);
+  job::Task run(const TrackingJob& job);
+  job::Task run(const MotionJob& job);
+  job::Task move_at_all_speeds(const MotionJob& job, recording::Table& record);
+  job::Task compare(const MotionJob& job, recording::Table before);
+  job::Task there_and_back(const RippleJob& job, double velocity, std::int64_t passes,
+                           recording::Table& record);
 
   const Parameters& parameters_;
   Instant began_;           // the job; times in records count from here

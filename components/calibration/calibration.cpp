@@ -6,13 +6,13 @@
 namespace invar::calibration {
 
 Calibration::Calibration(const Parameters& parameters) : parameters_{parameters} {
-  if (!parameters.prints.empty()) printing_ = std::make_unique<Printing>(*this, host_);
+  if (!parameters.prints.empty()) printing_ = std::make_unique<printing::Printing>(*this, host_);
 }
 
 void Calibration::activate() {
   models_.forget();
   thermal_.forget();
-  JobComponent::activate();
+  job::JobComponent::activate();
 }
 
 void Calibration::make_safe() {
@@ -22,16 +22,16 @@ void Calibration::make_safe() {
   if (printing_) printing_->make_safe();
 }
 
-std::optional<JobComponent::Job> Calibration::find(const std::string& wanted) {
-  if (const auto* job = named(parameters_.jobs, wanted))
+std::optional<job::JobComponent::Job> Calibration::find(const std::string& wanted) {
+  if (const auto* job = job::named(parameters_.jobs, wanted))
     return Job{to_its_end(geometric_.run(*job)), job->out};
-  if (const auto* job = named(parameters_.thermal_jobs, wanted))
+  if (const auto* job = job::named(parameters_.thermal_jobs, wanted))
     return Job{to_its_end(thermal_.run(*job)), job->out};
-  if (const auto* job = named(parameters_.prints, wanted)) return Job{to_its_end(print(*job)), job->out};
+  if (const auto* job = job::named(parameters_.prints, wanted)) return Job{to_its_end(print(*job)), job->out};
   return std::nullopt;
 }
 
-Task Calibration::to_its_end(Task job) {
+job::Task Calibration::to_its_end(job::Task job) {
   co_await std::move(job);
   progress_ = 1.0;
   report(job::JOB_DONE, "done");
@@ -50,7 +50,7 @@ void Calibration::tell(const std::string& text, double progress) {
   report(job::JOB_RUNNING, text);
 }
 
-Task Calibration::print(const PrintJob& job) {
+job::Task Calibration::print(const printing::PrintJob& job) {
   if (!job.first.empty()) {
     const auto first = std::find_if(parameters_.jobs.begin(), parameters_.jobs.end(),
                                     [&](const GeometricJob& other) { return other.name == job.first; });

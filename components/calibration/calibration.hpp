@@ -10,22 +10,22 @@
 
 #include "components/calibration/axis_group.hpp"
 #include "components/calibration/geometric_calibration.hpp"
-#include "components/calibration/job_component.hpp"
-#include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
 #include "components/calibration/line_laser.hpp"
 #include "components/calibration/model_transaction.hpp"
-#include "components/calibration/printing.hpp"
-#include "components/calibration/task.hpp"
 #include "components/calibration/thermal_calibration.hpp"
+#include "components/printing/printing.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/job/job_component.hpp"
+#include "core/job/job_host.hpp"
+#include "core/job/task.hpp"
 
 namespace invar::calibration {
 
 /// A job is a transaction on the compensation. Its model is put to use on trial, watched, and kept
 /// only if it makes the error smaller. A job that fails, is cancelled or dies leaves the models as they were.
-class Calibration final : public JobComponent, private JobHost {
+class Calibration final : public job::JobComponent, private job::JobHost {
  public:
   struct Parameters {
     std::int64_t axes = 2;
@@ -33,7 +33,7 @@ class Calibration final : public JobComponent, private JobHost {
     double velocity = 0.0;
     std::vector<GeometricJob> jobs;
     std::vector<ThermalJob> thermal_jobs;
-    std::vector<PrintJob> prints;
+    std::vector<printing::PrintJob> prints;
     std::vector<std::string> zones;
     void describe(auto& p) {
       p(axes, "axes", 1, 3, "how many axes the machine has");
@@ -45,10 +45,10 @@ class Calibration final : public JobComponent, private JobHost {
       p(prints, "prints", "print jobs that can be run");
       if constexpr (requires { p.node(); }) {
         std::set<std::string> names;
-        check_names(p.node()["jobs"], jobs, names);
-        check_names(p.node()["thermal_jobs"], thermal_jobs, names);
-        check_names(p.node()["prints"], prints, names);
-        for (const PrintJob& print : prints)
+        job::check_names(p.node()["jobs"], jobs, names);
+        job::check_names(p.node()["thermal_jobs"], thermal_jobs, names);
+        job::check_names(p.node()["prints"], prints, names);
+        for (const printing::PrintJob& print : prints)
           if (!print.first.empty() && std::none_of(jobs.begin(), jobs.end(),
                                                    [&](const auto& job) { return job.name == print.first; }))
             p.node()["prints"].fault("`" + print.first + "` is no job of `jobs`",
@@ -64,24 +64,25 @@ class Calibration final : public JobComponent, private JobHost {
   std::optional<Job> find(const std::string& wanted) override;
   void make_safe() override;
   void tend(bool job_runs) override;
-  Task print(const PrintJob& job);
-  Task to_its_end(Task job);
+  job::Task print(const printing::PrintJob& job);
+  job::Task to_its_end(job::Task job);
 
   // JobHost
-  Task enable_axes() override { return axes_.enable(); }
-  Task move_to(Eigen::Vector3d target, Pace pace) override { return axes_.move_to(target, pace); }
+  job::Task enable_axes() override { return axes_.enable(); }
+  job::Task move_to(Eigen::Vector3d target, job::Pace pace) override { return axes_.move_to(target, pace); }
   void tell(const std::string& text, double progress) override;
   void advance(double progress) override { progress_ = progress; }
   std::uint64_t next_id() override { return next_command_id(); }
 
   const Parameters& parameters_;
-  JobHost& host_{*this};
+  job::JobHost& host_{*this};
   LineLaser laser_{*this, host_, parameters_.settle_timeout};
   ModelTransaction models_{*this, host_};
   ThermalCalibration thermal_{*this, host_, laser_, models_, parameters_.zones};
   GeometricCalibration geometric_{host_, laser_, models_};
   AxisGroup axes_{*this, host_, {parameters_.axes, parameters_.settle_timeout, parameters_.velocity}};
-  std::unique_ptr<Printing> printing_;  // only where there are print jobs: its ports must be connected
+  std::unique_ptr<printing::Printing>
+      printing_;  // only where there are print jobs: its ports must be connected
 };
 
 }  // namespace invar::calibration

@@ -7,8 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "components/calibration/wait.hpp"
 #include "core/compensation/fusion_file.hpp"
+#include "core/job/wait.hpp"
 #include "core/numerics/sure_gain.hpp"
 
 namespace invar::calibration {
@@ -119,8 +119,8 @@ std::vector<Reach> FusionTrial::reaches() const {
   return all;
 }
 
-std::optional<JobComponent::Job> FusionTrial::find(const std::string& wanted) {
-  const auto* job = named(parameters_.jobs, wanted);
+std::optional<job::JobComponent::Job> FusionTrial::find(const std::string& wanted) {
+  const auto* job = job::named(parameters_.jobs, wanted);
   if (job == nullptr) return std::nullopt;
   return Job{run(*job), job->out};
 }
@@ -148,9 +148,9 @@ void FusionTrial::take_down(recording::Table&) {
 }
 
 /// One sinusoid from rest; what was read stands in `rows_` afterwards.
-Task FusionTrial::swing(const FusionJob& job, double period) {
+job::Task FusionTrial::swing(const FusionJob& job, double period) {
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
   recording::Table unused;
   take_down(unused);  // what waited
   rows_.clear();
@@ -191,7 +191,7 @@ metrology::FusionRun FusionTrial::run_of_rows() const {
   return run;
 }
 
-Task FusionTrial::verify(const FusionJob& job, const std::string& when, Verified& found) {
+job::Task FusionTrial::verify(const FusionJob& job, const std::string& when, Verified& found) {
   std::vector<double> of_fused, of_axis;
   std::vector<std::size_t> part_of;  // each error of the fused position
   recording::Table table;
@@ -218,11 +218,11 @@ Task FusionTrial::verify(const FusionJob& job, const std::string& when, Verified
   found = {size_of(of_fused), size_of(of_axis), sizes_of_parts(of_fused, part_of, first_part)};
 }
 
-Task FusionTrial::run(const FusionJob& job) {
+job::Task FusionTrial::run(const FusionJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   co_await enable();
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
   co_await align(job.from);
   Verified before, after;
   co_await verify(job, "before", before);
@@ -250,7 +250,7 @@ Task FusionTrial::run(const FusionJob& job) {
   const auto file = folder / "compensation.yaml";
   text.write(file);
   co_await move(job.from, 0.0, nullptr);
-  co_await wait(*this, settle);
+  co_await job::wait(*this, settle);
   co_await use_model(file);
   progress_ = 0.8;
   report(job::JOB_RUNNING, "the model is in use; verifying");

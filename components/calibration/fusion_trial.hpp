@@ -17,13 +17,13 @@
 namespace invar::calibration {
 
 /// Sinusoids to identify from, and others before and after, which are not fitted.
-struct FusionJob : JobSpec {
+struct FusionJob : job::JobSpec {
   double from = 0.0;
   double amplitude = 0.1;
   std::vector<double> periods{1.3, 2.0, 2.6, 3.5, 4.5, 6.0};
   std::vector<double> verify_periods{3.0, 5.0};
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(from, "from", "m", Range{-10.0, 10.0}, "where the sinusoids begin: their lower end");
     p(amplitude, "amplitude", "m", Range{-1.0, 1.0}, "half of the way");
     p(periods, "periods", "s", Range{1e-2, 1e4}, "one sinusoid each, to identify from");
@@ -57,7 +57,7 @@ class FusionTrial final : public AxisRunner {
       p(jobs, "jobs", "that identify them");
       if constexpr (requires { p.node(); }) {
         std::set<std::string> names;
-        check_names(p.node()["jobs"], jobs, names);
+        job::check_names(p.node()["jobs"], jobs, names);
         if (std::none_of(sensors.begin(), sensors.end(),
                          [](const Sensor& sensor) { return sensor.quantity == "position"; }))
           p.node()["sensors"].fault("none measures a position", "name the sensors of the fusion");
@@ -76,15 +76,15 @@ class FusionTrial final : public AxisRunner {
 
   std::optional<Job> find(const std::string& wanted) override;
   void take_down(recording::Table& record) override;
-  Task run(const FusionJob& job);
-  Task swing(const FusionJob& job, double period);
+  job::Task run(const FusionJob& job);
+  job::Task swing(const FusionJob& job, double period);
   /// Results of sinusoids that were not fitted.
   struct Verified {
     Size fused, tracked;  // errors by the laser: of the fused position, and of the axis that follows it
     std::vector<double>
         parts;  // how large the fused position's error is in each part of each sinusoid (logarithm)
   };
-  Task verify(const FusionJob& job, const std::string& when, Verified& found);
+  job::Task verify(const FusionJob& job, const std::string& when, Verified& found);
   [[nodiscard]] metrology::FusionRun run_of_rows() const;
 
   const Parameters& parameters_;

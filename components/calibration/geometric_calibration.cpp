@@ -67,7 +67,7 @@ void check_travel(const GeometricJob& job, const config::Node& node) {
   check("verify", job.verify);
 }
 
-Task GeometricCalibration::measure(const LineSpec& line, const Way& how, recording::Table& table) {
+job::Task GeometricCalibration::measure(const LineSpec& line, const Way& how, recording::Table& table) {
   const Eigen::Vector3d from = line.start();
   const Eigen::Vector3d to = line.end();
   const double length = (to - from).norm();
@@ -96,7 +96,7 @@ Task GeometricCalibration::measure(const LineSpec& line, const Way& how, recordi
   host_.tell("measured line " + line.name, progress_);
 }
 
-Task GeometricCalibration::run(const GeometricJob& job) {
+job::Task GeometricCalibration::run(const GeometricJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   const double share = 1.0 / static_cast<double>(job.lines.size() + 2 * job.verify.size() + 1);
   const Way fitted{job.interval, job.cycles, job.readings, share};

@@ -4,10 +4,10 @@
 
 #include <cstdint>
 
-#include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
 #include "components/calibration/line_laser.hpp"
 #include "components/calibration/model_transaction.hpp"
+#include "core/job/job_host.hpp"
 #include "core/recording/table.hpp"
 
 namespace invar::calibration {
@@ -15,12 +15,12 @@ namespace invar::calibration {
 /// Not real-time.
 class GeometricCalibration {
  public:
-  GeometricCalibration(JobHost& host, LineLaser& laser, ModelTransaction& models)
+  GeometricCalibration(job::JobHost& host, LineLaser& laser, ModelTransaction& models)
       : host_{host}, laser_{laser}, models_{models} {}
 
   /// Files into job.out: verify_before.csv, lines.csv, compensation.yaml, verify_after.csv. Throws std::runtime_error and
   /// InputError with what a user can mend.
-  Task run(const GeometricJob& job);
+  job::Task run(const GeometricJob& job);
 
  private:
   /// How a line is measured.
@@ -30,9 +30,9 @@ class GeometricCalibration {
     std::int64_t readings = 4;  // at each point
     double share = 0.0;         // of the whole job
   };
-  Task measure(const LineSpec& line, const Way& how, recording::Table& table);  // `how` outlives it
+  job::Task measure(const LineSpec& line, const Way& how, recording::Table& table);  // `how` outlives it
 
-  JobHost& host_;
+  job::JobHost& host_;
   LineLaser& laser_;
   ModelTransaction& models_;
   double progress_ = 0.0;

@@ -60,7 +60,7 @@ bool is_due(Asked& asked, Instant now) {
 
 }  // namespace
 
-Task enable_axes(std::vector<JobAxis*> axes, CommandIds next_id, Duration patience) {
+job::Task enable_axes(std::vector<JobAxis*> axes, CommandIds next_id, Duration patience) {
   std::vector<Asked> waiting;
   for (JobAxis* axis : axes) waiting.push_back({axis, {}});
   const auto now = [&] { return axes.front()->owner().now(); };
@@ -74,7 +74,7 @@ Task enable_axes(std::vector<JobAxis*> axes, CommandIds next_id, Duration patien
       asked.at = now();
       asked.once = true;
     }
-    co_await NextStep{};
+    co_await job::NextStep{};
     std::erase_if(waiting, [](const Asked& asked) {
       return asked.axis->has_answered() && asked.axis->state.latest()->enabled();
     });

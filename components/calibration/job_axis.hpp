@@ -8,8 +8,8 @@
 
 #include "components/calibration/axis_link.hpp"
 #include "components/calibration/loop_watch.hpp"
-#include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
+#include "core/job/task.hpp"
 #include "idl/stage.h"
 
 namespace invar::calibration {
@@ -58,6 +58,6 @@ using CommandIds = std::function<std::uint64_t()>;
 /// The one rule by which a job enables its axes. Processes come up in any order: an axis that does not answer is asked again each
 /// 0.5 s. One that refuses says why in a notice, and is asked again after 2 s. One that tripped is never asked again.
 /// Throws std::runtime_error where an axis tripped, or is not enabled within `patience`.
-Task enable_axes(std::vector<JobAxis*> axes, CommandIds next_id, Duration patience);
+job::Task enable_axes(std::vector<JobAxis*> axes, CommandIds next_id, Duration patience);
 
 }  // namespace invar::calibration

@@ -6,34 +6,15 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "core/base/range.hpp"
 #include "core/component/parameters.hpp"
 #include "core/config/yaml.hpp"
+#include "core/job/job_spec.hpp"
 
 namespace invar::calibration {
-
-/// Parameters of every job.
-struct JobSpec {
-  std::string name;
-  std::string out = "out";
-  void describe(auto& p) {
-    p(name, "name", "name of the job in `invar job run`");
-    p(out, "out", "folder for the files, created; relative to where the cell was started");
-    if constexpr (requires { p.node(); }) check_folder(p.node(), "out", out);
-  }
-};
-
-/// The job of this name; nullptr: there is none.
-template <class Spec>
-const Spec* named(const std::vector<Spec>& jobs, const std::string& wanted) {
-  const auto job =
-      std::find_if(jobs.begin(), jobs.end(), [&](const Spec& one) { return one.name == wanted; });
-  return job == jobs.end() ? nullptr : &*job;
-}
 
 /// A displacement line to measure.
 struct LineSpec {
@@ -66,17 +47,8 @@ struct GeometricJob;
 /// Faults at `job` for its machine's file, and for lines that leave the travel that this names.
 void check_travel(const GeometricJob& job, const config::Node& node);
 
-/// A fault where a job has the name of an earlier one.
-template <class Spec>
-void check_names(const config::Node& list, const std::vector<Spec>& jobs, std::set<std::string>& names) {
-  const auto places = list.list();
-  for (std::size_t i = 0; i < std::min(jobs.size(), places.size()); ++i)
-    if (!jobs[i].name.empty() && !names.insert(jobs[i].name).second)
-      places[i].fault("job `" + jobs[i].name + "` stands twice in this component", "rename one of them");
-}
-
 /// One geometric calibration as a transaction: lines to fit, lines to verify before and after.
-struct GeometricJob : JobSpec {
+struct GeometricJob : job::JobSpec {
   std::filesystem::path machine;
   std::vector<LineSpec> lines;
   std::vector<LineSpec> verify;
@@ -85,7 +57,7 @@ struct GeometricJob : JobSpec {
   std::int64_t cycles = 1;
   std::int64_t readings = 4;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(machine, "machine", "machine.yaml: chain and travel");
     p(lines, "lines", "displacement lines to identify the error from");
     p(verify, "verify", "lines not fitted, measured before and after");
@@ -129,7 +101,7 @@ struct TraceSpec {
 /// The error of one axis over position and temperature as a transaction. A line is read at room temperature, and repeatedly
 /// while the heater follows a trace. The model is then compared with that of room temperature at points and
 /// temperatures that were not fitted.
-struct ThermalJob : JobSpec {
+struct ThermalJob : job::JobSpec {
   LineSpec line;
   double interval = 0.005;
   std::int64_t readings = 4;
@@ -143,7 +115,7 @@ struct ThermalJob : JobSpec {
   double soak = 300.0;
   double steady_timeout = 7200.0;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(line, "line", "along the axis to calibrate, from where the laser is zeroed");
     p(interval, "interval", "m", Range{1e-4, 1.0}, "between the points of the line");
     p(readings, "readings", 1, 10'000, "averaged at each point");

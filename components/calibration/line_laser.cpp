@@ -4,7 +4,7 @@
 
 namespace invar::calibration {
 
-LineLaser::LineLaser(Component& owner, JobHost& host, const double& timeout)
+LineLaser::LineLaser(Component& owner, job::JobHost& host, const double& timeout)
     : owner_{owner},
       host_{host},
       timeout_{timeout},
@@ -17,7 +17,7 @@ void LineLaser::drop_readings() {
   }
 }
 
-Task LineLaser::align(Eigen::Vector3d from, Eigen::Vector3d to) {
+job::Task LineLaser::align(Eigen::Vector3d from, Eigen::Vector3d to) {
   const Eigen::Vector3d direction = (to - from).normalized();
   sensing::BeamCommand beam;
   owner_.stamp(beam);
@@ -25,17 +25,17 @@ Task LineLaser::align(Eigen::Vector3d from, Eigen::Vector3d to) {
   beam.beam_start({from.x(), from.y(), from.z()});
   beam.beam_direction({direction.x(), direction.y(), direction.z()});
   beam_.write(beam);
-  for (int k = 0; k < 4; ++k) co_await NextStep{};  // the beam is aligned before the first reading
+  for (int k = 0; k < 4; ++k) co_await job::NextStep{};  // the beam is aligned before the first reading
 }
 
-Task LineLaser::average(std::int64_t count, double& mean) {
+job::Task LineLaser::average(std::int64_t count, double& mean) {
   drop_readings();
   sensing::DisplacementReading reading;
   const Instant after = owner_.now();
   double sum = 0.0;
   std::int64_t taken = 0;
   while (taken < count) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     while (taken < count && reading_.take(reading)) {
       if (reading.at().time_ns() < after.ns) continue;
       if (!reading.valid()) throw std::runtime_error{"the laser lost its beam"};

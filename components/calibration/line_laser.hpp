@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-#include "components/calibration/job_host.hpp"
 #include "core/component/component.hpp"
+#include "core/job/job_host.hpp"
 #include "idl/sensing.h"
 
 namespace invar::calibration {
@@ -14,18 +14,18 @@ namespace invar::calibration {
 class LineLaser {
  public:
   /// `timeout`: the job fails when readings take longer [s]; outlives this.
-  LineLaser(Component& owner, JobHost& host, const double& timeout);
+  LineLaser(Component& owner, job::JobHost& host, const double& timeout);
 
   /// Aligns the beam and zeroes it where the tool stands.
-  Task align(Eigen::Vector3d from, Eigen::Vector3d to);
+  job::Task align(Eigen::Vector3d from, Eigen::Vector3d to);
   /// `mean`: of the next `count` readings that are taken after now [m]. Throws std::runtime_error.
-  Task average(std::int64_t count, double& mean);
+  job::Task average(std::int64_t count, double& mean);
   /// Forgets the readings that nobody waits for.
   void drop_readings();
 
  private:
   Component& owner_;
-  JobHost& host_;
+  job::JobHost& host_;
   const double& timeout_;
   Inbox<sensing::DisplacementReading> reading_;
   Output<sensing::BeamCommand> beam_;

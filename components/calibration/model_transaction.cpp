@@ -2,12 +2,12 @@
 
 #include <stdexcept>
 
-#include "components/calibration/deliver.hpp"
-#include "components/calibration/wait.hpp"
+#include "core/job/deliver.hpp"
+#include "core/job/wait.hpp"
 
 namespace invar::calibration {
 
-ModelTransaction::ModelTransaction(Component& owner, JobHost& host)
+ModelTransaction::ModelTransaction(Component& owner, job::JobHost& host)
     : owner_{owner},
       host_{host},
       model_{owner, "model", "command"},
@@ -25,11 +25,11 @@ std::uint64_t ModelTransaction::send(compensation::ModelCommandKind kind, const 
   return command.id();
 }
 
-Task ModelTransaction::command(compensation::ModelCommandKind kind, const std::string& path) {
+job::Task ModelTransaction::command(compensation::ModelCommandKind kind, const std::string& path) {
   const std::uint64_t sent = send(kind, path);
   const Instant give_up = owner_.now() + Duration::seconds(5.0);
   for (;;) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     const auto* status = status_.latest();
     if (status != nullptr && status->command_id() == sent) {
       if (status->state() == compensation::MODEL_REFUSED)
@@ -44,28 +44,28 @@ Task ModelTransaction::command(compensation::ModelCommandKind kind, const std::s
   }
 }
 
-Task ModelTransaction::clear(const std::string& layers) {
+job::Task ModelTransaction::clear(const std::string& layers) {
   transaction_ = host_.next_id();
   known_ = false;
   co_await command(compensation::MODEL_CLEAR, layers);
   known_ = true;
 }
 
-Task ModelTransaction::use(const std::filesystem::path& model) {
+job::Task ModelTransaction::use(const std::filesystem::path& model) {
   std::string path;
-  co_await deliver(owner_, model_, model, path);
+  co_await job::deliver(owner_, model_, model, path);
   co_await command(compensation::MODEL_STAGE, path);
   co_await command(compensation::MODEL_ACTIVATE, path);
-  co_await wait(owner_, 1.0);
+  co_await job::wait(owner_, 1.0);
 }
 
-Task ModelTransaction::keep() {
+job::Task ModelTransaction::keep() {
   known_ = false;
   co_await command(compensation::MODEL_COMMIT, "");
   transaction_ = 0;
 }
 
-Task ModelTransaction::roll_back(const std::string& why) {
+job::Task ModelTransaction::roll_back(const std::string& why) {
   known_ = false;
   co_await command(compensation::MODEL_ROLLBACK, "");
   transaction_ = 0;

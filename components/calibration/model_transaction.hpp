@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <string>
 
-#include "components/calibration/job_host.hpp"
 #include "core/component/component.hpp"
+#include "core/job/job_host.hpp"
 #include "idl/compensation.h"
 
 namespace invar::calibration {
@@ -15,16 +15,16 @@ namespace invar::calibration {
 /// answer. Not real-time.
 class ModelTransaction {
  public:
-  ModelTransaction(Component& owner, JobHost& host);
+  ModelTransaction(Component& owner, job::JobHost& host);
 
   /// Begins: `layers` empty takes out all models, "thermal" that of position and temperature.
-  Task clear(const std::string& layers);
+  job::Task clear(const std::string& layers);
   /// Activates a model on trial and waits until its correction is blended in.
-  Task use(const std::filesystem::path& model);
+  job::Task use(const std::filesystem::path& model);
   /// Ends: the model on trial stays.
-  Task keep();
+  job::Task keep();
   /// Ends with all as it was before, and throws std::runtime_error{why}.
-  Task roll_back(const std::string& why);
+  job::Task roll_back(const std::string& why);
 
   /// Once a step of a job: shows the compensation that the job lives. Throws std::runtime_error when the compensation no longer
   /// knows the transaction, restarted or rolled back by itself.
@@ -37,11 +37,11 @@ class ModelTransaction {
   [[nodiscard]] std::uint32_t geometric_checksum() { return status_.latest()->geometric_checksum(); }
 
  private:
-  Task command(compensation::ModelCommandKind kind, const std::string& path);
+  job::Task command(compensation::ModelCommandKind kind, const std::string& path);
   std::uint64_t send(compensation::ModelCommandKind kind, const std::string& path);
 
   Component& owner_;
-  JobHost& host_;
+  job::JobHost& host_;
   Output<compensation::ModelCommand> model_;
   Input<compensation::ModelStatus> status_;
   std::uint64_t transaction_ = 0;  // ours on the compensation; 0: none

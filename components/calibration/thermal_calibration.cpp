@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "components/calibration/identify.hpp"
-#include "components/calibration/wait.hpp"
 #include "core/base/new_file.hpp"
+#include "core/job/wait.hpp"
 
 namespace invar::calibration {
 
@@ -46,7 +46,7 @@ void write_models_tried(const metrology::ThermalFit& fit, const std::filesystem:
 
 }  // namespace
 
-ThermalCalibration::ThermalCalibration(Component& owner, JobHost& host, LineLaser& laser,
+ThermalCalibration::ThermalCalibration(Component& owner, job::JobHost& host, LineLaser& laser,
                                        ModelTransaction& models, const std::vector<std::string>& zones)
     : owner_{owner},
       host_{host},
@@ -120,13 +120,13 @@ void ThermalCalibration::forget() {
 }
 
 /// Holds a temperature until it has stood there for the soak.
-Task ThermalCalibration::reach(const ThermalJob& job, double temperature) {
+job::Task ThermalCalibration::reach(const ThermalJob& job, double temperature) {
   trace_ = nullptr;
   set_heater(temperature);
   const Instant began = owner_.now();
   Instant away = owner_.now();
   while (owner_.now() - away < Duration::seconds(job.soak)) {
-    co_await NextStep{};
+    co_await job::NextStep{};
     const auto* sample = temperature_.latest();
     if (sample == nullptr || sample->stale() || std::abs(sample->temperature() - temperature) > job.tolerance)
       away = owner_.now();
@@ -137,7 +137,7 @@ Task ThermalCalibration::reach(const ThermalJob& job, double temperature) {
 }
 
 /// The line once forth and back.
-Task ThermalCalibration::pass(const Pass& what, recording::Table& table) {
+job::Task ThermalCalibration::pass(const Pass& what, recording::Table& table) {
   const Eigen::Vector3d from = what.job.line.start();
   const Eigen::Vector3d way = what.job.line.end() - from;
   const auto intervals = std::max<std::int64_t>(1, std::llround(way.norm() / what.job.interval));
@@ -171,8 +171,9 @@ Task ThermalCalibration::pass(const Pass& what, recording::Table& table) {
 }
 
 /// Passes with the one and the other model in turn: two of each at a temperature that holds, or as many as a trace lasts.
-Task ThermalCalibration::compare(const ThermalJob& job, const TraceSpec* trace,
-                                 const std::array<std::filesystem::path, 2>& files, recording::Table& table) {
+job::Task ThermalCalibration::compare(const ThermalJob& job, const TraceSpec* trace,
+                                      const std::array<std::filesystem::path, 2>& files,
+                                      recording::Table& table) {
   trace_ = trace;
   trace_start_ = owner_.now();
   for (int number = 0;; ++number) {
@@ -189,7 +190,8 @@ Task ThermalCalibration::compare(const ThermalJob& job, const TraceSpec* trace,
 
 /// Passes at room temperature, then while the heater follows the trace; into `table`, the first `cold_rows` of it at room
 /// temperature, and into thermal.csv.
-Task ThermalCalibration::measure(const ThermalJob& job, recording::Table& table, std::size_t& cold_rows) {
+job::Task ThermalCalibration::measure(const ThermalJob& job, recording::Table& table,
+                                      std::size_t& cold_rows) {
   host_.tell("waiting for the room temperature of the slide", 0.0);
   co_await reach(job, job.room);
   co_await host_.move_to(job.line.start(), {});
@@ -207,7 +209,7 @@ Task ThermalCalibration::measure(const ThermalJob& job, recording::Table& table,
   while (owner_.now() - trace_start_ < Duration::seconds(job.trace.length())) {
     const Pass next{job, false, ++number, ""};
     co_await pass(next, table);
-    co_await wait(owner_, job.pause);
+    co_await job::wait(owner_, job.pause);
     const double share = (owner_.now() - trace_start_).in_seconds() / job.trace.length();
     host_.advance(0.1 + 0.4 * std::min(1.0, share));
   }
@@ -255,7 +257,8 @@ void ThermalCalibration::identify(const ThermalJob& job, const recording::Table&
 }
 
 /// Keeps the model over position and temperature, or rolls back and throws std::runtime_error.
-Task ThermalCalibration::verify(const ThermalJob& job, const std::array<std::filesystem::path, 2>& files) {
+job::Task ThermalCalibration::verify(const ThermalJob& job,
+                                     const std::array<std::filesystem::path, 2>& files) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   host_.tell("comparing with the model of room temperature at one temperature", 0.5);
   co_await reach(job, job.fixed);
@@ -276,9 +279,9 @@ Task ThermalCalibration::verify(const ThermalJob& job, const std::array<std::fil
   co_await models_.keep();
 }
 
-Task ThermalCalibration::run(const ThermalJob& job) {
+job::Task ThermalCalibration::run(const ThermalJob& job) {
   began_ = owner_.now();
-  if (temperature_.latest() == nullptr) co_await wait(owner_, 5.0);  // the cell is coming up
+  if (temperature_.latest() == nullptr) co_await job::wait(owner_, 5.0);  // the cell is coming up
   if (temperature_.latest() == nullptr)
     throw std::runtime_error{"no temperature arrives: connect `temperature` and `heater`"};
   setpoint_before_ = temperature_.latest()->setpoint();

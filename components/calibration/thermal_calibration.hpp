@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "components/calibration/job_host.hpp"
 #include "components/calibration/job_specs.hpp"
 #include "components/calibration/line_laser.hpp"
 #include "components/calibration/model_transaction.hpp"
 #include "core/component/component.hpp"
+#include "core/job/job_host.hpp"
 #include "core/metrology/thermal/heat_trace.hpp"
 #include "core/metrology/thermal/thermal_identification.hpp"
 #include "core/recording/table.hpp"
@@ -25,12 +25,12 @@ namespace invar::calibration {
 class ThermalCalibration {
  public:
   /// `zones`: further temperatures to record; outlive this.
-  ThermalCalibration(Component& owner, JobHost& host, LineLaser& laser, ModelTransaction& models,
+  ThermalCalibration(Component& owner, job::JobHost& host, LineLaser& laser, ModelTransaction& models,
                      const std::vector<std::string>& zones);
 
   /// Files into job.out: thermal.csv, models_tried.txt, compensation.yaml, verify_fixed.csv, verify_varying.csv, and the model
   /// of room temperature in room/. Throws std::runtime_error and InputError with what a user can mend.
-  Task run(const ThermalJob& job);
+  job::Task run(const ThermalJob& job);
   /// Once a step, also without a job: what the temperature did, and the setpoint of the trace.
   void follow();
   /// The heater goes back to its setpoint before the job.
@@ -45,20 +45,20 @@ class ThermalCalibration {
     double number = 0.0;
     std::string model;  // in use meanwhile; empty: none
   };
-  Task measure(const ThermalJob& job, recording::Table& table, std::size_t& cold_rows);
+  job::Task measure(const ThermalJob& job, recording::Table& table, std::size_t& cold_rows);
   void identify(const ThermalJob& job, const recording::Table& table, std::size_t cold_rows,
                 std::array<std::filesystem::path, 2>& files);
-  Task verify(const ThermalJob& job, const std::array<std::filesystem::path, 2>& files);
-  Task reach(const ThermalJob& job, double temperature);
-  Task pass(const Pass& what, recording::Table& table);  // `what` outlives it
-  Task compare(const ThermalJob& job, const TraceSpec* trace,
-               const std::array<std::filesystem::path, 2>& files, recording::Table& table);
+  job::Task verify(const ThermalJob& job, const std::array<std::filesystem::path, 2>& files);
+  job::Task reach(const ThermalJob& job, double temperature);
+  job::Task pass(const Pass& what, recording::Table& table);  // `what` outlives it
+  job::Task compare(const ThermalJob& job, const TraceSpec* trace,
+                    const std::array<std::filesystem::path, 2>& files, recording::Table& table);
   [[nodiscard]] recording::Table heat_table(bool with_models) const;
   void set_heater(double setpoint);
   void remember(double at, double temperature);
 
   Component& owner_;
-  JobHost& host_;
+  job::JobHost& host_;
   LineLaser& laser_;
   ModelTransaction& models_;
   const std::vector<std::string>& zone_names_;

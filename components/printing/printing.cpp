@@ -1,15 +1,15 @@
-#include "components/calibration/printing.hpp"
+#include "components/printing/printing.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
-#include "components/calibration/deliver.hpp"
 #include "core/compensation/trajectory_file.hpp"
+#include "core/job/deliver.hpp"
 #include "core/recording/table.hpp"
 
-namespace invar::calibration {
+namespace invar::printing {
 
 using namespace dispensing;
 using metrology::TrajectoryFit;
@@ -58,7 +58,7 @@ std::vector<std::vector<Eigen::Vector2d>> rows_of(const TriggerPattern& pattern)
 
 }  // namespace
 
-Printing::Printing(Component& owner, JobHost& host)
+Printing::Printing(Component& owner, job::JobHost& host)
     : owner_{owner},
       host_{host},
       pressure_command_{owner, "pressure_command", "command"},
@@ -84,11 +84,11 @@ Sample Printing::stamped() const {
   return sample;
 }
 
-Task Printing::wait_for(const Condition& done, double seconds, std::string what) {
+job::Task Printing::wait_for(const Condition& done, double seconds, std::string what) {
   const Instant give_up = owner_.now() + Duration::seconds(seconds);
   while (!done()) {
     if (owner_.now() > give_up) throw std::runtime_error{what};
-    co_await NextStep{};
+    co_await job::NextStep{};
   }
 }
 
@@ -107,7 +107,7 @@ void Printing::make_safe() {
   pressure_command_.write(off);
 }
 
-Task Printing::pressurise() {
+job::Task Printing::pressurise() {
   const Condition heard = [this] { return pressure_.latest() != nullptr; };
   co_await wait_for(heard, 10.0, "the dispenser says nothing: is it active?");
   auto on = stamped<PressureCommand>();
@@ -118,7 +118,7 @@ Task Printing::pressurise() {
   co_await wait_for(steady, 20.0, "the pressure does not reach its band: look at the supply and the alarms");
 }
 
-Task Printing::change_model(compensation::ModelCommandKind kind, std::string path) {
+job::Task Printing::change_model(compensation::ModelCommandKind kind, std::string path) {
   auto command = stamped<compensation::ModelCommand>();
   command.id(last_command_ = host_.next_id());
   command.kind(kind);
@@ -133,19 +133,19 @@ Task Printing::change_model(compensation::ModelCommandKind kind, std::string pat
                              aim_status_.latest()->text().c_str()};
 }
 
-Task Printing::use(const metrology::DropletTrajectory& trajectory, std::filesystem::path source,
-                   std::filesystem::path file) {
+job::Task Printing::use(const metrology::DropletTrajectory& trajectory, std::filesystem::path source,
+                        std::filesystem::path file) {
   compensation::ModelText text{"dispenser", {source}};
   compensation::write_trajectory(text, trajectory);
   text.write(file);
   std::string path;
-  co_await deliver(owner_, aim_, file, path);
+  co_await job::deliver(owner_, aim_, file, path);
   co_await change_model(compensation::MODEL_STAGE, path);
   co_await change_model(compensation::MODEL_ACTIVATE, path);
 }
 
 /// One picture with everything on it that vision found; its answer is in the inbox afterwards.
-Task Printing::calibrate_camera(Eigen::Vector2d ruler) {
+job::Task Printing::calibrate_camera(Eigen::Vector2d ruler) {
   host_.tell("calibrating the camera", progress_);
   const Condition seen = [this] { return vision_.latest() != nullptr; };
   co_await wait_for(seen, 10.0, "vision says nothing: is it active?");
@@ -167,8 +167,8 @@ Task Printing::calibrate_camera(Eigen::Vector2d ruler) {
 }
 
 /// Each row with a run-up, at the job's velocity, one after the other.
-Task Printing::drive_rows(const PrintJob& job, const TriggerPattern& pattern) {
-  const Pace pace{job.velocity, job.acceleration, job.jerk};
+job::Task Printing::drive_rows(const PrintJob& job, const TriggerPattern& pattern) {
+  const job::Pace pace{job.velocity, job.acceleration, job.jerk};
   const double lead = static_cast<double>(pattern.points().front().lead_ns()) * 1e-9;
   const double before = 1.2 * run_up(job) + job.velocity * std::max(lead, 0.0) + 2e-4;
   const double after = 1.2 * run_up(job) + job.velocity * std::max(-lead, 0.0) + 2e-4;
@@ -183,7 +183,7 @@ Task Printing::drive_rows(const PrintJob& job, const TriggerPattern& pattern) {
 }
 
 /// Appends what was printed and seen; droplets that vision did not find are left out.
-Task Printing::print(const PrintJob& job, double height, std::string picture, Prints& prints) {
+job::Task Printing::print(const PrintJob& job, double height, std::string picture, Prints& prints) {
   auto fresh = stamped<SubstrateCommand>();
   fresh.id(last_command_ = host_.next_id());
   fresh.height(height);
@@ -249,7 +249,7 @@ Task Printing::print(const PrintJob& job, double height, std::string picture, Pr
 }
 
 /// Looks at the pattern and joins each droplet to the target that it is nearest to; the others are taken out.
-Task Printing::measure(const PrintJob& job, std::string picture, Prints& prints) {
+job::Task Printing::measure(const PrintJob& job, std::string picture, Prints& prints) {
   Eigen::Vector2d low = prints.front().target, high = low;
   for (const Print& one : prints) {
     low = low.cwiseMin(one.target);
@@ -367,7 +367,7 @@ double error_rms(const Prints& prints) {
 
 }  // namespace
 
-Task Printing::watch_drift(const PrintJob& job, const TrajectoryFit& fit) {
+job::Task Printing::watch_drift(const PrintJob& job, const TrajectoryFit& fit) {
   const double height = *std::max_element(job.heights.begin(), job.heights.end());
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   metrology::TrajectoryTracker tracker{fit, {job.drift.placement, job.drift.slowness, job.drift.limit}};
@@ -397,7 +397,7 @@ Task Printing::watch_drift(const PrintJob& job, const TrajectoryFit& fit) {
   }
 }
 
-Task Printing::run(const PrintJob& job) {
+job::Task Printing::run(const PrintJob& job) {
   const std::filesystem::path folder = std::filesystem::absolute(job.out);
   begun_ = owner_.now();
   progress_ = 0.0;
@@ -429,4 +429,4 @@ Task Printing::run(const PrintJob& job) {
   make_safe();
 }
 
-}  // namespace invar::calibration
+}  // namespace invar::printing

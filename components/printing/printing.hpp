@@ -8,17 +8,17 @@
 #include <string>
 #include <vector>
 
-#include "components/calibration/job_host.hpp"
-#include "components/calibration/job_specs.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/job/job_host.hpp"
+#include "core/job/job_spec.hpp"
 #include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "core/metrology/droplet/trajectory_tracker.hpp"
 #include "idl/compensation.h"
 #include "idl/dispensing.h"
 #include "idl/image.h"
 
-namespace invar::calibration {
+namespace invar::printing {
 
 /// More prints after the calibration, while the head drifts: each is measured, and the model follows.
 struct DriftWatch {
@@ -37,7 +37,7 @@ struct DriftWatch {
   }
 };
 
-struct PrintJob : JobSpec {
+struct PrintJob : job::JobSpec {
   std::string first;
   std::string pattern;
   std::vector<double> heights{2e-3, 20e-3};
@@ -48,7 +48,7 @@ struct PrintJob : JobSpec {
   double reach = 9e-4;
   DriftWatch drift;
   void describe(auto& p) {
-    JobSpec::describe(p);
+    job::JobSpec::describe(p);
     p(first, "first", "a job of `jobs` that is done before");
     p(pattern, "pattern", "pattern of the dispenser, printed at each height");
     p(heights, "heights", "m", "from nozzle to substrate, in the order of printing");
@@ -75,10 +75,10 @@ struct PrintJob : JobSpec {
 /// Owns the ports of the job, on behalf of the component that runs it.
 class Printing {
  public:
-  Printing(Component& owner, JobHost& host);
+  Printing(Component& owner, job::JobHost& host);
   /// Files into job.out: droplets.csv (before), compensation.yaml, droplets_after.csv, drift.csv, and a picture a print.
   /// Throws std::runtime_error and InputError with what a user can mend; the model is rolled back when it does not help.
-  Task run(const PrintJob& job);
+  job::Task run(const PrintJob& job);
   /// Pressure off, valve disarmed.
   void make_safe();
 
@@ -92,22 +92,22 @@ class Printing {
   using Prints = std::vector<Print>;
   using Condition = std::function<bool()>;
 
-  Task wait_for(const Condition& done, double seconds, std::string what);
-  Task pressurise();
-  Task calibrate_camera(Eigen::Vector2d ruler);
-  Task print(const PrintJob& job, double height, std::string picture, Prints& prints);
-  Task drive_rows(const PrintJob& job, const dispensing::TriggerPattern& pattern);
-  Task measure(const PrintJob& job, std::string picture, Prints& prints);
-  Task change_model(compensation::ModelCommandKind kind, std::string path);
-  Task use(const metrology::DropletTrajectory& trajectory, std::filesystem::path source,
-           std::filesystem::path file);
-  Task watch_drift(const PrintJob& job, const metrology::TrajectoryFit& fit);
+  job::Task wait_for(const Condition& done, double seconds, std::string what);
+  job::Task pressurise();
+  job::Task calibrate_camera(Eigen::Vector2d ruler);
+  job::Task print(const PrintJob& job, double height, std::string picture, Prints& prints);
+  job::Task drive_rows(const PrintJob& job, const dispensing::TriggerPattern& pattern);
+  job::Task measure(const PrintJob& job, std::string picture, Prints& prints);
+  job::Task change_model(compensation::ModelCommandKind kind, std::string path);
+  job::Task use(const metrology::DropletTrajectory& trajectory, std::filesystem::path source,
+                std::filesystem::path file);
+  job::Task watch_drift(const PrintJob& job, const metrology::TrajectoryFit& fit);
   void trigger(dispensing::TriggerCommandKind kind, std::uint64_t pattern_id);
   template <class Sample>
   Sample stamped() const;
 
   Component& owner_;
-  JobHost& host_;
+  job::JobHost& host_;
   Output<dispensing::PressureCommand> pressure_command_;
   Input<dispensing::PressureState> pressure_;
   Output<dispensing::PatternCommand> print_;
@@ -129,4 +129,4 @@ class Printing {
   Instant begun_;
 };
 
-}  // namespace invar::calibration
+}  // namespace invar::printing

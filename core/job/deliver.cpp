@@ -1,4 +1,4 @@
-#include "components/calibration/deliver.hpp"
+#include "core/job/deliver.hpp"
 
 #include <chrono>
 #include <future>
@@ -7,7 +7,7 @@
 #include "core/component/component.hpp"
 #include "core/component/model_courier.hpp"
 
-namespace invar::calibration {
+namespace invar::job {
 
 Task deliver(const Component& owner, const Port& output, std::filesystem::path file, std::string& found) {
   found = file.string();
@@ -18,4 +18,4 @@ Task deliver(const Component& owner, const Port& output, std::filesystem::path f
   found = brought.get().string();
 }
 
-}  // namespace invar::calibration
+}  // namespace invar::job

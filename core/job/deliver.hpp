@@ -4,13 +4,13 @@
 #include <filesystem>
 #include <string>
 
-#include "components/calibration/task.hpp"
 #include "core/component/port.hpp"
+#include "core/job/task.hpp"
 
-namespace invar::calibration {
+namespace invar::job {
 
 /// `found`: the path for a command on `output`. Throws std::runtime_error where the file could not be brought. In simulated
 /// time all within one step, so that runs repeat.
 Task deliver(const Component& owner, const Port& output, std::filesystem::path file, std::string& found);
 
-}  // namespace invar::calibration
+}  // namespace invar::job

@@ -1,11 +1,11 @@
-#include "components/calibration/job_component.hpp"
+#include "core/job/job_component.hpp"
 
 #include <exception>
 #include <utility>
 
 #include "core/base/folder.hpp"
 
-namespace invar::calibration {
+namespace invar::job {
 
 void JobComponent::activate() {
   task_ = {};
@@ -82,4 +82,4 @@ void JobComponent::step(const Tick&) noexcept {
   }
 }
 
-}  // namespace invar::calibration
+}  // namespace invar::job

@@ -7,12 +7,12 @@
 #include <optional>
 #include <string>
 
-#include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/job/task.hpp"
 #include "idl/job.h"
 
-namespace invar::calibration {
+namespace invar::job {
 
 /// Port `job` takes commands, port `status` answers. A request that comes twice is one. A job that throws has failed; one that
 /// fails, is cancelled or deactivated is made safe. Not real-time.
@@ -59,4 +59,4 @@ class JobComponent : public Component {
   std::uint64_t next_command_ = 1;
 };
 
-}  // namespace invar::calibration
+}  // namespace invar::job

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <string>
 
-#include "components/calibration/task.hpp"
+#include "core/job/task.hpp"
 
-namespace invar::calibration {
+namespace invar::job {
 
 /// Along the path, whatever its direction; 0: the stage's own.
 struct Pace {
@@ -31,4 +31,4 @@ class JobHost {
   virtual std::uint64_t next_id() = 0;
 };
 
-}  // namespace invar::calibration
+}  // namespace invar::job

@@ -5,7 +5,7 @@
 #include <exception>
 #include <utility>
 
-namespace invar::calibration {
+namespace invar::job {
 
 /// A coroutine without a thread: `co_await NextStep{}` gives back control until the component is stepped again,
 /// `co_await other_task` runs a part of the job. Exceptions travel to the awaiting task and to `resume`. Being driven by
@@ -86,4 +86,4 @@ inline std::coroutine_handle<> Task::Final::await_suspend(Handle ended) noexcept
 /// Waits until the component is stepped again.
 struct NextStep : std::suspend_always {};
 
-}  // namespace invar::calibration
+}  // namespace invar::job

@@ -1,10 +1,10 @@
 // wait: a job lets time pass.
 #pragma once
 
-#include "components/calibration/task.hpp"
 #include "core/component/component.hpp"
+#include "core/job/task.hpp"
 
-namespace invar::calibration {
+namespace invar::job {
 
 /// `seconds` on the clock of `owner`, whose job this is.
 inline Task wait(const Component& owner, double seconds) {
@@ -12,4 +12,4 @@ inline Task wait(const Component& owner, double seconds) {
   while (owner.now() < until) co_await NextStep{};
 }
 
-}  // namespace invar::calibration
+}  // namespace invar::job

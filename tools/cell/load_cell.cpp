@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "components/all.hpp"
-#include "components/calibration/job_component.hpp"
 #include "core/base/shown.hpp"
+#include "core/job/job_component.hpp"
 #include "tools/cell/bridge_file.hpp"
 #include "tools/cell/connections.hpp"
 #include "tools/cell/plugins.hpp"
@@ -92,7 +92,7 @@ void check_jobs(const LoadedCell& loaded) {
       for (const auto& [job, component] : loaded.cell->jobs) {
         if (component != member.file->name || !member.component) continue;
         const config::Node at = loaded.yaml.root()["jobs"][job];
-        auto* runs = dynamic_cast<calibration::JobComponent*>(member.component.get());
+        auto* runs = dynamic_cast<job::JobComponent*>(member.component.get());
         if (runs == nullptr)
           at.fault("`" + component + "` runs no jobs", "name the component that runs it");
         else if (!runs->has(job))

@@ -15,7 +15,6 @@
 #include <set>
 #include <thread>
 
-#include "components/calibration/job_component.hpp"
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "core/base/clock.hpp"
@@ -30,6 +29,7 @@
 #include "core/dds/wire_type.hpp"
 #include "core/executor/locked_memory.hpp"
 #include "core/executor/process_control.hpp"
+#include "core/job/job_component.hpp"
 #include "core/recording/type_book.hpp"
 #include "idl/stage.h"
 #include "tools/cell/black_box_file.hpp"
@@ -126,7 +126,7 @@ class RunningProcess {
       member.component->folders = folders;
       if (auto* found = dynamic_cast<recorder::Recorder*>(member.component.get())) recorder_ = found;
       if (auto* found = dynamic_cast<supervisor::Supervisor*>(member.component.get())) supervisor_ = found;
-      if (auto* found = dynamic_cast<calibration::JobComponent*>(member.component.get()))
+      if (auto* found = dynamic_cast<job::JobComponent*>(member.component.get()))
         found->refuse_while([this] {
           return node_.clocks() == nullptr ? "" : node_.clocks()->farther_than(loaded_.cell->clock_bound);
         });

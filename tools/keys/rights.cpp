@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "components/calibration/job_component.hpp"
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "core/base/fault.hpp"
@@ -10,6 +9,7 @@
 #include "core/dds/cell_client.hpp"
 #include "core/dds/identity.hpp"
 #include "core/dds/node.hpp"
+#include "core/job/job_component.hpp"
 #include "tools/cell/bridge_file.hpp"
 #include "tools/cell/standbys.hpp"
 
@@ -78,11 +78,10 @@ Rights of_process(const LoadedCell& loaded, const LoadedProcess& process) {
   });
   if (has_partner_on_another_pc(loaded, process.file->name))  // it hears there that the other's process ended
     rights.reads.insert(dds::ServiceTopics{cell.name}.process_status);
-  if (has_supervisor(process) || has<calibration::JobComponent>(process)) add_client(cell, rights);
+  if (has_supervisor(process) || has<job::JobComponent>(process)) add_client(cell, rights);
   if (has_supervisor(process)) add_requests(cell, rights);
   // It brings the model that it found to a component on another PC.
-  if (has<calibration::JobComponent>(process))
-    rights.writes.insert(dds::ServiceTopics{cell.name}.model_request);
+  if (has<job::JobComponent>(process)) rights.writes.insert(dds::ServiceTopics{cell.name}.model_request);
   return rights;
 }
 

@@ -56,7 +56,7 @@ struct Enabling {
   /// Answers `first` for as long [s], then `then`; what the job failed with, or "".
   std::string run(Answer first, double as_long, Answer then) {
     std::vector<JobAxis*> axes{&runner.axis};
-    Task task = enable_axes(
+    job::Task task = enable_axes(
         axes, [this] { return ++id; }, Duration::seconds(10.0));
     Instant now;
     try {

@@ -1,5 +1,5 @@
 // The whole print job without middleware: stage, valve, pressure over Modbus TCP, flight, and a camera that sees perfectly.
-#include "components/calibration/printing.hpp"
+#include "components/printing/printing.hpp"
 
 #include <gmock/gmock.h>
 
@@ -21,7 +21,7 @@
 #include "tests/support/free_port.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-namespace invar::calibration {
+namespace invar::printing {
 namespace {
 
 namespace fs = std::filesystem;
@@ -76,7 +76,7 @@ struct Cell final : Component {
   dispenser::Dispenser::Parameters dispenser_parameters;
   world::SimulatedPneumatics::Parameters air_parameters;
   world::SimulatedSubstrate::Parameters head;
-  Calibration::Parameters parameters;
+  calibration::Calibration::Parameters parameters;
   struct Member {
     std::unique_ptr<Component> component;
     int every;
@@ -136,7 +136,7 @@ struct Cell final : Component {
     add<dispenser::Dispenser>("dispenser", dispenser_parameters, 20);
     members["vision"] = {std::make_unique<Seer>(), 10};
     order.emplace_back("vision");
-    add<Calibration>("job", parameters, 10);
+    add<calibration::Calibration>("job", parameters, 10);
     for (const char* axis : {"x", "y"}) {
       const std::string stage = std::string{"stage_"} + axis, state = std::string{"state_"} + axis;
       join("world", (std::string{"feedback_"} + axis).c_str(), stage.c_str(), "feedback");
@@ -301,4 +301,4 @@ TEST(Printing, FailsWithWhatTheUserCanMend) {
 }
 
 }  // namespace
-}  // namespace invar::calibration
+}  // namespace invar::printing
