@@ -14,6 +14,10 @@ std::filesystem::path progress_file(const std::filesystem::path& outcome) {
   return outcome.empty() ? file : file += ".progress";
 }
 
+std::filesystem::path rest_file(const std::filesystem::path& outcome) {
+  return std::filesystem::path{outcome}.replace_extension(".rest");
+}
+
 void write_whole(const std::filesystem::path& file, const nlohmann::json& json) noexcept {
   try {
     std::filesystem::path part = file;

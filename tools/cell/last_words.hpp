@@ -1,4 +1,4 @@
-// Files that a process leaves for its launcher: how far its job is, and at the end the outcome of the process.
+// Files that a process leaves for its launcher: how far its job is, that it rests, at the end its outcome.
 #pragma once
 
 #include <chrono>
@@ -13,6 +13,9 @@ namespace invar::tools {
 
 /// Where the process that leaves `outcome` says how far its job is.
 [[nodiscard]] std::filesystem::path progress_file(const std::filesystem::path& outcome);
+
+/// There once the process that leaves `outcome` moves nothing any more, as it was ordered.
+[[nodiscard]] std::filesystem::path rest_file(const std::filesystem::path& outcome);
 
 /// The file is there as a whole or not at all: a full disk, or a folder that somebody cleared away, stops no cell.
 void write_whole(const std::filesystem::path& file, const nlohmann::json& json) noexcept;

@@ -27,9 +27,6 @@ struct ProcessOrders {
   std::atomic<bool> rest{false};  // by the clock: what moves comes to rest; all goes on until `stop`
 };
 
-/// Beside the outcome file: this process moves nothing any more, as it was ordered.
-[[nodiscard]] std::filesystem::path rest_file(const std::filesystem::path& outcome);
-
 /// Runs until `stop` is set, the job has ended, or in simulated time the master ends the run. Checks the whole cell first. One
 /// that `invar run` started (it has an outcome file) comes to rest and stops, too, when that is no more.
 /// Throws InputError. Exit status: 0 in order; 1 a component failed to come up, the job failed, time stood still, or, without a launcher
