@@ -328,6 +328,14 @@ class Looking(unittest.TestCase):
         # Nothing is cut: the words that a wide line has stand in the narrow one.
         wide = invar("param", "list", CELL_FILE, "calibration", "--wait", 20, env=dict(os.environ, COLUMNS="1000"))[1]
         self.assertGreater(max(map(len, wide.splitlines())), 80)
+        # Names of topics and types, which are searched for and copied, stay whole; a program gets one line a topic.
+        topics = json.loads(invar("topics", CELL_FILE, "--wait", 20, "--json")[1])
+        narrow = invar("topics", CELL_FILE, "--wait", 20, env=here)[1].splitlines()
+        piped = invar("topics", CELL_FILE, "--wait", 20, env={k: v for k, v in os.environ.items() if k != "COLUMNS"})[1].splitlines()
+        for topic in topics:
+            self.assertIn(f"{topic['topic']}  {topic['type']}", narrow)
+            self.assertEqual([line.split()[1] for line in piped if line.split()[0] == topic["topic"]], [topic["type"]])
+        self.assertEqual(len(piped), len(topics) + 1)
         # On a terminal its width counts.
         ours, theirs = pty.openpty()
         fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))

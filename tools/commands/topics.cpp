@@ -1,5 +1,7 @@
 // `invar topics`: what is written and read in a cell's domain, and which ends do not meet.
+#include <algorithm>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -46,6 +48,41 @@ std::map<std::string, Topic> topics_of(const dds::Snapshot& snapshot, bool all) 
   return topics;
 }
 
+const dds::Endpoint& first_end(const Topic& topic) {
+  return topic.writers.empty() ? topic.readers.front() : topic.writers.front();
+}
+
+std::string qos_of(const Topic& topic) {
+  return topic.writers.empty() ? "(nobody writes)" : qos_text(topic.writers.front().qos);
+}
+
+std::string counted(std::size_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+/// Names of topics and types stay whole, so that they can be searched for and copied: a line a topic where `width` has room, else
+/// two.
+void print(const std::map<std::string, Topic>& topics, std::size_t width) {
+  TextTable table{{"topic", "type", "writers>", "readers>", "qos of the writer"}};
+  std::size_t name_width = 0, type_width = 0;
+  for (const auto& [name, topic] : topics) {
+    const std::string& type = first_end(topic).type;
+    name_width = std::max(name_width, name.size());
+    type_width = std::max(type_width, type.size());
+    table.add({name, type, std::to_string(topic.writers.size()), std::to_string(topic.readers.size()),
+               qos_of(topic)});
+  }
+  constexpr std::size_t numbers_and_qos = 40;  // two columns of numbers, and room for words of a QoS
+  if (topics.empty()) return;
+  if (width >= name_width + type_width + numbers_and_qos) return table.print(std::cout, width);
+  for (const auto& [name, topic] : topics) {
+    print_wrapped(name + "  " + first_end(topic).type, 2, std::cout);
+    print_wrapped("  " + counted(topic.writers.size(), "writer") + ", " +
+                      counted(topic.readers.size(), "reader") + "; " + qos_of(topic),
+                  4, std::cout);
+  }
+}
+
 int topics(Options& options) {
   options.call.resolve();
   LiveCell cell{options.call};
@@ -62,13 +99,7 @@ int topics(Options& options) {
     }
     std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   } else {
-    TextTable table{{"topic", "type", "writers>", "readers>", "qos of the writer"}};
-    for (const auto& [name, topic] : found) {
-      const auto& end = topic.writers.empty() ? topic.readers.front() : topic.writers.front();
-      table.add({name, end.type, std::to_string(topic.writers.size()), std::to_string(topic.readers.size()),
-                 topic.writers.empty() ? "(nobody writes)" : qos_text(end.qos)});
-    }
-    if (!table.empty()) table.print(std::cout);
+    print(found, is_shown_to_a_person() ? line_width() : std::numeric_limits<std::size_t>::max());
     for (const auto& [name, topic] : found)
       for (const auto& problem : topic.problems) {
         print_wrapped("no samples flow on " + name + ": " + problem, 2, std::cout);

@@ -53,6 +53,8 @@ std::size_t line_width() {
   return usual_width;
 }
 
+bool is_shown_to_a_person() { return std::getenv("COLUMNS") != nullptr || isatty(STDOUT_FILENO) == 1; }
+
 std::vector<std::string> wrapped(const std::string& text, std::size_t width) {
   std::vector<std::string> lines;
   std::string_view left = text;

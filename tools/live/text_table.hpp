@@ -10,6 +10,8 @@ namespace invar::tools {
 
 /// Letters that a line may hold: COLUMNS where it is set, else the terminal's width, else 80.
 [[nodiscard]] std::size_t line_width();
+/// The output goes to a terminal, or COLUMNS says how wide lines may be; else to a program or a file.
+[[nodiscard]] bool is_shown_to_a_person();
 
 class TextTable {
  public:
