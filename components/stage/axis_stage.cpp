@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -141,13 +142,34 @@ MotionPoint Stage::setpoint(const Tick& tick) const noexcept {
   return trajectory_.at((tick.now - trajectory_start_).in_seconds());
 }
 
-/// A drive lets go of a carriage whose loop stands still. The setpoint waits meanwhile, or the carriage would run after it.
-void Stage::wait_out_stall(const Tick& tick) noexcept {
+/// How long [s] after `begin` on its trajectory, `most` at most, the setpoint comes nearest to `place`.
+double Stage::time_along(double begin, double most, double place) const noexcept {
+  constexpr int parts = 32;  // of a stall, then of the two parts about the nearest place, and of two of those
+  double nearest = 0.0, least = std::numeric_limits<double>::infinity(), from = 0.0, width = most;
+  for (int round = 0; round < 3; ++round) {
+    for (int part = 0; part <= parts; ++part) {
+      const double time = std::clamp(from + width * part / parts, 0.0, most);
+      const double off = std::abs(trajectory_.at(begin + time).position - place);
+      if (off < least) least = off, nearest = time;
+    }
+    from = nearest - width / parts;
+    width = 2.0 * width / parts;
+  }
+  return nearest;
+}
+
+/// While a loop stands still its carriage drives on with the last current, until the drive lets go of it. The setpoint goes on from
+/// where on its way the carriage is, so that neither leaps after the other.
+void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
   constexpr double periods = 8.0;  // as many as the overrun policy `degrade` leaves out
-  const Duration one = Duration::seconds(tick.period);
-  if (const Duration gone = last_step_ ? tick.now - *last_step_ : one;
-      gone > Duration::seconds(periods * tick.period))
-    trajectory_start_ = trajectory_start_ + (gone - one);
+  const double gone = last_step_ ? (tick.now - *last_step_).in_seconds() : tick.period;
+  if (gone > periods * tick.period) {
+    const double most = gone - tick.period;
+    const double begin = (*last_step_ - trajectory_start_).in_seconds() + tick.period;
+    const double place = position_ - correction_held_ + following_error_;
+    const double went = fresh ? time_along(begin, most, place) : 0.0;
+    trajectory_start_ = trajectory_start_ + Duration::seconds(most - went);
+  }
   last_step_ = tick.now;
 }
 
@@ -349,7 +371,6 @@ void Stage::track_settling(const Tick& tick, const MotionPoint& at) noexcept {
 }
 
 void Stage::step(const Tick& tick) noexcept {
-  wait_out_stall(tick);
   const auto* feedback = feedback_.latest();
   const Duration patience = Duration::seconds(parameters_.feedback_timeout);
   // What is no number has not come: one is bridged, more of them are a loss.
@@ -370,6 +391,7 @@ void Stage::step(const Tick& tick) noexcept {
   if (const auto* correction = correction_.latest(); correction != nullptr && bad == nullptr)
     correction_held_ = correction->correction();
   if (seeing && !primed_) prime(tick);
+  rejoin_after_stall(tick, fresh);
   look_for_correction(tick);
   if (!leads(tick, seeing)) return stand_by(tick, seeing);
 

@@ -213,7 +213,8 @@ class Stage final : public Component, public Redundant {
   void publish(const MotionPoint& setpoint) noexcept;
   [[nodiscard]] bool moves() const noexcept;
   [[nodiscard]] MotionPoint setpoint(const Tick& tick) const noexcept;
-  void wait_out_stall(const Tick& tick) noexcept;
+  [[nodiscard]] double time_along(double begin, double most, double place) const noexcept;
+  void rejoin_after_stall(const Tick& tick, bool fresh) noexcept;
   [[nodiscard]] double feedforward(const Tick& tick) noexcept;
 
   const Parameters& parameters_;

@@ -362,6 +362,31 @@ TEST(Stage, ALoopThatStoodStillAsksForNoLeap) {
   EXPECT_NEAR(bench.position, 0.15, 1e-4);
 }
 
+TEST(Stage, ACarriageThatDroveOnWhileItsLoopStoodStillIsNotTornBack) {
+  for (const unsigned gone : {13U, 41U, 90U}) {
+    Bench bench;
+    bench.enable();
+    bench.send(AXIS_COMMAND_MOVE, 0.15);
+    const double cruise = bench.parameters.limits.velocity;
+    ASSERT_TRUE(bench.run_until([&](const AxisState& s) { return s.setpoint_velocity() > 0.99 * cruise; }));
+    bench.cycle_once();
+    const double current = bench.state.latest()->current();
+    bench.cycle += gone;
+    bench.position += bench.velocity * gone * Bench::period;  // the last current keeps its speed up
+    const AxisState after = bench.cycle_once();
+    EXPECT_NEAR(after.current(), current, 0.2) << gone;
+    double slowest = cruise, fastest = 0.0;
+    ASSERT_TRUE(bench.run_until([&](const AxisState& s) {
+      if (s.setpoint_velocity() > 0.99 * cruise) slowest = std::min(slowest, bench.velocity);
+      fastest = std::max(fastest, bench.velocity);
+      return s.settled() && s.command_done();
+    }));
+    EXPECT_GT(slowest, 0.9 * cruise) << gone;
+    EXPECT_LT(fastest, 1.1 * cruise) << gone;
+    EXPECT_NEAR(bench.position, 0.15, 1e-4);
+  }
+}
+
 TEST(Stage, AnEncoderThatGivesNoNumberIsLostFeedback) {
   Bench bench;
   bench.enable();
