@@ -163,13 +163,14 @@ std::string place_of(const Case& data, const physics::Term& term) {
   if (data.model.plant == physics::Plant::axis && term.with == "command")
     return "current between controller and motor";
   if (data.model.plant == physics::Plant::equations) {
+    const auto with = term.with.empty() || term.with == term.on ? "" : ", with " + term.with;
     for (const auto& input : data.model.equations.inputs)
       if (input.symbol == term.on) return "input " + term.on;
     for (const auto& output : data.model.equations.outputs)
       if (physics::place_of_output(data.model.equations, output.name) == term.on)
-        return "output " + output.name;
+        return "output " + output.name + with;
     if (physics::is_felt_by_others_alone(term)) return "state " + term.on + " as the others feel it";
-    return "state " + term.on + (term.with.empty() || term.with == term.on ? "" : ", with " + term.with);
+    return "state " + term.on + with;
   }
   std::string text = site;
   for (const auto& one : known)

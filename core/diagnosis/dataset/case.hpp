@@ -63,7 +63,7 @@ struct Case {
     std::size_t count = 0;  // 0: each recording is simulated from its first row to its last
     double length = 0.0;    // of one, in the unit of time
     bool grows = false;     // a disturbance of the model grows; false: it stays
-    bool few = false;       // as few as stay near, for what is slow
+    bool are_long = false;  // as long as the model stays near, for what is slow
     std::size_t anew = 0;   // beginnings at states of their own for other reasons: gaps, further recordings
     std::size_t forgetting = 0;  // rows behind gaps that are not compared
   };

@@ -89,9 +89,14 @@ double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, c
          odds_of_sliding_at_once(data, best, place, finding);
 }
 
-bool is_another_cause(const Finding& finding, const Alternative& alternative) {
+bool is_another_cause(const Case& data, const Finding& finding, const Alternative& alternative) {
   const auto &one = finding.term, &other = alternative.term;
-  return one.info != other.info || one.on != other.on || one.with != other.with ||
+  const auto& inputs = data.model.equations.inputs;
+  const bool is_over_another_input =
+      one.with != other.with && std::any_of(inputs.begin(), inputs.end(), [&](const auto& input) {
+        return input.symbol == one.with || input.symbol == other.with;
+      });
+  return one.info != other.info || one.on != other.on || is_over_another_input ||
          one.info->plant != Plant::equations;
 }
 
@@ -113,7 +118,7 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)
-    if (is_another_cause(finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
+    if (is_another_cause(data, finding, a)) sum += std::exp(std::min(0.0, 0.5 * a.log_odds));
   finding.other_cause = 0.0;
   if (finding.term.curve.knots.empty()) {
     finding.relatives = odds_of_relatives(data, d.best, place, finding);

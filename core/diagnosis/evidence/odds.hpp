@@ -24,9 +24,9 @@ double odds_of_nothing(const Finding& finding);
 /// friction that slides at once or springs first, a sine that enters at the motor or the carriage.
 double odds_of_relatives(const Case& data, const Fit& best, std::size_t place, const Finding& finding);
 
-/// Does an alternative say anything else than the finding? A term of equations that acts at the same place over a variable
-/// that runs alike is the same name for the same cause.
-bool is_another_cause(const Finding& finding, const Alternative& alternative);
+/// Does an alternative say anything else than the finding? A term of equations that acts at the same place over a state that
+/// runs alike is the same name for the same cause. Another input is another cause, however alike the two run.
+bool is_another_cause(const Case& data, const Finding& finding, const Alternative& alternative);
 
 /// By a lag or by a delay: an instrument's latency is the name of either.
 bool comes_late(const physics::Term& term);

@@ -47,6 +47,8 @@ std::string only_in(const std::vector<std::string>& one, const std::vector<std::
 std::string separating_experiment(const Case& data, const physics::Term& at, const physics::Term& beside) {
   if (at.info == beside.info && data.model.plant == physics::Plant::error_map)
     return varied(std::string{physics::temperature_of(at)}) + ", and the other way round";
+  if (at.info == beside.info && at.on == beside.on && at.with != beside.with)
+    return varied(at.with.empty() ? beside.with : at.with);
   if (at.info == beside.info)
     return "record with one instrument more, between the " + place_of(data, at) + " and the " +
            place_of(data, beside) + ": it shows the effect of the one and not that of the other";

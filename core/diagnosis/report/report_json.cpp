@@ -232,8 +232,7 @@ json assumed_json(const Case& data, const Diagnosis& d) {
                 {"site", site_of(data, finding.term)},
                 {"parameters", parameters_json(data, finding)},
                 {"heldout", fit_json(heldout)}};
-    if (!finding.term.on.empty()) one["on"] = finding.term.on;
-    if (!finding.term.with.empty()) one["with"] = finding.term.with;
+    add_place(one, finding.term);
     all.push_back(one);
   }
   return all;

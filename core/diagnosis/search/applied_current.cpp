@@ -20,7 +20,6 @@ void Search::stop_at_the_law() {
     for (auto& row : *rows) row.after = row.before;
   conclude(data_, d_);
   say_controller();
-  progress_(1.0, "done");
 }
 
 void Search::say_controller() {

@@ -1,5 +1,6 @@
 #include "core/diagnosis/search/diagnose.hpp"
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <optional>
@@ -18,11 +19,12 @@ namespace invar::diagnosis {
 
 namespace {
 
-/// How much a verdict says of what is missing.
-int named_by(const Diagnosis& d) {
-  return d.verdict == Verdict::explained                                             ? 2
-         : d.verdict == Verdict::partly_explained || d.verdict == Verdict::ambiguous ? 1
-                                                                                     : 0;
+/// How much of what is missing a verdict names.
+enum class Named { nothing, a_part, all };
+Named named(const Diagnosis& d) {
+  return d.verdict == Verdict::explained                                             ? Named::all
+         : d.verdict == Verdict::partly_explained || d.verdict == Verdict::ambiguous ? Named::a_part
+                                                                                     : Named::nothing;
 }
 
 /// Does the one leave plainly less of an output than the other? What lags behind its inputs is like one whose inputs were
@@ -35,40 +37,44 @@ bool is_nearer(const Case& data, const Diagnosis& d, const Case& other_data, con
   return false;
 }
 
-/// Another way to read the same recordings. A search on it takes the place of the one before where it is better.
-struct Reading {
-  const char* name;
-  /// Nothing where there is no reason to read them so.
-  std::optional<Case> (*read)(const Case& as_read, const Case& data, const Diagnosis& d);
-  bool (*is_better)(const Case& other, const Diagnosis& found, const Case& data, const Diagnosis& d);
+/// Another way to take the same recordings. A search on it takes the place of the one before where it is preferred.
+struct Alternate {
+  const char* name;  // where it is not tried
+  /// The recordings taken so; nothing where there is no reason to.
+  std::optional<Case> (*take)(const Case& as_read, const Case& data, const Diagnosis& d);
+  bool (*is_preferred)(const Case& other, const Diagnosis& found, const Case& data, const Diagnosis& d);
 };
 
-std::optional<Case> in_longer_windows(const Case& as_read, const Case& data, const Diagnosis& d) {
-  if ((named_by(d) == 2 && d.findings.size() < 2) || !has_longer_windows(data)) return std::nullopt;
+std::optional<Case> with_longer_windows(const Case& as_read, const Case& data, const Diagnosis& d) {
+  if ((named(d) == Named::all && d.findings.size() < 2) || !has_longer_windows(data)) return std::nullopt;
   auto longer = as_read;
-  longer.windows.few = true;
+  longer.windows.are_long = true;
   return longer;
 }
 
-constexpr std::array readings{
-    Reading{in_step_columns, with_columns_in_step,
-            [](const Case& moved, const Diagnosis& found, const Case&, const Diagnosis&) {
-              return !comes_late_again(moved, found);
-            }},
-    Reading{"longer windows", in_longer_windows,
-            // The same with fewer names is what more evidence makes of it.
-            [](const Case&, const Diagnosis& found, const Case&, const Diagnosis& d) {
-              return named_by(found) > named_by(d) ||
-                     (named_by(found) == 2 && found.findings.size() < d.findings.size());
-            }},
-    Reading{quiet_inputs, with_quiet_inputs,
-            [](const Case& quiet, const Diagnosis& found, const Case& data, const Diagnosis& d) {
-              return !is_nearer(data, d, quiet, found);
-            }}};
+constexpr std::array alternates{
+    Alternate{in_step_columns, with_columns_in_step,
+              [](const Case& moved, const Diagnosis& found, const Case&, const Diagnosis&) {
+                return !comes_late_again(moved, found);
+              }},
+    Alternate{longer_windows, with_longer_windows,
+              // The same with fewer names is what more evidence makes of it.
+              [](const Case&, const Diagnosis& found, const Case&, const Diagnosis& d) {
+                return named(found) > named(d) ||
+                       (named(found) == Named::all && found.findings.size() < d.findings.size());
+              }},
+    Alternate{quiet_inputs, with_quiet_inputs,
+              [](const Case& quiet, const Diagnosis& found, const Case& data, const Diagnosis& d) {
+                return !is_nearer(data, d, quiet, found);
+              }}};
 
 }  // namespace
 
 Diagnosis diagnose(Case& data, const Progress& progress, const Options& options) {
+  double reached = 0.0;  // a search begun anew does not go back on the bar
+  const Progress onwards = [&](double share, const std::string& what) {
+    progress(reached = std::max(reached, share), what);
+  };
   std::vector<std::string> not_tried;
   // A step beside the search proper: one that is interrupted counts for nothing, and is named.
   const auto take = [&](const char* what, const auto& step) -> decltype(step()) {
@@ -80,31 +86,34 @@ Diagnosis diagnose(Case& data, const Progress& progress, const Options& options)
     return {};
   };
   if (data.model.plant == physics::Plant::axis) {  // before any physics: what the recordings hold
-    take("how the reference goes on between rows", [&] { return settle_hold(data), true; });
-    take("the current beside the controller's law", [&] { return settle_recorded_current(data), true; });
+    take(recorded_hold, [&] { return settle_hold(data), true; });
+    take(beside_the_law, [&] { return settle_recorded_current(data), true; });
   }
   Case as_read = data;
-  auto best = Search{data, progress, options}.run();
-  if (!options.refuses) return best;
-  for (const auto& reading : readings) {
-    if (best.is_partial) break;
-    auto other = take(reading.name, [&] { return reading.read(as_read, data, best); });
+  auto best = Search{data, onwards, options}.run();
+  for (const auto& alternate : alternates) {
+    if (!options.refuses) break;
+    if (best.is_partial) {
+      add_once(not_tried, other_ways);
+      break;
+    }
+    auto other = take(alternate.name, [&] { return alternate.take(as_read, data, best); });
     if (!other) continue;
     other->remembered = std::make_shared<Remembered>();
     const Case other_as_read = *other;
-    auto found = Search{*other, progress, options}.run();
+    auto found = Search{*other, onwards, options}.run();
     if (found.is_partial) {
-      add_once(not_tried, reading.name);
-    } else if (reading.is_better(*other, found, data, best)) {
+      add_once(not_tried, alternate.name);
+    } else if (alternate.is_preferred(*other, found, data, best)) {
       as_read = other_as_read;
       data = std::move(*other);
       best = std::move(found);
     }
   }
-  if (!best.is_partial)
-    take("the best model in longer windows",
-         [&] { return keep_to_longer_windows(as_read, data, best), true; });
+  if (options.refuses && !best.is_partial)
+    take(holds_longer, [&] { return hold_to_longer_windows(as_read, data, best), true; });
   say_not_tried(best, not_tried);
+  progress(1.0, "done");
   return best;
 }
 

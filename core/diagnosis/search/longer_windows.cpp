@@ -17,7 +17,7 @@ namespace invar::diagnosis {
 namespace {
 
 /// The recordings as they were judged, without their windows, for the best model in longer ones.
-Case in_longer_windows(const Case& as_read, const Case& data, const Diagnosis& d) {
+Case best_in_longer_windows(const Case& as_read, const Case& data, const Diagnosis& d) {
   auto longer = as_read;
   longer.model = d.best.model;
   std::erase_if(longer.model.parameters, is_start);
@@ -27,7 +27,8 @@ Case in_longer_windows(const Case& as_read, const Case& data, const Diagnosis& d
     recording.simulation = physics::prepare(longer.model, recording.inputs);
   }
   longer.windows = {};
-  longer.windows.few = true;
+  longer.windows.are_long = true;
+  longer.stop = data.stop;
   longer.remembered = std::make_shared<Remembered>();
   cut_into_windows(longer);
   return longer;
@@ -51,18 +52,18 @@ double most_over_noise(const Case& data, const physics::Model& model, const Diag
 
 }  // namespace
 
-void keep_to_longer_windows(const Case& as_read, Case& data, Diagnosis& d) {
+void hold_to_longer_windows(const Case& as_read, Case& data, Diagnosis& d) {
   const bool leaves_nothing = d.verdict == Verdict::explained || d.verdict == Verdict::no_mismatch ||
                               d.verdict == Verdict::parameters_only;
   if (!leaves_nothing || !has_longer_windows(data)) return;
-  const auto longer = in_longer_windows(as_read, data, d);
+  const auto longer = best_in_longer_windows(as_read, data, d);
   if (longer.windows.count == 0 || longer.windows.length < 1.5 * data.windows.length) return;
   const auto plain = weigh(longer, simulate(longer, longer.model), Colour::white);
   const auto anew = fit(longer, plain, longer.model, longer.model, Effort::follow(8));
   const double times = most_over_noise(longer, anew.model, d);
   if (!(times > thresholds::times_noise)) return;
+  if (d.findings.empty()) d.suspect = most_suspect(data, d);  // may be interrupted
   d.verdict = d.verdict == Verdict::explained ? Verdict::partly_explained : Verdict::unknown_physics;
-  if (d.findings.empty()) d.suspect = most_suspect(data, d);
   std::ostringstream text;
   text.precision(2);
   text << "in longer windows, of " << longer.windows.length << " s, the model errs by " << times

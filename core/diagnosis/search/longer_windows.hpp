@@ -6,9 +6,9 @@
 namespace invar::diagnosis {
 
 /// Where a verdict leaves nothing open that was found in short windows, the best model must hold in longer ones too
-/// (`Case::Windows::few`), its numbers fitted anew. A residual there beyond twice the instruments' noise is mismatch: the
+/// (`Case::Windows::are_long`), its numbers fitted anew. A residual there beyond twice the instruments' noise is mismatch: the
 /// verdict leaves it open, and `data.doubts` says so. `as_read`: the recordings before they were cut; `data`: the case that `d` was
 /// found in.
-void keep_to_longer_windows(const Case& as_read, Case& data, Diagnosis& d);
+void hold_to_longer_windows(const Case& as_read, Case& data, Diagnosis& d);
 
 }  // namespace invar::diagnosis

@@ -10,7 +10,13 @@ namespace invar::diagnosis {
 
 /// Steps of the search, as the report names those that were not tried.
 inline constexpr const char* own_numbers = "the model's own numbers refitted to their end";
+inline constexpr const char* other_ways =
+    "the recordings taken in other ways (columns in step, longer windows, quiet inputs)";
 inline constexpr const char* in_step_columns = "columns that come early";
+inline constexpr const char* longer_windows = "a search in longer windows";
+inline constexpr const char* holds_longer = "whether the best model holds in longer windows";
+inline constexpr const char* recorded_hold = "how the reference goes on between rows";
+inline constexpr const char* beside_the_law = "the current beside the controller's law";
 inline constexpr const char* quiet_inputs = "inputs without their noise";
 inline constexpr const char* all_needed = "whether all that was found is needed";
 inline constexpr const char* rivals_weighed = "other names in place of what was found";

@@ -132,7 +132,7 @@ Case case_of(const Case& data, const OtherRun& run) {
   other.outputs = data.outputs;
   other.given_noise = data.given_noise;
   other.is_time_series = data.is_time_series;
-  other.windows.few = data.windows.few;
+  other.windows.are_long = data.windows.are_long;
   other.recordings.push_back({run.name, run.inputs, run.measured, physics::prepare(other.model, run.inputs)});
   return other;
 }

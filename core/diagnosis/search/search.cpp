@@ -93,8 +93,7 @@ Diagnosis Search::run() {
     data_.stop = options_.stop;
     leave(own_numbers);
   }
-  const bool is_applied =
-      options_.refuses && take("the current beside the controller's law", [&] { return add_applied(); });
+  const bool is_applied = options_.refuses && take(beside_the_law, [&] { return add_applied(); });
   if (!is_applied && options_.refuses &&
       take("the controller's law", [&] { return is_another_controller(); })) {
     stop_at_the_law();
@@ -129,7 +128,6 @@ Diagnosis Search::run() {
   (void)noise_->put_back();
   if (d_.findings.empty() && d_.off_law && d_.off_law->is_another_law()) say_controller();
   say_not_tried(d_, not_tried_);
-  progress_(1.0, "done");
   return d_;
 }
 

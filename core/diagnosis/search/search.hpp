@@ -25,12 +25,7 @@ using Progress = std::function<void(double, const std::string&)>;
 class Search {
  public:
   Search(Case& data, const Progress& progress, const Options& options)
-      : data_{data},
-        // A search begun anew does not go back on the bar.
-        progress_{[this, &progress](double share, const std::string& what) {
-          progress(reached_ = std::max(reached_, share), what);
-        }},
-        options_{options} {}
+      : data_{data}, progress_{progress}, options_{options} {}
   Search(const Search&) = delete;
   Search& operator=(const Search&) = delete;
 
@@ -126,8 +121,7 @@ class Search {
   [[nodiscard]] std::size_t given() const { return data_.model.terms.size(); }
 
   Case& data_;
-  double reached_ = 0.0;
-  const Progress progress_;
+  const Progress& progress_;
   const Options& options_;
   Diagnosis d_;
   Rivals rivals_;

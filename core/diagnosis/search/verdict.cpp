@@ -135,13 +135,13 @@ std::vector<double> weigh_findings(const Case& data, const std::vector<double>& 
 /// Does another cause at the same place explain as well as one of the findings? A small one beside the chief effect has
 /// its rivals in the list, and leaves the verdict on the chief effect as it is. Sizes are shares of the whole mismatch: the
 /// user's numbers, retuned, may take most of a chief effect upon themselves, and nothing of a small one.
-bool is_ambiguous(const Diagnosis& d) {
+bool is_ambiguous(const Case& data, const Diagnosis& d) {
   double chief = 0.0;
   for (const auto& finding : d.findings) chief = std::max(chief, finding.share);
   return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& finding) {
     return finding.share >= thresholds::small_beside_chief * chief &&
            std::any_of(finding.alternatives.begin(), finding.alternatives.end(), [&](const Alternative& a) {
-             return a.explains_as_well() && is_another_cause(finding, a) &&
+             return a.explains_as_well() && is_another_cause(data, finding, a) &&
                     !is_elsewhere(finding.term, a.term);
            });
   });
@@ -155,11 +155,11 @@ Verdict verdict_without_findings(const Case& data, const Diagnosis& d, bool foll
   return d.parameter_excursion > thresholds::moved_sigmas ? Verdict::parameters_only : Verdict::no_mismatch;
 }
 
-Verdict verdict_on_findings(const Diagnosis& d, const std::vector<double>& rests) {
+Verdict verdict_on_findings(const Case& data, const Diagnosis& d, const std::vector<double>& rests) {
   const bool nameless = std::all_of(d.findings.begin(), d.findings.end(),
                                     [](const Finding& f) { return f.stand_in != nullptr; });
   if (d.is_unnamed || nameless) return Verdict::unknown_physics;
-  if (is_ambiguous(d)) return Verdict::ambiguous;
+  if (is_ambiguous(data, d)) return Verdict::ambiguous;
   const bool leaves_more =
       d.has_rest || d.still_follows > thresholds::little_left ||
       std::any_of(rests.begin(), rests.end(), [](double rest) { return rest > thresholds::little_left; });
@@ -211,7 +211,8 @@ void conclude(const Case& data, Diagnosis& d) {
                *std::max_element(excess.begin(), excess.end()) > thresholds::far_above_given_noise ||
                    (own_equations && beyond_unrelated > thresholds::far_above_unrelated),
                beyond_unrelated);
-  d.verdict = d.findings.empty() ? verdict_without_findings(data, d, follows) : verdict_on_findings(d, rests);
+  d.verdict =
+      d.findings.empty() ? verdict_without_findings(data, d, follows) : verdict_on_findings(data, d, rests);
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);
   keep_to_noise(data, d);
   tidy_rejections(d);

@@ -305,7 +305,7 @@ void cut_into_windows(Case& data, const Model& near) {
   }
   const std::size_t shortest =
       std::max({fewest_rows, rows * states / most_starts, all_rows * states / (2 * most_starts)});
-  std::size_t window = data.windows.few ? std::max(shortest, rows / long_windows) : shortest;
+  std::size_t window = data.windows.are_long ? std::max(shortest, rows / long_windows) : shortest;
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
   double growth = growth_over_windows(cut);
@@ -351,7 +351,7 @@ std::optional<Model> begun_in_windows(const Case& data) {
 }
 
 bool has_longer_windows(const Case& data) {
-  return data.model.plant == physics::Plant::equations && !data.windows.grows && !data.windows.few &&
+  return data.model.plant == physics::Plant::equations && !data.windows.grows && !data.windows.are_long &&
          data.windows.count >= 2 * long_windows * data.recordings.size();
 }
 

@@ -27,7 +27,7 @@ struct InWindows {
 /// The case in those short windows, and its model fitted to them; nothing where there are none.
 std::optional<InWindows> in_short_windows(const Case& data);
 
-/// Are there longer windows in which the model stays near (`Case::Windows::few`)? Short ones keep a wrong model near the
+/// Are there longer windows in which the model stays near (`Case::Windows::are_long`)? Short ones keep a wrong model near the
 /// machine, but begin anew before anything slow shows.
 bool has_longer_windows(const Case& data);
 

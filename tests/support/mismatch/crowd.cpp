@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 namespace invar::test::mismatch {
 
@@ -60,20 +61,26 @@ bool is_beyond(const recording::Table& table, const recording::Table& bare) {
   for (const auto& column : table.columns) {
     const auto* like = bare.find(column.name);
     if (like == nullptr || like->values.empty()) continue;
-    const auto [low, high] = std::minmax_element(like->values.begin(), like->values.end());
-    const double reach = many * std::max(*high - *low, std::abs(*high));
-    for (const double v : column.values)
-      if (!(std::abs(v - *low) <= reach)) return true;
+    // What the machine says nothing of without its crowd is no measure: a crowd cannot be made small enough for it.
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const double v : like->values)
+      if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+    const double reach = many * std::max(high - low, std::abs(high));
+    for (std::size_t i = 0; i < std::min(column.values.size(), like->values.size()); ++i)
+      if (std::isfinite(like->values[i]) && !(std::abs(column.values[i] - low) <= reach)) return true;
   }
   return false;
 }
 
-/// Does a machine leave all that it does without its crowd far behind?
+}  // namespace
+
 bool runs_away(const Machine& machine, const Machine& bare) {
   for (std::size_t r = 0; r < machine.quiet.size(); ++r)
     if (is_beyond(machine.quiet[r], bare.quiet[r])) return true;
   return is_beyond(machine.test_outputs, bare.test_outputs);
 }
+
+namespace {
 
 /// Those of a plant that a crowd may hold: not what asks for columns of its own, and not what is like the chief.
 std::vector<std::string> members(const std::string& plant, const std::string& chief) {

@@ -11,4 +11,7 @@ namespace invar::test::mismatch {
 Machine make_crowded(const std::string& plant, const std::string& chief, double size, unsigned seed,
                      Trouble trouble = {});
 
+/// Does a machine leave all that it does without its crowd (`bare`) far behind? Never where it does the same.
+bool runs_away(const Machine& machine, const Machine& bare);
+
 }  // namespace invar::test::mismatch

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "core/diagnosis/candidates/place.hpp"
 #include "core/diagnosis/dataset/case.hpp"
 #include "core/diagnosis/dataset/load.hpp"
 #include "core/diagnosis/evidence/diagnosis.hpp"
@@ -255,6 +256,18 @@ TEST(Experiment, TwoHeightsTellCarryFromAValveThatOpensLate) {
     EXPECT_EQ(then.d.verdict, Verdict::explained) << summary(then.data, then.d);
     EXPECT_THAT(then.names(), UnorderedElementsAre(std::string{truth.info->name}));
   }
+}
+
+TEST(Experiment, OneInputVariedAloneTellsItFromItsTwin) {
+  Case data;
+  data.model.plant = physics::Plant::equations;
+  physics::Term one;
+  one.info = physics::find_term(physics::Plant::equations, "coupling");
+  one.on = "x", one.with = "u";
+  auto other = one;
+  other.with = "w";
+  EXPECT_EQ(separating_experiment(data, one, other), "record with u varied on its own and all else held");
+  EXPECT_NE(name_beside(data, one, other), name_beside(data, other, one));
 }
 
 TEST(Experiment, OfPairsWithoutOneOfTheirOwnSaysWhatToVary) {

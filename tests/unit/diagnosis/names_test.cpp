@@ -154,17 +154,18 @@ TEST(Names, WhatLeavesMuchBeyondTheNoiseIsDoubtedWhereItActsItself) {
 }
 
 TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {
-  const Case data;
+  Case data;
+  data.model.equations.inputs = {{"u", "u", false}, {"w", "w", false}};
   const auto term = [](const char* name, const char* with) {
     physics::Term t;
     t.info = physics::find_term(physics::Plant::equations, name);
     t.on = std::string{"v"}, t.with = std::string{with};
     return t;
   };
-  const auto probability_beside = [&](const physics::Term& other) {
+  const auto probability_beside = [&](const physics::Term& other, const char* with = "x") {
     Diagnosis d;
     Finding finding;
-    finding.term = term("quadratic", "x");
+    finding.term = term("quadratic", with);
     finding.gain = 1000.0, finding.share = 1.0;
     finding.alternatives.push_back({other, 0.0});
     weigh_name(data, d, 0, 0.0, finding);
@@ -172,6 +173,9 @@ TEST(Names, TheSameLawOverAVariableThatRunsAlikeIsNoRival) {
   };
   EXPECT_GT(probability_beside(term("quadratic", "y")), 0.9);
   EXPECT_LT(probability_beside(term("cubic", "x")), 0.5);
+  // Two inputs are two causes, though nothing tells them apart.
+  EXPECT_LE(probability_beside(term("quadratic", "w"), "u"), 0.5);
+  EXPECT_LE(probability_beside(term("quadratic", "x"), "u"), 0.5);
 }
 
 }  // namespace

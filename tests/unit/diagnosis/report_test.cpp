@@ -57,6 +57,7 @@ void expect_finding(const json& finding, const std::string& plant) {
   }
   double sum = finding.at("probability");
   for (const auto& a : finding.at("alternatives")) {
+    EXPECT_FALSE(a.at("site").get<std::string>().empty());
     EXPECT_TRUE(a.at("term").is_string() && is_share(a.at("probability")));
     sum += a.at("probability").get<double>();
   }

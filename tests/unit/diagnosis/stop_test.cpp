@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/diagnosis/dataset/case.hpp"
@@ -9,6 +10,7 @@
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/diagnose.hpp"
 #include "core/diagnosis/search/options.hpp"
+#include "tests/support/mismatch/crowd.hpp"
 #include "tests/support/mismatch/marks.hpp"
 
 namespace invar::test::mismatch {
@@ -94,6 +96,25 @@ TEST(Stopped, AtNoMomentAnythingIsClaimedThatTheWholeSearchWouldNot) {
       EXPECT_THAT(said, ::testing::Not(HasSubstr("No mismatch")));
     }
   }
+}
+
+TEST(Crowd, AMachineThatSaysNothingOfARowDoesNotRunAwayThere) {
+  const double nothing = std::nan("");
+  const auto machine = [](std::vector<double> values) {
+    Machine m;
+    m.quiet.emplace_back().add("y", "m", std::move(values));
+    return m;
+  };
+  const auto bare = machine({nothing, 0.0, 1.0, nothing});
+  EXPECT_FALSE(runs_away(bare, bare));  // a crowd of no size at all
+  EXPECT_TRUE(runs_away(machine({0.0, 0.0, nothing, 0.0}), bare));
+  EXPECT_TRUE(runs_away(machine({0.0, 30.0, 1.0, 0.0}), bare));
+  EXPECT_FALSE(runs_away(machine({nothing}), machine({nothing})));
+}
+
+TEST(Stopped, NamesTheFurtherWaysThatWereNotTried) {
+  const auto stopped = run(make("thermal", "sensor_lag", 1.0, 3), 50);
+  EXPECT_THAT(stopped.diagnosis.not_tried, ::testing::Contains(HasSubstr("in other ways")));
 }
 
 TEST(Progress, OnlyGrowsAndEndsAtOne) {
