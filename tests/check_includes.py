@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
 """Dependencies point one way: checks every #include against the table of what a room may use, and that no modules (a header
-with its source) include one another in a circle."""
+with its source) include one another in a circle. Nothing else than the house stands at the top of the repository."""
 import pathlib
 import re
+import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+TOP = set(""".ci .clang-format .clang-tidy .editorconfig .gitignore CHANGELOG.md CMakeLists.txt CMakePresets.json CONTRIBUTING.md
+README.md SECURITY.md cmake components core deployment docs examples idl mkdocs.yml tests tools""".split())
 
 # External libraries by the beginning of the path that is included.
 LIBRARIES = {
@@ -129,9 +133,18 @@ def circles(uses: dict):
     return found
 
 
+def strangers() -> list:
+    """What git keeps at the top beside the house, as the log of a run; nothing in a copy without git."""
+    kept = subprocess.run(["git", "-C", str(ROOT), "ls-files", "-z"], capture_output=True, text=True).stdout.split("\0")
+    return sorted({name.split("/")[0] for name in kept if name} - TOP)
+
+
 def main() -> int:
     faults = 0
     uses = {}
+    for name in strangers():
+        print(f"{name}: stands at the top of the repository; take it out, or add it to TOP in tests/check_includes.py")
+        faults += 1
     for folder in ("core", "components", "tools"):
         for path in sorted((ROOT / folder).rglob("*")):
             if path.suffix not in (".hpp", ".cpp", ".h"):
