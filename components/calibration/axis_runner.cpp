@@ -49,10 +49,15 @@ job::Task AxisRunner::command_axis(stage::AxisCommand command, recording::Table*
   }
 }
 
+/// A carriage that nobody held comes to rest in the hands of its loop before the job moves it.
 job::Task AxisRunner::enable() {
+  const auto* state = axis_.state.latest();
+  if (state != nullptr && state->enabled()) co_return;
+  const Instant asked = now();
   std::vector<JobAxis*> axes{&axis_};
   CommandIds ids = [this] { return next_command_id(); };
   co_await enable_axes(axes, ids, Duration::seconds(10.0));
+  co_await job::wait(*this, 0.5 - (now() - asked).in_seconds());
 }
 
 job::Task AxisRunner::move(double target, double velocity, recording::Table* record) {
