@@ -154,7 +154,7 @@ class Campaign:
     def work(self):
         """After all of it the cell does what it is for."""
         self.wait("the whole cell", self.is_well)
-        for _ in range(3):  # one that was set in motion before may still run
+        for _ in range(12):  # one that was set in motion before may still run
             answer = self.call("stage-pc", "job", "run", self.file, "move", "--wait", "10")
             if answer.returncode == 0:
                 return
