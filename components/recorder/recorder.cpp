@@ -20,7 +20,8 @@ void Recorder::configure() {
       file(), recording::RecordingOptions{.reserve_bytes =
                                               megabyte * static_cast<std::uint64_t>(parameters_.reserve_mb)});
   channels_.clear();
-  for (const Early& sample : std::exchange(early_, {})) write(sample.origin, sample.cdr);
+  for (const Early& one : std::exchange(early_, {}))
+    write({one.source, one.writer, one.sequence, one.sent, one.received}, one.cdr);
   was_open_ = true;
 }
 
@@ -94,11 +95,11 @@ bool Recorder::is_wanted(const std::string& topic) const {
 void Recorder::record(const Source& source, const std::string& writer, std::uint64_t sequence, Instant sent,
                       Instant received, std::span<const std::byte> cdr) {
   const std::scoped_lock lock{mutex_};
-  const Origin origin{source, writer, sequence, sent, received};
-  if (writer_) return write(origin, cdr);
-  if (was_open_ || early_bytes_ + cdr.size() > most_early_bytes) return;
-  early_bytes_ += cdr.size();
-  early_.push_back({origin, {cdr.begin(), cdr.end()}});
+  if (writer_) return write({source, writer, sequence, sent, received}, cdr);
+  const std::size_t size = sizeof(Early) + source.idl.size() + cdr.size();
+  if (was_open_ || early_bytes_ + size > most_early_bytes) return;
+  early_bytes_ += size;
+  early_.push_back({source, writer, sequence, sent, received, {cdr.begin(), cdr.end()}});
 }
 
 void Recorder::write(const Origin& origin, std::span<const std::byte> cdr) {

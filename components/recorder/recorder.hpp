@@ -74,14 +74,17 @@ class Recorder final : public Component {
   void attach(const std::filesystem::path& file);
 
  private:
-  struct Origin {
+  struct Origin {  // of a sample, as `record` has it: nothing is copied
+    const Source& source;
+    const std::string& writer;
+    std::uint64_t sequence;
+    Instant sent, received;
+  };
+  struct Early {
     Source source;
     std::string writer;
     std::uint64_t sequence = 0;
     Instant sent, received;
-  };
-  struct Early {
-    Origin origin;
     std::vector<std::byte> cdr;
   };
   void write(const Origin& origin, std::span<const std::byte> cdr);

@@ -82,11 +82,10 @@ bool is_state(const Case& data, const std::string& place) {
 std::string unit_at(const Case& data, const std::string& place) {
   if (const auto unit = unit_of_variable(data, place); !unit.empty()) return unit;
   for (const auto& output : data.model.equations.outputs)
-    if (const auto unit = unit_of_variable(data, output.name); output.expression == place && !unit.empty())
-      return unit;
-  for (const auto& parameter : data.model.parameters)
-    if (parameter.name == place + ".initial" && parameter.unit != "1") return parameter.unit;
-  return "";
+    if (output.expression == place)
+      if (const auto unit = unit_of_variable(data, output.name); !unit.empty()) return unit;
+  const auto* start = data.model.find(place + ".initial");
+  return start != nullptr && start->unit != "1" ? start->unit : "";
 }
 
 /// The unit of an effect's number at a place of the user's own equations; an effect on a state is added to its rate.

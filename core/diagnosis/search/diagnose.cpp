@@ -91,12 +91,10 @@ Diagnosis diagnose(Case& data, const Progress& progress, const Options& options)
   }
   Case as_read = data;
   auto best = Search{data, onwards, options}.run();
+  const bool goes_on = options.refuses && !best.is_partial;
+  if (options.refuses && !goes_on) add_once(not_tried, other_ways);
   for (const auto& alternate : alternates) {
-    if (!options.refuses) break;
-    if (best.is_partial) {
-      add_once(not_tried, other_ways);
-      break;
-    }
+    if (!goes_on) break;
     auto other = take(alternate.name, [&] { return alternate.take(as_read, data, best); });
     if (!other) continue;
     other->remembered = std::make_shared<Remembered>();
@@ -110,8 +108,7 @@ Diagnosis diagnose(Case& data, const Progress& progress, const Options& options)
       best = std::move(found);
     }
   }
-  if (options.refuses && !best.is_partial)
-    take(holds_longer, [&] { return hold_to_longer_windows(as_read, data, best), true; });
+  if (goes_on) take(holds_longer, [&] { return hold_to_longer_windows(as_read, data, best), true; });
   say_not_tried(best, not_tried);
   progress(1.0, "done");
   return best;
