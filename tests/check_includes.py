@@ -30,6 +30,7 @@ ROOMS = {
     "core/machine": ["core/base", "core/config", "core/numerics", *METROLOGY, "core/physics", "yaml-cpp", "Eigen"],
     "core/compensation": ["core/base", "core/config", "core/numerics", *METROLOGY, "core/physics", "Eigen", "compression"],
     "core/physics": ["core/base", "core/numerics", "Eigen", "muParser"],
+    "core/vision": ["core/base", "core/config", "core/numerics", "core/metrology/droplet", "core/metrology/camera", "core/compensation", "Eigen", "OpenCV", "compression"],
     "core/model": ["core/base", "core/config", "core/physics", "core/recording", "yaml-cpp"],
     "core/component": ["core/base", "core/config", "idl"],
     "core/job": ["core/base", "core/config", "core/component", "idl", "Eigen"],
@@ -44,7 +45,7 @@ for subject in METROLOGY:
 COMPONENT = ["core/base", "core/config", "core/component", "core/numerics", *METROLOGY, "core/machine", "core/compensation",
              "core/physics", "core/modbus", "core/job", "idl", "Eigen", "yaml-cpp"]
 # The print job is no component: calibration runs it.
-MORE_FOR = {"vision": ["OpenCV", "compression"], "calibration": ["core/model", "core/recording", "components/printing"],
+MORE_FOR = {"vision": ["core/vision"], "calibration": ["core/model", "core/recording", "components/printing"],
             "printing": ["core/recording"],
             "recorder": ["core/recording", "core/dds"], "dispenser": ["core/model", "core/recording"], "supervisor": ["core/dds"],
             "stage": ["core/model"], "compensation": ["core/model"], "watch": ["core/model"], "world": ["core/model"]}
@@ -66,7 +67,7 @@ CIRCLES = [
     {"core/metrology/geometric/displacement_line", "core/metrology/geometric/line_fit"},
     {"core/metrology/droplet/droplet_trajectory", "core/metrology/droplet/droplet_fit"},
     {"core/modbus/map", "core/modbus/codec"},
-    {"components/vision/outline", "components/vision/outline_curve"},
+    {"core/vision/outline", "core/vision/outline_curve"},
     {"core/dds/rtps_message", "core/dds/rtps_parameters", "core/dds/sequence_guard"},
     {"core/dds/node", "core/dds/connection", "core/dds/participant"},
     {"core/recording/recording_reader", "core/recording/mcap_scan"},

@@ -5,8 +5,8 @@
 #include <cctype>
 #include <string_view>
 
-#include "components/vision/library.hpp"
 #include "core/base/fault.hpp"
+#include "core/vision/library.hpp"
 
 namespace invar::vision {
 

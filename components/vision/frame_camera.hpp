@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "components/vision/pixels.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/vision/pixels.hpp"
 #include "idl/image.h"
 #include "idl/stage.h"
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "components/vision/library.hpp"
 #include "core/base/fault.hpp"
+#include "core/vision/library.hpp"
 
 namespace invar::vision {
 

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "components/vision/frame_camera.hpp"
-#include "components/vision/mount.hpp"
-#include "components/vision/ruler_file.hpp"
-#include "components/vision/scene.hpp"
+#include "core/vision/mount.hpp"
+#include "core/vision/ruler_file.hpp"
+#include "core/vision/scene.hpp"
 #include "idl/dispensing.h"
 #include "idl/sensing.h"
 

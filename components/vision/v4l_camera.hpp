@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "components/vision/frame_camera.hpp"
-#include "components/vision/video.hpp"
+#include "core/vision/video.hpp"
 
 namespace invar::vision {
 

@@ -5,13 +5,13 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "components/vision/camera_file.hpp"
-#include "components/vision/library.hpp"
-#include "components/vision/ruler_file.hpp"
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
 #include "core/base/new_file.hpp"
 #include "core/component/cell_folders.hpp"
+#include "core/vision/camera_file.hpp"
+#include "core/vision/library.hpp"
+#include "core/vision/ruler_file.hpp"
 
 namespace invar::vision {
 

@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "components/vision/camera.hpp"
-#include "components/vision/droplets.hpp"
-#include "components/vision/mount.hpp"
-#include "components/vision/pixels.hpp"
 #include "core/component/component.hpp"
 #include "core/component/parameters.hpp"
+#include "core/vision/camera.hpp"
+#include "core/vision/droplets.hpp"
+#include "core/vision/mount.hpp"
+#include "core/vision/pixels.hpp"
 #include "idl/image.h"
 
 namespace invar::vision {

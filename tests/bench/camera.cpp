@@ -15,12 +15,12 @@
 #include <thread>
 #include <vector>
 
-#include "components/vision/camera_file.hpp"
 #include "components/vision/frame_camera.hpp"
-#include "components/vision/library.hpp"
 #include "components/vision/vision_component.hpp"
 #include "core/dds/node.hpp"
 #include "core/executor/executor.hpp"
+#include "core/vision/camera_file.hpp"
+#include "core/vision/library.hpp"
 #include "tests/unit/vision/scenes.hpp"
 
 extern char** environ;

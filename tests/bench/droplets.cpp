@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "components/vision/droplets.hpp"
 #include "core/metrology/camera/circle_fit.hpp"
+#include "core/vision/droplets.hpp"
 #include "tests/unit/vision/scenes.hpp"
 
 namespace {

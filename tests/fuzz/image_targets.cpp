@@ -2,7 +2,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "components/vision/image_file.hpp"
+#include "core/vision/image_file.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace invar::fuzz {

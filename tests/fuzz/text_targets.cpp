@@ -4,8 +4,6 @@
 #include <fstream>
 #include <iterator>
 
-#include "components/vision/camera_file.hpp"
-#include "components/vision/ruler_file.hpp"
 #include "core/base/unit.hpp"
 #include "core/compensation/component_file.hpp"
 #include "core/compensation/fusion_file.hpp"
@@ -23,6 +21,8 @@
 #include "core/model/recording_file.hpp"
 #include "core/physics/expression.hpp"
 #include "core/physics/expression_units.hpp"
+#include "core/vision/camera_file.hpp"
+#include "core/vision/ruler_file.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"

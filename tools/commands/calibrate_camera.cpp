@@ -6,10 +6,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "components/vision/camera_file.hpp"
-#include "components/vision/library.hpp"
-#include "components/vision/ruler_file.hpp"
 #include "core/base/new_file.hpp"
+#include "core/vision/camera_file.hpp"
+#include "core/vision/library.hpp"
+#include "core/vision/ruler_file.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"

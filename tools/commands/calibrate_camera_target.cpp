@@ -8,12 +8,12 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "components/vision/camera_file.hpp"
 #include "core/metrology/camera/bad_views.hpp"
 #include "core/metrology/camera/planar_camera.hpp"
 #include "core/numerics/robust.hpp"
 #include "core/numerics/significance.hpp"
 #include "core/recording/table.hpp"
+#include "core/vision/camera_file.hpp"
 #include "tools/commands/calibrate_camera.hpp"
 #include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"

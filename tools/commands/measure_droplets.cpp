@@ -4,9 +4,9 @@
 #include <memory>
 #include <optional>
 
-#include "components/vision/camera_file.hpp"
-#include "components/vision/library.hpp"
 #include "core/recording/table.hpp"
+#include "core/vision/camera_file.hpp"
+#include "core/vision/library.hpp"
 #include "tools/command.hpp"
 #include "tools/image/droplets_page.hpp"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "components/vision/library.hpp"
+#include "core/vision/library.hpp"
 
 namespace invar::tools {
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "components/vision/camera.hpp"
-#include "components/vision/droplets.hpp"
-#include "components/vision/pixels.hpp"
+#include "core/vision/camera.hpp"
+#include "core/vision/droplets.hpp"
+#include "core/vision/pixels.hpp"
 #include "tools/report/page.hpp"
 
 namespace invar::tools {

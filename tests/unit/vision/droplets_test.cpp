@@ -1,4 +1,4 @@
-#include "components/vision/droplets.hpp"
+#include "core/vision/droplets.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "components/vision/image_file.hpp"
+#include "core/vision/image_file.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -6,7 +6,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "components/vision/camera_file.hpp"
+#include "core/vision/camera_file.hpp"
 #include "tests/support/fault_of.hpp"
 #include "tests/support/temporary_folder.hpp"
 

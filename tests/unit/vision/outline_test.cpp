@@ -10,9 +10,9 @@
 #include <random>
 #include <vector>
 
-#include "components/vision/droplets.hpp"
-#include "components/vision/render.hpp"
 #include "core/metrology/camera/circle_fit.hpp"
+#include "core/vision/droplets.hpp"
+#include "core/vision/render.hpp"
 
 namespace invar::vision {
 namespace {

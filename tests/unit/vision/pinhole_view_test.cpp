@@ -1,12 +1,12 @@
 // A pinhole camera on a plane: points that it projects come back to where they lie.
-#include "components/vision/pinhole_view.hpp"
+#include "core/vision/pinhole_view.hpp"
 
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "components/vision/camera_file.hpp"
+#include "core/vision/camera_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace invar::vision {

@@ -1,11 +1,11 @@
-#include "components/vision/ruler.hpp"
+#include "core/vision/ruler.hpp"
 
 #include <gmock/gmock.h>
 
 #include <cstdio>
 #include <random>
 
-#include "components/vision/render.hpp"
+#include "core/vision/render.hpp"
 
 namespace invar::vision {
 namespace {

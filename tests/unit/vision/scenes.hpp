@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "components/vision/droplets.hpp"
-#include "components/vision/render.hpp"
+#include "core/vision/droplets.hpp"
+#include "core/vision/render.hpp"
 
 namespace invar::vision::testing {
 

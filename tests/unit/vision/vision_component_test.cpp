@@ -9,8 +9,8 @@
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 
-#include "components/vision/camera_file.hpp"
 #include "components/vision/simulated_camera.hpp"
+#include "core/vision/camera_file.hpp"
 #include "tests/support/fault_of.hpp"
 #include "tests/support/temporary_folder.hpp"
 
