@@ -5,7 +5,7 @@
     tests/reference_pages.py build/bin/invar --check    # exit status 1 where a page differs, with the command to run
 
 commands.md comes from --help, components.md from `invar types`, terms.md from core/physics/terms, types.md from idl/,
-qos-profiles.md from deployment/profiles.yaml. The check also asks the pages written by hand for each key that the code reads or writes.
+qos-profiles.md from deployment/profiles.yaml, the example of model-file.md from the program. The check also asks the pages written by hand for each key that the code reads or writes.
 """
 import argparse
 import json
@@ -245,6 +245,15 @@ def profiles():
 
 # ------------------------------------------------------------------ pages written by hand
 
+# A block that a program prints: the call stands in a comment on the line before it.
+PRINTED = re.compile(r"(<!-- invar (.+) -->\n```yaml\n)(.*?)(```\n)", re.S)
+
+
+def with_printed_blocks(invar, text):
+    text, count = PRINTED.subn(lambda found: found.group(1) + run(invar, *found.group(2).split()) + found.group(4), text)
+    return text if count else sys.exit("docs/reference/model-file.md: its printed example is gone: `<!-- invar diagnose --example axis -->`")
+
+
 def missing_keys():
     for page, pattern, sources in BY_HAND:
         text = (PAGES / page).read_text()
@@ -260,7 +269,8 @@ def main():
     parser.add_argument("--check", action="store_true", help="compare only")
     options = parser.parse_args()
     made = {"commands.md": commands(options.invar), "components.md": components(options.invar), "terms.md": terms(), "types.md": types(),
-            "qos-profiles.md": profiles()}
+            "qos-profiles.md": profiles(),
+            "model-file.md": with_printed_blocks(options.invar, (PAGES / "model-file.md").read_text())}
     faults = []
     for name, text in made.items():
         path = PAGES / name
