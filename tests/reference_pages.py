@@ -4,7 +4,7 @@
     tests/reference_pages.py build/bin/invar            # write the pages
     tests/reference_pages.py build/bin/invar --check    # exit status 1 where a page differs, with the command to run
 
-commands.md comes from --help, components.md from `invar types`, terms.md from core/physics/terms, types.md from idl/,
+commands.md comes from --help, components.md and topics.md from `invar types`, terms.md from core/physics/terms, types.md from idl/,
 qos-profiles.md from deployment/profiles.yaml, the example of model-file.md from the program. The check also asks the pages written by hand for each key that the code reads or writes.
 """
 import argparse
@@ -113,12 +113,67 @@ def component_page(invar, component, cells):
     return "\n".join(out)
 
 
-def components(invar):
+def all_components(invar):
     cells = sorted(path for path in (ROOT / "deployment").glob("*.yaml") if "invar_cell:" in path.read_text())
-    listed = json.loads(run(invar, "types", "--json"))
+    return json.loads(run(invar, "types", "--json")), cells
+
+
+def components(invar):
+    listed, cells = all_components(invar)
     return "\n".join(["# Components\n", NOTE,
                       "Component types that a cell file can name. `invar types TYPE --cell CELL` shows the ports in a given cell.\n",
                       *(component_page(invar, component, cells) for component in listed)])
+
+
+# ------------------------------------------------------------------ topics
+
+# Topics that each cell has whatever its components are; Commands.Looking compares them, and those of components, with a running cell.
+OF_EACH_CELL = [("process/status", "invar::lifecycle::ProcessStatus", "state", "rate, overruns and latencies of each process"),
+                ("process/components", "invar::lifecycle::ComponentStatus", "state", "state and failure of each component"),
+                ("process/notices", "invar::event::Notice", "event", "warnings and faults, also of components")]
+
+RULES = """CELL is the `name` of the cell file, NAME that of the component there. Example: `deployment/xy-table.yaml` has `name: xy_table` and
+a component `thermal` of type `thermal`, so the topic of its port `state` is `cell/xy_table/thermal/state`.
+
+- *reads* and *writes* say what another program does with the topic: it reads outputs and writes inboxes.
+- A port that `connect` joins to a port of another component has the topic of that port. Inputs have no topic of their own.
+- `qos` of a component gives a port another profile, and `publish` a highest rate.
+- A port with `_x` stands for one of each axis; where zones or axes follow from parameters, the ports are those of a cell of `deployment/`.
+
+In a running cell `invar topics CELL` lists who writes and reads each topic, with the QoS. How to join: [other DDS programs](../how-to/other-dds-programs.md),
+[connect to the plant](../how-to/connect-to-the-plant.md).
+"""
+
+
+def type_link(name):
+    return f"[{name}](types.md#{anchor(name)})"
+
+
+def profile_link(name):
+    return f"[{name}](qos-profiles.md#{anchor(name)})"
+
+
+def topics(invar):
+    listed, cells = all_components(invar)
+    rows, unknown = [], []
+    for component in listed:
+        if "ports_unknown" in component:
+            component, _ = with_ports(invar, component, cells)
+        if "ports_unknown" in component:
+            unknown.append(code(component["type"]))
+        for port in component["ports"]:
+            if port["direction"] == "input" or port["data"] in ("invar::event::Notice", "invar::standby::WarmState"):
+                continue  # the cell's own topics
+            rows.append([component["type"], code(port["name"]), code(f"cell/CELL/NAME/{port['name']}"),
+                         "reads" if port["direction"] == "output" else "writes", type_link(port["data"]), profile_link(port["profile"])])
+    return "\n".join(["# Topics\n", NOTE, "Topic, type and QoS profile of each port that another DDS program can read or write.\n", RULES,
+                      "## Topics of components\n",
+                      table(["component type", "port", "topic", "another program", "IDL type", "QoS profile"], rows),
+                      *([f"Ports of {', '.join(unknown)} follow from parameters; `invar types TYPE --cell CELL` shows those of a cell.\n"] if unknown else []),
+                      "## Topics of each cell\n",
+                      table(["topic", "another program", "IDL type", "QoS profile", "content"],
+                            [[code(f"cell/CELL/{topic}"), "reads", type_link(data), profile_link(profile), words]
+                             for topic, data, profile, words in OF_EACH_CELL])])
 
 
 # ------------------------------------------------------------------ physics terms
@@ -268,7 +323,8 @@ def main():
     parser.add_argument("invar", type=pathlib.Path, help="the program, build/bin/invar")
     parser.add_argument("--check", action="store_true", help="compare only")
     options = parser.parse_args()
-    made = {"commands.md": commands(options.invar), "components.md": components(options.invar), "terms.md": terms(), "types.md": types(),
+    made = {"commands.md": commands(options.invar), "components.md": components(options.invar), "topics.md": topics(options.invar),
+            "terms.md": terms(), "types.md": types(),
             "qos-profiles.md": profiles(),
             "model-file.md": with_printed_blocks(options.invar, (PAGES / "model-file.md").read_text())}
     faults = []

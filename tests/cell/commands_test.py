@@ -189,7 +189,33 @@ def tearDownModule():
     shutil.rmtree(FOLDER)
 
 
+PAGE = re.compile(r"\| (?:(\w+) \| `\w+` \| )?`cell/CELL/([\w/]+)` \| (reads|writes) \| \[([\w:]+)\]\(\S+\) \| \[(\w+)\]")
+
+
 class Looking(unittest.TestCase):
+    def is_as_the_page_of_topics_says(self, running, types):
+        """docs/reference/topics.md against what DDS has discovered."""
+        page = {(component, topic.removeprefix("NAME/")): rest
+                for component, topic, *rest in PAGE.findall((SOURCE / "docs/reference/topics.md").read_text())}
+        profiles = (SOURCE / "deployment/profiles.yaml").read_text()
+        seen = {"reads": 0, "writes": 0, "": 0}
+        for topic in running:
+            name, port = topic["topic"].removeprefix("cell/small/").split("/", 1) if topic["topic"].count("/") > 2 else ("", "")
+            key = (types[name], port) if name in types else ("", f"{name}/{port}")
+            if key not in page and name not in types:
+                continue  # for processes among themselves
+            self.assertIn(key, page, topic["topic"])
+            way, data, profile = page[key]
+            ends = topic["writers" if way == "reads" else "readers"]
+            policies = re.search(rf"^  {profile}:\n((?:    .*\n)+)", profiles, re.M).group(1)
+            expected = (data, "reliability: reliable" in policies, "durability: transient_local" in policies, "ownership: exclusive" in policies)
+            found = [(end["type"], end["qos"].startswith("reliable"), "transient local" in end["qos"], "exclusive" in end["qos"])
+                     for end in ends if end["participant"].startswith("invar/small/")]
+            self.assertIn(expected, found, (topic["topic"], way, profile))
+            seen[way if key[0] else ""] += 1
+        self.assertEqual(seen[""], 3, "the topics of each cell")
+        self.assertGreater(min(seen["reads"], seen["writes"]), 2, seen)
+
     def test_looks_at_the_running_cell(self):
         # All at once: they wait for discovery most of the time.
         calls = {
@@ -197,6 +223,7 @@ class Looking(unittest.TestCase):
             "domain": Call("status", "--domain", DOMAIN, "--address", "127.0.0.1", "--json", "--wait", 20),
             "top": Call("top", CELL_FILE, "--once", "--interval", 3, "--json", "--wait", 20),
             "topics": Call("topics", CELL_FILE, "--json", "--wait", 20),
+            "all": Call("topics", CELL_FILE, "--all", "--json", "--wait", 20),
             "echo": Call("echo", CELL_FILE, "stage_x.state", "--count", 3, "--json", "--wait", 20),
             "text": Call("echo", CELL_FILE, "cell/small/thermal/state", "--count", 1, "--wait", 20),
             "hz": Call("hz", CELL_FILE, "stage_x.state", "--duration", 3, "--json", "--wait", 20),
@@ -233,6 +260,7 @@ class Looking(unittest.TestCase):
         self.assertEqual([w["participant"] for w in state["writers"]], ["invar/small/motion/realtime"])
         self.assertIn("invar/small/calibration/realtime", [r["participant"] for r in state["readers"]])
         self.assertEqual(state["problems"], [])
+        self.is_as_the_page_of_topics_says(json.loads(ends["all"][1]), {c["name"]: c["type"] for c in answer["components"]})
 
         samples = [json.loads(line) for line in ends["echo"][1].splitlines()]
         self.assertEqual(len(samples), 3)
