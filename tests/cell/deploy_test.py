@@ -117,6 +117,7 @@ class WithSystemd(Deployed):
         self.calibrations_come_back()
         self.a_release_that_cannot_start_is_taken_back(first)
         self.a_process_that_hangs_is_restarted()
+        self.a_pc_is_replaced()
 
     def a_first_release_that_cannot_start_leaves_nothing_behind(self):
         self.cell.write_text(self.text.replace("port: 15020", "port: 80"))
@@ -172,6 +173,42 @@ class WithSystemd(Deployed):
         while self.pids()[0] in ("0", launcher):
             self.assertLess(time.monotonic(), end, "systemd ends an `invar run` that hangs")
             time.sleep(0.5)
+
+    def a_pc_is_replaced(self):
+        """As docs/how-to/deploy-a-cell.md#replace-a-pc says it."""
+        config = ("--ssh-config", PCS.folder / "ssh_config")
+        models, file = f"{self.home()}/data/out/models", self.folder / "before.tar"
+        self.deploy()
+        release = self.releases()
+        subprocess.run(PCS.at_the_switch(INVAR, "backup", self.cell, "--deployed", *config, "--out", file), check=True)
+        PCS.on("pc-b", f"mkdir -p {models} && echo since >{models}/y.yaml && chown -R invar: {models}")
+        PCS.replace("pc-a")
+        current = f"readlink {self.home()}/current; systemctl show -P MainPID invar-plant"
+        others = [PCS.on(name, current).stdout for name in ("pc-b", "pc-c")]
+        PCS.wait_until_it_answers("pc-a")
+        self.assertRegex(self.deploy(status=1).stderr, r"pc-a \(10.81.0.11\): ssh: Host key verification failed")
+        self.assertEqual([PCS.on(name, current).stdout for name in ("pc-b", "pc-c")], others, "they go on")
+
+        PCS.trust("pc-a")
+        said = self.deploy().stdout
+        self.assertRegex(said, r"pc-a: [1-9]\d* files to send, .*; current -")
+        for name in ("pc-b", "pc-c"):
+            self.assertIn(f"{name}: 0 files to send", said)
+        self.assertEqual(self.releases(), release)
+        self.assert_well()
+        self.assertIn("pc-a: the release before is -: there is none to go back to", self.deploy("--roll-back", status=1).stderr)
+
+        subprocess.run(["tar", "-xf", file, "-C", self.folder, "pc-a.tar"], check=True)
+        PCS.on("pc-a", "systemctl stop invar-plant")
+        with open(self.folder / "pc-a.tar", "rb") as part:
+            PCS.on("pc-a", f"cd {self.home()} && LD_LIBRARY_PATH=current/lib current/bin/invar restore \"current/$(cat current/CELL)\" - --data data",
+                   stdin=part)
+        PCS.on("pc-a", "systemctl start invar-plant")
+        pcs.run("ip", "-n", PCS.switch, "link", "set", "lo", "up")  # a DDS program stands at the switch
+        subprocess.run(PCS.at_the_switch(INVAR, "status", self.cell, "--wait", "30"), check=True, stdout=subprocess.DEVNULL)
+        self.assertEqual(PCS.on("pc-a", f"cat {models}/x.yaml; stat -c %U {models} {models}/x.yaml").stdout.split(), ["good", "invar", "invar"])
+        self.assertEqual(PCS.on("pc-b", f"cat {models}/y.yaml").stdout, "since\n", "what the others calibrated since stays")
+        self.assert_well()
 
 
 class FilesOnly(Deployed):

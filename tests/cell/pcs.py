@@ -56,7 +56,8 @@ class Pcs(Cables):
         super().__init__(names)
         self.environment = dict(os.environ, KEEP_LIBRARIES="1" if keep_libraries else "")
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="invar-pcs-"))
-        self.started = []
+        self.started = {}
+        self.gone = []
         try:
             self.lay("10.81.0.1/24")  # this program's own calls stand at the switch, too
             self.keys()
@@ -77,26 +78,59 @@ class Pcs(Cables):
 
     def boot(self):
         for name in self.names:
-            pc = self.folder / name
-            pc.mkdir()
-            shutil.copytree(self.folder / "keys", pc / "keys")
-            with open(pc / "log", "wb") as log:
-                self.started.append(subprocess.Popen([BOOT, pc, self.space[name], self.address[name]], stdout=log, stderr=log,
-                                                     stdin=subprocess.DEVNULL, env=self.environment))
-        end = time.monotonic() + 60
+            (self.folder / name).mkdir()
+            shutil.copytree(self.folder / "keys", self.folder / name / "keys")
+            self.start(name)
         for name in self.names:
-            while self.on(name, "systemctl is-active pc.target", check=False).stdout.strip() != "active":
-                if time.monotonic() > end:
-                    raise SystemExit(f"{name} does not boot: {(self.folder / name / 'log').read_text()}")
-                time.sleep(0.2)
+            self.wait_for(name)
+
+    def start(self, name):
+        with open(self.folder / name / "log", "wb") as log:
+            self.started[name] = subprocess.Popen([BOOT, self.folder / name, self.space[name], self.address[name]], stdout=log, stderr=log,
+                                                  stdin=subprocess.DEVNULL, env=self.environment)
+
+    def wait_for(self, name):
+        end = time.monotonic() + 60
+        while self.on(name, "systemctl is-active pc.target", check=False).stdout.strip() != "active":
+            if time.monotonic() > end:
+                raise SystemExit(f"{name} does not boot: {(self.folder / name / 'log').read_text()}")
+            time.sleep(0.2)
+
+    def replace(self, name):
+        """Another PC at the same address: it has nothing of the old one, and another host key, which nobody knows before `trust`."""
+        old = self.started.pop(name)
+        self.gone.append(old)
+        old.kill()
+        old.wait()
+        key = self.folder / name / "keys" / "host_key"
+        key.unlink()
+        key.with_suffix(".pub").unlink()
+        run("ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key)
+        self.start(name)
+
+    def wait_until_it_answers(self, name):
+        """Its sshd listens, whether or not its key is known."""
+        end = time.monotonic() + 60
+        while not subprocess.run(self.at_the_switch("ssh-keyscan", "-T", "2", self.address[name]), capture_output=True).stdout:
+            if time.monotonic() > end:
+                raise SystemExit(f"{name} does not boot: {(self.folder / name / 'log').read_text()}")
+            time.sleep(0.2)
+
+    def trust(self, name):
+        """As a person does who has compared the new host key."""
+        known = self.folder / "known"
+        run("ssh-keygen", "-R", self.address[name], "-f", known)
+        with open(known, "a", encoding="utf-8") as file:
+            file.write(f"{self.address[name]} {(self.folder / name / 'keys' / 'host_key.pub').read_text()}")
+        self.wait_for(name)
 
     def at_the_switch(self, *words):
         return ["ip", "netns", "exec", self.switch, *[str(word) for word in words]]
 
-    def on(self, name, command, check=True):
+    def on(self, name, command, check=True, stdin=subprocess.DEVNULL):
         return subprocess.run(self.at_the_switch("ssh", "-F", self.folder / "ssh_config", "-o", "BatchMode=yes", "-o", "ConnectTimeout=3",
                                                  self.address[name], command), check=check, capture_output=True, text=True,
-                              stdin=subprocess.DEVNULL)
+                              stdin=stdin)
 
     def put(self, name, file, path):
         with open(file, "rb") as content:
@@ -107,14 +141,15 @@ class Pcs(Cables):
         run("ip", "-n", self.switch, "link", "set", name, state)
 
     def end(self):
-        for pc in self.started:
+        pcs = [*self.started.values(), *self.gone]
+        for pc in pcs:
             pc.kill()
-        for pc in self.started:
+        for pc in pcs:
             pc.wait()
         self.take_away()
         groups = pathlib.Path(next(line.split()[1] for line in pathlib.Path("/proc/mounts").read_text().splitlines()
                                    if line.split()[2] == "cgroup2"))
-        for pc in self.started:
+        for pc in pcs:
             group = groups / f"invar-pc-{pc.pid}"
             for _ in range(50):  # until the kernel is done with the last process
                 for folder, _, _ in os.walk(group, topdown=False):
