@@ -181,6 +181,12 @@ inline constexpr double seen_first = 0.995;
 /// Rows of an instrument that would show that it wanders. Judgement.
 inline constexpr std::size_t rows_that_show_wander = 1500;
 
+/// Share of a residual's power that the steps of a reading make: enough to draw a saw over the output. Judgement.
+inline constexpr double made_by_rounding = 0.25;
+/// Sigmas, and share, of what neighbouring loud rows have in common. White noise that is louder there has neither. Judgement.
+inline constexpr double related_sigmas = 4.0;
+inline constexpr double related_share = 0.1;
+
 // --- search: what is kept, and the verdict
 
 /// Ratio of two RMS on rows that no fit saw. Statistics: the RMS of fifty independent values is uncertain
@@ -278,6 +284,9 @@ inline constexpr double loop_margins = 1.1;
 inline constexpr double map_astray = 5.0;
 
 // --- report: what is said
+
+/// Ratio of a stated noise to the whole residual. Judgement: a sigma may be taken with care, not five times too large.
+inline constexpr double noise_overstated = 5.0;
 
 /// Probability that something is missing at the controller, where the current is not what its law makes. Judgement.
 inline constexpr double sure_of_its_place = 0.9;

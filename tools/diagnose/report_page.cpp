@@ -6,6 +6,7 @@
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
+#include "core/diagnosis/evidence/odds.hpp"
 #include "core/diagnosis/report/region.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/segments/windows.hpp"
@@ -138,15 +139,34 @@ void add_bars(report::Page& page, const FitRow& row, bool any_found) {
   page.bars(row.signal, bars);
 }
 
+/// Other names for what was found, in percent of the name that each would replace.
+std::string rivals_of(const Case& data, const Diagnosis& d) {
+  std::string text;
+  for (const auto& finding : d.findings)
+    for (const auto& a : finding.alternatives)
+      text += (text.empty() ? "" : "; ") + readable(finding.term.info->name) + " may be " +
+              readable(a.term.info->name) + " (" + place_of(data, a.term) +
+              "): " + number(100.0 * probability_of(finding, a), 3) + " %";
+  return text.empty() ? "no other term of the library comes near" : text;
+}
+
 /// What somebody must know who reads no further.
 void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
   Names missing;
   for (std::size_t i = 0; i < d.findings.size(); ++i) {
     const auto& finding = d.findings[i];
-    missing.push_back({title_of(finding), where_of(data, d, i), number(100.0 * finding.probability, 3) + " %",
-                       sizes_of(data, d, finding)});
+    missing.push_back({title_of(finding), where_of(data, d, i), number(100.0 * finding.share, 3) + " %",
+                       number(100.0 * finding.probability, 3) + " %", sizes_of(data, d, finding)});
   }
-  if (!missing.empty()) page.table({"missing", "where", "how sure", "size"}, missing);
+  if (!missing.empty()) {
+    page.table({"missing", "where", "share", "how sure", "size"}, missing);
+    page.paragraph(
+        "Share: part of the mismatch that comes back when the effect alone is taken out. The rest belongs to "
+        "the "
+        "model's own parameters, refitted, and to what remains. How sure: probability that the name is "
+        "right, "
+        "against its rivals and against a cause that the library lacks.");
+  }
   std::string fit;
   for (const auto& row : d.heldout) {
     if (is_bare(row)) continue;
@@ -163,6 +183,7 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
                                            : "so far the above: the search ended before all was tried"});
   else if (missing.empty() && d.verdict != Verdict::unknown_physics)
     rows.push_back({"what is missing", "nothing that this recording shows"});
+  if (!missing.empty()) rows.push_back({"other names", rivals_of(data, d)});
   rows.push_back({"error (RMS) on data that no fit saw", fit});
   rows.push_back({"what remains", d.unexplained < 1.3 ? rest + ": nothing to speak of" : rest});
   rows.push_back({"next step", next_experiment(data, d)});
@@ -360,25 +381,25 @@ void add_parameters(report::Page& page, const Case& data, const Diagnosis& d) {
 void add_considered(report::Page& page, const Case& data, const Diagnosis& d) {
   page.heading("Considered and not claimed");
   if (!d.not_tried.empty()) page.paragraph(why_ended(d) + " before all was tried. " + not_tried(d) + ".");
-  Names considered;
+  Names rivals, tried;
   for (const auto& finding : d.findings)
     for (const auto& a : finding.alternatives)
-      considered.push_back(
+      rivals.push_back(
           {readable(a.term.info->name) + " (" + place_of(data, a.term) + ")",
            "in place of " + readable(finding.term.info->name) +
                (a.explains_as_well() ? ": explains the recording as well" : ": explains the recording worse"),
-           number(a.log_odds)});
-  for (const auto& r : d.rejected) considered.push_back({readable(r.term), r.why, number(r.gain)});
-  if (considered.empty()) {
+           number(100.0 * probability_of(finding, a), 3) + " %"});
+  for (const auto& r : d.rejected) tried.push_back({readable(r.term), r.why, number(r.gain)});
+  if (rivals.empty() && tried.empty()) {
     page.paragraph(d.is_partial ? "The search ended before anything else was weighed."
                                 : "No other term of the library came near: none had a gain worth a fit.");
     return;
   }
-  page.table({"effect", "why not", "log evidence"}, considered);
-  page.paragraph(
-      "Log evidence: for a rival, against what it would replace (each unit makes it e times less likely); "
-      "otherwise what the effect gained by itself, of which claims need " +
-      number(claim_margin_of(d.weighing)) + " and a gain on held-out data.");
+  if (!rivals.empty()) page.table({"rival", "why not", "how sure"}, rivals);
+  if (tried.empty()) return;
+  page.table({"tried by itself", "why not", "log evidence gained"}, tried);
+  page.paragraph("A claim needs a gain of " + number(claim_margin_of(d.weighing)) +
+                 ", also against slow noise, a possible sign and a gain on held-out data.");
 }
 
 /// Terms that the user named, beside what was found.
@@ -402,7 +423,7 @@ void add_assumed(report::Page& page, const Case& data, const Diagnosis& d) {
 }  // namespace
 
 std::string page_text(const Case& data, const Diagnosis& d, const std::string& subject) {
-  report::Page page{"Why model and machine differ", subject};
+  report::Page page{"Model and machine compared", subject};
   const bool fine = d.verdict == Verdict::no_mismatch && !d.is_partial;
   const bool clear =
       (d.verdict == Verdict::explained || d.verdict == Verdict::parameters_only) && !d.is_partial;

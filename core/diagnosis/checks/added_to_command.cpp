@@ -163,8 +163,8 @@ Guess dead_zone(const Series& series) {
   return guess;
 }
 
-/// The current comes in steps, about zero as a converter counts.
-Guess steps(const Series& series) {
+/// The current comes in steps, about zero as a converter counts; nothing where what is left is finer than any step to tell.
+std::optional<Guess> steps(const Series& series) {
   double top = 0.0;
   for (const double u : series.asked) top = std::max(top, std::abs(u));
   const auto stepped = [](double step) { return [step](double u) { return step * std::round(u / step); }; };
@@ -178,13 +178,12 @@ Guess steps(const Series& series) {
   for (double step = std::max(2.0 * rms, thresholds::finest_steps * top); step < std::min(top, 6.0 * rms);
        step *= 1.0 + 0.2 * step / top)
     values.push_back(step);
-  Guess guess;
-  guess.left = series.squares;
-  if (values.size() < 3) return guess;
+  if (values.size() < 3) return std::nullopt;
   const double near = least_of(values, [&](double step) { return left_by(thin, stepped(step)); }),
                step = least_of({0.999 * near, near, 1.001 * near},
                                [&](double a) { return left_by(series, stepped(a)); }),
                edge = 0.5 * step, before = edge * (1.0 - 1e-6);
+  Guess guess;
   guess.becomes = stepped(step);
   guess.added.term = curve_on_command({-edge, before}, {edge, -before}, step);
   guess.added.words = "steps of " + amperes(step);
@@ -349,7 +348,8 @@ std::vector<Guess> guesses_of(const Case& data, const std::vector<LawRows>& law,
   if (has_level) all.push_back(offset(series));
   all.push_back(limit(series));
   const auto much = asked_much(series);
-  for (auto* kind : {&dead_zone, &steps}) all.push_back(kind(much));
+  all.push_back(dead_zone(much));
+  if (auto stepped = steps(much)) all.push_back(std::move(*stepped));
   for (auto& guess : all)
     if (guess.becomes) guess.left = left_by(series, guess.becomes);
   const auto rows = static_cast<double>(series.time.size());

@@ -7,12 +7,8 @@
 
 namespace invar::diagnosis {
 
-namespace {
-
 using Series = std::vector<double>;
 
-/// The least step between two neighbouring readings that differ: what a converter counts in. Of readings with noise it is
-/// far below the noise.
 double counting_step(const Series& values) {
   double low = 1e300, high = -1e300, least = 1e300;
   for (const double v : values)
@@ -23,6 +19,8 @@ double counting_step(const Series& values) {
       least = std::min(least, step);
   return least < 1e300 ? least : 0.0;
 }
+
+namespace {
 
 /// The signal that says when a machine rests; empty where none does: heat and levels go on by themselves.
 std::string driven_by(const Case& data) {

@@ -6,6 +6,10 @@
 
 namespace invar::diagnosis {
 
+/// The least step between two neighbouring readings that differ: what a converter counts in. It is far below the noise of
+/// readings that have some; 0 where none differ.
+double counting_step(const std::vector<double>& values);
+
 /// [SI] 1 sigma of an output: the `noise` of the model's file; else the largest of three estimates. The first is from second
 /// differences of neighbouring rows, of the readings or of the residual, whichever is less. The second is the scatter of the
 /// reading while the machine rests, the third the step in which it counts. Errors that go on from row to row are no noise.

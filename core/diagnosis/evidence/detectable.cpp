@@ -118,6 +118,13 @@ Detectable described(const Case& data, const Smallest& smallest, double times) {
   return effect;
 }
 
+/// Can a term be of that size at all? Beyond the bound of its parameter the recording shows the effect at no size.
+bool is_possible(const Case& data, const Smallest& smallest, double times) {
+  const auto& start = smallest.screened->start;
+  return times * smallest.value <=
+         physics::bounds_of_parameter(data.model, start.term, start.directions[0].amplitude).upper;
+}
+
 }  // namespace
 
 void smallest_effects(const Case& data, const std::vector<Screened>& screened, Diagnosis& d) {
@@ -142,7 +149,8 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
       smallest.push_back(range.most);
   }
   if (!data.is_time_series || d.best.columns.cols() != static_cast<Eigen::Index>(d.best.free.size())) {
-    for (const auto& one : smallest) d.detectable.push_back(described(data, one, 1.0));
+    for (const auto& one : smallest)
+      if (is_possible(data, one, 1.0)) d.detectable.push_back(described(data, one, 1.0));
     return;
   }
   const Series series{data, d};
@@ -154,7 +162,7 @@ void smallest_effects(const Case& data, const std::vector<Screened>& screened, D
     while (times[i] < most && !series.shows(effect, times[i])) times[i] *= finer;
   });
   for (std::size_t i = 0; i < smallest.size(); ++i)
-    if (times[i] < most)  // else it could be a wander at any size
+    if (times[i] < most && is_possible(data, smallest[i], times[i]))  // else it could be a wander at any size
       d.detectable.push_back(described(data, smallest[i], times[i]));
 }
 

@@ -115,6 +115,10 @@ double rest_beside(const std::vector<double>& won, const std::vector<double>& ex
   return most;
 }
 
+double probability_of(const Finding& finding, const Alternative& alternative) {
+  return finding.probability * std::exp(0.5 * std::min(0.0, alternative.log_odds));
+}
+
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding) {
   double sum = 1.0;
   for (const auto& a : finding.alternatives)

@@ -39,6 +39,9 @@ bool is_elsewhere(const physics::Term& one, const physics::Term& other);
 /// the name explains and what is left. Returned is the worst output with at least a tenth of all that the name explains.
 double rest_beside(const std::vector<double>& won, const std::vector<double>& excess);
 
+/// Probability of a name in place of the finding's.
+double probability_of(const Finding& finding, const Alternative& alternative);
+
 /// Puts the odds together: `probability` and `other_cause` of a finding whose `gain`, `share` and alternatives are known, and
 /// the `rest` beside it, a share.
 void weigh_name(const Case& data, const Diagnosis& d, std::size_t place, double rest, Finding& finding);

@@ -149,10 +149,10 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
 
 std::string why_impossible(const Start& start) {
   const auto& d = start.directions.front();
-  if (d.amplitude >= none) return "fits best with the opposite of what it does, which nothing has";
+  if (d.amplitude >= none) return "the best fit has the opposite of its effect, which is impossible";
   std::string name{start.term.info->parameters[d.amplitude].name};
   std::replace(name.begin(), name.end(), '_', ' ');
-  return "fits best with a negative " + name + ", which nothing has";
+  return "the best fit needs a negative " + name + ", which is impossible";
 }
 
 physics::Model with(const Fit& base, const std::vector<const Screened*>& added, double share) {

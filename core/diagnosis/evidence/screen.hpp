@@ -16,7 +16,7 @@ struct Screened {
   bool impossible = false;   // needs a sign that its bounds forbid
 };
 
-/// Why no machine has what a start would need: "fits best with a negative time constant, which nothing has".
+/// Why no machine has what a start would need: "the best fit needs a negative time constant, which is impossible".
 std::string why_impossible(const Start& start);
 
 /// Best first by merit. `keep` bounds how many carry their columns.

@@ -1,4 +1,6 @@
 #include "core/diagnosis/locate/left_over.hpp"
+#include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/thresholds.hpp"
 
 #include <Eigen/Dense>
 #include <algorithm>
@@ -197,6 +199,14 @@ MeanSquare mean_square(const std::vector<Series>& all) {
   return mean;
 }
 
+/// Is a good part of what is left made by the steps of a reading? That goes with the output itself as a saw does.
+bool is_rounding(const Case& data, const std::vector<Series>& left, std::size_t output) {
+  double step = 0.0;
+  for (const auto& recording : data.recordings)
+    step = std::max(step, counting_step(recording.measured[output]));
+  return step * step / 12.0 > thresholds::made_by_rounding * mean_square(left).square;
+}
+
 /// What the user gave, or what cannot be told from the row before, whichever is more.
 double noise_of(const Case& data, const Weighing& weighing, std::size_t output) {
   return std::fmax(data.given_noise[output], weighing.filters[output].sigma);
@@ -286,6 +296,10 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
     auto changing = changing_effects(data, fit, o, causes);
     append(basis, changing);
     double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
+    if (is_rounding(data, left, o)) {
+      shares.push_back(share);
+      continue;
+    }
     for (const auto& order : orders)
       if (order.size() >= enough)
         share = std::max(
@@ -304,6 +318,25 @@ bool goes_with_recording(const Case& data, const Fit& with, const Fit& without) 
     if (before[o] > 0.1 && after[o] < 0.5 * before[o]) return true;
   return false;
 }
+
+namespace {
+
+/// Are rows that are `expected` to be loud alike from one to the next? Else their instrument is louder there.
+bool is_related(const std::vector<Series>& left, const Eigen::VectorXd& expected, double loud) {
+  double product = 0.0, square = 0.0, fourth = 0.0;
+  Eigen::Index at = 0;
+  for (const auto& one : left)
+    for (std::size_t i = 0; i < one.size(); ++i, ++at) {
+      if (i == 0 || expected(at) < loud || !std::isfinite(one[i]) || !std::isfinite(one[i - 1])) continue;
+      const double both = one[i] * one[i - 1];
+      product += both, square += one[i] * one[i], fourth += both * both;
+    }
+  // Of unrelated rows the sum of products has the square root of their squares' sum for its sigma.
+  return std::abs(product) > thresholds::related_sigmas * std::sqrt(fourth) &&
+         std::abs(product) > thresholds::related_share * square;
+}
+
+}  // namespace
 
 bool is_louder_in_motion(const Case& data, const Fit& fit) {
   constexpr double least = 5.0;  // coarse steps of a reading make it half as loud again at most
@@ -328,7 +361,9 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
         if (e <= low) quiet += v, quiet_rows += 1.0;
         if (e >= high) loud += v, loud_rows += 1.0;
       }
-    if (loud * quiet_rows > least * quiet * loud_rows) return true;
+    if (loud * quiet_rows > least * quiet * loud_rows &&
+        is_related(left_of(data, simulated, o), expected, high))
+      return true;
   }
   return false;
 }

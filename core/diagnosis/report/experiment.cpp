@@ -152,10 +152,13 @@ std::string experiment_of(const Case& data, const Diagnosis& d) {
     case Verdict::parameters_only:
       return "Measure the parameter that moved on its own, or take over patched.yaml.";
     default:
+      if (std::any_of(d.other_runs.begin(), d.other_runs.end(),
+                      [&](const OtherRun& run) { return !worse_on(d, run).empty(); }))
+        return "Do not take patched.yaml over yet: give all recordings together (--recording), so that one "
+               "model has to explain them.";
       return (d.other_runs.empty()
                   ? std::string{"Simulate patched.yaml on a recording that was not used here (--check)"}
-                  : std::string{"Where patched.yaml meets the other recording as well (above), take it "
-                                "over"}) +
+                  : std::string{"Take patched.yaml over: it does well on the other recording too"}) +
              (data.model.plant == physics::Plant::axis
                   ? "; then give it to the running stage (invar job apply)."
               : data.model.plant == physics::Plant::error_map

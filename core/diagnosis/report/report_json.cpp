@@ -127,8 +127,7 @@ void add_finding(json& report, const Case& data, const Diagnosis& d, const Findi
   const auto& term = finding.term;
   json alternatives = json::array();
   for (const auto& a : finding.alternatives) {
-    const double p = finding.probability * std::exp(0.5 * std::min(0.0, a.log_odds));
-    if (p > 1e-4) {
+    if (const double p = probability_of(finding, a); p > 1e-4) {
       json other = {{"term", a.term.info->name}, {"site", site_of(data, a.term)}, {"probability", p}};
       add_place(other, a.term);
       alternatives.push_back(std::move(other));

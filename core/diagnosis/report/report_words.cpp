@@ -180,6 +180,12 @@ std::string beside_the_verdict(const Case& data, const Diagnosis& d) {
             " RMS off what the controller makes of the recorded reference and position (" +
             number(100.0 * d.off_law->share, 2) + " % of the mismatch): look at the controller block";
   for (const auto& doubt : data.doubts) text += (text.empty() ? "" : "; ") + doubt;
+  for (std::size_t o = 0; o < d.heldout.size(); ++o)
+    if (const auto& row = d.heldout[o];
+        row.after > 0.0 && data.given_noise[o] > thresholds::noise_overstated * row.after)
+      text += (text.empty() ? "" : "; ") + std::string{"the noise of `"} + row.signal + "` is stated as " +
+              si(data.given_noise[o], row.unit) + ", yet no more than " + si(row.after, row.unit) +
+              " is left: look at its unit";
   const std::size_t values = data.count.rows * data.outputs.size();
   if (data.count.outliers > 0 && thresholds::one_in_outliers * data.count.outliers >= values)
     text +=
@@ -217,6 +223,9 @@ namespace {
 /// So far as it went: what was found until then.
 std::string sentence_of_part(const Case& data, const Diagnosis& d) {
   const std::string ended = why_ended(d) + " before all was tried";
+  if (d.findings.empty() && d.verdict == Verdict::unknown_physics)
+    return "Not finished. " + ended + "; something is missing, as " + times(most_over_noise(d)) +
+           " times the noise is left, and nothing named it until then.";
   if (d.findings.empty())
     return "Not finished, nothing can be said. " + ended +
            "; nothing was found until then, which does not say that nothing is missing.";
@@ -279,6 +288,13 @@ std::string sentence_of_unknown(const Case& data, const Diagnosis& d) {
          ", and no known term describes it.";
 }
 
+/// Does the model as it was given leave plainly more than the same model with its numbers fitted?
+bool needs_other_numbers(const Diagnosis& d) {
+  return std::any_of(d.heldout.begin(), d.heldout.end(), [](const FitRow& row) {
+    return row.before > thresholds::worse_by_chance * row.retuned;
+  });
+}
+
 }  // namespace
 
 std::string verdict_sentence(const Case& data, const Diagnosis& d) {
@@ -286,7 +302,10 @@ std::string verdict_sentence(const Case& data, const Diagnosis& d) {
   const std::string names = names_of_findings(data, d);
   switch (d.verdict) {
     case Verdict::no_mismatch:
-      return "No mismatch: the model explains the recording to " +
+      return "No mismatch: " +
+             std::string{needs_other_numbers(d) ? "with its numbers fitted within what was believed, the"
+                                                : "the"} +
+             " model explains the recording to " +
              (d.unexplained >= 1.5 ? times(d.unexplained) + " times " : std::string{}) + "the noise.";
     case Verdict::parameters_only:
       return "Only parameters are off, no physics is missing: " + listed(moved_numbers(d, 3.0)) + ".";

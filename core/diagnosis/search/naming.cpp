@@ -94,6 +94,13 @@ bool Search::leads_out(const OneName& name) {
   return true;
 }
 
+/// The evidence counts rows; the gain that a claim needs is held against slow noise too.
+std::string Search::why_it_does_not_pay(double evidence) const {
+  if (evidence < margin()) return "it explains no more than chance would";
+  return noise_->is_fed_back() ? "noise that the loop feeds back can explain the same"
+                               : "a slow wander of the readings can explain the same";
+}
+
 /// Adds the term that explains most, if one stands under the filters that its own residual asks for.
 bool Search::add_named(double round) {
   const bool is_first = d_.best.model.terms.size() == given();
@@ -104,9 +111,10 @@ bool Search::add_named(double round) {
     const bool pays = sought.best && sought.best->gain >= margin();
     if (from == From::coloured && take_shaken(sought.base, pays ? &sought.best->with : nullptr)) return true;
     if (!pays) {
-      for (const auto& f : sought.fits)
-        d_.reject(std::string{f.model.terms.back().info->name}, "it explains no more than chance would",
-                  f.evidence - sought.base.evidence);
+      for (const auto& f : sought.fits) {
+        const double evidence = f.evidence - sought.base.evidence;
+        d_.reject(std::string{f.model.terms.back().info->name}, why_it_does_not_pay(evidence), evidence);
+      }
       continue;
     }
     const auto rather = [&](From other_base, double leaves) {

@@ -8,6 +8,7 @@
 #include "core/diagnosis/dataset/starts.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
 #include "core/diagnosis/estimate/instrument_noise.hpp"
+#include "core/diagnosis/evidence/form.hpp"
 #include "core/diagnosis/search/handed_over.hpp"
 #include "core/diagnosis/segments/windows.hpp"
 #include "core/diagnosis/thresholds.hpp"
@@ -167,7 +168,7 @@ std::optional<Range> range_of(const Case& other, const physics::Term& term) {
 bool says_nothing_of(const Case& other, const physics::Term& term) {
   const auto& curve = term.curve;
   if (curve.knots.empty() || curve.period > 0.0 || curve.memory != physics::Curve::Memory::none) return false;
-  if (curve.over == "time" || curve.over == "t") return true;
+  if (is_over_time(term)) return true;
   const auto range = range_of(other, term);
   // Between two knots it goes straight, and so it may half a step beyond the last.
   const double beyond = curve.knots.size() > 1 ? 0.5 * (curve.knots[1] - curve.knots[0]) : 0.0;
@@ -239,8 +240,13 @@ physics::Model best_without(const Case& data, const Diagnosis& diagnosis,
                             const std::vector<std::size_t>& terms) {
   auto model = diagnosis.best.model;
   if (terms.empty()) return model;
-  if (data.model.terms.size() + terms.size() == model.terms.size()) return diagnosis.retuned.model;
+  const bool happened_once = std::all_of(
+      terms.begin(), terms.end(), [&](std::size_t t) { return is_over_time(diagnosis.best.model.terms[t]); });
+  if (!happened_once && data.model.terms.size() + terms.size() == model.terms.size())
+    return diagnosis.retuned.model;
   for (std::size_t k = terms.size(); k-- > 0;) model = physics::without_term(std::move(model), terms[k]);
+  // Rows that hold what happened once would lead the numbers astray again.
+  if (happened_once) return model;
   return fit(data, diagnosis.weighing, model, data.model, Effort::follow(8)).model;
 }
 

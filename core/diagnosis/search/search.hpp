@@ -47,6 +47,7 @@ class Search {
   /// Why a name that pays is not claimed beside others.
   std::optional<std::string> why_not(const OneName& name);
   bool add_named(double round);
+  std::string why_it_does_not_pay(double evidence) const;
   /// Does a name do no more than lead the user's numbers out of a valley in which they were stuck (a pendulum that went over
   /// the top)? Then the search goes on from there. Asked once.
   bool leads_out(const OneName& name);

@@ -157,4 +157,19 @@ void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, d
   }
 }
 
+void doubt_places(Diagnosis& d) {
+  if (!(most_over_noise(d) > thresholds::times_noise)) return;
+  double left = 0.0, missing = 0.0;  // in the power of the noise
+  for (const auto& row : d.heldout) {
+    if (!(row.noise_floor > 0.0)) continue;
+    left += std::pow(row.after / row.noise_floor, 2);
+    missing += std::pow(row.retuned / row.noise_floor, 2);
+  }
+  const double share = missing > 0.0 ? std::max(0.0, 1.0 - std::sqrt(left / missing)) : 0.0,
+               most = thresholds::place_alone + (thresholds::surest - thresholds::place_alone) * share;
+  for (auto& finding : d.findings)
+    if (finding.stand_in != nullptr || !finding.term.curve.knots.empty())
+      finding.probability = std::min(finding.probability, most);
+}
+
 }  // namespace invar::diagnosis

@@ -24,6 +24,10 @@ bool set_aside(const Case& data, Diagnosis& d);
 /// ten times the noise.
 void leave_unsaid(Diagnosis& d, const std::vector<double>& rests, bool is_far, double times_the_noise);
 
+/// Where more than twice the noise is left, a place without a name is as sure as what its curve takes away on rows that no fit
+/// saw. One that explains nothing may as well be the wrong place.
+void doubt_places(Diagnosis& d);
+
 /// Findings whose names were all left unsaid are held to what a curve without a name must do: an engineer sees the residual
 /// shrink, on rows that no fit saw. Those that do not are taken back; true where they were.
 bool leave_out_unseen(Diagnosis& d);

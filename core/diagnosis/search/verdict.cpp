@@ -211,6 +211,7 @@ void conclude(const Case& data, Diagnosis& d) {
                *std::max_element(excess.begin(), excess.end()) > thresholds::far_above_given_noise ||
                    (own_equations && beyond_unrelated > thresholds::far_above_unrelated),
                beyond_unrelated);
+  doubt_places(d);
   d.verdict =
       d.findings.empty() ? verdict_without_findings(data, d, follows) : verdict_on_findings(data, d, rests);
   if (d.findings.empty() && d.verdict == Verdict::unknown_physics) d.suspect = most_suspect(data, d);

@@ -192,6 +192,14 @@ TEST(AddedToCommand, NothingIsClaimedOfNoiseCoarseStepsOrAnotherGain) {
   }
 }
 
+TEST(AddedToCommand, NothingIsClaimedOfHowFinelyAFileWasWritten) {
+  for (const double last_digit : {1e-5, 3e-6, 1e-6, 1e-7, 1e-8}) {
+    const auto found = added(
+        {.meter = [=](double u, double) { return last_digit * std::round(u / last_digit); }, .ammeter = 0.0});
+    EXPECT_FALSE(found) << last_digit << " A: " << found->words;
+  }
+}
+
 TEST(AddedToCommand, TheCarriageFeelsWhatIsAddedAndNotWhatIsMisread) {
   for (const bool is_cascade : {false, true}) {
     auto data = case_of({.is_cascade = is_cascade, .drive = sine(0.1, 7.0)});

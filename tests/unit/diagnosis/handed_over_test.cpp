@@ -13,9 +13,12 @@
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/report/report.hpp"
 #include "core/diagnosis/search/handed_over.hpp"
+#include "core/diagnosis/search/not_tried.hpp"
 #include "core/diagnosis/search/other_run.hpp"
+#include "core/diagnosis/search/unsure.hpp"
 #include "core/diagnosis/search/verdict.hpp"
 #include "core/diagnosis/segments/windows.hpp"
+#include "core/diagnosis/thresholds.hpp"
 #include "core/physics/library.hpp"
 #include "core/recording/table.hpp"
 #include "tests/support/model_of.hpp"
@@ -187,6 +190,67 @@ TEST(OtherRecording, ACurveOverTimeOrPastItsKnotsIsLeftOutThereAndOfTheModelThat
       EXPECT_THAT(summary(data, d), HasSubstr("left out in other.csv: the curve over " + over));
       EXPECT_THAT(summary(data, d), Not(HasSubstr("Worse on")));
     }
+  }
+}
+
+/// A door that was open in one recording: the numbers fitted beside it stay, those of a fit to these rows without it are astray.
+TEST(OtherRecording, WithoutWhatHappenedOnceTheNumbersStayThoseFittedBesideIt) {
+  const auto data = make_case(motor(), {run_of_motor(12.0, 4)});
+  auto d = with_curve(data, "t", {0.0, 6.0, 12.0}, 3.0);
+  for (auto& p : d.retuned.model.parameters)
+    if (p.name == "k") p.value = 20.0;
+  for (auto& p : d.best.model.parameters)
+    if (p.name == "k") p.value = 12.1;
+  const auto model = best_without(data, d, {0});
+  EXPECT_TRUE(model.terms.empty());
+  EXPECT_DOUBLE_EQ(model.value("k"), 12.1);
+}
+
+TEST(Doubt, APlaceWithoutANameIsAsSureAsWhatItsCurveTakesAway) {
+  Diagnosis d;
+  auto& finding = d.findings.emplace_back();
+  finding.term.info = physics::unmodelled(physics::Plant::equations, "state");
+  finding.term.curve.knots = {0.0, 1.0}, finding.term.curve.values = {0.0, 1.0};
+  const auto sure = [&](double after) {
+    finding.probability = 0.9;
+    d.heldout = {{"speed", "rad/s", 1.2, 1.0, after, 0.02}};
+    doubt_places(d);
+    return finding.probability;
+  };
+  EXPECT_NEAR(sure(0.95), thresholds::place_alone, 0.05);
+  EXPECT_LT(sure(0.8), 0.6);
+  EXPECT_GT(sure(0.1), 0.85);
+  EXPECT_DOUBLE_EQ(sure(0.025), 0.9);  // nothing to speak of is left
+}
+
+TEST(Doubt, ASearchThatEndedEarlyBesideALargeRestDoesNotOfferThatNothingIsMissing) {
+  const auto data = make_case(motor(), {run_of_motor(12.0, 4)});
+  for (const double rest : {0.021, 1.3}) {
+    auto d = fitted(data, data.model);
+    d.heldout = d.train = {{"speed", "rad/s", rest, rest, rest, noise}};
+    d.unexplained = rest / noise;
+    auto begun = d;
+    say_not_tried(begun, {own_numbers});
+    EXPECT_EQ(begun.verdict, Verdict::ambiguous);
+    say_not_tried(d, {"pairs"});
+    EXPECT_EQ(d.verdict, rest > 1.0 ? Verdict::unknown_physics : Verdict::ambiguous);
+    const auto report = nlohmann::json::parse(report_json(data, d));
+    EXPECT_EQ(report.at("ambiguity").empty(), rest > 1.0);
+    EXPECT_THAT(summary(data, d), HasSubstr(rest > 1.0 ? "something is missing" : "nothing can be said"));
+  }
+}
+
+TEST(Doubt, ANoiseStatedFarAboveAllThatIsLeftIsTold) {
+  auto data = make_case(motor(), {run_of_motor(12.0, 4)});
+  auto d = fitted(data, data.model);
+  d.heldout = d.train = {{"speed", "rad/s", 0.02, 0.02, 0.02, 20.0}};
+  for (const double stated : {0.02, 20.0}) {
+    data.given_noise[0] = stated;
+    const auto text = summary(data, d);
+    if (stated > 1.0)
+      EXPECT_THAT(text, HasSubstr("the noise of `speed` is stated as 20 rad/s, yet no more than"));
+    else
+      EXPECT_THAT(text, Not(HasSubstr("is stated as")));
   }
 }
 

@@ -74,6 +74,15 @@ TEST(Heat, AStoreBehindAWeakContactIsAStore) {
   EXPECT_NEAR(d.findings[0].term.values[1], 3000.0, 600.0);
 }
 
+TEST(Heat, CountsOfACoarseThermometerAreNoPhysics) {
+  auto data = heated(400.0, 1.3, 60.0, 0.01, [](const Moment&) { return 0.0; });
+  data.given_noise[0] = std::nan("");
+  for (double& v : data.recordings[0].measured[0]) v = 0.1 * std::round(10.0 * v);
+  const auto d = diagnose(data, [](double, const std::string&) {});
+  EXPECT_TRUE(d.findings.empty()) << summary(data, d);
+  EXPECT_NE(d.verdict, Verdict::unknown_physics) << summary(data, d);
+}
+
 TEST(Heat, AirThatIsDrivenCarriesHeatAwayWithAPowerOfTheSpeed) {
   auto data = heated(2000.0, 10.0, 300.0, 0.02, [](const Moment& at) {
     return -1.5 * std::pow(at.speed, 0.7) * (at.temperature - 22.0);

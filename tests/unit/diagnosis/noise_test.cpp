@@ -57,6 +57,34 @@ TEST(InstrumentNoise, IsWhatNeighbouringRowsSayWhateverWandersBeside) {
   EXPECT_LT(noise_of(make_case(encoder(), {readings(12.0 * white)})), 2.0 * white);
 }
 
+/// A level behind an outlet, read with white noise that grows with it.
+TEST(InstrumentNoise, ThatGrowsWithTheReadingIsNoPhysics) {
+  std::mt19937 random{3};
+  std::normal_distribution<double> unit;
+  std::uniform_real_distribution<double> any{0.2, 1.6};
+  std::vector<double> time, inflow, level;
+  double h = 0.5, u = 1.0;
+  for (int i = 0; i < 1500; ++i) {
+    if (i % 60 == 0) u = any(random);
+    time.push_back(i), inflow.push_back(u),
+        level.push_back(h * (1.0 + 0.01 * unit(random)) + 0.002 * unit(random));
+    for (int part = 0; part < 20; ++part) h += 0.05 * (0.05 * u - 0.04 * std::sqrt(h));
+  }
+  recording::Table table;
+  table.add("t", "s", time);
+  table.add("q", "1", inflow);
+  table.add("h", "m", level);
+  auto data = make_case(
+      test::model_of(
+          "invar_model: 1\nplant: equations\ncolumns: {time: t}\ninputs: {u: q}\n"
+          "states: {x: {derivative: 'a*u - b*sqrt(x)', initial: {value: 0.5, unit: m, sigma: 0.05}}}\n"
+          "outputs: {level: {column: h, expression: x}}\n"
+          "parameters: {a: {value: 0.05, unit: 1, sigma: 0.005}, b: {value: 0.04, unit: 1, sigma: 0.004}}\n"),
+      {table});
+  const auto d = diagnose(data, [](double, const std::string&) {});
+  EXPECT_EQ(d.verdict, Verdict::no_mismatch) << summary(data, d);
+}
+
 TEST(InstrumentNoise, IsWhatTheModelSays) {
   EXPECT_DOUBLE_EQ(noise_of(make_case(encoder("noise: {encoder: 3.0e-6}\n"), {readings(0.0)})), 3e-6);
 }
