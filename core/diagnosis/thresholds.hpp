@@ -183,6 +183,9 @@ inline constexpr std::size_t rows_that_show_wander = 1500;
 
 /// Share of a residual's power that the steps of a reading make: enough to draw a saw over the output. Judgement.
 inline constexpr double made_by_rounding = 0.25;
+/// Correlation of a residual's power with the reading: noise of an instrument grows with it. That of a jitter of time goes with
+/// the speed. Judgement.
+inline constexpr double goes_with_reading = 0.8;
 /// Sigmas, and share, of what neighbouring loud rows have in common. White noise that is louder there has neither. Judgement.
 inline constexpr double related_sigmas = 4.0;
 inline constexpr double related_share = 0.1;

@@ -321,6 +321,18 @@ bool goes_with_recording(const Case& data, const Fit& with, const Fit& without) 
 
 namespace {
 
+/// Is what is `expected` of the rows' power a matter of how much is read? Noise of an instrument often grows with its reading.
+bool goes_with_reading(const std::vector<physics::Outputs>& simulated, std::size_t output,
+                       const Eigen::VectorXd& expected) {
+  Eigen::VectorXd read(expected.size());
+  Eigen::Index at = 0;
+  for (const auto& outputs : simulated)
+    for (const double v : outputs[output]) read(at++) = std::abs(v);
+  read.array() -= read.mean();
+  const Eigen::VectorXd power = expected.array() - expected.mean();
+  return read.dot(power) > thresholds::goes_with_reading * read.norm() * power.norm();
+}
+
 /// Are rows that are `expected` to be loud alike from one to the next? Else their instrument is louder there.
 bool is_related(const std::vector<Series>& left, const Eigen::VectorXd& expected, double loud) {
   double product = 0.0, square = 0.0, fourth = 0.0;
@@ -362,7 +374,8 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
         if (e >= high) loud += v, loud_rows += 1.0;
       }
     if (loud * quiet_rows > least * quiet * loud_rows &&
-        is_related(left_of(data, simulated, o), expected, high))
+        (!goes_with_reading(simulated, o, expected) ||
+         is_related(left_of(data, simulated, o), expected, high)))
       return true;
   }
   return false;
