@@ -227,7 +227,7 @@ def own_numbers():
 
     def change(text):
         text = re.sub(r"(?m)^domain: \d+", f"domain: {domain}", text)
-        text = re.sub(r"(--domain|\bplant) \d+", rf"\1 {domain}", text)
+        text = re.sub(r"(--domain|\bplant|/position) \d+", rf"\1 {domain}", text)
         return re.sub(r"\b150([2-5])(\d)\b", lambda m: str(port + 2 * (int(m.group(1)) - 2) + int(m.group(2)) % 2), text)
     return change
 
