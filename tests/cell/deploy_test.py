@@ -127,24 +127,24 @@ class WithSystemd(Deployed):
         for name in PCS.names:
             self.assertEqual(PCS.on(name, f"ls {self.home()}/current /etc/systemd/system/invar-plant.service; pgrep invar", check=False).stdout, "")
 
-    def calibrations_come_back(self):
+    def deployed(self, *words, status=0):
         remote = ("--deployed", "--ssh-config", PCS.folder / "ssh_config")
+        done = subprocess.run(PCS.at_the_switch(INVAR, *words, *remote), capture_output=True, text=True, timeout=200)
+        self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        return done.stderr
 
-        def invar(*words, status=0):
-            done = subprocess.run(PCS.at_the_switch(INVAR, *words, *remote), capture_output=True, text=True, timeout=200)
-            self.assertEqual(done.returncode, status, done.stdout + done.stderr)
-            return done.stderr
+    def calibrations_come_back(self):
         models = f"{self.home()}/data/out/models"
         PCS.on("pc-a", f"mkdir -p {models} && echo good >{models}/x.yaml && chown -R invar: {models}")
         file = self.folder / "backup.tar"
-        invar("backup", self.cell, "--out", file)
+        self.deployed("backup", self.cell, "--out", file)
         PCS.on("pc-a", f"echo bad >{models}/x.yaml")
         pid = self.pids()[0]
         damaged = self.folder / "damaged.tar"
         damaged.write_bytes(file.read_bytes().replace(b"good", b"evil"))
-        self.assertIn("is no backup of Invar, or was cut or changed", invar("restore", self.cell, damaged, status=2))
+        self.assertIn("is no backup of Invar, or was cut or changed", self.deployed("restore", self.cell, damaged, status=2))
         self.assertEqual(self.pids()[0], pid, "it goes on")
-        invar("restore", self.cell, file)
+        self.deployed("restore", self.cell, file)
         self.assertEqual(PCS.on("pc-a", f"cat {models}/x.yaml; stat -c %U {models} {models}/x.yaml").stdout.split(), ["good", "invar", "invar"])
         current = f"{self.home()}/current"
         PCS.on("pc-a", f"LD_LIBRARY_PATH={current}/lib {current}/bin/invar status {current}/\"$(cat {current}/CELL)\" --wait 30")
@@ -176,11 +176,10 @@ class WithSystemd(Deployed):
 
     def a_pc_is_replaced(self):
         """As docs/how-to/deploy-a-cell.md#replace-a-pc says it."""
-        config = ("--ssh-config", PCS.folder / "ssh_config")
         models, file = f"{self.home()}/data/out/models", self.folder / "before.tar"
         self.deploy()
         release = self.releases()
-        subprocess.run(PCS.at_the_switch(INVAR, "backup", self.cell, "--deployed", *config, "--out", file), check=True)
+        self.deployed("backup", self.cell, "--out", file)
         PCS.on("pc-b", f"mkdir -p {models} && echo since >{models}/y.yaml && chown -R invar: {models}")
         PCS.replace("pc-a")
         current = f"readlink {self.home()}/current; systemctl show -P MainPID invar-plant"
@@ -198,12 +197,8 @@ class WithSystemd(Deployed):
         self.assert_well()
         self.assertIn("pc-a: the release before is -: there is none to go back to", self.deploy("--roll-back", status=1).stderr)
 
-        subprocess.run(["tar", "-xf", file, "-C", self.folder, "pc-a.tar"], check=True)
-        PCS.on("pc-a", "systemctl stop invar-plant")
-        with open(self.folder / "pc-a.tar", "rb") as part:
-            PCS.on("pc-a", f"cd {self.home()} && LD_LIBRARY_PATH=current/lib current/bin/invar restore \"current/$(cat current/CELL)\" - --data data",
-                   stdin=part)
-        PCS.on("pc-a", "systemctl start invar-plant")
+        self.assertIn("is no host of", self.deployed("restore", self.cell, file, "--host", "pc-d", status=2))
+        self.deployed("restore", self.cell, file, "--host", "pc-a")
         pcs.run("ip", "-n", PCS.switch, "link", "set", "lo", "up")  # a DDS program stands at the switch
         subprocess.run(PCS.at_the_switch(INVAR, "status", self.cell, "--wait", "30"), check=True, stdout=subprocess.DEVNULL)
         self.assertEqual(PCS.on("pc-a", f"cat {models}/x.yaml; stat -c %U {models} {models}/x.yaml").stdout.split(), ["good", "invar", "invar"])

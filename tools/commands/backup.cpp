@@ -126,6 +126,8 @@ void add_restore(CLI::App& program) {
       "Exit status: 0 restored, 1 a PC failed, 2 the call or a file is wrong: nothing was changed");
   auto options = common(*command);
   command->add_option("backup", options->file, "the file; - is the standard input")->required();
+  command->add_option("--host", options->remote.only, "with --deployed: this PC alone, the others go on")
+      ->needs("--deployed");
   command->add_flag("--dry-run", options->dry_run, "look for faults of the backup, and change nothing");
   command->add_option("--service", options->service, "with --deployed, as of `invar deploy`")
       ->check(CLI::IsMember({"systemd", "none"}))

@@ -283,6 +283,13 @@ config::Cell hosts_of(const DeployOptions& options) {
   const config::Yaml yaml = config::Yaml::load(options.cell);
   config::Cell cell = config::read_cell(yaml);
   if (flaw_of_identifier(cell.name) || cell.hosts.empty()) yaml.finish();
+  if (options.only.empty()) return cell;
+  std::vector<std::string> names;
+  for (const config::CellHost& host : cell.hosts) names.push_back(host.name);
+  std::erase_if(cell.hosts, [&](const config::CellHost& host) { return host.name != options.only; });
+  if (cell.hosts.empty())
+    throw InputError{"--host", "`" + printable(options.only) + "` is no host of " + options.cell.string(),
+                     mend_name(options.only, names)};
   return cell;
 }
 

@@ -19,6 +19,7 @@ struct DeployOptions {
   bool service = true;                          // systemd starts it; false: files only
   std::filesystem::path identity, ssh_config;
   int ssh_port = 0;
+  std::string only;        // the one host that is meant; empty: all
   double patience = 60.0;  // s, for a service to start and for the cell to be well
 };
 
