@@ -39,6 +39,29 @@ ROOMS = {
     "core/modbus": ["core/base", "core/config", "libmodbus"],
     "core/recording": ["core/base", "idl", "compression", "nlohmann-json"],
     "tools": None,  # everything
+    "tools/commands": None,
+    "tools/report": ["core/base", "nlohmann-json"],
+    "tools/host": ["core/base", "core/config", "core/dds", "spdlog"],
+    "tools/live": ["core/base", "core/config", "core/dds", "tools/host", "idl", "CLI11", "nlohmann-json"],
+    "tools/metrics": ["core/base", "core/dds", "tools/live", "idl", "prometheus-cpp"],
+    "tools/image": ["core/vision", "tools/report"],
+    "tools/thermal": ["core/metrology/thermal", "tools/report", "nlohmann-json"],
+    "tools/calibration": ["core/base", "core/compensation", "core/config", "core/recording", "tools/live", "tools/report", "Eigen", "nlohmann-json"],
+    "tools/new": [],
+}
+CALIBRATED = ["core/base", "core/compensation", "core/config", "core/recording", *METROLOGY, "tools/calibration", "tools/report", "Eigen",
+              "nlohmann-json"]
+DEPLOYED = ["core/base", "core/config", "core/dds", "core/job", "tools/cell", "OpenSSL"]
+ROOMS |= {
+    "tools/geometric": CALIBRATED,
+    "tools/history": CALIBRATED,
+    "tools/deploy": DEPLOYED,
+    "tools/keys": [*DEPLOYED, "tools/report", "components/recorder", "components/supervisor"],
+    # A cell is loaded, run and summed up: it knows all components, but no command and none of the engines behind these.
+    "tools/cell": ["components", "components/calibration", "components/compensation", "components/recorder", "components/stage",
+                   "components/supervisor", "core/base", "core/compensation", "core/component", "core/config", "core/dds", "core/executor",
+                   "core/job", "core/metrology/droplet", "core/metrology/geometric", "core/recording", "tools/host", "tools/live",
+                   "tools/report", "idl", "nlohmann-json", "spdlog"],
 }
 for subject in METROLOGY:
     ROOMS[subject] = ["core/base", "core/numerics", "Eigen"]
@@ -57,6 +80,7 @@ ROOMS["core/diagnosis"] = []  # thresholds.hpp
 for at, stage in enumerate(STAGES):
     ROOMS[f"core/diagnosis/{stage}"] = DIAGNOSIS + ["core/diagnosis"] + [f"core/diagnosis/{earlier}" for earlier in STAGES[:at]]
 ROOMS["core/diagnosis/report"].append("nlohmann-json")
+ROOMS["tools/diagnose"] = ["core/base", "core/physics", "core/diagnosis", *(f"core/diagnosis/{stage}" for stage in STAGES), "tools/report"]
 
 # Modules that still include one another; no further ones may, and a set that is cut leaves the list.
 CIRCLES = [
@@ -83,8 +107,8 @@ def room_of(path: str):
         return "/".join(parts[:3])
     if parts[0] == "core" and len(parts) > 2:
         return "core/" + parts[1]
-    if parts[0] == "components" and len(parts) > 2:
-        return "components/" + parts[1]
+    if parts[0] in ("components", "tools") and len(parts) > 2:
+        return parts[0] + "/" + parts[1]
     return parts[0]
 
 

@@ -43,4 +43,12 @@ std::string nearest(std::string_view word, const std::vector<std::string>& choic
   return best;
 }
 
+std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
+  if (names.empty()) return "there is none";
+  if (const std::string near = nearest(word, names); !near.empty()) return "did you mean `" + near + "`?";
+  std::string text = "there are: ";
+  for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
+  return text;
+}
+
 }  // namespace invar::config

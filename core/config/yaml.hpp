@@ -130,4 +130,7 @@ class Yaml {
 /// The nearest of `choices` to a misspelt `word`, for "did you mean"; empty when none is near.
 std::string nearest(std::string_view word, const std::vector<std::string>& choices);
 
+/// Words that a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.
+[[nodiscard]] std::string mend_name(const std::string& word, const std::vector<std::string>& names);
+
 }  // namespace invar::config

@@ -8,6 +8,7 @@
 
 #include "core/base/shown.hpp"
 #include "core/component/port.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/cell_client.hpp"
 #include "core/dds/wire_type.hpp"
 #include "idl/event.h"
@@ -40,7 +41,7 @@ void check_port_keys(const LoadedComponent& member) {
       const Port* found = member.component->find_port(entry.key());
       if (found == nullptr) {
         entry.fault("`" + clipped(entry.key()) + "` is no port of `" + member.file->type + "`",
-                    mend_name(entry.key(), names));
+                    config::mend_name(entry.key(), names));
       } else if (only == Port::Direction::output && found->direction() != only) {
         entry.fault("`" + entry.key() + "` is an input", "only outputs are published");
       } else if (only == Port::Direction::input && found->direction() != only) {
@@ -274,7 +275,8 @@ Port* named_port(const LoadedCell& loaded, const std::string& connection, const 
     std::vector<std::string> names;
     for (const auto& process : loaded.cell->processes)
       for (const auto& candidate : process.components) names.push_back(candidate.name);
-    at.fault("`" + clipped(component) + "` is no component of this cell", mend_name(component, names));
+    at.fault("`" + clipped(component) + "` is no component of this cell",
+             config::mend_name(component, names));
     return nullptr;
   }
   if (const auto* named = loaded.cell->find(component); named->standby) {
@@ -288,7 +290,7 @@ Port* named_port(const LoadedCell& loaded, const std::string& connection, const 
       for (const LoadedComponent& member : process.components)
         if (member.file->name == component && member.component)
           at.fault("`" + component + "` has no port `" + clipped(port) + "`",
-                   mend_name(port, port_names(*member.component)));
+                   config::mend_name(port, port_names(*member.component)));
   }
   return found;
 }

@@ -18,18 +18,19 @@
 #include <thread>
 
 #include "core/base/temporary_folder.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/identity.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/simulated_clock.hpp"
 #include "tools/cell/children_watch.hpp"
 #include "tools/cell/last_words.hpp"
 #include "tools/cell/load_cell.hpp"
-#include "tools/cell/own_host.hpp"
 #include "tools/cell/process.hpp"
 #include "tools/cell/process_claim.hpp"
 #include "tools/cell/restart_news.hpp"
 #include "tools/cell/restarts.hpp"
 #include "tools/cell/standbys.hpp"
+#include "tools/host/own_host.hpp"
 
 extern char** environ;  // NOLINT: POSIX names it so
 
@@ -347,8 +348,9 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
   const LoadedCell loaded = load_cell(options.cell);
   const config::Cell& cell = *loaded.cell;
   if (!options.job.empty() && !cell.jobs.contains(options.job))
-    throw InputError{cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell",
-                     mend_name(options.job, names_of(cell.jobs, [](const auto& job) { return job.first; }))};
+    throw InputError{
+        cell.file.string() + ": jobs", "`" + options.job + "` is no job of this cell",
+        config::mend_name(options.job, names_of(cell.jobs, [](const auto& job) { return job.first; }))};
   const std::set<std::string> hosts = own_hosts(cell, options.host);
   for (const auto& process : cell.processes)  // let go at once: the processes claim their names themselves
     if (hosts.contains(process.host)) (void)ProcessClaim{cell, process.name};

@@ -4,6 +4,7 @@
 
 #include "components/all.hpp"
 #include "core/base/shown.hpp"
+#include "core/config/yaml.hpp"
 #include "core/job/job_component.hpp"
 #include "tools/cell/bridge_file.hpp"
 #include "tools/cell/connections.hpp"
@@ -97,7 +98,7 @@ void check_jobs(const LoadedCell& loaded) {
           at.fault("`" + component + "` runs no jobs", "name the component that runs it");
         else if (!runs->has(job))
           at.fault("`" + component + "` has no job `" + clipped(job) + "`",
-                   mend_name(job, job_names(member)));
+                   config::mend_name(job, job_names(member)));
       }
 }
 

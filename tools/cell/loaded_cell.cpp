@@ -2,15 +2,6 @@
 
 namespace invar::tools {
 
-std::string mend_name(const std::string& word, const std::vector<std::string>& names) {
-  if (names.empty()) return "there is none";
-  if (const std::string near = config::nearest(word, names); !near.empty())
-    return "did you mean `" + near + "`?";
-  std::string text = "there are: ";
-  for (const auto& name : names) text += (name == names.front() ? "" : ", ") + name;
-  return text;
-}
-
 std::vector<std::string> LoadedCell::process_names() const {
   std::vector<std::string> names;
   for (const LoadedProcess& each : processes) names.push_back(each.file->name);

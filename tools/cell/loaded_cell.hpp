@@ -38,7 +38,4 @@ struct LoadedCell {
   [[nodiscard]] Port* port(const std::string& component, const std::string& name) const;
 };
 
-/// Words that a wrong word could have meant, for the end of a message: the nearest of `names`, or all of them.
-[[nodiscard]] std::string mend_name(const std::string& word, const std::vector<std::string>& names);
-
 }  // namespace invar::tools

@@ -16,6 +16,7 @@
 #include "components/recorder/recorder.hpp"
 #include "components/supervisor/supervisor.hpp"
 #include "core/component/standby.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/host_clocks.hpp"
 #include "core/dds/node.hpp"
 #include "core/dds/process_service.hpp"
@@ -32,7 +33,6 @@
 #include "tools/cell/load_cell.hpp"
 #include "tools/cell/node_courier.hpp"
 #include "tools/cell/notice_log.hpp"
-#include "tools/cell/own_host.hpp"
 #include "tools/cell/partner_ends.hpp"
 #include "tools/cell/process_claim.hpp"
 #include "tools/cell/process_node.hpp"
@@ -41,6 +41,7 @@
 #include "tools/cell/standbys.hpp"
 #include "tools/cell/supervised_cell.hpp"
 #include "tools/cell/topic_recording.hpp"
+#include "tools/host/own_host.hpp"
 
 namespace invar::tools {
 
@@ -375,7 +376,7 @@ int run_process(const ProcessOptions& options, const ProcessOrders& orders) {
   LoadedProcess* process = loaded.process(options.process);
   if (process == nullptr)
     throw InputError{options.cell.string(), "`" + options.process + "` is no process of this cell",
-                     mend_name(options.process, loaded.process_names())};
+                     config::mend_name(options.process, loaded.process_names())};
   const ProcessClaim claim{*loaded.cell, options.process};
   if (options.launcher == 0)
     spdlog::info("invar {}: process `{}` of cell `{}` ({}) starts in {}, pid {}", INVAR_VERSION,

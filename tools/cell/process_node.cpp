@@ -7,7 +7,7 @@
 #include "components/supervisor/supervisor.hpp"
 #include "core/dds/host_clocks.hpp"
 #include "core/dds/segment_size.hpp"
-#include "tools/cell/own_host.hpp"
+#include "tools/host/own_host.hpp"
 
 namespace invar::tools {
 

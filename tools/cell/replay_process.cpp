@@ -7,6 +7,7 @@
 #include <set>
 
 #include "components/compensation/compensation.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/typed_wire.hpp"
 #include "core/executor/process_control.hpp"
 #include "core/recording/cdr.hpp"
@@ -205,7 +206,7 @@ ReplayReport replay_process(const std::filesystem::path& cell, const std::string
   LoadedProcess* found = loaded.process(process);
   if (found == nullptr)
     throw InputError{cell.string(), "`" + process + "` is no process of this cell",
-                     mend_name(process, loaded.process_names())};
+                     config::mend_name(process, loaded.process_names())};
   const auto file = recording::Recording::open(recording);
   // Simulated time begins at 0; what is years away was stamped by UTC.
   if (file.statistics().start > Instant{} + Duration::seconds(1e8))

@@ -11,7 +11,7 @@
 #include "core/dds/simulated_clock.hpp"
 #include "idl/event.h"
 #include "idl/lifecycle.h"
-#include "tools/cell/own_host.hpp"
+#include "tools/host/own_host.hpp"
 
 namespace invar::tools {
 

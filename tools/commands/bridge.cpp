@@ -5,9 +5,9 @@
 
 #include "tools/cell/bridge.hpp"
 #include "tools/cell/load_cell.hpp"
-#include "tools/cell/own_host.hpp"
 #include "tools/cell/process_claim.hpp"
 #include "tools/cell/service_manager.hpp"
+#include "tools/host/own_host.hpp"
 #include "tools/live/commands.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/text_table.hpp"

@@ -10,10 +10,10 @@
 #include "core/vision/camera_file.hpp"
 #include "core/vision/library.hpp"
 #include "core/vision/ruler_file.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 #include "tools/commands/calibrate_camera.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 

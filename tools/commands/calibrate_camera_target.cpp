@@ -14,8 +14,8 @@
 #include "core/numerics/significance.hpp"
 #include "core/recording/table.hpp"
 #include "core/vision/camera_file.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/commands/calibrate_camera.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 

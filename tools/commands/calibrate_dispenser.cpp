@@ -6,8 +6,9 @@
 
 #include "core/compensation/trajectory_file.hpp"
 #include "core/metrology/droplet/droplet_trajectory.hpp"
+#include "tools/calibration/calibration_result.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"
 
 namespace invar::tools {

@@ -7,8 +7,9 @@
 
 #include "core/compensation/fusion_file.hpp"
 #include "core/metrology/fusion/fusion_identification.hpp"
+#include "tools/calibration/calibration_result.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"
 
 namespace invar::tools {

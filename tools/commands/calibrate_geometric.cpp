@@ -10,9 +10,10 @@
 
 #include "core/compensation/geometric_file.hpp"
 #include "core/machine/machine_file.hpp"
+#include "tools/calibration/calibration_result.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/geometric/field_points.hpp"
 #include "tools/geometric/geometric_report.hpp"
 #include "tools/geometric/lines_file.hpp"

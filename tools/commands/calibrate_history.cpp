@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "core/base/new_file.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/history/history_page.hpp"
 #include "tools/positive.hpp"
 
@@ -125,7 +125,8 @@ void add_calibrate_history(CLI::App& group) {
   auto options = std::make_shared<Options>();
   command->add_option("folder", options->folder, "folder of calibrations")->required();
   command
-      ->add_option("--accuracy", options->accuracy, "wanted of the machine's error [m]; of a rotary axis [rad], a thermistor [K]")
+      ->add_option("--accuracy", options->accuracy,
+                   "wanted of the machine's error [m]; of a rotary axis [rad], a thermistor [K]")
       ->check(positive());
   command->add_option("--out", options->out, "folder for report.html and report.json");
   command->add_flag("--json", options->json, "print report.json instead of the summary");

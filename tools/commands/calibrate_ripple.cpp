@@ -12,8 +12,8 @@
 #include "core/model/recording_file.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/ripple_identification.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/report/left_out.hpp"
 #include "tools/report/page.hpp"
 

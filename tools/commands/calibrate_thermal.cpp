@@ -7,8 +7,9 @@
 #include "core/compensation/thermal_file.hpp"
 #include "core/metrology/geometric/error_motions.hpp"
 #include "core/metrology/thermal/thermal_identification.hpp"
+#include "tools/calibration/calibration_result.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/thermal/distortion.hpp"
 #include "tools/thermal/thermal_page.hpp"
 

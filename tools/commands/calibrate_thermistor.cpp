@@ -7,8 +7,9 @@
 
 #include "core/metrology/thermal/thermistor.hpp"
 #include "core/numerics/significance.hpp"
+#include "tools/calibration/calibration_result.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/commands/calibrate.hpp"
-#include "tools/commands/calibration_result.hpp"
 #include "tools/positive.hpp"
 #include "tools/report/left_out.hpp"
 

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "tools/calibration/predict.hpp"
 #include "tools/command.hpp"
 #include "tools/commands/calibrate.hpp"
 

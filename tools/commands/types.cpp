@@ -221,7 +221,7 @@ void types(const Options& options) {
       throw InputError{std::vector{fault}};
   if (!options.type.empty() && !registry.has(options.type))
     throw InputError{"TYPE", "`" + clipped(options.type) + "` is no component type",
-                     mend_name(options.type, registry.names())};
+                     config::mend_name(options.type, registry.names())};
   if (!options.type.empty()) {
     const Type type = look_at(registry, options.type, cell ? &*cell : nullptr);
     if (options.json)

@@ -17,6 +17,7 @@
 
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
+#include "core/config/yaml.hpp"
 #include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"
 #include "tools/deploy/host_keys.hpp"
@@ -289,7 +290,7 @@ config::Cell hosts_of(const DeployOptions& options) {
   std::erase_if(cell.hosts, [&](const config::CellHost& host) { return host.name != options.only; });
   if (cell.hosts.empty())
     throw InputError{"--host", "`" + printable(options.only) + "` is no host of " + options.cell.string(),
-                     mend_name(options.only, names)};
+                     config::mend_name(options.only, names)};
   return cell;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
+#include "core/config/yaml.hpp"
 #include "tools/cell/bridge_file.hpp"
 
 namespace invar::tools {
@@ -61,7 +62,7 @@ void check_host(const config::Cell& cell, const std::string& host) {
   for (const config::CellHost& each : cell.hosts) names.push_back(each.name);
   if (std::find(names.begin(), names.end(), host) == names.end())
     throw InputError{cell.file.string() + ": hosts", "`" + printable(host) + "` is no host of this cell",
-                     mend_name(host, names)};
+                     config::mend_name(host, names)};
   if (std::none_of(cell.processes.begin(), cell.processes.end(),
                    [&](const auto& process) { return process.host == host; }))
     throw InputError{cell.file.string() + ": processes", "none runs on the host `" + host + "`",

@@ -9,7 +9,7 @@
 
 #include "core/base/fault.hpp"
 #include "core/recording/table.hpp"
-#include "tools/commands/calibration_result.hpp"
+#include "tools/calibration/calibration_result.hpp"
 
 namespace invar::tools {
 

@@ -1,4 +1,5 @@
 #include "tools/geometric/rotary.hpp"
+#include "tools/calibration/predict.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 
 #include "core/compensation/rotary_file.hpp"
 #include "core/recording/table.hpp"
-#include "tools/commands/calibration_result.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/geometric/positioning.hpp"
 #include "tools/geometric/rotary_readings.hpp"
 #include "tools/report/left_out.hpp"

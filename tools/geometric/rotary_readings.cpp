@@ -5,7 +5,7 @@
 #include "core/base/unit.hpp"
 #include "core/config/yaml.hpp"
 #include "core/recording/table.hpp"
-#include "tools/commands/calibration_result.hpp"
+#include "tools/calibration/calibration_result.hpp"
 #include "tools/geometric/rtl_file.hpp"
 #include "tools/geometric/sense_of_motion.hpp"
 

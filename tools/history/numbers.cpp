@@ -17,7 +17,7 @@
 #include "core/config/yaml.hpp"
 #include "core/metrology/geometric/error_motions.hpp"
 #include "core/metrology/thermal/thermistor.hpp"
-#include "tools/commands/calibrate.hpp"
+#include "tools/calibration/predict.hpp"
 #include "tools/history/calibrations.hpp"
 #include "tools/report/page.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "core/base/fault.hpp"
 #include "core/base/new_file.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/identity.hpp"
 #include "tools/keys/authority.hpp"
 #include "tools/keys/documents.hpp"
@@ -128,7 +129,7 @@ std::vector<KeyState> make_keys(LoadedCell& loaded, const KeyOrder& order) {
       std::vector<std::string> names;
       names.reserve(all.size());
       for (const Rights& rights : all) names.push_back(rights.name);
-      throw InputError{"--renew", "`" + name + "` is nobody of this cell", mend_name(name, names)};
+      throw InputError{"--renew", "`" + name + "` is nobody of this cell", config::mend_name(name, names)};
     }
   make_folder(order.folder / "public", fs::perms{0755});
   make_folder(order.folder / "authority", fs::perms::owner_all);

@@ -10,7 +10,7 @@
 #include "core/dds/domain_ports.hpp"
 #include "core/dds/middleware_log.hpp"
 #include "core/dds/own_address.hpp"
-#include "tools/cell/own_host.hpp"
+#include "tools/host/own_host.hpp"
 #include "tools/live/interrupt.hpp"
 #include "tools/live/status_view.hpp"
 

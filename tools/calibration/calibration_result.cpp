@@ -1,4 +1,4 @@
-#include "tools/commands/calibration_result.hpp"
+#include "tools/calibration/calibration_result.hpp"
 
 #include <unistd.h>
 

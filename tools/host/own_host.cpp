@@ -1,4 +1,4 @@
-#include "tools/cell/own_host.hpp"
+#include "tools/host/own_host.hpp"
 
 #include <linux/rtnetlink.h>
 #include <spdlog/spdlog.h>
@@ -15,8 +15,8 @@
 
 #include "core/base/clock.hpp"
 #include "core/base/fault.hpp"
+#include "core/config/yaml.hpp"
 #include "core/dds/own_address.hpp"
-#include "tools/cell/loaded_cell.hpp"
 
 namespace invar::tools {
 
@@ -25,7 +25,8 @@ std::set<std::string> own_hosts(const config::Cell& cell, const std::string& hos
   for (const auto& each : cell.hosts) names.push_back(each.name);
   if (!host.empty()) {
     if (std::find(names.begin(), names.end(), host) != names.end()) return {host};
-    throw InputError{"--host", "`" + host + "` is no host of " + cell.file.string(), mend_name(host, names)};
+    throw InputError{"--host", "`" + host + "` is no host of " + cell.file.string(),
+                     config::mend_name(host, names)};
   }
   std::set<std::string> own;
   std::string list;
