@@ -40,6 +40,7 @@ Compensation::~Compensation() = default;
 
 void Compensation::configure() {
   active_ = before_ = transaction_start_ = {};
+  knows_before_ = false;
   staged_ = nullptr;
   transaction_ = 0;
   kept_refusal_.clear();
@@ -71,19 +72,28 @@ void Compensation::start_with_named() {
   }
 }
 
+/// Throws InputError for a model that is not the one that was kept, or none for this machine.
+Compensation::Stack Compensation::stack_of(const std::vector<KeptModels::Entry>& entries) {
+  Stack stack;
+  for (const auto& entry : entries) {
+    LiveModel& model = *loader_.load(entry.file);
+    const char* why = put_into(stack, model);
+    if (why == nullptr && model.checksum != entry.checksum) why = "it is not the one that was kept";
+    if (why != nullptr) throw InputError{entry.file.string(), why, "calibrate again"};
+  }
+  return stack;
+}
+
 /// All of the kept models or none: a part of them would correct for another machine.
 void Compensation::start_with_kept() {
   try {
     const auto kept = KeptModels::read(parameters_.state);
     if (!kept.any) return start_with_named();
-    Stack stack;
-    for (const auto& entry : kept.models) {
-      LiveModel& model = *loader_.load(entry.file);
-      const char* why = put_into(stack, model);
-      if (why == nullptr && model.checksum != entry.checksum) why = "it is not the one that was kept";
-      if (why != nullptr) throw InputError{entry.file.string(), why, "calibrate again"};
+    active_ = stack_of(kept.models);
+    try {
+      if (kept.before) before_ = stack_of(*kept.before), knows_before_ = true;
+    } catch (const InputError&) {  // a rollback is refused; what is in use stands
     }
-    active_ = stack;
   } catch (const InputError& error) {
     kept_refusal_ = std::string{"the kept model is refused: "} + error.what();
     start_with_named();
@@ -91,7 +101,10 @@ void Compensation::start_with_kept() {
 }
 
 void Compensation::keep() noexcept {
-  kept_.keep({active_.geometric, active_.thermal[0], active_.thermal[1], active_.thermal[2]});
+  const auto of = [](const Stack& stack) {
+    return KeptModels::Selection{stack.geometric, stack.thermal[0], stack.thermal[1], stack.thermal[2]};
+  };
+  kept_.keep({of(active_), knows_before_, of(before_)});
 }
 
 void Compensation::cleanup() noexcept {
@@ -187,6 +200,11 @@ void Compensation::end_transaction() noexcept {
   transaction_start_ = {};
 }
 
+void Compensation::change_to(const Stack& next) noexcept {
+  if (transaction_ == 0) before_ = active_, knows_before_ = true;
+  use(next);
+}
+
 void Compensation::obey(const ModelCommand& command) noexcept {
   if (transaction_ != 0 && command.transaction() != transaction_) {
     answer(command.id(), MODEL_REFUSED, nullptr, "another calibration is under way; wait, or cancel it");
@@ -230,8 +248,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
       } else {
         next.thermal[model->axis] = model;
       }
-      before_ = active_;
-      use(next);
+      change_to(next);
       if (transaction_ == 0) keep();
       answer(command.id(), MODEL_ACTIVE, model, "");
       return;
@@ -240,13 +257,16 @@ void Compensation::obey(const ModelCommand& command) noexcept {
       Stack next = active_;
       next.thermal = {};
       if (command.path().size() == 0) next.geometric = nullptr;
-      before_ = active_;
-      use(next);
+      change_to(next);
       break;
     }
     case MODEL_ROLLBACK:
       if (command.transaction() != 0 && transaction_ == 0) {
         answer(command.id(), MODEL_REFUSED, nullptr, no_transaction);
+        return;
+      }
+      if (transaction_ == 0 && !std::exchange(knows_before_, false)) {
+        answer(command.id(), MODEL_REFUSED, nullptr, no_model_before);
         return;
       }
       use(transaction_ != 0 ? transaction_start_ : std::exchange(before_, {}));
@@ -258,6 +278,7 @@ void Compensation::obey(const ModelCommand& command) noexcept {
         return;
       }
       before_ = transaction_start_;
+      knows_before_ = true;
       end_transaction();
       break;
     case MODEL_KEEP:

@@ -96,6 +96,8 @@ class Compensation final : public Component {
   // Models and transactions.
   void start_with_kept();
   void start_with_named();
+  [[nodiscard]] Stack stack_of(const std::vector<KeptModels::Entry>& entries);
+  void change_to(const Stack& next) noexcept;
   [[nodiscard]] const char* put_into(Stack& stack, LiveModel& model) const noexcept;
   void keep() noexcept;
   void obey(const ModelCommand& command) noexcept;
@@ -154,7 +156,8 @@ class Compensation final : public Component {
   Output<event::Notice> notices_{*this, "notices", "event"};
 
   Stack active_;
-  Stack before_;  // what a rollback without a transaction goes back to
+  Stack before_;               // what a rollback without a transaction goes back to
+  bool knows_before_ = false;  // since the first change, also over a restart
   LiveModel* staged_ = nullptr;
   std::uint64_t transaction_ = 0;
   Stack transaction_start_;

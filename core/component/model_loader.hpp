@@ -23,6 +23,10 @@
 
 namespace invar {
 
+/// Why a rollback is refused: since the start, and in what was kept over it, no other model stood before the one in use.
+inline constexpr const char* no_model_before =
+    "the model before this one is not known; name its file, or take this one out";
+
 /// Loading and checking happen on a thread of its own, never in the loop (in simulated time at once, so that runs
 /// repeat). The loop holds plain pointers, and says by `use` which: what it holds no more is given back. A `Model` has a number
 /// `id` and a text `refusal`, empty where it is sound.

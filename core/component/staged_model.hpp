@@ -42,6 +42,7 @@ class StagedModel {
   /// Set-up: from the component's configure. An empty file: no model at first. Throws InputError.
   void open(const std::filesystem::path& file, const char* mend) {
     active_ = staged_ = previous_ = nullptr;
+    knows_previous_ = false;
     if (!file.empty()) {
       Model* model = loader_.load(file);
       if (!model->refusal.empty()) throw InputError{file.string(), model->refusal, mend};
@@ -52,6 +53,7 @@ class StagedModel {
   /// From the component's cleanup.
   void close() noexcept {
     active_ = staged_ = previous_ = nullptr;
+    knows_previous_ = false;
     loader_.close();
   }
   /// From the component's activate: the next update says which model is in use (what is written before the first step may
@@ -115,16 +117,22 @@ class StagedModel {
           return false;
         }
         previous_ = active_;
+        knows_previous_ = true;
         active_ = std::exchange(staged_, nullptr);
         answer(command.id(), compensation::MODEL_ACTIVE, active_, "");
         return true;
       case compensation::MODEL_ROLLBACK:
+        if (!std::exchange(knows_previous_, false)) {
+          answer(command.id(), compensation::MODEL_REFUSED, active_, no_model_before);
+          return false;
+        }
         active_ = std::exchange(previous_, nullptr);
         answer(command.id(), active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE,
                active_, "");
         return true;
       case compensation::MODEL_CLEAR:
         previous_ = std::exchange(active_, nullptr);
+        knows_previous_ = true;
         answer(command.id(), compensation::MODEL_NONE, nullptr, "");
         return true;
       case compensation::MODEL_KEEP:
@@ -143,6 +151,7 @@ class StagedModel {
   Model* active_ = nullptr;
   Model* staged_ = nullptr;
   Model* previous_ = nullptr;
+  bool knows_previous_ = false;  // since the first change; a rollback uses it up
   bool begins_ = false;
   bool handles_models_ = false;  // something was loaded or changed
   compensation::ModelStatus reply_;

@@ -69,7 +69,30 @@ TEST(KeptModels, ATrialThatWasNeverCommittedIsForgotten) {
   EXPECT_EQ(cell.geometric(), checksum_of(good));
 }
 
-TEST(KeptModels, WhatWasTakenOutStaysOutAndOnlyCopiesInUseStay) {
+TEST(KeptModels, ARollbackGoesBackOverARestartAndIsRefusedWhereNothingIsKnown) {
+  KeptCell cell;
+  cell.bring_up();
+  EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_REFUSED);
+  const auto first = write(cell.folder, "first.yaml", geometry(5e-5, 0.0));
+  const auto second = write(cell.folder, "second.yaml", geometry(6e-5, 0.0));
+  cell.use(first);
+  ASSERT_EQ(cell.use(second, 7).state(), MODEL_ACTIVE);
+  ASSERT_EQ(cell.tell(MODEL_COMMIT, {}, 7).state(), MODEL_ACTIVE);
+  fs::remove(first);
+  cell.start_again();
+  EXPECT_EQ(cell.geometric(), checksum_of(second));
+  EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_ACTIVE);
+  const auto seal = cell.geometric();
+  EXPECT_NE(seal, checksum_of(second));
+  EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_REFUSED);
+  EXPECT_EQ(cell.geometric(), seal) << "a refusal changes nothing";
+  cell.start_again();
+  EXPECT_EQ(cell.geometric(), seal);
+  EXPECT_EQ(cell.tell(MODEL_ROLLBACK).state(), MODEL_REFUSED);
+  EXPECT_EQ(cell.geometric(), seal);
+}
+
+TEST(KeptModels, WhatWasTakenOutStaysOutAndOnlyCopiesInUseAndBeforeStay) {
   KeptCell cell;
   cell.bring_up();
   const auto first = write(cell.folder, "first.yaml", geometry(5e-5, 0.0));
@@ -77,8 +100,12 @@ TEST(KeptModels, WhatWasTakenOutStaysOutAndOnlyCopiesInUseStay) {
   cell.use(first);
   EXPECT_TRUE(fs::exists(cell.copy_of(first)));
   cell.use(second);
+  EXPECT_TRUE(fs::exists(cell.copy_of(first)));  // a rollback goes back to it
+  const auto third = write(cell.folder, "third.yaml", geometry(7e-5, 0.0));
+  cell.use(third);
   EXPECT_FALSE(fs::exists(cell.copy_of(first)));
   EXPECT_TRUE(fs::exists(cell.copy_of(second)));
+  EXPECT_TRUE(fs::exists(cell.copy_of(third)));
   EXPECT_EQ(cell.tell(MODEL_CLEAR).state(), MODEL_NONE);
   cell.parameters.model = second;  // the cell file's: for a folder that holds nothing yet
   cell.start_again();
