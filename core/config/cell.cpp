@@ -110,13 +110,23 @@ RealtimeRequest read_realtime(const Node& node) {
   return request;
 }
 
-void check_publish_rates(const CellComponent& component, Duration period) {
-  const double steps = 1.0 / (period * component.every).in_seconds();
+void check_publish_rates(const CellComponent& component, const CellProcess& process) {
+  if (!process.rate_known) return;
+  const double steps = 1.0 / (process.period * component.every).in_seconds();
   for (const auto& [port, rate] : component.publish_rates)
     if (rate > steps * (1.0 + 1e-6))
       component.node["publish"][port].fault(
           "`" + shown(rate) + "` Hz is above the " + shown(steps) + " Hz at which the component is stepped",
           "lower it, or leave it out: every step is then published");
+}
+
+/// The period of a loop: `node` is the part that has its `rate`.
+void read_rate(const Node& node, CellProcess& process) {
+  const Range rates{0.1, 20'000.0};
+  const std::size_t faults = node.fault_count();
+  const double rate = node.number("rate", "Hz", rates);
+  process.rate_known = node.is_map() && node.fault_count() == faults;
+  process.period = Duration::seconds(1.0 / std::max(rate, rates.lower));
 }
 
 CellProcess read_process(const Node& node, const std::vector<CellHost>& hosts, std::uint32_t& next_id) {
@@ -125,17 +135,14 @@ CellProcess read_process(const Node& node, const std::vector<CellHost>& hosts, s
   process.where = node.where();
   check_name(node, process.name, In::files);
   process.host = hosts.size() == 1 ? node.text("host", hosts.front().name) : node.text("host");
-  const Range rates{0.1, 20'000.0};
-  double rate = 1.0;
   if (const Node realtime = node["realtime"]; realtime.exists()) {
     if (node.has("rate"))
       node["rate"].fault("stands beside `realtime`", "keep `realtime: {rate: ...}` alone");
     process.realtime = read_realtime(realtime);
-    rate = realtime.number("rate", "Hz", rates);
+    read_rate(realtime, process);
   } else {
-    rate = node.number("rate", "Hz", rates);
+    read_rate(node, process);
   }
-  process.period = Duration::seconds(1.0 / std::max(rate, rates.lower));
   const std::string overrun = node.choice("overrun", {"skip", "degrade", "safe_stop"}, "skip");
   process.overrun = overrun == "degrade"     ? OverrunPolicy::degrade
                     : overrun == "safe_stop" ? OverrunPolicy::safe_stop
@@ -154,7 +161,7 @@ CellProcess read_process(const Node& node, const std::vector<CellHost>& hosts, s
   for (const Node& child : components.map()) process.components.push_back(read_component(child, next_id++));
   if (components.is_map() && process.components.empty())
     components.fault("has no components", "name at least one, or remove the process");
-  for (const CellComponent& component : process.components) check_publish_rates(component, process.period);
+  for (const CellComponent& component : process.components) check_publish_rates(component, process);
   return process;
 }
 
@@ -220,7 +227,7 @@ void take_from_leaders(Cell& cell) {
       standby.publish_rates = leader->publish_rates;
       standby.latencies = leader->latencies;
       standby.node = leader->node;
-      check_publish_rates(standby, process.period);
+      check_publish_rates(standby, process);
     }
 }
 

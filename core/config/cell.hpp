@@ -53,6 +53,8 @@ struct CellProcess {
   std::string name;
   std::string host;
   Duration period;
+  bool rate_known =
+      true;  // no: the file's `rate` has a fault, and what follows from the period need not be told
   std::optional<RealtimeRequest> realtime;
   OverrunPolicy overrun = OverrunPolicy::skip;
   std::int64_t tolerate = 0;  // lost periods within a second before `degrade` or `safe_stop` acts

@@ -76,6 +76,24 @@ std::string range_text(Range range, std::string_view unit) {
   return "between " + shown(range.lower) + " and " + shown(range.upper) + suffix;
 }
 
+/// A word of the file as a message shows it.
+std::string word_of(const Node& node) { return node.is_scalar() ? clipped(node.raw().Scalar()) : "..."; }
+
+/// How a list of numbers is written: plainly, and as the file has it with one unit for all: {value: [0, 200], unit: mm}.
+std::string mend_list(const Node& at, const std::string& plain, std::string_view unit) {
+  if (unit.empty() || unit == "1") return "write " + plain;
+  const std::string mend = "write " + plain + " in " + std::string{unit};
+  if (!at.is_map()) return mend;
+  at.accept_all();
+  const Node values = at["value"], other = at["unit"];
+  if (!values.is_list() || values.children().size() > 3 || !other.is_scalar()) return mend;
+  std::string listed;
+  for (const Node& number : values.children())
+    listed +=
+        (listed.empty() ? "{value: " : ", {value: ") + word_of(number) + ", unit: " + word_of(other) + "}";
+  return mend + ", or [" + listed + "]";
+}
+
 }  // namespace
 
 Node::Node(std::shared_ptr<Document> document, std::shared_ptr<Place> place)
@@ -242,6 +260,13 @@ double Node::as_number(std::string_view unit, Range range) const { return as_qua
 
 std::int64_t Node::as_integer(std::int64_t lower, std::int64_t upper) const {
   std::int64_t value = 0;
+  if (is_map() && has("value")) {
+    accept_all();
+    const Node number = (*this)["value"];
+    const bool whole = number.is_scalar() && YAML::convert<std::int64_t>::decode(number.raw(), value);
+    fault("a whole number has no unit", "write " + (whole ? number.shown_scalar() : "it alone"));
+    return lower;
+  }
   if (!is_scalar() || !YAML::convert<std::int64_t>::decode(place_->yaml, value)) {
     fault("`" + shown_scalar() + "` is not a whole number", "write a whole number");
     return lower;
@@ -287,6 +312,10 @@ bool Node::as_flag() const {
 }
 
 Range Node::as_range(std::string_view unit) const {
+  if (exists() && !is_list()) {
+    fault("a range is expected here", mend_list(*this, "[low, high]", unit));
+    return {0.0, 1.0};
+  }
   const std::size_t known = fault_count();
   const auto numbers = as_numbers(unit);
   if (fault_count() > known) return {0.0, 1.0};
@@ -299,7 +328,8 @@ Range Node::as_range(std::string_view unit) const {
 
 std::vector<double> Node::as_numbers(std::string_view unit, Range each) const {
   std::vector<double> result;
-  if (exists() && !is_list()) fault("a list of numbers is expected here", "write [1, 2, 3]");
+  if (exists() && !is_list())
+    fault("a list of numbers is expected here", mend_list(*this, "[1, 2, 3]", unit));
   if (is_list())
     for (const Node& child : children()) result.push_back(child.as_number(unit, each));
   return result;

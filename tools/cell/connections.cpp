@@ -171,7 +171,7 @@ void check_claims(const LoadedCell& loaded) {
 void check_rates(const LoadedCell& loaded) {
   for (const LoadedProcess& process : loaded.processes)
     for (const LoadedComponent& member : process.components) {
-      if (!member.component) continue;
+      if (!member.component || !process.file->rate_known) continue;
       const Duration step = process.file->period * member.file->every;
       if (const auto unfit = member.component->unfit(step.in_seconds())) {
         const Node at = member.file->node;
@@ -213,6 +213,7 @@ void check_latencies(const LoadedCell& loaded) {
             const std::string prefix = other.file->name + ".";
             // Within a process a sample may be of the very cycle that reads it.
             if (&writer == &reader || !connection->second.starts_with(prefix)) continue;
+            if (!writer.file->rate_known) continue;
             const Duration period =
                 between_samples(*writer.file, *other.file, connection->second.substr(prefix.size()));
             if (latency < period)

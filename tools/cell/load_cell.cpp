@@ -23,18 +23,24 @@ std::string list(const std::vector<std::string>& names) {
   return text;
 }
 
+/// Where the cell has no plugin, the type may be one of the reader's own.
+std::string mend_type(const std::string& type, const std::vector<std::string>& names, bool no_plugins) {
+  const std::string near = config::nearest(type, names);
+  if (near.empty())
+    return "use one of: " + list(names) + (no_plugins ? "; or name its library under `plugins`" : "");
+  return "did you mean `" + near + "`?" + (no_plugins ? " Else name its library under `plugins`" : "");
+}
+
 /// `types_known`: an unknown type is a fault, for no plugin that may bring it is missing.
 void prepare(LoadedCell& loaded, const config::CellComponent& component, bool types_known) {
   LoadedComponent result;
   result.file = &component;
   if (!loaded.registry->has(component.type)) {
-    const auto names = loaded.registry->names();
-    const std::string near = config::nearest(component.type, names);
     component.node.accept_all();
     if (!component.type.empty() && types_known)
       component.node["type"].fault(
           "`" + clipped(component.type) + "` is no component type",
-          near.empty() ? "use one of: " + list(names) : "did you mean `" + near + "`?");
+          mend_type(component.type, loaded.registry->names(), loaded.cell->plugins.empty()));
     loaded.processes.back().components.push_back(std::move(result));
     return;
   }

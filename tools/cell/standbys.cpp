@@ -83,7 +83,7 @@ bool can_stand_by(const Two& two) {
              unfit->mend);
     return false;
   }
-  if (deadline_of(two) <= two.leader.period()) {
+  if (two.leader.process->file->rate_known && deadline_of(two) <= two.leader.period()) {
     (*two.spare.component->file->standby)["deadline"].fault(
         "is not above the period of " + milliseconds(two.leader.period()) + " in which the other shows life",
         "raise it, or leave it out");

@@ -21,7 +21,7 @@ namespace {
 using Level = Finding::Level;
 
 std::string rule(const dds::DomainPorts& ports) {
-  return "let UDP " + ports.text() + " in on each PC: nft add rule inet filter input udp dport { " +
+  return "let UDP " + ports.text() + " in on each PC: nft insert rule inet filter input udp dport { " +
          ports.text() + " } accept";
 }
 

@@ -144,6 +144,26 @@ TEST(Yaml, ShowsTheConvertedValueAndStopsAtAWrongUnit) {
   EXPECT_EQ(only_fault(wrong), "a.yaml:1: v.unit: `m/sec` is no unit; write it in m/s");
 }
 
+TEST(Yaml, SaysHowAListAndAWholeNumberAreWrittenThatHaveOneUnit) {
+  const auto range = Yaml::parse("v: {value: [0, 200], unit: mm, sigma: 1}\n", "a.yaml");
+  (void)range.root()["v"].as_range("m");
+  EXPECT_EQ(only_fault(range),
+            "a.yaml:1: v: a range is expected here; write [low, high] in m, or "
+            "[{value: 0, unit: mm}, {value: 200, unit: mm}]");
+  const auto right = Yaml::parse("v: [{value: 0, unit: mm}, {value: 200, unit: mm}]\n", "a.yaml");
+  EXPECT_DOUBLE_EQ(right.root()["v"].as_range("m").upper, 0.2);  // the form that the message names
+  EXPECT_TRUE(right.faults().empty());
+  const auto list = Yaml::parse("v: {value: 7}\n", "a.yaml");
+  (void)list.root()["v"].as_numbers("m");
+  EXPECT_EQ(only_fault(list), "a.yaml:1: v: a list of numbers is expected here; write [1, 2, 3] in m");
+  const auto pure = Yaml::parse("v: 7\n", "a.yaml");
+  (void)pure.root()["v"].as_numbers("");
+  EXPECT_EQ(only_fault(pure), "a.yaml:1: v: a list of numbers is expected here; write [1, 2, 3]");
+  const auto count = Yaml::parse("v: {value: 50, unit: ms}\n", "a.yaml");
+  (void)count.root().integer("v", 1, 100);
+  EXPECT_EQ(only_fault(count), "a.yaml:1: v: a whole number has no unit; write 50");
+}
+
 TEST(Yaml, AnAliasMayNeitherHoldItselfNorRepeatAPartWithoutEnd) {
   const auto fault = [](const std::string& text) {
     return invar::testing::fault_of([&] { (void)Yaml::parse(text, "a.yaml"); });
