@@ -138,8 +138,8 @@ CellProcess read_process(const Node& node, const std::vector<CellHost>& hosts, s
   if (const Node realtime = node["realtime"]; realtime.exists()) {
     if (node.has("rate"))
       node["rate"].fault("stands beside `realtime`", "keep `realtime: {rate: ...}` alone");
+    read_rate(realtime, process);  // first: of a scalar the message names the key that is asked for first
     process.realtime = read_realtime(realtime);
-    read_rate(realtime, process);
   } else {
     read_rate(node, process);
   }
