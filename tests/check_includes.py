@@ -51,7 +51,7 @@ ROOMS = {
 }
 CALIBRATED = ["core/base", "core/compensation", "core/config", "core/recording", *METROLOGY, "tools/calibration", "tools/report", "Eigen",
               "nlohmann-json"]
-DEPLOYED = ["core/base", "core/config", "core/dds", "core/job", "tools/cell", "OpenSSL"]
+DEPLOYED = ["core/base", "core/config", "core/dds", "core/job", "tools/cell", "tools/host", "OpenSSL"]
 ROOMS |= {
     "tools/geometric": CALIBRATED,
     "tools/history": CALIBRATED,

@@ -90,10 +90,7 @@ def with_ports(invar, component, cells):
     return component, ""
 
 
-def component_page(invar, component, cells):
-    source = ""
-    if "ports_unknown" in component:
-        component, source = with_ports(invar, component, cells)
+def component_page(component, source):
     out = [f"## {component['type']}\n", component["description"][0].upper() + component["description"][1:] + ".\n"]
     if component["ports"]:
         if source:
@@ -114,15 +111,16 @@ def component_page(invar, component, cells):
 
 
 def all_components(invar):
+    """Each component type, with the cell that its ports are taken from where they follow from parameters."""
     cells = sorted(path for path in (ROOT / "deployment").glob("*.yaml") if "invar_cell:" in path.read_text())
-    return json.loads(run(invar, "types", "--json")), cells
+    return [with_ports(invar, component, cells) if "ports_unknown" in component else (component, "")
+            for component in json.loads(run(invar, "types", "--json"))]
 
 
-def components(invar):
-    listed, cells = all_components(invar)
+def components(listed):
     return "\n".join(["# Components\n", NOTE,
                       "Component types that a cell file can name. `invar types TYPE --cell CELL` shows the ports in a given cell.\n",
-                      *(component_page(invar, component, cells) for component in listed)])
+                      *(component_page(component, source) for component, source in listed)])
 
 
 # ------------------------------------------------------------------ topics
@@ -153,12 +151,9 @@ def profile_link(name):
     return f"[{name}](qos-profiles.md#{anchor(name)})"
 
 
-def topics(invar):
-    listed, cells = all_components(invar)
+def topics(listed):
     rows, unknown = [], []
-    for component in listed:
-        if "ports_unknown" in component:
-            component, _ = with_ports(invar, component, cells)
+    for component, _ in listed:
         if "ports_unknown" in component:
             unknown.append(code(component["type"]))
         for port in component["ports"]:
@@ -323,7 +318,8 @@ def main():
     parser.add_argument("invar", type=pathlib.Path, help="the program, build/bin/invar")
     parser.add_argument("--check", action="store_true", help="compare only")
     options = parser.parse_args()
-    made = {"commands.md": commands(options.invar), "components.md": components(options.invar), "topics.md": topics(options.invar),
+    listed = all_components(options.invar)
+    made = {"commands.md": commands(options.invar), "components.md": components(listed), "topics.md": topics(listed),
             "terms.md": terms(), "types.md": types(),
             "qos-profiles.md": profiles(),
             "model-file.md": with_printed_blocks(options.invar, (PAGES / "model-file.md").read_text())}

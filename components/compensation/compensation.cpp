@@ -39,8 +39,8 @@ Compensation::Compensation(const Parameters& parameters)
 Compensation::~Compensation() = default;
 
 void Compensation::configure() {
-  active_ = before_ = transaction_start_ = {};
-  knows_before_ = false;
+  active_ = transaction_start_ = {};
+  before_.reset();
   staged_ = nullptr;
   transaction_ = 0;
   kept_refusal_.clear();
@@ -91,7 +91,7 @@ void Compensation::start_with_kept() {
     if (!kept.any) return start_with_named();
     active_ = stack_of(kept.models);
     try {
-      if (kept.before) before_ = stack_of(*kept.before), knows_before_ = true;
+      if (kept.before) before_ = stack_of(*kept.before);
     } catch (const InputError&) {  // a rollback is refused; what is in use stands
     }
   } catch (const InputError& error) {
@@ -104,11 +104,14 @@ void Compensation::keep() noexcept {
   const auto of = [](const Stack& stack) {
     return KeptModels::Selection{stack.geometric, stack.thermal[0], stack.thermal[1], stack.thermal[2]};
   };
-  kept_.keep({of(active_), knows_before_, of(before_)});
+  KeptModels::Selections models{of(active_), std::nullopt};
+  if (before_) models.before = of(*before_);
+  kept_.keep(models);
 }
 
 void Compensation::cleanup() noexcept {
-  active_ = before_ = transaction_start_ = {};
+  active_ = transaction_start_ = {};
+  before_.reset();
   staged_ = nullptr;
   transaction_ = 0;
   loader_.close();  // what is waiting is kept first
@@ -201,7 +204,7 @@ void Compensation::end_transaction() noexcept {
 }
 
 void Compensation::change_to(const Stack& next) noexcept {
-  if (transaction_ == 0) before_ = active_, knows_before_ = true;
+  if (transaction_ == 0) before_ = active_;
   use(next);
 }
 
@@ -265,11 +268,11 @@ void Compensation::obey(const ModelCommand& command) noexcept {
         answer(command.id(), MODEL_REFUSED, nullptr, no_transaction);
         return;
       }
-      if (transaction_ == 0 && !std::exchange(knows_before_, false)) {
+      if (transaction_ == 0 && !before_) {
         answer(command.id(), MODEL_REFUSED, nullptr, no_model_before);
         return;
       }
-      use(transaction_ != 0 ? transaction_start_ : std::exchange(before_, {}));
+      use(transaction_ != 0 ? transaction_start_ : *std::exchange(before_, std::nullopt));
       end_transaction();
       break;
     case MODEL_COMMIT:
@@ -278,7 +281,6 @@ void Compensation::obey(const ModelCommand& command) noexcept {
         return;
       }
       before_ = transaction_start_;
-      knows_before_ = true;
       end_transaction();
       break;
     case MODEL_KEEP:
@@ -308,7 +310,7 @@ void Compensation::watch_transaction(const Tick& tick) noexcept {
 /// Says which models are still in use; one that is in no place any more is given back.
 void Compensation::say_in_use() noexcept {
   const auto& a = active_;
-  const auto& b = before_;
+  const Stack b = before_.value_or(Stack{});
   const auto& t = transaction_start_;
   loader_.use({staged_, a.geometric, a.thermal[0], a.thermal[1], a.thermal[2], b.geometric, b.thermal[0],
                b.thermal[1], b.thermal[2], t.geometric, t.thermal[0], t.thermal[1], t.thermal[2]});

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -156,8 +157,7 @@ class Compensation final : public Component {
   Output<event::Notice> notices_{*this, "notices", "event"};
 
   Stack active_;
-  Stack before_;               // what a rollback without a transaction goes back to
-  bool knows_before_ = false;  // since the first change, also over a restart
+  std::optional<Stack> before_;  // what a rollback without a transaction goes back to; nothing: not known
   LiveModel* staged_ = nullptr;
   std::uint64_t transaction_ = 0;
   Stack transaction_start_;

@@ -79,8 +79,8 @@ void KeptModels::write(const std::filesystem::path& folder, const Selections& mo
   ModelText list{"kept", {}};
   std::set<std::filesystem::path> kept;
   add(list, "models", folder, models.in_use, kept);
-  list.integer("knows_before", models.knows_before ? 1 : 0);
-  if (models.knows_before) add(list, "before", folder, models.before, kept);
+  list.integer("knows_before", models.before ? 1 : 0);
+  if (models.before) add(list, "before", folder, *models.before, kept);
   list.write(folder / list_name);
   for (const auto& entry : std::filesystem::directory_iterator{folder}) {
     const std::string name = entry.path().filename().string();

@@ -23,8 +23,7 @@ class KeptModels {
   using Selection = std::array<const LiveModel*, 4>;
   struct Selections {
     Selection in_use{};
-    bool knows_before = false;
-    Selection before{};  // what a rollback goes back to
+    std::optional<Selection> before;  // what a rollback goes back to; nothing: not known
   };
   struct Entry {
     std::filesystem::path file;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -41,8 +42,8 @@ class StagedModel {
 
   /// Set-up: from the component's configure. An empty file: no model at first. Throws InputError.
   void open(const std::filesystem::path& file, const char* mend) {
-    active_ = staged_ = previous_ = nullptr;
-    knows_previous_ = false;
+    active_ = staged_ = nullptr;
+    previous_.reset();
     if (!file.empty()) {
       Model* model = loader_.load(file);
       if (!model->refusal.empty()) throw InputError{file.string(), model->refusal, mend};
@@ -52,8 +53,8 @@ class StagedModel {
   }
   /// From the component's cleanup.
   void close() noexcept {
-    active_ = staged_ = previous_ = nullptr;
-    knows_previous_ = false;
+    active_ = staged_ = nullptr;
+    previous_.reset();
     loader_.close();
   }
   /// From the component's activate: the next update says which model is in use (what is written before the first step may
@@ -63,7 +64,7 @@ class StagedModel {
   /// Takes commands; true when another model, or none, is active from now on. Real-time.
   bool update() noexcept {
     // Said a step later, when the component too no longer uses the earlier model.
-    if (std::exchange(handles_models_, false)) loader_.use({active_, staged_, previous_});
+    if (std::exchange(handles_models_, false)) loader_.use({active_, staged_, previous_.value_or(nullptr)});
     bool changed = false;
     if (std::exchange(begins_, false))
       answer(0, active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE, active_, "");
@@ -117,22 +118,20 @@ class StagedModel {
           return false;
         }
         previous_ = active_;
-        knows_previous_ = true;
         active_ = std::exchange(staged_, nullptr);
         answer(command.id(), compensation::MODEL_ACTIVE, active_, "");
         return true;
       case compensation::MODEL_ROLLBACK:
-        if (!std::exchange(knows_previous_, false)) {
+        if (!previous_) {
           answer(command.id(), compensation::MODEL_REFUSED, active_, no_model_before);
           return false;
         }
-        active_ = std::exchange(previous_, nullptr);
+        active_ = *std::exchange(previous_, std::nullopt);
         answer(command.id(), active_ != nullptr ? compensation::MODEL_ACTIVE : compensation::MODEL_NONE,
                active_, "");
         return true;
       case compensation::MODEL_CLEAR:
         previous_ = std::exchange(active_, nullptr);
-        knows_previous_ = true;
         answer(command.id(), compensation::MODEL_NONE, nullptr, "");
         return true;
       case compensation::MODEL_KEEP:
@@ -150,8 +149,7 @@ class StagedModel {
   Output<compensation::ModelStatus> status_;
   Model* active_ = nullptr;
   Model* staged_ = nullptr;
-  Model* previous_ = nullptr;
-  bool knows_previous_ = false;  // since the first change; a rollback uses it up
+  std::optional<Model*> previous_;  // since the first change; a rollback uses it up
   bool begins_ = false;
   bool handles_models_ = false;  // something was loaded or changed
   compensation::ModelStatus reply_;

@@ -53,8 +53,7 @@ struct CellProcess {
   std::string name;
   std::string host;
   Duration period;
-  bool rate_known =
-      true;  // no: the file's `rate` has a fault, and what follows from the period need not be told
+  bool rate_known = true;  // no: `rate` has a fault; what follows from the period need not be told
   std::optional<RealtimeRequest> realtime;
   OverrunPolicy overrun = OverrunPolicy::skip;
   std::int64_t tolerate = 0;  // lost periods within a second before `degrade` or `safe_stop` acts

@@ -127,10 +127,10 @@ class Pcs(Cables):
     def at_the_switch(self, *words):
         return ["ip", "netns", "exec", self.switch, *[str(word) for word in words]]
 
-    def on(self, name, command, check=True, stdin=subprocess.DEVNULL):
+    def on(self, name, command, check=True):
         return subprocess.run(self.at_the_switch("ssh", "-F", self.folder / "ssh_config", "-o", "BatchMode=yes", "-o", "ConnectTimeout=3",
                                                  self.address[name], command), check=check, capture_output=True, text=True,
-                              stdin=stdin)
+                              stdin=subprocess.DEVNULL)
 
     def put(self, name, file, path):
         with open(file, "rb") as content:

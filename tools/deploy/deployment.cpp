@@ -17,12 +17,12 @@
 
 #include "core/base/name.hpp"
 #include "core/base/shown.hpp"
-#include "core/config/yaml.hpp"
 #include "tools/cell/load_cell.hpp"
 #include "tools/deploy/archive.hpp"
 #include "tools/deploy/host_keys.hpp"
 #include "tools/deploy/scripts.hpp"
 #include "tools/deploy/unit.hpp"
+#include "tools/host/own_host.hpp"
 
 namespace invar::tools {
 
@@ -285,12 +285,9 @@ config::Cell hosts_of(const DeployOptions& options) {
   config::Cell cell = config::read_cell(yaml);
   if (flaw_of_identifier(cell.name) || cell.hosts.empty()) yaml.finish();
   if (options.only.empty()) return cell;
-  std::vector<std::string> names;
-  for (const config::CellHost& host : cell.hosts) names.push_back(host.name);
-  std::erase_if(cell.hosts, [&](const config::CellHost& host) { return host.name != options.only; });
-  if (cell.hosts.empty())
-    throw InputError{"--host", "`" + printable(options.only) + "` is no host of " + options.cell.string(),
-                     config::mend_name(options.only, names)};
+  const auto is_other = [&](const config::CellHost& host) { return host.name != options.only; };
+  if (std::all_of(cell.hosts.begin(), cell.hosts.end(), is_other)) throw unknown_host(cell, options.only);
+  std::erase_if(cell.hosts, is_other);
   return cell;
 }
 

@@ -162,10 +162,8 @@ void in_short(report::Page& page, const Case& data, const Diagnosis& d) {
     page.table({"missing", "where", "share", "how sure", "size"}, missing);
     page.paragraph(
         "Share: part of the mismatch that comes back when the effect alone is taken out. The rest belongs to "
-        "the "
-        "model's own parameters, refitted, and to what remains. How sure: probability that the name is "
-        "right, "
-        "against its rivals and against a cause that the library lacks.");
+        "the model's own parameters, refitted, and to what remains. How sure: probability that the name is "
+        "right, against its rivals and against a cause that the library lacks.");
   }
   std::string fit;
   for (const auto& row : d.heldout) {

@@ -14,19 +14,25 @@
 #include <vector>
 
 #include "core/base/clock.hpp"
-#include "core/base/fault.hpp"
+#include "core/base/name.hpp"
 #include "core/config/yaml.hpp"
 #include "core/dds/own_address.hpp"
 
 namespace invar::tools {
 
-std::set<std::string> own_hosts(const config::Cell& cell, const std::string& host) {
+InputError unknown_host(const config::Cell& cell, const std::string& host) {
   std::vector<std::string> names;
   for (const auto& each : cell.hosts) names.push_back(each.name);
+  return {"--host", "`" + printable(host) + "` is no host of " + cell.file.string(),
+          config::mend_name(host, names)};
+}
+
+std::set<std::string> own_hosts(const config::Cell& cell, const std::string& host) {
   if (!host.empty()) {
-    if (std::find(names.begin(), names.end(), host) != names.end()) return {host};
-    throw InputError{"--host", "`" + host + "` is no host of " + cell.file.string(),
-                     config::mend_name(host, names)};
+    if (std::any_of(cell.hosts.begin(), cell.hosts.end(),
+                    [&](const auto& each) { return each.name == host; }))
+      return {host};
+    throw unknown_host(cell, host);
   }
   std::set<std::string> own;
   std::string list;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/fault.hpp"
 #include "core/base/time.hpp"
 #include "core/config/cell.hpp"
 #include "core/dds/node.hpp"
@@ -16,6 +17,9 @@ namespace invar::tools {
 /// The hosts whose processes this PC runs: `host` where it is given, otherwise all that have an address of this PC.
 /// Throws InputError when `host` is none of the cell, or this PC has none of the addresses.
 [[nodiscard]] std::set<std::string> own_hosts(const config::Cell& cell, const std::string& host);
+
+/// Why `--host` names none of the cell's hosts, with the nearest of them.
+[[nodiscard]] InputError unknown_host(const config::Cell& cell, const std::string& host);
 
 /// The address of a host: that of the file, or the one that its interface has on this PC now; empty: it has none.
 [[nodiscard]] std::string address_of(const config::CellHost& host);

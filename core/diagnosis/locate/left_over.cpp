@@ -296,12 +296,9 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
     auto changing = changing_effects(data, fit, o, causes);
     append(basis, changing);
     double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
-    if (is_rounding(data, left, o)) {
-      shares.push_back(share);
-      continue;
-    }
+    const bool has_saw = is_rounding(data, left, o);
     for (const auto& order : orders)
-      if (order.size() >= enough)
+      if (!has_saw && order.size() >= enough)
         share = std::max(
             share, beyond_chance([&](double shift) { return share_along(order, turned(left, shift)); }));
     shares.push_back(share);
@@ -343,7 +340,7 @@ bool is_related(const std::vector<Series>& left, const Eigen::VectorXd& expected
       const double both = one[i] * one[i - 1];
       product += both, square += one[i] * one[i], fourth += both * both;
     }
-  // Of unrelated rows the sum of products has the square root of their squares' sum for its sigma.
+  // The sigma of the sum of products, for unrelated rows, is the square root of the sum of their squares.
   return std::abs(product) > thresholds::related_sigmas * std::sqrt(fourth) &&
          std::abs(product) > thresholds::related_share * square;
 }
@@ -356,7 +353,8 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
   const auto basis = surface(data, simulated).basis;
   if (basis.rows() < enough) return false;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
-    auto power = left_of(data, simulated, o);
+    const auto left = left_of(data, simulated, o);
+    auto power = left;
     for (auto& one : power)
       for (double& v : one) v *= v;
     if (!(beyond_chance([&](double shift) { return share_on(basis, turned(power, shift)); }) > 0.0)) continue;
@@ -374,8 +372,7 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
         if (e >= high) loud += v, loud_rows += 1.0;
       }
     if (loud * quiet_rows > least * quiet * loud_rows &&
-        (!goes_with_reading(simulated, o, expected) ||
-         is_related(left_of(data, simulated, o), expected, high)))
+        (!goes_with_reading(simulated, o, expected) || is_related(left, expected, high)))
       return true;
   }
   return false;
