@@ -49,7 +49,7 @@ ROOMS = {
     "tools/calibration": ["core/base", "core/compensation", "core/config", "core/recording", "tools/live", "tools/report", "Eigen", "nlohmann-json"],
     "tools/new": [],
 }
-CALIBRATED = ["core/base", "core/compensation", "core/config", "core/recording", *METROLOGY, "tools/calibration", "tools/report", "Eigen",
+CALIBRATED = ["core/base", "core/compensation", "core/config", "core/numerics", "core/recording", *METROLOGY, "tools/calibration", "tools/report", "Eigen",
               "nlohmann-json"]
 DEPLOYED = ["core/base", "core/config", "core/dds", "core/job", "tools/cell", "tools/host", "OpenSSL"]
 ROOMS |= {

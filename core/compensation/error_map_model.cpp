@@ -1,12 +1,13 @@
 #include "core/compensation/error_map_model.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/spline.hpp"
 #include "core/physics/static_plants.hpp"
 
@@ -65,7 +66,7 @@ metrology::ThermalTerm network(ThermalFactor factor, const Range& range,
       influence(i, k) =
           std::exp(-0.5 * static_cast<double>((i - k) * (i - k))) / std::sqrt(2.0 * std::numbers::pi);
   }
-  term.weights = influence.llt().solve(values);
+  term.weights = numerics::solve_positive(influence, values);
   return term;
 }
 

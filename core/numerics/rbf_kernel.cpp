@@ -1,10 +1,11 @@
 #include "core/numerics/rbf_kernel.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <cmath>
 #include <limits>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::numerics {
 
@@ -39,7 +40,7 @@ KernelFit fit_kernel(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Re
     for (const double ridge : options.ridges) {
       Eigen::MatrixXd k = kernel;
       k.diagonal().array() += ridge;
-      const Eigen::MatrixXd inverse = k.llt().solve(Eigen::MatrixXd::Identity(n, n));
+      const Eigen::MatrixXd inverse = numerics::solve_positive(k, Eigen::MatrixXd::Identity(n, n));
       const Eigen::VectorXd weights = inverse * target;
       const Eigen::VectorXd left_out = weights.cwiseQuotient(inverse.diagonal());
       if (left_out.squaredNorm() >= best) continue;

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::numerics {
 
@@ -161,7 +162,8 @@ RidgeFit fit_ridge(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<
   information.diagonal().tail(net.size()).array() += fit.ridge;
   const double variance = std::pow(fit.noise / net.output_scale, 2);
   const Eigen::MatrixXd inverse =
-      variance * information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
+      variance * numerics::solve_symmetric(information,
+                                           Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   fit.covariance = Eigen::MatrixXd::Zero(1 + inputs + net.size(), 1 + inputs + net.size());
   std::vector<Eigen::Index> place{0};
   for (const Eigen::Index d : slopes) place.push_back(1 + d);

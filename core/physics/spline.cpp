@@ -1,10 +1,11 @@
 #include "core/physics/spline.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::physics {
 
@@ -31,7 +32,7 @@ CubicSpline::CubicSpline(std::vector<double> x, std::vector<double> y) : x_{std:
     a(0, 0) = h(1), a(0, 1) = -(h(0) + h(1)), a(0, 2) = h(0);
     a(n - 1, n - 3) = h(n - 2), a(n - 1, n - 2) = -(h(n - 3) + h(n - 2)), a(n - 1, n - 1) = h(n - 3);
   }
-  const Eigen::VectorXd m = a.partialPivLu().solve(b);
+  const Eigen::VectorXd m = numerics::solve_square(a, b);
   for (Eigen::Index i = 0; i < n; ++i) second_[static_cast<std::size_t>(i)] = m(i);
 }
 

@@ -1,11 +1,12 @@
 #include "core/vision/edge_filter.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::vision {
 
@@ -23,7 +24,7 @@ EdgeFilter::EdgeFilter(double blur_px, int half_px) : blur{blur_px}, half{half_p
     design.row(i) << 1.0, beyond, density, inner(i), outer(i), density * u;
   }
   const auto inverse = [](const Eigen::MatrixXd& a) -> Eigen::MatrixXd {
-    return (a.transpose() * a).ldlt().solve(a.transpose());
+    return numerics::solve_symmetric((a.transpose() * a), a.transpose());
   };
   // Samples to ground, contrast, contrast * offset; to these and the slopes; to these and the change of blur.
   const Eigen::MatrixXd step = inverse(design.leftCols(3)), sloped = inverse(design.leftCols(5));

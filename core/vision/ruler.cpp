@@ -1,11 +1,12 @@
 #include "core/vision/ruler.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 
+#include "core/numerics/decompositions.hpp"
 #include "core/vision/blobs.hpp"
 
 namespace invar::vision {
@@ -144,7 +145,7 @@ Joint solve(const std::vector<Circle>& circles, const std::vector<double>& radii
     }
     for (std::size_t e = 0; e < effects; ++e)
       if (!free[e]) normal(static_cast<Index>(1 + e), static_cast<Index>(1 + e)) = 1.0;
-    const Eigen::VectorXd step = normal.ldlt().solve(right);
+    const Eigen::VectorXd step = numerics::solve_symmetric(normal, right);
     relative += step(0), share += step(1), stretch += step(2), beyond += step(3);
     for (Index j = 0; j < n; ++j) at.centers[static_cast<std::size_t>(j)] += step.segment<2>(common + 2 * j);
     if (step.head<3>().norm() + step(3) / size_unit < 1e-12) break;
@@ -152,7 +153,7 @@ Joint solve(const std::vector<Circle>& circles, const std::vector<double>& radii
   at.per_metre = size_unit * relative;
   at.value = {unit * share, stretch, beyond};
   const double freedom = std::max(1.0, weight_sum - static_cast<double>(size));
-  const Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::MatrixXd inverse = numerics::solve_symmetric(normal, Eigen::MatrixXd::Identity(size, size));
   // Neighbouring rays share pixels, and what remains of an edge's shape is common to a circle: the residuals are not
   // independent. A correlation over four rays is what simulated pictures show.
   const double variance = 4.0 * at.chi / freedom;

@@ -1,9 +1,11 @@
 #include "tools/geometric/geometric_plots.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::tools {
 
@@ -79,7 +81,7 @@ Plot field_plot(const GeometricModel& model, int a, int b) {
     normal += modes(i).transpose() * modes(i);
     right += modes(i).transpose() * Eigen::Vector2d{errors[i][a], errors[i][b]};
   }
-  const Eigen::Vector3d motion = normal.ldlt().solve(right);
+  const Eigen::Vector3d motion = numerics::solve_symmetric(normal, right);
   double longest = 0.0;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     const Eigen::Vector2d taken = modes(i) * motion;

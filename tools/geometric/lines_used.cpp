@@ -1,8 +1,10 @@
 #include "tools/geometric/lines_used.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::tools {
 
@@ -58,7 +60,7 @@ Eigen::VectorXd apart_of(const metrology::Identification& found, std::size_t l,
     weight[i] = line.weights[i] >= used && found.point_weights[l][point] > 0.5 ? 1.0 : 0.0;
   }
   const Eigen::VectorXd fit =
-      (weight.asDiagonal() * shared).completeOrthogonalDecomposition().solve(weight.cwiseProduct(apart));
+      numerics::shortest_least_squares((weight.asDiagonal() * shared), weight.cwiseProduct(apart));
   return apart - shared * fit;
 }
 

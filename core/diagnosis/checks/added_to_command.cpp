@@ -1,6 +1,6 @@
 #include "core/diagnosis/checks/added_to_command.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -10,6 +10,7 @@
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/locate/lines.hpp"
 #include "core/diagnosis/thresholds.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -202,7 +203,7 @@ Wave wave_at(const Series& series, double frequency) {
     const Eigen::Vector3d row{1.0, std::cos(angle), std::sin(angle)};
     normal += row * row.transpose(), right += series.beyond[i] * row;
   }
-  const Eigen::Vector3d parts = normal.ldlt().solve(right);
+  const Eigen::Vector3d parts = numerics::solve_symmetric(normal, right);
   return {parts(0), parts(1), parts(2), series.squares - parts.dot(right)};
 }
 Wave square_at(const Series& series, double frequency, double phase) {
@@ -213,7 +214,7 @@ Wave square_at(const Series& series, double frequency, double phase) {
     const Eigen::Vector2d row{1.0, std::sin(angle) >= 0.0 ? 1.0 : -1.0};
     normal += row * row.transpose(), right += series.beyond[i] * row;
   }
-  const Eigen::Vector2d parts = normal.ldlt().solve(right);
+  const Eigen::Vector2d parts = numerics::solve_symmetric(normal, right);
   return {parts(0), 0.0, parts(1), series.squares - parts.dot(right)};
 }
 

@@ -1,11 +1,12 @@
 #include "core/diagnosis/checks/control_law.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "core/diagnosis/thresholds.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/axis_controller.hpp"
 #include "core/physics/library.hpp"
 
@@ -128,7 +129,7 @@ double squares_with(const Eigen::MatrixXd& motion, const Eigen::VectorXd& left, 
       square += columns.transpose() * columns, product += columns.transpose() * values;
     }
     square.diagonal().array() += 1e-9;
-    const Eigen::VectorXd strength = square.ldlt().solve(product);
+    const Eigen::VectorXd strength = numerics::solve_symmetric(square, product);
     for (Eigen::Index b = 1 - half; b < blocks; b += 2) {
       const auto [columns, values] = block(b);
       const Eigen::VectorXd told = columns * strength;

@@ -1,11 +1,12 @@
 #include "core/diagnosis/checks/late_command.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/quantity.hpp"
 #include "core/diagnosis/thresholds.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -88,7 +89,8 @@ std::optional<Added> comes_late_from_law(const Case& data, const std::vector<Law
   if (rows < static_cast<double>(thresholds::fewest_rows_of_law) || !(square.trace() > 0.0))
     return std::nullopt;
   square.diagonal().array() += 1e-9 * square.trace();
-  const Eigen::VectorXd goes_with = product.cwiseProduct(square.ldlt().solve(product)).colwise().sum();
+  const Eigen::VectorXd goes_with =
+      product.cwiseProduct(numerics::solve_symmetric(square, product)).colwise().sum();
   Eigen::Index best = 0;
   if (!goes_with.allFinite()) return std::nullopt;
   goes_with.minCoeff(&best);

@@ -1,6 +1,6 @@
 #include "core/diagnosis/estimate/fit.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +9,7 @@
 #include "core/diagnosis/estimate/priors.hpp"
 #include "core/diagnosis/estimate/sensitivities.hpp"
 #include "core/diagnosis/thresholds.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/equations_columns.hpp"
 #include "core/physics/library.hpp"
@@ -82,7 +83,7 @@ Eigen::VectorXd step_within(const Eigen::MatrixXd& hessian, const Eigen::VectorX
   for (Eigen::Index k = 0; k < n; ++k) damped(k, k) += damping * hessian(k, k) + 1e-300;
   Eigen::VectorXd downhill = -gradient;
   for (;;) {
-    const Eigen::VectorXd step = damped.ldlt().solve(downhill);
+    const Eigen::VectorXd step = numerics::solve_symmetric(damped, downhill);
     bool held = false;
     for (Eigen::Index k = 0; k < n; ++k) {
       const auto& f = at.free[static_cast<std::size_t>(k)];
@@ -299,7 +300,7 @@ class Minimizer {
   void find_covariance() {
     Eigen::MatrixXd regular = hessian_;
     for (Eigen::Index k = 0; k < count(); ++k) regular(k, k) = regular(k, k) * (1.0 + 1e-9) + 1e-300;
-    at_.covariance = regular.ldlt().solve(Eigen::MatrixXd::Identity(count(), count()));
+    at_.covariance = numerics::solve_symmetric(regular, Eigen::MatrixXd::Identity(count(), count()));
     at_.sigma = at_.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   }
 

@@ -6,6 +6,7 @@
 #include "core/diagnosis/dataset/in_parallel.hpp"
 #include "core/diagnosis/evidence/first_order.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/counted_units.hpp"
 
 namespace invar::diagnosis {
@@ -34,7 +35,7 @@ double solve(const Weighing& weighing, const Fit& base, const Nuisance& n, const
   const Eigen::VectorXd g = slope_along(weighing, base, n, columns, b);
   Eigen::MatrixXd regular = reduced;
   for (Eigen::Index k = 0; k < m.rows(); ++k) regular(k, k) += 1e-6 * m(k, k);
-  strength = -regular.ldlt().solve(g);
+  strength = -numerics::solve_symmetric(regular, g);
   if (!strength.allFinite() || is_of_own_numbers(reduced, m)) {
     strength.setZero();
     return 0.0;

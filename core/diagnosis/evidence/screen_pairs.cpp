@@ -7,6 +7,7 @@
 #include "core/diagnosis/evidence/first_order.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
 #include "core/diagnosis/segments/excerpt.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/counted_units.hpp"
 
 namespace invar::diagnosis {
@@ -85,7 +86,7 @@ class PairScreen {
       m(c, c) += 1e-6 * all_(place, place) + 1e-300;
     }
     const Eigen::VectorXd g = slope_(places);
-    const Eigen::VectorXd strength = -m.ldlt().solve(g);
+    const Eigen::VectorXd strength = -numerics::solve_symmetric(m, g);
     if (!strength.allFinite() || is_impossible(base_.model, starts_[i], strength, 0) ||
         is_impossible(base_.model, starts_[k], strength, second))
       return std::nullopt;

@@ -1,10 +1,11 @@
 #include "core/diagnosis/evidence/shaken_loose.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/diagnosis/thresholds.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -37,7 +38,8 @@ Step solved(const Weighing& weighing, const Fit& base, const Eigen::MatrixXd& co
       normal(k, k) += 1.0 / (sigma * sigma);
   normal.diagonal() *= 1.0 + 1e-9;
   const Eigen::Index last = columns.cols();
-  const Eigen::MatrixXd covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(last + 1, last + 1));
+  const Eigen::MatrixXd covariance =
+      numerics::solve_symmetric(normal, Eigen::MatrixXd::Identity(last + 1, last + 1));
   const Eigen::VectorXd found = covariance * slope;
   return {found(last), std::sqrt(std::max(0.0, covariance(last, last))), found.head(last)};
 }

@@ -1,11 +1,12 @@
 #include "core/diagnosis/evidence/shape.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/diagnosis/evidence/claim.hpp"
 #include "core/diagnosis/evidence/form.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::diagnosis {
 
@@ -36,7 +37,7 @@ double squares_taken(const Weighing& weighing, const Case& data, const Fit& name
   const auto all = whitened(data, weighing, named.columns.with(columns)).dense();
   const auto own = named.columns.cols();
   const auto left = [&](Eigen::Index count) {
-    const Eigen::VectorXd strength = all.leftCols(count).colPivHouseholderQr().solve(named.residual);
+    const Eigen::VectorXd strength = numerics::least_squares(all.leftCols(count), named.residual);
     return (named.residual - all.leftCols(count) * strength).squaredNorm();
   };
   return own > 0 ? left(own) - left(all.cols()) : named.residual.squaredNorm() - left(all.cols());
@@ -69,7 +70,7 @@ double lead_over_shift(const Case& data, const Fit& named, const Eigen::MatrixXd
   const auto all = whitened(data, plain, named.columns.with(shift.rowwise().sum())).dense();
   const auto own = named.columns.cols();
   Eigen::VectorXd apart = all.col(own);
-  if (own > 0) apart -= all.leftCols(own) * all.leftCols(own).colPivHouseholderQr().solve(apart).eval();
+  if (own > 0) apart -= all.leftCols(own) * numerics::least_squares(all.leftCols(own), apart);
   if (!(left > 0.0)) return 0.0;
   return 0.5 * independent_rows(data, named.model) * std::log1p(apart.squaredNorm() / left);
 }

@@ -1,10 +1,11 @@
 #include "core/diagnosis/locate/axis_modes.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/diagnosis/locate/carried_back.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::diagnosis {
 
@@ -65,7 +66,7 @@ double gain_of_mode(const Heard& heard, double frequency, double damping_ratio) 
     wins += (std::conj(swings) * cell.with_back).real();
     beside += Eigen::Vector2d{swings.real() * cell.power, (std::conj(swings) * cell.with_velocity).real()};
   }
-  const Eigen::Vector2d gives_way = heard.rigid.ldlt().solve(beside);
+  const Eigen::Vector2d gives_way = numerics::solve_symmetric(heard.rigid, beside);
   const double left = shows - beside.dot(gives_way), pays = wins - heard.slope.dot(gives_way);
   const bool has_mass = pays > 0.0 && left > 1e-9 * shows;  // and none that is negative
   return has_mass ? pays * pays / left : 0.0;

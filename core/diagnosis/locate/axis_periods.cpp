@@ -1,6 +1,6 @@
 #include "core/diagnosis/locate/axis_periods.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,6 +12,7 @@
 #include "core/diagnosis/locate/axis_modes.hpp"
 #include "core/diagnosis/locate/carried_back.hpp"
 #include "core/diagnosis/locate/lines.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::diagnosis {
 
@@ -41,7 +42,7 @@ std::vector<double> long_pitches(const std::vector<double>& sums, const std::vec
     normal << all, mean.real(), mean.imag(), mean.real(), cc, cs, mean.imag(), cs, ss;
     normal.diagonal().array() += 1e-12 * all;
     const Eigen::Vector3d slope{level, right.real(), right.imag()};
-    gain[k] = slope.dot(normal.ldlt().solve(slope)) - level * level / all;
+    gain[k] = slope.dot(numerics::solve_symmetric(normal, slope)) - level * level / all;
   }
   std::vector<std::pair<double, double>> tops;
   for (std::size_t k = 9; k + 1 < gain.size(); ++k)

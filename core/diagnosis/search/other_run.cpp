@@ -1,6 +1,6 @@
 #include "core/diagnosis/search/other_run.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +14,7 @@
 #include "core/diagnosis/thresholds.hpp"
 #include "core/model/record_file.hpp"
 #include "core/model/recording_file.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::diagnosis {
 
@@ -62,7 +63,7 @@ physics::Outputs from_best_start(const physics::Model& model, const OtherRun& ru
       slope.col(static_cast<Eigen::Index>(k)) = (differences(run, simulated(model, inputs)) - from) / by;
       *start[k] = value;
     }
-    const Eigen::VectorXd change = slope.colPivHouseholderQr().solve(-from);
+    const Eigen::VectorXd change = numerics::least_squares(slope, -from);
     if (!change.allFinite()) break;
     std::vector<double> before;
     for (std::size_t k = 0; k < start.size(); ++k) {

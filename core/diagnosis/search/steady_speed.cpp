@@ -1,11 +1,12 @@
 #include "core/diagnosis/search/steady_speed.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <cmath>
 #include <numbers>
 
 #include "core/diagnosis/candidates/candidates.hpp"
 #include "core/diagnosis/dataset/variables.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/counted_units.hpp"
 #include "core/physics/library.hpp"
 
@@ -29,7 +30,7 @@ Line line_of(const Case& data) {
   columns.col(0).setOnes();
   columns.col(1) = Eigen::Map<const Eigen::VectorXd>(time.data(), rows);
   const auto x = Eigen::Map<const Eigen::VectorXd>(position.data(), rows);
-  const Eigen::Vector2d parts = columns.colPivHouseholderQr().solve(x);
+  const Eigen::Vector2d parts = numerics::least_squares(columns, x);
   return {parts(0), parts(1), (x - columns * parts).norm() / std::sqrt(static_cast<double>(rows))};
 }
 

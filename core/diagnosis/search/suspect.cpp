@@ -1,10 +1,11 @@
 #include "core/diagnosis/search/suspect.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <array>
 
 #include "core/diagnosis/candidates/place.hpp"
 #include "core/diagnosis/evidence/screen.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/physics/library.hpp"
 
 namespace invar::diagnosis {
@@ -30,7 +31,7 @@ double gain_of_lateness(const Case& data, const Diagnosis& d, std::size_t output
       }
   Eigen::MatrixXd columns(late.rows(), d.best.columns.cols() + late.cols());
   columns << whitened(data, d.weighing, d.best.columns).dense(), whitened(data, d.weighing, late);
-  const Eigen::VectorXd strength = columns.colPivHouseholderQr().solve(d.best.residual);
+  const Eigen::VectorXd strength = numerics::least_squares(columns, d.best.residual);
   return 0.5 * d.weighing.temper *
          (d.best.residual.squaredNorm() - (d.best.residual - columns * strength).squaredNorm());
 }

@@ -1,12 +1,13 @@
 #include "core/metrology/camera/circle_fit.hpp"
 
-#include <Eigen/Dense>
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -35,7 +36,7 @@ std::optional<Normalised> normalise(Outline points) {
   out.points /= out.scale;
   // Points on a line have no circle: the smaller principal moment vanishes.
   const Eigen::Matrix2d moment = out.points * out.points.transpose() / static_cast<double>(points.cols());
-  if (Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>{moment}.eigenvalues()(0) < 1e-14) return std::nullopt;
+  if (numerics::symmetric_eigen(moment).values(0) < 1e-14) return std::nullopt;
   return out;
 }
 
@@ -66,7 +67,7 @@ std::optional<Circle> kasa_circle(Outline points) {
   design.leftCols<2>() = in->points.transpose();
   design.col(2).setOnes();
   const VectorXd z = in->points.colwise().squaredNorm().transpose();
-  const Vector3d solution = design.colPivHouseholderQr().solve(-z);
+  const Vector3d solution = numerics::least_squares(design, -z);
   return from_algebraic(*in, 1.0, solution(0), solution(1), solution(2));
 }
 
@@ -83,12 +84,12 @@ std::optional<Circle> pratt_circle(Outline points) {
   Eigen::Matrix4d inverse = Eigen::Matrix4d::Zero();
   inverse(0, 3) = inverse(3, 0) = -0.5;
   inverse(1, 1) = inverse(2, 2) = 1.0;
-  const Eigen::EigenSolver<Eigen::Matrix4d> solver{inverse * moment};
-  if (solver.info() != Eigen::Success) return std::nullopt;
+  const auto eigen = numerics::real_eigen(inverse * moment);
+  if (!eigen) return std::nullopt;
   std::array<Index, 4> order{0, 1, 2, 3};
-  const Eigen::Vector4d values = solver.eigenvalues().real();
+  const Eigen::Vector4d values = eigen->values;
   std::sort(order.begin(), order.end(), [&](Index i, Index j) { return values(i) < values(j); });
-  const Eigen::Vector4d v = solver.eigenvectors().col(order[1]).real();
+  const Eigen::Vector4d v = eigen->vectors.col(order[1]);
   return from_algebraic(*in, v(0), v(1), v(2), v(3));
 }
 
@@ -104,8 +105,7 @@ std::optional<Circle> taubin_circle(Outline points) {
     rows.bottomRows<2>() = in->points;
     moment = rows * rows.transpose() / static_cast<double>(points.cols());
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver{moment};
-  const Vector3d v = solver.eigenvectors().col(0);
+  const Vector3d v = numerics::symmetric_eigen(moment).vectors.col(0);
   return from_algebraic(*in, 0.5 * v(0), v(1), v(2), -0.5 * v(0));
 }
 
@@ -137,7 +137,7 @@ std::optional<CircleFit> geometric_circle(Outline points, const Circle& start, c
     for (int attempt = 0;; ++attempt) {
       Matrix3d damped = normal;
       damped.diagonal() *= 1.0 + damping;
-      const Vector3d step = damped.ldlt().solve(-gradient);
+      const Vector3d step = numerics::solve_symmetric(damped, -gradient);
       if (!step.allFinite() || attempt > 30) return std::nullopt;
       const Circle next{at.center + step.head<2>(), at.radius + step(2)};
       const double there = cost(next);
@@ -161,7 +161,7 @@ std::optional<CircleFit> geometric_circle(Outline points, const Circle& start, c
   fit.residual_rms = total > 0.0 ? std::sqrt(current / total) : 0.0;
   const double freedom = total - 3.0;
   const double variance = freedom > 0.0 ? current / freedom : std::numeric_limits<double>::infinity();
-  fit.covariance = variance * normal.ldlt().solve(Matrix3d::Identity());
+  fit.covariance = variance * numerics::solve_symmetric(normal, Matrix3d::Identity());
   return fit;
 }
 

@@ -6,6 +6,8 @@
 #include <functional>
 #include <limits>
 
+#include "core/numerics/decompositions.hpp"
+
 namespace invar::metrology {
 
 namespace {
@@ -192,7 +194,7 @@ std::optional<Adjusted> adjust(const Matrix2Xd& target, const std::vector<Matrix
       if (attempt > 40) return at;  // no way down: at the minimum within rounding
       MatrixXd damped = normal;
       damped.diagonal() *= 1.0 + damping;
-      const VectorXd step = damped.ldlt().solve(right);
+      const VectorXd step = numerics::solve_symmetric(damped, right);
       if (!step.allFinite()) return std::nullopt;
       Adjusted next = at;
       for (Index k = 0; k < m; ++k) next.camera(moving[static_cast<std::size_t>(k)]) += step(k);
@@ -284,7 +286,8 @@ std::optional<PlanarCalibration> calibrate_planar(const Matrix2Xd& target,
   const double freedom = 2.0 * points - static_cast<double>(fit->normal.rows());
   const VectorXd variance =
       fit->square / std::max(1.0, freedom) *
-      fit->normal.ldlt().solve(MatrixXd::Identity(fit->normal.rows(), fit->normal.rows())).diagonal();
+      numerics::solve_symmetric(fit->normal, MatrixXd::Identity(fit->normal.rows(), fit->normal.rows()))
+          .diagonal();
   VectorXd sigma = VectorXd::Zero(intrinsics);
   Index next = 0;
   for (Index i = 0; i < intrinsics; ++i)

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/robust.hpp"
 #include "core/numerics/significance.hpp"
 
@@ -42,7 +43,7 @@ DropletSolution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, con
   // Heights are a thousandth of what placements are counted in: scale the columns before the decomposition.
   const Eigen::VectorXd scale = a.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = a * scale.cwiseInverse().asDiagonal();
-  solution.theta = scaled.colPivHouseholderQr().solve(y).cwiseQuotient(scale);
+  solution.theta = numerics::least_squares(scaled, y).cwiseQuotient(scale);
   const Eigen::MatrixXd inverse =
       (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
   solution.covariance = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();

@@ -1,9 +1,10 @@
 #include "core/metrology/fusion/fusion_runs.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/robust.hpp"
 
 namespace invar::metrology {
@@ -25,7 +26,7 @@ Motion motion_of(const FusionRun& run) {
       gram += row * row.transpose();
       moment += row * (run.reference(k) - run.reference(i));
     }
-    const Eigen::Vector3d p = gram.ldlt().solve(moment);
+    const Eigen::Vector3d p = numerics::solve_symmetric(gram, moment);
     motion.velocity(i) = p(1) / span;
     motion.acceleration(i) = 2.0 * p(2) / (span * span);
   }

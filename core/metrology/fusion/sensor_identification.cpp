@@ -1,10 +1,11 @@
 #include "core/metrology/fusion/sensor_identification.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/robust.hpp"
 
 namespace invar::metrology {
@@ -83,7 +84,7 @@ PositionSensorModel identify_position(const std::vector<FusionRun>& runs, const 
   Eigen::VectorXd residual;
   for (int round = 0; round < 4; ++round) {
     const Eigen::VectorXd scale = weight.cwiseProduct(keep);
-    p = (scale.asDiagonal() * a).colPivHouseholderQr().solve(scale.cwiseProduct(y));
+    p = numerics::least_squares((scale.asDiagonal() * a), scale.cwiseProduct(y));
     residual = y - a * p;
     const Eigen::VectorXd scaled = residual.cwiseProduct(weight);
     const double size = std::max(numerics::robust_deviation({scaled.begin(), scaled.end()}, 0.0), 1e-6);
@@ -183,7 +184,7 @@ VelocitySensorModel identify_velocity(const std::vector<FusionRun>& runs, const 
     for (int k = 1; k < powers; ++k) gram(k, k) += 1.0 / std::pow(0.2 * fastest, 2);
     gram(powers, powers) += 1.0 / std::pow(0.02 * fastest, 2);
     gram(powers + 1, powers + 1) += 1.0 / std::pow(20e-3, 2);
-    p = gram.colPivHouseholderQr().solve(moment);
+    p = numerics::least_squares(gram, moment);
   }
   for (int k = 0; k < powers; ++k) model.gains[static_cast<std::size_t>(k)] = p(k) / std::pow(fastest, k + 1);
   model.offset = p(powers);

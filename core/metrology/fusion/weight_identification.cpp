@@ -1,10 +1,11 @@
 #include "core/metrology/fusion/weight_identification.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/rbf_kernel.hpp"
 #include "core/numerics/robust.hpp"
 
@@ -99,7 +100,7 @@ void fit_polynomial(WeightModel& model, const std::vector<FusionRun>& runs, int 
     }
   }
   gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
-  p.coefficients = gram.colPivHouseholderQr().solve(moment);
+  p.coefficients = numerics::least_squares(gram, moment);
 }
 
 }  // namespace

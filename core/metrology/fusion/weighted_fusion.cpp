@@ -1,12 +1,13 @@
 #include "core/metrology/fusion/weighted_fusion.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -24,7 +25,7 @@ WeightFit fit_weights(const Eigen::Ref<const Eigen::MatrixXd>& sensors,
   a.leftCols(n - 1) = sensors.rightCols(n - 1).colwise() - sensors.col(0);
   a.col(n - 1).setOnes();
   const Eigen::VectorXd y = reference - sensors.col(0);
-  const Eigen::VectorXd theta = a.colPivHouseholderQr().solve(y);
+  const Eigen::VectorXd theta = numerics::least_squares(a, y);
   WeightFit fit;
   fit.weights.resize(n);
   fit.weights.tail(n - 1) = theta.head(n - 1);

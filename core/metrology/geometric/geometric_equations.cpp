@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -232,7 +233,8 @@ Posterior solve(const NormalEquations& equations, const GeometricBasis& basis, c
   for (std::size_t k = 0; k < basis.blocks.size(); ++k) {
     const auto& block = basis.blocks[k];
     posterior.prior_covariance.block(block.first, block.first, block.size(), block.size()) =
-        system.blocks[k].precision.llt().solve(Eigen::MatrixXd::Identity(block.size(), block.size()));
+        numerics::solve_positive(system.blocks[k].precision,
+                                 Eigen::MatrixXd::Identity(block.size(), block.size()));
   }
   for (int i = basis.first_wave(); i < basis.size; ++i)
     posterior.prior_covariance(i, i) = std::pow(constant_sd(basis, prior, i), 2);
@@ -272,7 +274,7 @@ Eigen::VectorXd told_by_others(const CondensedLine& line, const LineRows& rows, 
   weighted << own.weighted, line.noise.expansion_information * line.noise.expansion;
   const Eigen::MatrixXd spread = all * posterior.covariance * all.transpose();
   const Eigen::MatrixXd left = Eigen::MatrixXd::Identity(n + 1, n + 1) - spread * information;
-  const Eigen::VectorXd told = left.partialPivLu().solve(all * posterior.mean - spread * weighted);
+  const Eigen::VectorXd told = numerics::solve_square(left, all * posterior.mean - spread * weighted);
   return told.head(n);
 }
 
@@ -312,7 +314,8 @@ Evidence evidence(const NormalEquations& equations, const GeometricBasis& basis,
     for (std::size_t a = 0; a <= b; ++a) {
       Eigen::MatrixXd middle = -inverse_l[a].bottomRows(inverse_l[b].rows()).transpose() * inverse_l[b];
       if (a == b)
-        middle += system.blocks[b].precision.llt().solve(Eigen::MatrixXd::Identity(own.size(), own.size()));
+        middle += numerics::solve_positive(system.blocks[b].precision,
+                                           Eigen::MatrixXd::Identity(own.size(), own.size()));
       const Eigen::MatrixXd product = system.blocks[a].solved * middle * right.transpose();
       w.block(first[a], first[b], product.rows(), product.cols()) = product;
       if (a != b) w.block(first[b], first[a], product.cols(), product.rows()) = product.transpose();

@@ -1,9 +1,10 @@
 // The search for the most evident prior.
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 
 #include "core/metrology/geometric/geometric_equations.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -43,7 +44,7 @@ EvidentPrior most_evident(const NormalEquations& equations, const GeometricBasis
   for (int evaluation = 0; evaluation < 20; ++evaluation) {
     StrengthMatrix damped = here.information;
     damped.diagonal() *= 1.0 + damping;
-    Strengths step = damped.llt().solve(here.slope);
+    Strengths step = numerics::solve_positive(damped, here.slope);
     if (step.dot(here.slope) < enough) break;  // twice what a quadratic would gain
     step *= std::min(1.0, longest_step / step.cwiseAbs().maxCoeff());
     Evidence there = score(equations, basis, expected, logs + step);
@@ -55,7 +56,8 @@ EvidentPrior most_evident(const NormalEquations& equations, const GeometricBasis
       damping = std::max(4.0 * damping, 0.5);
     }
   }
-  return {with_log_strengths(expected, logs), here.information.llt().solve(StrengthMatrix::Identity())};
+  return {with_log_strengths(expected, logs),
+          numerics::solve_positive(here.information, StrengthMatrix::Identity())};
 }
 
 }  // namespace invar::metrology

@@ -1,8 +1,10 @@
 #include "core/metrology/geometric/geometric_field.hpp"
 
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -74,7 +76,7 @@ RigidPart rigid_part(const GeometricBasis& basis, const Squareness& squareness,
     normal += modes.transpose() * modes;
     right += modes.transpose() * field;
   }
-  return {normal.completeOrthogonalDecomposition().solve(right)};
+  return {numerics::shortest_least_squares(normal, right)};
 }
 
 Eigen::MatrixXd shape_map(const GeometricBasis& basis, const Squareness& squareness, const RigidPart& rigid,

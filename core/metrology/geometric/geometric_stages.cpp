@@ -1,10 +1,12 @@
 #include "core/metrology/geometric/geometric_stages.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -85,11 +87,12 @@ Eigen::VectorXd mean_in_stages(const std::vector<CondensedLine>& lines, const st
     const NormalEquations equations = assemble(chosen_lines, chosen_rows, basis.size, misfit);
     const auto count = static_cast<Eigen::Index>(unknown.size());
     const Eigen::MatrixXd covariance = beforehand(unknown, unknown);
-    const Eigen::MatrixXd precision = covariance.llt().solve(Eigen::MatrixXd::Identity(count, count));
+    const Eigen::MatrixXd precision =
+        numerics::solve_positive(covariance, Eigen::MatrixXd::Identity(count, count));
     // What earlier steps found is taken as known; the unknowns of this one are still zero in `mean`.
     const Eigen::VectorXd right = equations.right - equations.normal * mean;
     const Eigen::MatrixXd normal = equations.normal(unknown, unknown) + precision;
-    const Eigen::VectorXd found = normal.llt().solve(Eigen::VectorXd{right(unknown)});
+    const Eigen::VectorXd found = numerics::solve_positive(normal, Eigen::VectorXd{right(unknown)});
     mean(unknown) = found;
   }
   return mean;

@@ -1,10 +1,11 @@
 #include "core/metrology/geometric/line_fit.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/robust.hpp"
 
 namespace invar::metrology {
@@ -109,7 +110,7 @@ std::vector<double> step_gains(const LineFit& work, const Eigen::VectorXd& resid
   Eigen::MatrixXd normal = centred.transpose() * centred;
   normal.diagonal() += variance * prior_variance.cwiseInverse();
   const Eigen::MatrixXd inverse =
-      normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+      numerics::solve_symmetric(normal, Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
   std::vector<double> gains(static_cast<std::size_t>(rows), 0.0);
   Eigen::VectorXd above = Eigen::VectorXd::Zero(work.points());
   Eigen::VectorXd shared = Eigen::VectorXd::Zero(work.regressors.cols());
@@ -247,7 +248,7 @@ void fit(LineFit& work, const Eigen::VectorXd& prior_variance) {
   }
   const double variance = work.scale * work.scale;
   for (Eigen::Index k = 0; k < q; ++k) normal(k, k) += variance / prior_variance[k] + 1e-12;
-  work.nuisance_covariance = normal.ldlt().solve(Eigen::MatrixXd::Identity(q, q));
+  work.nuisance_covariance = numerics::solve_symmetric(normal, Eigen::MatrixXd::Identity(q, q));
   work.nuisance = work.nuisance_covariance * right;
   work.residual.resize(work.rows());
   for (int i = 0; i < work.rows(); ++i) {

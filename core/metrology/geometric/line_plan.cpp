@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/metrology/geometric/geometric_field.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -255,7 +256,7 @@ std::vector<NextLine> next_lines(const Machine& machine, const Identification& f
     inner.array() += 1e-6;  // m^2: the zero point is free
     const Eigen::MatrixXd spread_part = spread(rows.unknowns, rows.unknowns);
     const Eigen::MatrixXd gain = rows.rows * spread_part * rows.rows.transpose();
-    const double less = inner.llt().solve(gain).trace();
+    const double less = numerics::solve_positive(inner, gain).trace();
     result.push_back({std::move(candidate), std::sqrt(std::max(now - less, 0.0))});
   }
   std::sort(result.begin(), result.end(),

@@ -1,10 +1,11 @@
 #include "core/metrology/geometric/line_search.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/metrology/geometric/geometric_field.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -64,7 +65,7 @@ class Search {
     const Eigen::Index points = r.rows();
     const Eigen::MatrixXd noise = one.variance * Eigen::MatrixXd::Identity(points, points) +
                                   zero_free * Eigen::MatrixXd::Ones(points, points);
-    const Eigen::MatrixXd more = r.transpose() * noise.llt().solve(r);
+    const Eigen::MatrixXd more = r.transpose() * numerics::solve_positive(noise, r);
     for (Eigen::Index i = 0; i < more.rows(); ++i)
       for (Eigen::Index j = 0; j < more.cols(); ++j)
         precision_(one.rows.unknowns[static_cast<std::size_t>(i)],
@@ -85,14 +86,14 @@ class Search {
       inner.diagonal().array() += one.variance;
       inner.array() += zero_free;
       const Eigen::MatrixXd outer = r * spread_part * r.transpose();
-      result.push_back(inner.llt().solve(outer).trace());
+      result.push_back(numerics::solve_positive(inner, outer).trace());
     }
     return result;
   }
 
  private:
   static Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) {
-    return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
+    return numerics::solve_positive(matrix, Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
   }
 
   const Machine& machine_;
