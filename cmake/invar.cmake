@@ -6,6 +6,11 @@ set(INVAR_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wsha
 # -ffp-contract=off keeps simulated time repeatable bit for bit across CPUs.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 add_compile_options(-ffp-contract=off)
+# tools/build compiles the sources of a target in batches (CMAKE_UNITY_BUILD): a first build takes half as long. For GCC all of
+# a batch is headers, whose types should have linkage.
+if(CMAKE_UNITY_BUILD)
+  add_compile_options($<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-subobject-linkage>)
+endif()
 # What a package names beside what is called stays out of every process.
 add_link_options(-Wl,--as-needed)
 

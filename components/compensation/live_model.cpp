@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "core/base/index.hpp"
 #include "core/compensation/component_file.hpp"
 #include "core/compensation/error_map_model.hpp"
 #include "core/compensation/geometric_file.hpp"
@@ -18,8 +19,6 @@ namespace {
 
 constexpr int steps = 20;               // of the grids on which a model is looked at
 constexpr double most_compiled = 2e-7;  // m, by which the loop's tables may differ from networks
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 std::string in_um(double metres) {
   std::array<char, 40> text{};

@@ -3,26 +3,26 @@
 #include <algorithm>
 #include <string>
 
+#include "core/base/index.hpp"
+
 namespace invar::compensation {
 
 using metrology::squareness_count;
 
 namespace {
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 constexpr double most_reversal = 1e-2;  // m, beyond it a model is refused
-std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
 
 }  // namespace
 
 void write_chain(ModelText& text, const metrology::Chain& chain, const std::array<Range, 3>& travel,
                  const Eigen::Vector3d& tool) {
   std::string letters;
-  for (int i = 0; i < chain.axes; ++i) letters += letter(chain.order[index(i)]);
+  for (int i = 0; i < chain.axes; ++i) letters += metrology::axis_letter(chain.order[index(i)]);
   text.text("chain", letters);
   text.open("travel");
   for (int k = 0; k < 3; ++k)
-    if (chain.has(k)) text.range(letter(k), travel[index(k)]);
+    if (chain.has(k)) text.range(metrology::axis_letter(k), travel[index(k)]);
   text.close();
   text.numbers("tool", tool.data(), 3);
 }
@@ -42,7 +42,7 @@ void read_chain(const config::Node& root, metrology::Chain& chain, std::array<Ra
   }
   const config::Node lengths = root.required("travel");
   for (int k = 0; k < 3; ++k)
-    if (chain.has(k)) travel[index(k)] = lengths.required(letter(k)).as_range("m");
+    if (chain.has(k)) travel[index(k)] = lengths.required(metrology::axis_letter(k)).as_range("m");
   const auto offset = exactly(root.required("tool"), 3, "m");
   tool = {offset[0], offset[1], offset[2]};
 }
@@ -110,7 +110,7 @@ void write_reversal(ModelText& text, const std::array<metrology::ReversalCurve, 
   for (int k = 0; k < 3; ++k) {
     const metrology::ReversalCurve& curve = reversal[index(k)];
     if (curve.empty()) continue;
-    write_curve(text, letter(k), curve);
+    write_curve(text, metrology::axis_letter(k), curve);
   }
   text.close();
 }
@@ -121,7 +121,7 @@ void read_reversal(const config::Node& root, const metrology::Chain& chain,
   const auto means = exactly(root.required("reversal"), 3, "m");
   const config::Node curves = root["reversal_over_position"];
   for (int k = 0; k < 3; ++k) {
-    const config::Node one = curves[letter(k)];
+    const config::Node one = curves[metrology::axis_letter(k)];
     if (!chain.has(k)) {
       if (one.exists()) one.fault("the chain has no such axis", "remove it");
       continue;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/index.hpp"
 #include "core/compensation/chain_file.hpp"
 #include "core/compensation/fusion_file.hpp"
 
@@ -16,8 +17,6 @@ using metrology::ErrorMotionNetworks;
 using metrology::is_rotation;
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr std::size_t most_states = 8;
 

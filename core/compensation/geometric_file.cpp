@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/index.hpp"
 #include "core/compensation/chain_file.hpp"
 
 namespace invar::compensation {
@@ -15,9 +16,6 @@ using metrology::axis_of;
 using metrology::error_motion_count;
 using metrology::GeometricModel;
 using metrology::is_rotation;
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-std::string letter(int axis) { return std::string(1, metrology::axis_letters[index(axis)]); }
 
 constexpr double most_translation = 0.1;  // m; rad for rotations: beyond it a model is refused
 
@@ -54,12 +52,13 @@ void write_geometric(ModelText& text, const GeometricModel& model) {
   text.comment(
       "Standard deviation of the field [m] at nodes over the travels, x fastest, less rigid motions.");
   text.open("field_sigma");
-  for (int k = 0; k < 3; ++k) text.integer("nodes_" + letter(k), model.field_sigma.count[index(k)]);
+  for (int k = 0; k < 3; ++k)
+    text.integer("nodes_" + metrology::axis_letter(k), model.field_sigma.count[index(k)]);
   for (int k = 0; k < 3; ++k) {
     if (!model.chain.has(k)) continue;
     std::vector<double> values;
     for (const auto& sigma : model.field_sigma.values) values.push_back(sigma[k]);
-    text.numbers("sigma_" + letter(k), values);
+    text.numbers("sigma_" + metrology::axis_letter(k), values);
   }
   text.close();
 }
@@ -120,14 +119,15 @@ GeometricModel read_geometric(const config::Node& root) {
   const config::Node grid = root.required("field_sigma");
   std::size_t nodes = 1;
   for (int k = 0; k < 3; ++k) {
-    model.field_sigma.count[index(k)] = static_cast<int>(grid.integer("nodes_" + letter(k), 1, 100));
+    model.field_sigma.count[index(k)] =
+        static_cast<int>(grid.integer("nodes_" + metrology::axis_letter(k), 1, 100));
     nodes *= index(model.field_sigma.count[index(k)]);
     if (model.chain.has(k)) model.field_sigma.range[index(k)] = model.travel[index(k)];
   }
   model.field_sigma.values.assign(nodes, Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()));
   for (int k = 0; k < 3; ++k) {
     if (!model.chain.has(k)) continue;
-    const auto values = exactly(grid.required("sigma_" + letter(k)), nodes, "m");
+    const auto values = exactly(grid.required("sigma_" + metrology::axis_letter(k)), nodes, "m");
     for (std::size_t i = 0; i < nodes; ++i) model.field_sigma.values[i][k] = values[i];
   }
   return model;

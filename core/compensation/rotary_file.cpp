@@ -9,7 +9,7 @@ namespace invar::compensation {
 
 namespace {
 
-constexpr double most_reversal = 1e-2;  // rad, beyond it a model is refused
+constexpr double most_rotary_reversal = 1e-2;  // rad, beyond it a model is refused
 constexpr const char* whole_turns = "whole turns are taken off";
 constexpr const char* held = "end values are held";
 
@@ -44,7 +44,7 @@ metrology::RotaryAxis read_rotary(const config::Node& root) {
   axis.error.network = read_network(root.required("error"));
   if (axis.error.network.inputs() != 1)
     root["error"].fault("has more inputs than the angle", "calibrate again");
-  if (root.has("reversal")) axis.reversal = read_curve(root["reversal"], "rad", most_reversal);
+  if (root.has("reversal")) axis.reversal = read_curve(root["reversal"], "rad", most_rotary_reversal);
   return axis;
 }
 

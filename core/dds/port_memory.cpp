@@ -18,7 +18,7 @@ namespace invar::dds {
 
 namespace {
 
-constexpr std::string_view prefix = "/fastrtps_port";
+constexpr std::string_view port_prefix = "/fastrtps_port";
 
 /// Which file a name meant: device and number.
 using FileNumber = std::pair<dev_t, ino_t>;
@@ -38,8 +38,8 @@ Opened& opened() {
 }
 
 std::optional<std::uint32_t> port_of(std::string_view name) {
-  if (!name.starts_with(prefix)) return std::nullopt;
-  const std::string_view digits = name.substr(prefix.size());
+  if (!name.starts_with(port_prefix)) return std::nullopt;
+  const std::string_view digits = name.substr(port_prefix.size());
   std::uint32_t port = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), port);
   if (error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
@@ -100,7 +100,7 @@ void give_up_replaced_port(std::uint32_t port) {
   const auto found = all.ports.find(port);
   if (found == all.ports.end()) return;
   struct stat status {};
-  if (stat(("/dev/shm" + std::string{prefix} + std::to_string(port)).c_str(), &status) != 0) return;
+  if (stat(("/dev/shm" + std::string{port_prefix} + std::to_string(port)).c_str(), &status) != 0) return;
   std::erase_if(found->second, [&](const auto& file) {
     if (file.first == number_of(status)) return false;
     if (file.second >= 0) {

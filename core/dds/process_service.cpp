@@ -78,7 +78,7 @@ std::uint32_t own_endpoints(const Node& node) {
                                                   [](const Endpoint& end) { return end.is_local; }));
 }
 
-std::string joined(const std::vector<std::string>& lines) {
+std::string one_line(const std::vector<std::string>& lines) {
   std::string text;
   for (const auto& line : lines) text += (text.empty() ? "" : "; ") + line;
   return text;
@@ -256,7 +256,7 @@ void ProcessService::publish_status() {
   process.pid(static_cast<std::uint32_t>(getpid()));
   process.realtime_asked(control_.executor().options().real_time.has_value());
   process.realtime_granted(process.realtime_asked() && status.not_granted.empty());
-  process.realtime_text(joined(status.not_granted));
+  process.realtime_text(one_line(status.not_granted));
   process.simulated(status.simulated);
   process.rate(1.0 / status.period.in_seconds());
   process.cycles(status.counters.executed);

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr std::size_t most_files = 100;  // beside those that are given up for newer ones
-constexpr std::string_view prefix = "model-";
+constexpr std::string_view folder_prefix = "model-";
 
 /// FNV-1a: a name, not a seal.
 std::string name_of(std::string_view text) {
@@ -24,13 +24,13 @@ std::string name_of(std::string_view text) {
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3U;
   char digits[20];
   std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
-  return std::string{prefix} + digits + ".yaml";
+  return std::string{folder_prefix} + digits + ".yaml";
 }
 
 void remove_oldest(const fs::path& folder) {
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   for (const auto& entry : fs::directory_iterator{folder})
-    if (entry.path().filename().string().starts_with(prefix))
+    if (entry.path().filename().string().starts_with(folder_prefix))
       files.emplace_back(entry.last_write_time(), entry.path());
   if (files.size() <= most_files) return;
   std::sort(files.begin(), files.end());

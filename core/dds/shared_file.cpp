@@ -13,7 +13,7 @@ namespace invar::dds {
 
 namespace {
 
-const std::filesystem::path folder{"/dev/shm"};
+const std::filesystem::path memory_folder{"/dev/shm"};
 constexpr const char* prefix = "invar_";
 
 std::byte* map(int file, std::size_t size) {
@@ -38,7 +38,7 @@ bool is_abandoned(const std::filesystem::path& path) {
 }  // namespace
 
 std::unique_ptr<SharedFile> SharedFile::make(const std::string& name, std::size_t size) {
-  const std::string path = folder / (prefix + name);
+  const std::string path = memory_folder / (prefix + name);
   const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (file < 0) return nullptr;
   // Reserved, not only sized: a full folder is an error here instead of a SIGBUS later.
@@ -52,7 +52,7 @@ std::unique_ptr<SharedFile> SharedFile::make(const std::string& name, std::size_
 }
 
 std::unique_ptr<SharedFile> SharedFile::open(const std::string& name) {
-  const std::string path = folder / (prefix + name);
+  const std::string path = memory_folder / (prefix + name);
   const int file = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
   if (file < 0) return nullptr;
   struct stat status {};
@@ -78,7 +78,7 @@ SharedFile::~SharedFile() {
 std::size_t remove_abandoned_shared_files() {
   std::size_t removed = 0;
   std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator{folder, error})
+  for (const auto& entry : std::filesystem::directory_iterator{memory_folder, error})
     if (entry.path().filename().string().starts_with(prefix) && is_abandoned(entry.path()) &&
         std::filesystem::remove(entry.path(), error))
       ++removed;

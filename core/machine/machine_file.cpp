@@ -14,10 +14,6 @@ using metrology::ErrorFunction;
 
 constexpr Range machine_length{-100.0, 100.0};  // m; beyond it somebody wrote millimetres
 
-std::string letter(int axis) {
-  return std::string(1, metrology::axis_letters[static_cast<std::size_t>(axis)]);
-}
-
 metrology::Chain read_chain(const Node& node, int least_axes) {
   metrology::Chain chain;
   const std::size_t known = node.fault_count();
@@ -84,7 +80,7 @@ metrology::MachineErrors read_errors(const Node& node, const metrology::Chain& c
     const Node child = node[metrology::iso_name(i)];
     if (!child.exists()) continue;
     if (!chain.has(metrology::axis_of(i)))
-      child.fault("this machine has no axis " + letter(metrology::axis_of(i)), "remove it");
+      child.fault("this machine has no axis " + metrology::axis_letter(metrology::axis_of(i)), "remove it");
     errors.functions[static_cast<std::size_t>(i)] =
         read_function(child, metrology::is_rotation(i) ? "rad" : "m");
   }
@@ -125,12 +121,12 @@ metrology::Machine read_machine(const config::Node& root, int least_axes) {
   const Node travel = root.required("travel");
   for (int axis = 0; axis < metrology::axis_count; ++axis) {
     if (!machine.chain.has(axis)) {
-      if (travel.is_map() && travel.has(letter(axis)))
-        travel[letter(axis)].fault("the chain has no axis " + letter(axis),
-                                   "remove it, or name it in the chain");
+      if (travel.is_map() && travel.has(metrology::axis_letter(axis)))
+        travel[metrology::axis_letter(axis)].fault("the chain has no axis " + metrology::axis_letter(axis),
+                                                   "remove it, or name it in the chain");
       continue;
     }
-    const Node range = travel.required(letter(axis));
+    const Node range = travel.required(metrology::axis_letter(axis));
     if (!range.exists()) continue;
     machine.travel[static_cast<std::size_t>(axis)] = range.as_range("m");
     const Range r = machine.travel[static_cast<std::size_t>(axis)];

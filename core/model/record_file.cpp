@@ -16,7 +16,7 @@ namespace invar::model {
 namespace {
 
 /// What SI counts in, and with it every unit that is none of its own.
-constexpr std::array own_units{"m", "kg", "s", "A", "K", "rad"};
+constexpr std::array si_units{"m", "kg", "s", "A", "K", "rad"};
 
 /// Does one of the model's numbers stand in this unit, alone (`cm`) or in another (`cm/s`, `cm3`)?
 bool speaks_in(const physics::Model& model, const std::string& unit) {
@@ -48,7 +48,7 @@ bool speaks_in_parts(const physics::Model& model, const std::string& unit) {
     at = end;
     const auto size = parse_unit(part);
     if (!size || std::abs(size->factor - 1.0) < 1e-12) continue;
-    const bool speaks_si = std::any_of(own_units.begin(), own_units.end(), [&](const char* si) {
+    const bool speaks_si = std::any_of(si_units.begin(), si_units.end(), [&](const char* si) {
       return parse_unit(si)->dimension == size->dimension && speaks_in(model, si);
     });
     if (speaks_si || !speaks_in(model, part)) return false;

@@ -7,14 +7,14 @@
 
 namespace invar::numerics {
 
-/// Of a symmetric matrix: eigenvalues in ascending order, eigenvectors as columns. Eigen's SelfAdjointEigenSolver.
+/// A symmetric matrix: its eigenvalues in ascending order, eigenvectors as columns. Eigen's SelfAdjointEigenSolver.
 struct SymmetricEigen {
   Eigen::VectorXd values;
   Eigen::MatrixXd vectors;
 };
 SymmetricEigen symmetric_eigen(const Eigen::Ref<const Eigen::MatrixXd>& a);
 
-/// Of any square matrix, the real parts, in no order; nothing where the iteration does not converge. Eigen's EigenSolver.
+/// Any square matrix: the real parts, in no order; nothing where the iteration does not converge. Eigen's EigenSolver.
 struct RealEigen {
   Eigen::VectorXd values;
   Eigen::MatrixXd vectors;

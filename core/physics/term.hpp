@@ -25,6 +25,7 @@ enum class Role {
 
 /// No more parameters than this in a term that has a fixed number of them.
 inline constexpr std::size_t most_parameters = 6;
+inline constexpr std::size_t no_parameter = most_parameters;  // in place of the index of one
 
 struct ParameterInfo {
   static constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -104,7 +105,7 @@ struct TermInfo {
     while (n < most_parameters && !parameters[n].name.empty()) ++n;
     return n;
   }
-  /// The place of a parameter by name; `most_parameters` where there is none of it.
+  /// The place of a parameter by name; `no_parameter` where there is none of it.
   [[nodiscard]] constexpr std::size_t index_of(std::string_view parameter) const {
     std::size_t i = parameter.empty() ? most_parameters : 0;
     while (i < most_parameters && parameters[i].name != parameter) ++i;

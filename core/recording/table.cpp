@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <set>
 #include <utility>
@@ -24,8 +23,6 @@
 namespace invar::recording {
 
 namespace {
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 /// A cell as a message shows it: a line of some hundred digits says no more than its beginning.
 std::string shortened(std::string_view cell) {
@@ -277,7 +274,7 @@ class Reader {
       refuse(at(number) + ": column `" + column.name + "`",
              "`" + clipped(std::string{cell}) + "` " + flaw->what, flaw->mend);
     column.texts.emplace_back(cell);
-    column.values.push_back(NumberCells{form_.separator}.read(cell).value_or(missing));
+    column.values.push_back(NumberCells{form_.separator}.read(cell).value_or(no_number));
   }
 
   double read_number(std::size_t k, std::string_view cell, std::size_t number) {
@@ -423,7 +420,7 @@ void Table::add(std::string name, std::string unit, std::vector<double> values) 
 
 void Table::add_texts(std::string name, std::vector<std::string> texts) {
   INVAR_EXPECTS(columns.empty() || texts.size() == rows(), name, texts.size(), rows());
-  columns.push_back({std::move(name), "", std::vector<double>(texts.size(), missing), std::move(texts)});
+  columns.push_back({std::move(name), "", std::vector<double>(texts.size(), no_number), std::move(texts)});
 }
 
 }  // namespace invar::recording

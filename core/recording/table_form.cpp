@@ -5,7 +5,6 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <limits>
 
 #include "core/base/fault.hpp"
 #include "core/recording/time_stamp.hpp"
@@ -13,8 +12,6 @@
 namespace invar::recording {
 
 namespace {
-
-constexpr double missing = std::numeric_limits<double>::quiet_NaN();
 
 /// What may part cells. Of two that part a file alike the table is ambiguous; blanks count where none of the others do.
 struct Separator {
@@ -185,7 +182,7 @@ TableForm form_of(const std::vector<NumberedLine>& sample, const std::optional<N
 }
 
 std::optional<double> NumberCells::read(std::string_view cell) {
-  if (cell.empty()) return missing;
+  if (cell.empty()) return no_number;
   if (cell.front() == '+') cell.remove_prefix(1);
   const auto whole = [](std::string_view text) -> std::optional<double> {
     double value = 0.0;
@@ -208,7 +205,7 @@ std::optional<double> NumberCells::read(std::string_view cell) {
     return value;
   }
   const auto lower = lower_case(cell.substr(0, longest_number));
-  if (std::find(no_numbers.begin(), no_numbers.end(), lower) != no_numbers.end()) return missing;
+  if (std::find(no_numbers.begin(), no_numbers.end(), lower) != no_numbers.end()) return no_number;
   return std::nullopt;
 }
 

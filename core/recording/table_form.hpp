@@ -3,12 +3,16 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace invar::recording {
+
+inline constexpr double no_number =
+    std::numeric_limits<double>::quiet_NaN();  // of a cell that is empty or says nan
 
 /// A line of the file with its number, from 1.
 struct NumberedLine {

@@ -18,7 +18,7 @@ struct Error {
   double rms = 0.0, largest = 0.0;
 };
 
-Error read(const std::filesystem::path& file) {
+Error read_error(const std::filesystem::path& file) {
   const auto table = recording::Table::read(file);
   const auto time = table.in("t", "s"), fused = table.in("fused", "m"), laser = table.in("reference", "m");
   Error all;
@@ -54,7 +54,7 @@ report::Series series(const Error& all, const std::string& label) {
 void summarise_fusion(const std::filesystem::path& folder, report::Page& page, std::ostream& out) {
   const auto before_file = folder / "fusion_before.csv", after_file = folder / "fusion_after.csv";
   if (!std::filesystem::exists(before_file) || !std::filesystem::exists(after_file)) return;
-  const Error before = read(before_file), after = read(after_file);
+  const Error before = read_error(before_file), after = read_error(after_file);
   out << "fused before    rms " << si(before.rms, "m") << ", max " << si(before.largest, "m")
       << "   (runs not fitted, by the laser)\n"
       << "fused after     rms " << si(after.rms, "m") << ", max " << si(after.largest, "m") << "   ("

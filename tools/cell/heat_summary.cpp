@@ -39,7 +39,7 @@ struct Comparison {
 const std::string room = "room temperature";
 const std::string heat = "position and temperature";
 
-std::map<std::string, Comparison> read(const std::filesystem::path& file) {
+std::map<std::string, Comparison> read_comparisons(const std::filesystem::path& file) {
   const auto table = recording::Table::read(file, {"model"});
   const auto& models = table.find("model")->texts;
   const auto x = table.in("x", "m");
@@ -96,7 +96,7 @@ void summarise_heat(const std::filesystem::path& folder, report::Page& page, std
   std::vector<std::vector<std::string>> rows;
   for (const Part& part : parts) {
     if (!std::filesystem::exists(folder / part.file)) return;
-    auto models = read(folder / part.file);
+    auto models = read_comparisons(folder / part.file);
     const Comparison& before = models[room];
     const Comparison& after = models[heat];
     const auto [low, high] = std::minmax_element(after.temperature.begin(), after.temperature.end());

@@ -18,7 +18,7 @@ struct Motion {
   double rms = 0.0, largest = 0.0;
 };
 
-Motion read(const std::filesystem::path& file) {
+Motion read_motion(const std::filesystem::path& file) {
   const auto table = recording::Table::read(file);
   Motion motion{table.in("t", "s"), table.in("following_error", "m")};
   const double begin = motion.time.front(), count = static_cast<double>(motion.error.size());
@@ -48,7 +48,7 @@ report::Series series(const Motion& motion, const std::string& label) {
 void summarise_motion(const std::filesystem::path& folder, report::Page& page, std::ostream& out) {
   const auto before_file = folder / "motion_before.csv", after_file = folder / "motion_after.csv";
   if (!std::filesystem::exists(before_file)) return;
-  const Motion before = read(before_file);
+  const Motion before = read_motion(before_file);
   report::Plot plot;
   plot.title = "Following error of the same motion";
   plot.x_label = "t [s]";
@@ -57,7 +57,7 @@ void summarise_motion(const std::filesystem::path& folder, report::Page& page, s
   out << "follows within  rms " << si(before.rms, "m") << ", max " << si(before.largest, "m")
       << "   (the model as it was believed)\n";
   if (std::filesystem::exists(after_file)) {
-    const Motion after = read(after_file);
+    const Motion after = read_motion(after_file);
     plot.series.push_back(series(after, "after"));
     out << "... patched     rms " << si(after.rms, "m") << ", max " << si(after.largest, "m") << "   ("
         << number(before.rms / after.rms, 2) << " times less)\n";

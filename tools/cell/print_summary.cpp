@@ -7,8 +7,8 @@
 #include <iomanip>
 #include <iterator>
 #include <map>
-#include <numbers>
 
+#include "core/base/angle.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "core/recording/table.hpp"
@@ -21,8 +21,6 @@ using report::number;
 using report::Plot;
 using report::Series;
 using report::si;
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 /// Droplets as printing.cpp writes them, in the order of printing.
 struct Prints {

@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::size_t largest_backup = 1024UL * 1024 * 1024;  // bytes; calibrations are a thousandth of that
 
-struct Options {
+struct BackupOptions {
   DeployOptions remote;
   std::filesystem::path data, file;
   std::string service = "systemd";
@@ -37,7 +37,7 @@ int tell(const HostFaults& faults, const char* command) {
   return faults.empty() ? 0 : 1;
 }
 
-std::filesystem::path data_of(const Options& options) {
+std::filesystem::path data_of(const BackupOptions& options) {
   const auto data =
       options.data.empty() ? std::filesystem::current_path() : std::filesystem::absolute(options.data);
   if (!std::filesystem::is_directory(data))
@@ -46,7 +46,7 @@ std::filesystem::path data_of(const Options& options) {
   return data;
 }
 
-int backup(const Options& options) {
+int backup(const BackupOptions& options) {
   check_remote_options(options.remote);
   std::string bytes;
   if (options.deployed) {
@@ -73,7 +73,7 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>{stream}, {}};
 }
 
-int restore(Options& options) {
+int restore(BackupOptions& options) {
   check_remote_options(options.remote);
   options.remote.service = options.service == "systemd";
   const std::string bytes = bytes_of(options.file);
@@ -86,8 +86,8 @@ int restore(Options& options) {
   return 0;
 }
 
-std::shared_ptr<Options> common(CLI::App& command) {
-  auto options = std::make_shared<Options>();
+std::shared_ptr<BackupOptions> common(CLI::App& command) {
+  auto options = std::make_shared<BackupOptions>();
   command.add_option("file", options->remote.cell, "the cell file")->required();
   auto* data = command.add_option("--data", options->data,
                                   "folder in which the cell runs; otherwise that of this call");

@@ -16,7 +16,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct BridgeOptions {
   std::filesystem::path cell;
   std::string host;
   double duration = 0.0;
@@ -37,7 +37,7 @@ dds::NodeOptions plant_options(const config::Cell& cell, const BridgeFile& file)
   return options;
 }
 
-void print(const BridgeFile& file, const Bridge& bridge, bool json) {
+void print_bridge(const BridgeFile& file, const Bridge& bridge, bool json) {
   auto all = nlohmann::ordered_json::array();
   TextTable table{{"topic of the plant", "way", "came>", "passed>", "left out>", "refused>"}};
   for (std::size_t i = 0; i < file.lines.size(); ++i) {
@@ -64,7 +64,7 @@ void tell_alarms(dds::Node& node) {
     std::cerr << "bridge: " << alarm.topic << ": " << alarm.text << '\n';
 }
 
-int run(const Options& options) {
+int run(const BridgeOptions& options) {
   ServiceManager manager = ServiceManager::from_environment();  // before any thread
   const LoadedCell loaded = load_cell(options.cell);
   const BridgeFile file = read_bridge(loaded);
@@ -96,7 +96,7 @@ int run(const Options& options) {
     tell_alarms(plant);
   }
   manager.stopping();
-  print(file, bridge, options.json);
+  print_bridge(file, bridge, options.json);
   return 0;
 }
 
@@ -114,7 +114,7 @@ void add_bridge(CLI::App& program) {
       "`invar units` and `invar deploy` write its service.\n"
       "Only these pass. Ends with a table of what passed, was left out by the rate, and was refused.\n"
       "Exit status: 0; 1 the network failed; 2 a fault of the call or the file");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BridgeOptions>();
   command->add_option("cell", options->cell, "the cell file")->required();
   command->add_option("--host", options->host, "the host that this PC is, where its address may come later");
   command->add_option("--duration", options->duration, "end after so many seconds (0: at Ctrl-C)")

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/index.hpp"
 #include "core/compensation/component_file.hpp"
 #include "core/machine/machine_file.hpp"
 #include "core/metrology/geometric/geometric_field.hpp"
@@ -26,9 +27,7 @@ using metrology::error_motion_count;
 using metrology::is_rotation;
 using report::si;
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-struct Options {
+struct CalibrateComponentsOptions {
   std::filesystem::path machine;
   std::filesystem::path readings;
   std::filesystem::path out;
@@ -119,7 +118,7 @@ void drop_unused_states(ComponentsResult& result) {
 
 /// Figures of a motion's targets by ISO 230-2. Of a straightness only what no alignment of the straightedge changes.
 std::optional<PositioningTest> test_of_motion(const ComponentsResult& result, int component,
-                                              const Options& options) {
+                                              const CalibrateComponentsOptions& options) {
   const bool along = metrology::is_positioning(component);
   const bool turns = is_rotation(component);
   const metrology::Iso230Conditions conditions{along ? options.device : 0.0,
@@ -136,7 +135,7 @@ std::optional<PositioningTest> test_of_motion(const ComponentsResult& result, in
 }
 
 /// Figures by ISO 230-1 and -2 of every motion that depends on its position alone.
-void test_motions(ComponentsResult& result, const Options& options) {
+void test_motions(ComponentsResult& result, const CalibrateComponentsOptions& options) {
   result.motions = motion_figures(result.readings, result.fits, result.model, options.environment);
   for (int c = 0; c < error_motion_count; ++c) {
     if (!result.fits[index(c)]) continue;
@@ -186,7 +185,7 @@ nlohmann::json report_of(const ComponentsResult& result) {
   return report;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateComponentsOptions& options) {
   const metrology::Machine machine = machine::load_machine(options.machine);
   ComponentsResult result;
   result.machine_file = options.machine;
@@ -252,7 +251,7 @@ void add_calibrate_components(CLI::App& group) {
       "figure by ISO "
       "230-1.\n"
       "From displacement lines alone: invar calibrate geometric.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateComponentsOptions>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command
       ->add_option("--readings", options->readings,

@@ -22,7 +22,7 @@ namespace {
 
 constexpr double worth_saying = 3e-8;  // m
 
-struct Options {
+struct CalibrateControllerOptions {
   std::filesystem::path model;
   std::filesystem::path out;
   int nodes = 21;
@@ -52,7 +52,7 @@ void make_folder(const std::filesystem::path& folder) {
   if (failed) throw InputError{folder.string(), "cannot be made", "name a folder that may be written to"};
 }
 
-void export_rotary(const Options& options) {
+void export_rotary(const CalibrateControllerOptions& options) {
   const auto axis = compensation::load_rotary(options.model);
   make_folder(options.out);
   const std::string letter(1, axis.letter);
@@ -70,7 +70,7 @@ std::string kind_of(const std::filesystem::path& model) {
   return yaml.root().has("kind") ? yaml.root()["kind"].as_text() : "";
 }
 
-void export_model(const Options& options) {
+void export_model(const CalibrateControllerOptions& options) {
   if (kind_of(options.model) == "rotary") return export_rotary(options);
   const auto model = compensation::load_geometric(options.model);
   make_folder(options.out);
@@ -118,7 +118,7 @@ void add_calibrate_controller(CLI::App& group) {
       "function that no "
       "line shows is left out,\n"
       "never zero. A rotary axis gives its COMP_FILE in degrees.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateControllerOptions>();
   command->add_option("--model", options->model, "compensation.yaml of kind geometric or rotary")->required();
   command->add_option("--out", options->out, "folder to write to")->required();
   command->add_option("--nodes", options->nodes, "nodes an axis of the ISG grid")

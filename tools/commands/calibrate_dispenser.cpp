@@ -2,8 +2,8 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <numbers>
 
+#include "core/base/angle.hpp"
 #include "core/compensation/trajectory_file.hpp"
 #include "core/metrology/droplet/droplet_trajectory.hpp"
 #include "tools/calibration/calibration_result.hpp"
@@ -19,8 +19,6 @@ using metrology::Droplets;
 using metrology::TrajectoryFit;
 using report::number;
 using report::si;
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 Droplets read_droplets(const recording::Table& table) {
   const auto column = [&](const std::string& name, const char* unit, double largest) {

@@ -21,7 +21,7 @@ using metrology::FusionRun;
 using report::number;
 using report::si;
 
-struct Options {
+struct CalibrateFusionOptions {
   std::vector<std::filesystem::path> recordings;
   std::filesystem::path out;
   std::string model = "linear";
@@ -121,7 +121,7 @@ struct Recordings {
   std::vector<FusionRun> runs;
 };
 
-Recordings read_recordings(const Options& options) {
+Recordings read_recordings(const CalibrateFusionOptions& options) {
   Recordings all;
   for (const auto& file : options.recordings) {
     const auto table = recording::Table::read(file, {"run"});
@@ -193,7 +193,7 @@ report::LeftOut rows_of(const Recordings& all, const FusionFit& fit, metrology::
   return rows;
 }
 
-report::Page page_of(const Options& options, const Recordings& all, const FusionFit& fit,
+report::Page page_of(const CalibrateFusionOptions& options, const Recordings& all, const FusionFit& fit,
                      const report::LeftOut& left_out) {
   const bool observer = fit.method == metrology::FusionMethod::observer;
   report::Page page{"Sensor fusion", std::to_string(all.runs.size()) + " runs from " +
@@ -314,7 +314,7 @@ nlohmann::json report_of(const Recordings& all, const FusionFit& fit, const repo
   return report;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateFusionOptions& options) {
   const Recordings all = read_recordings(options);
   metrology::FusionOptions how;
   how.polynomial = options.model == "polynomial";
@@ -359,7 +359,7 @@ void calibrate(const Options& options) {
 void add_calibrate_fusion(CLI::App& group) {
   auto* command = group.add_subcommand("fusion", "One position from several position and velocity sensors");
   command->footer("Example: invar calibrate fusion --recording quiet.csv --recording noisy.csv --out result");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateFusionOptions>();
   command
       ->add_option("--recording", options->recordings,
                    "t [s], reference [m], position_<name> [m], velocity_<name> [m/s]; optional run, "

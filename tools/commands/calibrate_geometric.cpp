@@ -26,7 +26,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct CalibrateGeometricOptions {
   std::filesystem::path machine;
   std::filesystem::path lines;
   std::filesystem::path out;
@@ -38,7 +38,7 @@ struct Options {
   double environment = -1.0;
 };
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateGeometricOptions& options) {
   if (const std::string axis = rotary_axis(options.machine); !axis.empty())
     return calibrate_rotary({options.machine, options.lines, options.out, axis, options.tolerances,
                              options.device, std::max(options.environment, 0.0)});
@@ -100,7 +100,7 @@ void add_calibrate_geometric(CLI::App& group) {
       "{c: {interval: [0, 360], unit: deg}}. Over a whole turn its model comes round; deviations.csv has "
       "the\n"
       "means by target.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateGeometricOptions>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--lines", options->lines, "readings of displacement lines, .csv or .csv.gz")
       ->required();

@@ -14,7 +14,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct CalibrateHistoryOptions {
   std::filesystem::path folder;
   std::filesystem::path out;
   double accuracy = 0.0;  // 0: none is wanted
@@ -22,8 +22,9 @@ struct Options {
 };
 
 /// One kind's history; a calibration that cannot be compared takes the kind to those left out.
-void add_kind(const std::string& kind, std::vector<Calibration> calibrations, const Options& options,
-              std::vector<KindHistory>& kinds, report::LeftOut& left_out) {
+void add_kind(const std::string& kind, std::vector<Calibration> calibrations,
+              const CalibrateHistoryOptions& options, std::vector<KindHistory>& kinds,
+              report::LeftOut& left_out) {
   KindHistory history{kind, std::move(calibrations), {}, std::nullopt, {}};
   if (options.accuracy > 0.0) history.accuracy = options.accuracy;
   try {
@@ -40,7 +41,7 @@ void add_kind(const std::string& kind, std::vector<Calibration> calibrations, co
   kinds.push_back(std::move(history));
 }
 
-void print(const std::vector<KindHistory>& kinds, const report::LeftOut& left_out) {
+void print_history(const std::vector<KindHistory>& kinds, const report::LeftOut& left_out) {
   for (const auto& kind : kinds) {
     std::cout << kind.kind << ": " << kind.calibrations.size() << " calibrations, "
               << time_text(kind.calibrations.front().time) << " to "
@@ -68,7 +69,7 @@ void print(const std::vector<KindHistory>& kinds, const report::LeftOut& left_ou
   for (const auto& row : left_out.rows) std::cout << "left out: " << row[0] << ": " << row[1] << '\n';
 }
 
-void history(const Options& options) {
+void history(const CalibrateHistoryOptions& options) {
   const FoundCalibrations found = find_calibrations(options.folder);
   report::LeftOut left_out;
   left_out.row = "calibration";
@@ -100,7 +101,7 @@ void history(const Options& options) {
     std::cout << json.dump(1) << '\n';
     return;
   }
-  print(kinds, left_out);
+  print_history(kinds, left_out);
   if (!options.out.empty())
     std::cout << "wrote " << (options.out / "report.json").string() << ", "
               << (options.out / "report.html").string() << '\n';
@@ -122,7 +123,7 @@ void add_calibrate_history(CLI::App& group) {
       "reach the "
       "accuracy\n"
       "(two sigma, RMS over the places). Exit status: 0; 2 there is nothing to compare.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateHistoryOptions>();
   command->add_option("folder", options->folder, "folder of calibrations")->required();
   command
       ->add_option("--accuracy", options->accuracy,

@@ -31,7 +31,7 @@ namespace {
 
 using metrology::PlannedLine;
 
-struct Options {
+struct CalibratePlanOptions {
   std::filesystem::path machine;
   std::filesystem::path pilot;
   std::filesystem::path output;
@@ -77,7 +77,8 @@ void write_table(const PlanChoice& choice, const std::filesystem::path& file) {
 }
 
 /// What the component `calibration` of a cell takes as one of its `jobs`; a cycle is a pass forth and back.
-void write_job(const PlanChoice& choice, const metrology::Machine& machine, const Options& options) {
+void write_job(const PlanChoice& choice, const metrology::Machine& machine,
+               const CalibratePlanOptions& options) {
   const auto place = [&](const Eigen::Vector3d& at) {
     std::string text;
     for (int k = 0; k < 3; ++k)
@@ -100,7 +101,7 @@ void write_job(const PlanChoice& choice, const metrology::Machine& machine, cons
 }
 
 /// Machine, and what is known or assumed of it.
-MeasuringPlan begin(const Options& options) {
+MeasuringPlan begin(const CalibratePlanOptions& options) {
   MeasuringPlan plan;
   plan.machine_file = options.machine;
   plan.pilot = options.pilot;
@@ -192,7 +193,7 @@ void print_best(const PlanChoice& best) {
     std::cout << "left open: " << open.words() << '\n';
 }
 
-void propose(const Options& options) {
+void propose(const CalibratePlanOptions& options) {
   MeasuringPlan plan = begin(options);
   weigh(plan, options.search);
   print_choices(plan);
@@ -227,7 +228,7 @@ void add_calibrate_plan(CLI::App& group) {
       "machine.yaml: see invar calibrate geometric --help. Exit status: 0; 1 the accuracy is out of reach; 2 "
       "a file is "
       "unusable.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibratePlanOptions>();
   command->add_option("--machine", options->machine, "machine.yaml: chain, travel, tool")->required();
   command->add_option("--accuracy", options->accuracy, "wanted RMS length of the remaining error vector [m]")
       ->required()

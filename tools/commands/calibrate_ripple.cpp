@@ -24,14 +24,15 @@ namespace {
 using report::number;
 using report::si;
 
-struct Options {
+struct CalibrateRippleOptions {
   std::filesystem::path model;
   std::filesystem::path recording;
   std::filesystem::path out;
 };
 
 /// `given` gets the number of rows of the recording.
-physics::RippleSamples read_runs(const Options& options, const physics::Model& model, std::size_t& given) {
+physics::RippleSamples read_runs(const CalibrateRippleOptions& options, const physics::Model& model,
+                                 std::size_t& given) {
   if (model.plant != physics::Plant::axis)
     throw InputError{options.model.string(), "is no model of an axis", "write plant: axis"};
   for (const auto& term : model.terms)
@@ -126,7 +127,7 @@ report::Plot force_plot(const physics::Model& model, const physics::RippleSample
   return plot;
 }
 
-report::Page page_of(const Options& options, const physics::Model& model,
+report::Page page_of(const CalibrateRippleOptions& options, const physics::Model& model,
                      const physics::RippleSamples& samples, const physics::RippleFit& fit,
                      const report::LeftOut& left_out) {
   const Units units{model};
@@ -193,8 +194,8 @@ nlohmann::json report_of(const physics::RippleSamples& samples, const physics::R
   return report;
 }
 
-void print(const physics::RippleSamples& samples, const physics::RippleFit& fit, const Units& units,
-           const report::LeftOut& left_out) {
+void print_ripple(const physics::RippleSamples& samples, const physics::RippleFit& fit, const Units& units,
+                  const report::LeftOut& left_out) {
   std::cout << "force ripple from " << samples.run.back() + 1 << " runs at constant velocity\n"
             << line_of(left_out) << '\n';
   if (fit.families.empty()) std::cout << "not identified: no ripple stands out of the noise\n";
@@ -211,7 +212,7 @@ void print(const physics::RippleSamples& samples, const physics::RippleFit& fit,
   for (const auto& what : left_out.unexplained) std::cout << "not explained: " << what << '\n';
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateRippleOptions& options) {
   const auto yaml = config::Yaml::load(options.model);
   auto model = model::read(yaml);
   yaml.finish();
@@ -227,7 +228,7 @@ void calibrate(const Options& options) {
   for (const auto& term : physics::ripple_terms(fit)) model.terms.push_back(term);
   write_calibration(options.out, "patched.yaml", model::patched(yaml, model),
                     report_of(samples, fit, units, left_out), page);
-  print(samples, fit, units, left_out);
+  print_ripple(samples, fit, units, left_out);
   std::cout << written(options.out, "patched.yaml") << '\n';
 }
 
@@ -238,7 +239,7 @@ void add_calibrate_ripple(CLI::App& group) {
   command->footer(
       "Example: invar calibrate ripple --model model.yaml --recording runs.csv --out result\n"
       "The stage feeds the ripple forward with `model: result/patched.yaml`.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateRippleOptions>();
   command->add_option("--model", options->model, "model.yaml of plant axis, without ripple")->required();
   command
       ->add_option("--recording", options->recording,

@@ -103,14 +103,14 @@ ThermalReadings read_readings(const recording::Table& table) {
   return readings;
 }
 
-struct Options {
+struct CalibrateThermalOptions {
   std::filesystem::path recording;
   std::filesystem::path out;
   std::string axis;
   std::filesystem::path above;
 };
 
-compensation::ThermalPlace place_of(const Options& options) {
+compensation::ThermalPlace place_of(const CalibrateThermalOptions& options) {
   compensation::ThermalPlace place;
   if (!options.axis.empty()) place.axis = metrology::axis_named(options.axis);
   if (options.above.empty()) return place;
@@ -122,7 +122,7 @@ compensation::ThermalPlace place_of(const Options& options) {
   return place;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateThermalOptions& options) {
   const std::filesystem::path& file = options.recording;
   const std::filesystem::path& folder = options.out;
   const compensation::ThermalPlace place = place_of(options);
@@ -189,7 +189,7 @@ void add_calibrate_thermal(CLI::App& group) {
       "first 60\n"
       "min and over the recording. Without gnuplot the report is written all the same; a sentence stands for "
       "each plot.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateThermalOptions>();
   command
       ->add_option("--recording", options->recording,
                    "x [m], temperature [degC], error [m]; optional heating_rate [K/s], direction, t [s], and "

@@ -22,13 +22,13 @@ using metrology::ThermistorFit;
 using report::number;
 using report::si;
 
-struct Options {
+struct CalibrateThermistorOptions {
   std::filesystem::path readings;
   std::filesystem::path out;
   double base_temperature = 25.0;
 };
 
-ThermistorFit fit_of(const Options& options, const std::vector<double>& temperature,
+ThermistorFit fit_of(const CalibrateThermistorOptions& options, const std::vector<double>& temperature,
                      const std::vector<double>& resistance) {
   const std::string file = options.readings.string();
   expect_finite(options.readings, "temperature", temperature, 1e3);
@@ -101,7 +101,7 @@ report::LeftOut rows_of(const std::vector<double>& temperature, const std::vecto
   return rows;
 }
 
-report::Page page_of(const Options& options, const std::vector<double>& temperature,
+report::Page page_of(const CalibrateThermistorOptions& options, const std::vector<double>& temperature,
                      const std::vector<double>& resistance, const ThermistorFit& fit) {
   report::Page page{"Thermistor", options.readings.filename().string()};
   page.callout(number(fit.thermistor.resistance_at_base, 6) + " ohm at " +
@@ -149,7 +149,7 @@ report::Page page_of(const Options& options, const std::vector<double>& temperat
   return page;
 }
 
-void calibrate(const Options& options) {
+void calibrate(const CalibrateThermistorOptions& options) {
   const auto table = recording::Table::read(options.readings);
   const auto temperature = table.in("temperature", "degC");
   const auto resistance = table.in("resistance", "ohm");
@@ -204,7 +204,7 @@ void calibrate(const Options& options) {
 void add_calibrate_thermistor(CLI::App& group) {
   auto* command = group.add_subcommand("thermistor", "Equation of a thermistor from readings");
   command->footer("Example: invar calibrate thermistor --readings thermistor.csv --out result");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateThermistorOptions>();
   command->add_option("--readings", options->readings, "temperature [degC], resistance [ohm]")->required();
   command->add_option("--base", options->base_temperature, "where the resistance is stated [degC]")
       ->check(CLI::Range(-50.0, 150.0));

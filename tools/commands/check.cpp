@@ -13,7 +13,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct CheckOptions {
   std::filesystem::path file;
   bool json = false;
 };
@@ -23,7 +23,7 @@ std::string counted(std::size_t number, const std::string& one, const std::strin
   return std::to_string(number) + " " + (number == 1 ? one : several);
 }
 
-int check(const Options& options) {
+int check(const CheckOptions& options) {
   std::vector<Fault> faults, notes;
   std::size_t components = 0;
   std::size_t processes = 0;
@@ -60,7 +60,7 @@ void add_check(CLI::App& program) {
   auto* command = program.add_subcommand("check", "Find every fault of a cell file before anything starts");
   command->footer(
       "Example: invar check deployment/xy-table.yaml\nExit status: 0 sound, 2 faults (one a line on stderr)");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CheckOptions>();
   command->add_option("file", options->file, "the cell file")->required();
   command->add_flag("--json", options->json, "print the faults as JSON on stdout");
   command->callback([options] {

@@ -13,13 +13,13 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct DeployCommand {
   DeployOptions deploy;
   std::string service = "systemd";
   bool roll_back = false, show = false, quiet = false;
 };
 
-int deploy(Options& options) {
+int deploy(DeployCommand& options) {
   check_remote_options(options.deploy);
   options.deploy.service = options.service == "systemd";
   const Tell tell = [&](const std::string& line) {
@@ -51,7 +51,7 @@ void add_deploy(CLI::App& program) {
       "may use\n"
       "sudo without a password and write below --prefix.\n"
       "Exit status: 0 done, 1 a PC or the cell failed, 2 the call or the file is wrong");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DeployCommand>();
   command->add_option("file", options->deploy.cell, "the cell file")->required();
   auto* back = command->add_flag("--roll-back", options->roll_back,
                                  "make the release before current again, on all PCs");

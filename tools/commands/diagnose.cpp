@@ -37,7 +37,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct DiagnoseOptions {
   std::filesystem::path model;
   std::vector<std::filesystem::path> recordings;
   std::filesystem::path out = "diagnosis";
@@ -92,7 +92,7 @@ class Ending {
 };
 
 /// What a fit has seen proves nothing of it.
-void check_are_others(const Options& options) {
+void check_are_others(const DiagnoseOptions& options) {
   for (const auto& check : options.checks)
     for (const auto& recording : options.recordings) {
       std::error_code unknown;  // a file that is not there is said when it is read
@@ -112,7 +112,7 @@ void keep_memory() {
 }
 
 /// The summary; on a terminal the lines that warn are red.
-void print(const std::string& summary) {
+void print_summary(const std::string& summary) {
   const bool is_seen = isatty(STDOUT_FILENO) == 1;
   std::istringstream lines{summary};
   for (std::string line; std::getline(lines, line);) {
@@ -124,7 +124,7 @@ void print(const std::string& summary) {
   }
 }
 
-int run(const Options& options) {
+int run(const DiagnoseOptions& options) {
   const auto began = Clock::now();
   keep_memory();
   if (!(options.budget > 0.0) || !std::isfinite(options.budget))
@@ -181,7 +181,7 @@ int run(const Options& options) {
   if (options.json)
     std::cout << json << '\n';
   else
-    print(diagnosis::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
+    print_summary(diagnosis::summary(data, diagnosis) + "  " + (options.out / "report.html").string() + "\n");
   return diagnosis.is_partial && diagnosis.budget == 0.0 ? 130 : 0;
 }
 
@@ -204,7 +204,7 @@ void add_diagnose(CLI::App& program) {
       "Exit status: 0 a report was written, 2 unusable input, 130 stopped by Ctrl-C. The report then holds "
       "what "
       "was known by then and says so (none where nothing can be said ten seconds later)");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DiagnoseOptions>();
   command
       ->add_option_function<std::string>(
           "--example",

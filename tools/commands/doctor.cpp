@@ -18,12 +18,12 @@ std::string word(Finding::Level level) {
   return level == Finding::Level::good ? "good" : level == Finding::Level::note ? "note" : "BAD";
 }
 
-struct Options {
+struct DoctorOptions {
   std::filesystem::path cell;
   bool json = false;
 };
 
-int doctor(const Options& options) {
+int doctor(const DoctorOptions& options) {
   auto findings = check_host();
   if (!options.cell.empty())
     for (Finding& finding : check_network(*read_structure(options.cell)))
@@ -60,7 +60,7 @@ void add_doctor(CLI::App& program) {
       "whether "
       "discovery passes, and room in /dev/shm.\n"
       "Looks only; changes nothing. Exit status: 0 nothing is bad (notes may be); 1 something is");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<DoctorOptions>();
   command->add_option("CELL", options->cell, "a cell file, whose network is looked at too");
   command->add_flag("--json", options->json, "print it as JSON");
   command->callback([options] {

@@ -19,8 +19,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command)
+struct EchoOptions {
+  explicit EchoOptions(CLI::App& command)
       : call{command, {{"TOPIC", "a topic's full name, or component.port"}}} {}
   CellCall call;
   std::size_t count = 0;
@@ -56,13 +56,13 @@ class Queue {
 };
 
 /// One field a line, indented by depth, with its unit.
-void print(const recording::Value& value, const std::string& name, const std::string& unit, int depth) {
+void print_value(const recording::Value& value, const std::string& name, const std::string& unit, int depth) {
   const std::string lead(static_cast<std::size_t>(depth) * 2, ' ');
   if (value.type->kind == recording::Kind::structure) {
     std::cout << lead << name << ":\n";
     const auto& members = std::get<std::vector<recording::Value>>(value.content);
     for (std::size_t i = 0; i < members.size(); ++i)
-      print(members[i], value.type->members[i].name, value.type->members[i].unit, depth + 1);
+      print_value(members[i], value.type->members[i].name, value.type->members[i].unit, depth + 1);
     return;
   }
   print_wrapped(lead + name + ": " + recording::to_json_line(recording::to_json(value)) +
@@ -99,11 +99,11 @@ void show(const dds::Endpoint& writer, const nlohmann::ordered_json& units, cons
   std::cout << "sample " << sample.sequence << ", sent at " << sample.sent_ns << " ns\n";
   const auto& members = std::get<std::vector<recording::Value>>(value.content);
   for (std::size_t i = 0; i < members.size(); ++i)
-    print(members[i], value.type->members[i].name, value.type->members[i].unit, 1);
+    print_value(members[i], value.type->members[i].name, value.type->members[i].unit, 1);
   std::cout << std::flush;
 }
 
-int echo(Options& options) {
+int echo(EchoOptions& options) {
   options.call.resolve();
   (void)interrupted();
   LiveCell cell{options.call};
@@ -155,7 +155,7 @@ void add_echo(CLI::App& program) {
       "Ctrl-C ends it. Exit status: 0; 1 nobody writes the topic, or a sample cannot be read; 2 a fault of "
       "the "
       "call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<EchoOptions>(*command);
   command->add_option("--count", options->count, "end after so many samples");
   command->add_flag("--json", options->json, "one JSON object a sample");
   command->callback([options] {

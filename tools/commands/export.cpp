@@ -10,7 +10,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct ExportCommand {
   std::filesystem::path recording, out;
   std::vector<std::string> topics;
   std::optional<double> from, to;
@@ -18,7 +18,7 @@ struct Options {
   bool json = false;
 };
 
-int export_(const Options& options) {
+int export_(const ExportCommand& options) {
   const auto recording = recording::Recording::open(options.recording);
   recording::ExportOptions how;
   how.json = options.json;
@@ -62,7 +62,7 @@ void add_export(CLI::App& program) {
       "the time of arrival at the recorder; --from and --to go by it. Both are in s since the recording's "
       "first message.\n"
       "Exit status: 0 every message was written, 1 some could not be read, 2 a fault of the call");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportCommand>();
   command->add_option("recording", options->recording, "the recording (.mcap)")->required();
   command->add_option("--out", options->out, "folder for the tables; made where missing")->required();
   command->add_option("--topic", options->topics,

@@ -16,15 +16,15 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command)
+struct HzOptions {
+  explicit HzOptions(CLI::App& command)
       : call{command, {{"TOPIC", "a topic's full name, or component.port"}}} {}
   CellCall call;
   double duration = 0.0, interval = 2.0;
   bool json = false;
 };
 
-void print(LiveCell& cell, const TopicWatch& watch, const std::string& topic, bool json) {
+void print_flow(LiveCell& cell, const TopicWatch& watch, const std::string& topic, bool json) {
   const auto flows = watch.flows();
   const auto found = flows.find(topic);
   if (found == flows.end()) return;
@@ -44,7 +44,7 @@ void print(LiveCell& cell, const TopicWatch& watch, const std::string& topic, bo
   table.print(std::cout);
 }
 
-int hz(Options& options) {
+int hz(HzOptions& options) {
   using Clock = std::chrono::steady_clock;
   options.call.resolve();
   (void)interrupted();
@@ -71,8 +71,8 @@ int hz(Options& options) {
   while (sleep_for(
              Duration::seconds(options.duration > 0.0 ? options.duration - elapsed() : options.interval)) &&
          options.duration <= 0.0)
-    print(cell, watch, topic, options.json);
-  if (options.duration > 0.0 || interrupted()) print(cell, watch, topic, options.json);
+    print_flow(cell, watch, topic, options.json);
+  if (options.duration > 0.0 || interrupted()) print_flow(cell, watch, topic, options.json);
   const auto flows = watch.flows();
   const auto found = flows.find(topic);
   return found != flows.end() && !found->second.empty() ? 0 : 1;
@@ -88,7 +88,7 @@ void add_hz(CLI::App& program) {
       "sum, "
       "as in `invar top`;\nmissing samples are gaps in its numbers.\n"
       "Ctrl-C ends it. Exit status: 0; 1 nothing came; 2 a fault of the call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<HzOptions>(*command);
   command
       ->add_option("--duration", options->duration,
                    "end after this time [s]; otherwise every `--interval` until Ctrl-C")

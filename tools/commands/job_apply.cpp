@@ -27,8 +27,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
-  Options(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
+struct JobApplyOptions {
+  JobApplyOptions(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
   CellCall call;
   std::filesystem::path model;
   bool rollback = false;
@@ -216,8 +216,8 @@ std::string state_text(compensation::ModelState state) {
   return index < words.size() ? words[index] : "?";
 }
 
-nlohmann::ordered_json json_of(const std::string& component, const compensation::ModelStatus& answer,
-                               const std::filesystem::path& file) {
+nlohmann::ordered_json apply_json(const std::string& component, const compensation::ModelStatus& answer,
+                                  const std::filesystem::path& file) {
   return {{"component", component},
           {"state", state_text(answer.state())},
           {"model", file.string()},
@@ -225,7 +225,7 @@ nlohmann::ordered_json json_of(const std::string& component, const compensation:
           {"time_ns", answer.at().time_ns()}};
 }
 
-int apply(Options& options) {
+int apply(JobApplyOptions& options) {
   options.call.resolve();
   std::filesystem::path file;
   Addressee of;
@@ -263,7 +263,7 @@ int apply(Options& options) {
   }
   const auto say = [&](const compensation::ModelStatus& answer, const std::string& text) {
     if (options.json)
-      std::cout << json_of(component, answer, file).dump(2) << '\n';
+      std::cout << apply_json(component, answer, file).dump(2) << '\n';
     else
       std::cout << component << ": " << text << '\n';
   };
@@ -308,8 +308,8 @@ void add_job_apply(CLI::App& job) {
       "`state`, a\n"
       "compensation starts next time with what it was given here, also with none.\n"
       "Exit status: 0 done; 1 refused or no answer; 2 a fault of the call or a file");
-  auto options =
-      std::make_shared<Options>(*command, std::vector<Word>{{"COMPONENT", "that takes it, such as stage_x"}});
+  auto options = std::make_shared<JobApplyOptions>(
+      *command, std::vector<Word>{{"COMPONENT", "that takes it, such as stage_x"}});
   auto* model =
       command->add_option("--model", options->model,
                           "model.yaml as `invar diagnose` writes it, or a calibration's compensation.yaml");

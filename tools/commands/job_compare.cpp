@@ -17,7 +17,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct JobCompareOptions {
   std::filesystem::path recording;
   std::filesystem::path machine;
   std::filesystem::path out = "out/compare";
@@ -55,7 +55,7 @@ Difference difference(const physics::Signal& signal, const std::vector<double>& 
   return result;
 }
 
-void compare(const Options& options) {
+void compare(const JobCompareOptions& options) {
   const auto model = model::load(options.machine);
   const auto table = model::read_recording(options.recording, model).front();
   const auto recorded = model::to_record(table, model, true);
@@ -137,7 +137,7 @@ void add_job_compare(CLI::App& job) {
       job.add_subcommand("compare", "Run a recorded reference through servo and plant, beside the recording");
   command->footer(
       "Example: invar job compare --recording recording.csv.gz --machine model.yaml --out out/compare");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<JobCompareOptions>();
   command->add_option("--recording", options->recording, "recording of the machine, .csv, .csv.gz or .mcap")
       ->required();
   command->add_option("--machine", options->machine, "model.yaml: parameters and controller of the machine")

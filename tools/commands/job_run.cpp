@@ -24,8 +24,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
-  Options(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
+struct JobRunOptions {
+  JobRunOptions(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
   CellCall call;
   std::string component;
   std::string arguments;
@@ -49,7 +49,7 @@ std::string phase_text(job::JobPhase phase) {
   return "?";
 }
 
-nlohmann::ordered_json json_of(const std::string& component, const job::JobStatus& status) {
+nlohmann::ordered_json job_json(const std::string& component, const job::JobStatus& status) {
   return {{"component", component},
           {"id", status.id()},
           {"job", status.name().c_str()},
@@ -170,7 +170,7 @@ class Jobs {
 };
 
 /// The component that runs the job: by the cell file, by --component, or the only one there is.
-std::string component_of(LiveCell& cell, Jobs& jobs, const Options& options, const std::string& name) {
+std::string component_of(LiveCell& cell, Jobs& jobs, const JobRunOptions& options, const std::string& name) {
   if (!options.component.empty()) return options.component;
   if (cell.file() != nullptr) {
     const auto& known = cell.file()->jobs;
@@ -194,9 +194,9 @@ std::string component_of(LiveCell& cell, Jobs& jobs, const Options& options, con
 }
 
 /// Exit status of a job that ended.
-int report(const Options& options, const std::string& component, const job::JobStatus& status) {
+int report(const JobRunOptions& options, const std::string& component, const job::JobStatus& status) {
   if (options.json)
-    std::cout << json_of(component, status).dump(2) << '\n';
+    std::cout << job_json(component, status).dump(2) << '\n';
   else
     std::cout << status.name().c_str() << ": " << phase_text(status.phase())
               << (status.phase() == job::JOB_DONE ? "" : std::string{": "} + status.text().c_str())
@@ -207,7 +207,7 @@ int report(const Options& options, const std::string& component, const job::JobS
   return status.phase() == job::JOB_DONE ? 0 : 1;
 }
 
-int follow(const Options& options, Jobs& jobs, const std::string& component, const std::string& name,
+int follow(const JobRunOptions& options, Jobs& jobs, const std::string& component, const std::string& name,
            std::uint64_t id) {
   JobProgress progress;
   bool cancelling = false, taken = false;
@@ -258,7 +258,7 @@ int follow(const Options& options, Jobs& jobs, const std::string& component, con
   }
 }
 
-int run(Options& options) {
+int run(JobRunOptions& options) {
   options.call.resolve();
   (void)interrupted();
   LiveCell cell{options.call};
@@ -287,7 +287,7 @@ int run(Options& options) {
   return 0;
 }
 
-int list(Options& options) {
+int list(JobRunOptions& options) {
   options.call.resolve();
   LiveCell cell{options.call};
   Jobs jobs{cell};
@@ -303,7 +303,7 @@ int list(Options& options) {
     const auto status = jobs.status(component);
     const bool is_last = status && job == status->name().c_str();
     if (options.json) {
-      json.push_back(is_last ? json_of(component, *status)
+      json.push_back(is_last ? job_json(component, *status)
                              : nlohmann::ordered_json{{"component", component},
                                                       {"job", job},
                                                       {"phase", status ? "idle" : "no answer"}});
@@ -328,7 +328,7 @@ int list(Options& options) {
   return 0;
 }
 
-int cancel(Options& options) {
+int cancel(JobRunOptions& options) {
   options.call.resolve();
   LiveCell cell{options.call};
   Jobs jobs{cell};
@@ -350,7 +350,7 @@ int cancel(Options& options) {
       if (!sleep_for(Duration::milliseconds(20))) break;
     const auto after = jobs.status(component);
     if (options.json)
-      std::cout << json_of(component, *after).dump(2) << '\n';
+      std::cout << job_json(component, *after).dump(2) << '\n';
     else
       std::cout << after->name().c_str() << ": " << phase_text(after->phase()) << '\n';
     return after->phase() == job::JOB_CANCELLED ? 0 : 1;
@@ -361,11 +361,11 @@ int cancel(Options& options) {
 }
 
 template <class Action>
-std::shared_ptr<Options> add(CLI::App& group, const std::string& name, const std::string& about,
-                             std::vector<Word> words, const std::string& footer, Action action) {
+std::shared_ptr<JobRunOptions> add(CLI::App& group, const std::string& name, const std::string& about,
+                                   std::vector<Word> words, const std::string& footer, Action action) {
   auto* command = group.add_subcommand(name, about);
   command->footer(footer);
-  auto options = std::make_shared<Options>(*command, std::move(words));
+  auto options = std::make_shared<JobRunOptions>(*command, std::move(words));
   command->callback([options, action] {
     if (const int result = action(*options); result != 0) throw CLI::RuntimeError(result);
   });

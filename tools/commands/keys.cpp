@@ -16,13 +16,13 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct KeysOptions {
   std::filesystem::path cell, out;
   KeyOrder order;
   bool json = false;
 };
 
-void print(const std::vector<KeyState>& states) {
+void print_keys(const std::vector<KeyState>& states) {
   TextTable table{{"name", "role", "valid until (UTC)", "certificate"}};
   for (const KeyState& state : states) table.add({state.name, text_of(state.role), state.until, state.state});
   table.print(std::cout);
@@ -38,7 +38,7 @@ nlohmann::ordered_json to_json(const std::vector<KeyState>& states, const std::f
   return json;
 }
 
-void keys(Options& options) {
+void keys(KeysOptions& options) {
   LoadedCell loaded = load_cell(options.cell);
   const auto& security = loaded.cell->security;
   const std::filesystem::path beside = std::filesystem::absolute(options.cell).parent_path() / "keys";
@@ -48,7 +48,7 @@ void keys(Options& options) {
     std::cout << to_json(states, options.order.folder).dump(2) << '\n';
     return;
   }
-  print(states);
+  print_keys(states);
   std::cout << '\n';
   print_wrapped("keys in " + options.order.folder.string() +
                     ": each PC gets `public` and the folders of its own names, never `authority`",
@@ -71,7 +71,7 @@ void add_keys(CLI::App& program) {
       "Authorities and certificates that are there already are kept; what is missing is made.\n"
       "Permissions follow from the cell file and are signed anew: call it after each change of the file.\n"
       "Exit status: 0; 2 a fault of the call, the file or the folder");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<KeysOptions>();
   command->add_option("CELL", options->cell, "the cell file")->required();
   command->add_option("--out", options->out, "folder of the keys, instead of that of the file");
   command->add_option("--days", options->order.days, "how long a new certificate is valid (730)")

@@ -21,7 +21,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct LatencyTestOptions {
   double rate = 1000.0;
   double duration = 10.0;
   int priority = 80;
@@ -37,7 +37,7 @@ struct Measured {
 };
 
 /// On a thread of its own, so that what it is granted ends with it.
-void measure(const Options& options, Measured& measured) {
+void measure(const LatencyTestOptions& options, Measured& measured) {
   RealTimeRequest request;
   request.priority = options.priority;
   if (options.cpu >= 0) request.cpu = options.cpu;
@@ -62,7 +62,7 @@ void measure(const Options& options, Measured& measured) {
   measured.overruns = pacer.overruns();
 }
 
-int latency_test(const Options& options) {
+int latency_test(const LatencyTestOptions& options) {
   (void)interrupted();
   if (options.cpu >= static_cast<int>(std::thread::hardware_concurrency()))
     throw InputError{"--cpu", "this PC has no core " + std::to_string(options.cpu),
@@ -108,7 +108,7 @@ void add_latency_test(CLI::App& program) {
       "A loop that does nothing else: what remains is the system's. Run it under the load that the plant "
       "will have.\n"
       "Exit status: 0 measured, whatever came out; 1 not measured; 2 a fault of the call");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LatencyTestOptions>();
   command->add_option("--rate", options->rate, "rate of the loop [Hz] (1000)")
       ->check(CLI::Range(1.0, 50'000.0));
   command->add_option("--duration", options->duration, "[s] (10)")->check(CLI::Range(0.01, 1e6));

@@ -12,8 +12,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command)
+struct LifecycleOptions {
+  explicit LifecycleOptions(CLI::App& command)
       : call{command,
              {{"COMPONENT", "a component; or `all`, of --process or of the cell"},
               {"TRANSITION",
@@ -56,7 +56,7 @@ std::vector<std::string> processes_of(LiveCell& cell, lifecycle::Transition tran
   return names;
 }
 
-int run(Options& options) {
+int run(LifecycleOptions& options) {
   options.call.resolve();
   const std::string& component = options.call.word(0);
   const auto transition = dds::parse_wire_transition(options.call.word(1));
@@ -116,7 +116,7 @@ void add_lifecycle(CLI::App& program) {
       "Example: invar lifecycle deployment/xy-table.yaml stage_x deactivate\n"
       "         invar lifecycle deployment/xy-table.yaml all stop --process heat\n"
       "Exit status: 0 done; 1 refused or no answer; 2 a fault of the call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<LifecycleOptions>(*command);
   command->add_option("--process", options->process, "the process that is meant, with `all`");
   command->add_flag("--json", options->json, "print the answers as JSON");
   command->callback([options] {

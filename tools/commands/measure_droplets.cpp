@@ -14,7 +14,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct MeasureDropletsOptions {
   std::vector<std::filesystem::path> images;
   std::optional<std::filesystem::path> camera;
   double distance = 0.0;
@@ -27,7 +27,7 @@ struct Rows {
   std::vector<double> x, y, radius, circularity, score, sigma, x_metres, y_metres, diameter;
 };
 
-void measure(const Options& options) {
+void measure(const MeasureDropletsOptions& options) {
   std::optional<vision::CameraModel> camera;
   if (options.camera) camera = vision::read_camera(*options.camera, options.distance);
   // Every image is read before anything is measured: a bad one must not cost the time of the good ones.
@@ -96,7 +96,7 @@ void add_measure(CLI::App& program) {
       "Example: invar measure droplets --image a.png --image b.png --camera result/camera.yaml --output "
       "droplets.csv\n"
       "Best droplets first within each image; status says ok, satellite, cut (by the border) or dust.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MeasureDropletsOptions>();
   command->add_option("--image", options->images, "image of droplets; may be given several times")
       ->required()
       ->type_size(1)

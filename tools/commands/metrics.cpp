@@ -18,8 +18,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command) : call{command, {}} {}
+struct MetricsOptions {
+  explicit MetricsOptions(CLI::App& command) : call{command, {}} {}
   CellCall call;
   std::string listen = "127.0.0.1:9464";
   bool no_topics = false;
@@ -105,7 +105,7 @@ class Watch {
   bool all_topics_;
 };
 
-int metrics(Options& options) {
+int metrics(MetricsOptions& options) {
   options.call.resolve();
   (void)interrupted();
   LiveCell cell{options.call};
@@ -135,7 +135,7 @@ void add_metrics(CLI::App& program) {
       "Rates and losses of topics are counted by reading them, which costs the cell's network that much.\n"
       "The cell need not run yet, and may be restarted meanwhile.\n"
       "Exit status: 0; 1 without a cell file, no cell answers; 2 a fault of the call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<MetricsOptions>(*command);
   command->add_option("--listen", options->listen, "address and port of this PC")->capture_default_str();
   command->add_flag("--no-topics", options->no_topics,
                     "count no topics; of devices and recorders only the state is read");

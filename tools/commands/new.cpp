@@ -23,7 +23,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct NewOptions {
   std::string name;
   std::filesystem::path out;
   int domain = 0;  // none: that of the template
@@ -90,7 +90,7 @@ void expect_name(const std::string& kind, const std::string& name) {
 }
 
 /// Name to text of all files. Throws InputError where two would have one name.
-std::map<std::string, std::string> files_of(const std::string& kind, const Options& options) {
+std::map<std::string, std::string> files_of(const std::string& kind, const NewOptions& options) {
   std::map<std::string, std::string> files;
   for (const TemplateFile& file : template_files()) {
     if (file.kind != kind) continue;
@@ -129,7 +129,7 @@ void write_folder(const std::filesystem::path& folder, const std::map<std::strin
   }
 }
 
-void make(const std::string& kind, const Options& options) {
+void make(const std::string& kind, const NewOptions& options) {
   expect_name(kind, options.name);
   const auto files = files_of(kind, options);
   const std::filesystem::path folder =
@@ -141,7 +141,7 @@ void make(const std::string& kind, const Options& options) {
 
 void add_kind(CLI::App& command, const std::string& kind, const std::string& what) {
   auto* sub = command.add_subcommand(kind, what);
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<NewOptions>();
   sub->add_option("NAME", options->name, "letters, digits and `_`; stands in files and texts")->required();
   sub->add_option("--out", options->out, "the folder to write, which does not exist yet (default: NAME)");
   sub->add_option("--domain", options->domain, "DDS domain of the cell (default: the template's)")

@@ -12,8 +12,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  Options(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
+struct ParamOptions {
+  ParamOptions(CLI::App& command, std::vector<Word> words) : call{command, std::move(words)} {}
   CellCall call;
   bool json = false;
 };
@@ -46,7 +46,7 @@ int show(const std::vector<lifecycle::Parameter>& parameters, bool json) {
 }
 
 /// The parameters of one component, or of every process when `component` is empty.
-int call(Options& options, lifecycle::ParameterAction action) {
+int call(ParamOptions& options, lifecycle::ParameterAction action) {
   options.call.resolve();
   const std::string& component = options.call.word(0);
   const bool lists = action == lifecycle::PARAMETER_LIST;
@@ -105,7 +105,7 @@ void add_action(CLI::App& group, const std::string& name, const std::string& abo
       "Example: " + example +
       "\nExit status: 0 done; 1 refused (the reason says which bounds) or no answer; 2 a fault of the "
       "call or the file");
-  auto options = std::make_shared<Options>(*command, std::move(words));
+  auto options = std::make_shared<ParamOptions>(*command, std::move(words));
   command->add_flag("--json", options->json, "print it as JSON");
   command->callback([options, action] {
     if (const int result = call(*options, action); result != 0) throw CLI::RuntimeError(result);

@@ -22,13 +22,13 @@ const std::map<std::string, Predict>& kinds() {
   return table;
 }
 
-struct Options {
+struct PredictOptions {
   std::filesystem::path model;
   std::filesystem::path inputs;
   std::filesystem::path output;
 };
 
-void predict(const Options& options) {
+void predict(const PredictOptions& options) {
   const auto model = config::Yaml::load(options.model);
   (void)model.root().integer("invar_compensation", 1, 1);
   const std::string kind = model.root().text("kind");
@@ -62,7 +62,7 @@ void add_predict(CLI::App& program) {
       "A model of heating rates, zones or a noise level needs those columns too. An infinite sigma: not "
       "known from the\n"
       "data. Exit status: 0; 2 a file is unusable.");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<PredictOptions>();
   command->add_option("--model", options->model, "compensation.yaml of any kind")->required();
   command->add_option("--inputs", options->inputs, "table of inputs, .csv or .csv.gz")->required();
   command->add_option("--output", options->output, "table to write: one row per input row")->required();

@@ -12,7 +12,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct ProfilesOptions {
   std::filesystem::path file;
   std::string xml;
 };
@@ -132,7 +132,7 @@ void write_omg(const dds::Profiles& profiles, std::ostream& out) {
   out << "  </qos_library>\n</dds>\n";
 }
 
-void print(const dds::Profiles& profiles) {
+void print_profiles(const dds::Profiles& profiles) {
   TextTable table{{"profile", "reliability", "history", "durability", "deadline [ms]>", "lifespan [ms]>",
                    "lease [ms]>", "ownership", "for"}};
   const auto ms = [](Duration time) {
@@ -155,7 +155,7 @@ void add_profiles(CLI::App& program) {
       "Example: invar profiles deployment/profiles.yaml\n"
       "         invar profiles --xml fastdds > invar-profiles.xml\n"
       "Exit status: 0; 2 the file has faults");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ProfilesOptions>();
   command->add_option("file", options->file,
                       "the profiles file; otherwise the profiles that ship with Invar");
   command->add_option("--xml", options->xml, "write XML: `fastdds` (2.x) or `cyclone` (OMG DDS-XML)")
@@ -168,7 +168,7 @@ void add_profiles(CLI::App& program) {
     } else if (options->xml == "cyclone") {
       write_omg(profiles, std::cout);
     } else {
-      print(profiles);
+      print_profiles(profiles);
     }
   });
 }

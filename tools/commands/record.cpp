@@ -25,8 +25,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command) : call{command, {}} {}
+struct RecordOptions {
+  explicit RecordOptions(CLI::App& command) : call{command, {}} {}
   CellCall call;
   std::filesystem::path out;
   std::vector<std::string> topics;
@@ -78,7 +78,7 @@ class Channels {
   std::map<std::pair<std::string, std::string>, std::uint16_t> channels_;
 };
 
-void report(const recording::LossLedger& ledger, const Options& options) {
+void report(const recording::LossLedger& ledger, const RecordOptions& options) {
   const auto total = ledger.total();
   if (options.json) {
     nlohmann::ordered_json json{{"file", options.out.string()},
@@ -120,7 +120,7 @@ void tell_clocks(LiveCell& cell) {
   }
 }
 
-int record(Options& options) {
+int record(RecordOptions& options) {
   options.call.resolve();
   (void)interrupted();
   LiveCell cell{options.call};
@@ -189,7 +189,7 @@ void add_record(CLI::App& program) {
       "full; 2 a fault of "
       "the "
       "call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<RecordOptions>(*command);
   command
       ->add_option("--out", options->out,
                    "the file to write (.mcap); an earlier one is renamed: F-1.mcap, ...")

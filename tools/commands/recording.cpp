@@ -29,7 +29,7 @@ std::string time_text(Instant time) {
   return text.str();
 }
 
-nlohmann::ordered_json json_of(const Recording& recording, const std::filesystem::path& file) {
+nlohmann::ordered_json recording_json(const Recording& recording, const std::filesystem::path& file) {
   const auto& statistics = recording.statistics();
   const auto ledger = recording.ledger().value_or(LossLedger{});
   nlohmann::ordered_json json{{"file", file.string()},
@@ -68,7 +68,7 @@ nlohmann::ordered_json json_of(const Recording& recording, const std::filesystem
   return json;
 }
 
-void print(const nlohmann::ordered_json& json) {
+void print_recording(const nlohmann::ordered_json& json) {
   const double span =
       static_cast<double>(json["end_ns"].get<std::int64_t>() - json["start_ns"].get<std::int64_t>()) * 1e-9;
   std::cout << json["file"].get<std::string>() << ": " << json["messages"] << " messages in " << span
@@ -108,23 +108,23 @@ void print(const nlohmann::ordered_json& json) {
   for (const auto& [name, values] : json["metadata"].items()) std::cout << "metadata    " << name << '\n';
 }
 
-struct Options {
+struct RecordingCommand {
   std::filesystem::path file, out;
   bool json = false;
 };
 
 /// The exit status: 1 where something is damaged.
-int info(const Options& options) {
+int info(const RecordingCommand& options) {
   const auto recording = Recording::open(options.file);
-  const auto json = json_of(recording, options.file);
+  const auto json = recording_json(recording, options.file);
   if (options.json)
     std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   else
-    print(json);
+    print_recording(json);
   return recording.has_all_data() ? 0 : 1;
 }
 
-void recover(const Options& options) {
+void recover(const RecordingCommand& options) {
   const auto recording = Recording::open(options.file);
   auto target = options.out;
   if (target.empty())
@@ -154,7 +154,7 @@ void recover(const Options& options) {
 void add_recording(CLI::App& program) {
   auto* group = program.add_subcommand("recording", "Look into a recording, or recover a cut one");
   group->require_subcommand(1);
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RecordingCommand>();
 
   auto* about = group->add_subcommand("info", "Show channels, counts and the loss ledger");
   about->footer(

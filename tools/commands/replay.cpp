@@ -19,8 +19,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command) : call{command, {{"FILE", "the recording (.mcap)"}}} {}
+struct ReplayOptions {
+  explicit ReplayOptions(CLI::App& command) : call{command, {{"FILE", "the recording (.mcap)"}}} {}
   CellCall call;
   std::vector<std::string> topics;
   double rate = 1.0;
@@ -56,7 +56,7 @@ dds::Profile profile_of(const dds::Profiles& profiles, const recording::mcap::Ch
   return profile;
 }
 
-bool is_wanted(const Options& options, const std::string& topic) {
+bool is_wanted(const ReplayOptions& options, const std::string& topic) {
   return options.topics.empty() ||
          std::any_of(options.topics.begin(), options.topics.end(), [&](const std::string& part) {
            std::string path = part;  // `component.port` stands in the topic as component/port
@@ -74,7 +74,7 @@ std::vector<std::string> written_already(LiveCell& cell, const std::set<std::str
 }
 
 /// The recording through the components of one process in simulated time.
-int replay_into(const Options& options) {
+int replay_into(const ReplayOptions& options) {
   if (options.call.file.empty())
     throw InputError{"--into", "needs the cell file", "name it instead of --domain"};
   const auto report = replay_process(options.call.file, options.process, options.call.word(0), interrupted);
@@ -116,7 +116,7 @@ int replay_into(const Options& options) {
   return status;
 }
 
-int replay(Options& options) {
+int replay(ReplayOptions& options) {
   options.call.resolve();
   if (!options.process.empty()) return replay_into(options);
   (void)interrupted();
@@ -202,7 +202,7 @@ void add_replay(CLI::App& program) {
       "Exit status: 0; 1 a topic is written already, samples were refused, or outputs differ; 2 a fault of "
       "the call or the "
       "file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<ReplayOptions>(*command);
   command
       ->add_option("--topic", options->topics, "only topics that contain this text; may stand several times")
       ->allow_extra_args(false);

@@ -41,7 +41,7 @@ void take_order(int signal) {
   (signal == SIGUSR1 ? orders.rest : signal == SIGUSR2 ? renew : orders.stop) = true;
 }
 
-struct Options {
+struct RunOptions {
   LaunchOptions launch;
   std::string process;
   std::filesystem::path outcome;
@@ -75,7 +75,7 @@ void check_rights(const std::filesystem::path& file, const std::string& process)
 }
 
 /// One process, without a launcher.
-int run_one(const Options& options) {
+int run_one(const RunOptions& options) {
   if (options.stamps_ns != 0) continue_stamps(Duration{options.stamps_ns});
   std::optional<TemporaryFolder> folder;  // for its last words, where only we want them
   std::filesystem::path outcome = options.outcome;
@@ -112,7 +112,7 @@ std::unique_ptr<spdlog::formatter> log_lines() {
   return lines;
 }
 
-int run(Options& options) {
+int run(RunOptions& options) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("run"));  // stdout is the summary's
   spdlog::set_formatter(log_lines());
   options.launch.quiet = options.launch.quiet || options.json;
@@ -166,7 +166,7 @@ void add_run(CLI::App& program) {
       "a\n"
       "process ended by itself, an axis was in fault, a heater latched, a device silent, a model refused, or "
       "a recording cut");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RunOptions>();
   command->add_option("file", options->launch.cell, "the cell file")->required();
   command->add_option("--host", options->launch.host, "only the processes of this host");
   command->add_option("--process", options->process, "only this process, here and now (no children)");

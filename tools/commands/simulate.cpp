@@ -13,7 +13,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct SimulateOptions {
   std::filesystem::path model;
   std::filesystem::path inputs;
   std::filesystem::path output;
@@ -21,7 +21,7 @@ struct Options {
 
 /// Of a model in time each row follows from the one before, and missing inputs are bridged: no number is none ever after.
 void expect_numbers(const physics::Model& model, const physics::Record& inputs,
-                    const physics::Outputs& outputs, const Options& options) {
+                    const physics::Outputs& outputs, const SimulateOptions& options) {
   if (model.plant != physics::Plant::axis && model.plant != physics::Plant::thermal &&
       model.plant != physics::Plant::equations)
     return;
@@ -35,7 +35,7 @@ void expect_numbers(const physics::Model& model, const physics::Record& inputs,
           "look for a division by zero, or begin with values with which the model does not run away"};
 }
 
-void simulate(const Options& options) {
+void simulate(const SimulateOptions& options) {
   expect_other_file("--output", options.output, {options.model, options.inputs});
   const auto model = model::load(options.model);
   const auto table = model::read_recording(options.inputs, model).front();
@@ -54,7 +54,7 @@ void add_simulate(CLI::App& program) {
   auto* command = program.add_subcommand("simulate", "Run a model on the input columns of a recording");
   command->footer(
       "Example: invar simulate --model model.yaml --inputs test_inputs.csv.gz --output simulated.csv");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   command
       ->add_option("--model", options->model,
                    "model.yaml or patched.yaml (invar diagnose --example shows one)")

@@ -15,8 +15,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& app) : call{app, {}}, command{app} {}
+struct StatusOptions {
+  explicit StatusOptions(CLI::App& app) : call{app, {}}, command{app} {}
   CellCall call;
   CLI::App& command;
   bool json = false;
@@ -40,7 +40,7 @@ std::vector<event::Notice> hear_notices(LiveCell& cell) {
   return notices;
 }
 
-int status(Options& options) {
+int status(StatusOptions& options) {
   options.call.resolve();
   LiveCell cell{options.call};
   CellStatus status;
@@ -72,7 +72,7 @@ void add_status(CLI::App& program) {
       "not active; 2 "
       "a "
       "fault of the call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<StatusOptions>(*command);
   command->add_flag("--json", options->json, "print it as JSON");
   command->callback([options] {
     if (const int result = status(*options); result != 0) throw CLI::RuntimeError(result);

@@ -23,8 +23,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command) : call{command, {}} {}
+struct TopOptions {
+  explicit TopOptions(CLI::App& command) : call{command, {}} {}
   CellCall call;
   double interval = 1.0;
   bool once = false;
@@ -61,7 +61,7 @@ void show(const CellStatus& status, const Looks& looks, bool topics, std::ostrea
 
 constexpr std::ptrdiff_t notices_kept = 20;
 
-int top(Options& options) {
+int top(TopOptions& options) {
   options.call.resolve();
   (void)interrupted();
   LiveCell cell{options.call};
@@ -139,7 +139,7 @@ void add_top(CLI::App& program) {
       "sent.\nThey are counted by reading the topics, which costs the cell's network that much.\n"
       "Exit status: 0; 1 no cell answers, or with --once something is not well; 2 a fault of the call or the "
       "file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<TopOptions>(*command);
   command->add_option("--interval", options->interval, "between two looks [s] (1)")
       ->check(CLI::Range(0.05, 3600.0));
   command->add_flag("--once", options->once, "one look, then end");

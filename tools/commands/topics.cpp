@@ -15,8 +15,8 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
-  explicit Options(CLI::App& command) : call{command, {}} {}
+struct TopicsOptions {
+  explicit TopicsOptions(CLI::App& command) : call{command, {}} {}
   CellCall call;
   bool all = false;
   bool json = false;
@@ -62,7 +62,7 @@ std::string counted(std::size_t count, const std::string& what) {
 
 /// Names of topics and types stay whole, so that they can be searched for and copied: a line a topic where `width` has room, else
 /// two.
-void print(const std::map<std::string, Topic>& topics, std::size_t width) {
+void print_topics(const std::map<std::string, Topic>& topics, std::size_t width) {
   TextTable table{{"topic", "type", "writers>", "readers>", "qos of the writer"}};
   std::size_t name_width = 0, type_width = 0;
   for (const auto& [name, topic] : topics) {
@@ -83,7 +83,7 @@ void print(const std::map<std::string, Topic>& topics, std::size_t width) {
   }
 }
 
-int topics(Options& options) {
+int topics(TopicsOptions& options) {
   options.call.resolve();
   LiveCell cell{options.call};
   if (cell.found() && cell.file() != nullptr) cell.wait_for_processes();
@@ -99,7 +99,7 @@ int topics(Options& options) {
     }
     std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
   } else {
-    print(found, is_shown_to_a_person() ? line_width() : std::numeric_limits<std::size_t>::max());
+    print_topics(found, is_shown_to_a_person() ? line_width() : std::numeric_limits<std::size_t>::max());
     for (const auto& [name, topic] : found)
       for (const auto& problem : topic.problems) {
         print_wrapped("no samples flow on " + name + ": " + problem, 2, std::cout);
@@ -120,7 +120,7 @@ void add_topics(CLI::App& program) {
       "Exit status: 0; 1 no topic was found, or a writer and a reader of one topic do not meet; 2 a fault of "
       "the "
       "call or the file");
-  auto options = std::make_shared<Options>(*command);
+  auto options = std::make_shared<TopicsOptions>(*command);
   command->add_flag("--all", options->all, "also the topics by which processes are watched and kept in step");
   command->add_flag("--json", options->json, "print it as JSON, with every writer and reader");
   command->callback([options] {

@@ -21,7 +21,7 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct TypesOptions {
   std::string type;
   std::vector<std::filesystem::path> plugins;
   std::filesystem::path cell;
@@ -124,7 +124,7 @@ nlohmann::ordered_json fields_of(const std::string& data) {
   return fields;
 }
 
-nlohmann::ordered_json json_of(const Type& type) {
+nlohmann::ordered_json type_json(const Type& type) {
   nlohmann::ordered_json json{{"type", type.name},
                               {"description", type.description},
                               {"ports", nlohmann::ordered_json::array()},
@@ -143,14 +143,14 @@ nlohmann::ordered_json json_of(const Type& type) {
     }
   for (const ParameterInfo& info : type.parameters)
     json["parameters"].push_back(json_of(ShownParameter{.component = "",
-                                                        .path = info.path,
-                                                        .type = info.type,
-                                                        .unit = info.unit,
-                                                        .value = "",
-                                                        .otherwise = info.otherwise,
-                                                        .range = info.range,
-                                                        .while_running = info.changeable,
-                                                        .description = info.description}));
+                                                          .path = info.path,
+                                                          .type = info.type,
+                                                          .unit = info.unit,
+                                                          .value = "",
+                                                          .otherwise = info.otherwise,
+                                                          .range = info.range,
+                                                          .while_running = info.changeable,
+                                                          .description = info.description}));
   if (!type.registers.empty()) json["registers"] = nlohmann::ordered_json::array();
   for (const RegisterInfo& info : type.registers)
     json["registers"].push_back({{"name", info.name},
@@ -161,7 +161,7 @@ nlohmann::ordered_json json_of(const Type& type) {
   return json;
 }
 
-void print(const Type& type) {
+void print_type(const Type& type) {
   std::cout << type.name << ": " << type.description << "\n\n";
   TextTable ports{{"port", "direction", "data", "profile", ""}};
   std::vector<std::string> data;
@@ -210,7 +210,7 @@ void print(const Type& type) {
   }
 }
 
-void types(const Options& options) {
+void types(const TypesOptions& options) {
   std::optional<LoadedCell> cell;
   if (!options.cell.empty()) cell = load_cell(options.cell);
   Registry own;
@@ -225,16 +225,16 @@ void types(const Options& options) {
   if (!options.type.empty()) {
     const Type type = look_at(registry, options.type, cell ? &*cell : nullptr);
     if (options.json)
-      std::cout << json_of(type).dump(2) << '\n';
+      std::cout << type_json(type).dump(2) << '\n';
     else
-      print(type);
+      print_type(type);
     return;
   }
   TextTable table{{"type", "ports>", "parameters>", "what"}};
   auto json = nlohmann::ordered_json::array();
   for (const auto& name : registry.names()) {
     const Type type = look_at(registry, name, cell ? &*cell : nullptr);
-    if (options.json) json.push_back(json_of(type));
+    if (options.json) json.push_back(type_json(type));
     table.add({name, type.example != nullptr ? std::to_string(type.example->ports().size()) : "-",
                std::to_string(type.parameters.size()), type.description});
   }
@@ -258,7 +258,7 @@ void add_types(CLI::App& program) {
       "defaults are shown,\n"
       "with --cell those of that cell's first component of the type.\n"
       "Exit status: 0; 2 a fault of the call or the library");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TypesOptions>();
   command->add_option("type", options->type, "all of this one");
   command->add_option("--plugin", options->plugins, "also those of this library; may stand several times")
       ->allow_extra_args(false);

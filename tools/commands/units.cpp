@@ -16,12 +16,12 @@ namespace invar::tools {
 
 namespace {
 
-struct Options {
+struct UnitsOptions {
   std::filesystem::path cell, out, data, program;
   UnitOptions unit;
 };
 
-int units(const Options& options) {
+int units(const UnitsOptions& options) {
   const LoadedCell loaded = load_cell(options.cell);
   const auto absolute = [](const std::filesystem::path& path) {
     return std::filesystem::absolute(path).lexically_normal();
@@ -60,7 +60,7 @@ void add_units(CLI::App& program) {
       "The host that `bridge` of the file names has a second service, for `invar bridge`.\n"
       "`invar deploy` writes and installs the units of all hosts by itself.\n"
       "Exit status: 0 written, 2 the call or the file is wrong");
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<UnitsOptions>();
   command->add_option("file", options->cell, "the cell file, where it lies on that PC")->required();
   command->add_option("--host", options->unit.host, "the host of the file")->required();
   command->add_option("--out", options->out, "folder for the unit; without it, the text is printed");

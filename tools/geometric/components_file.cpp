@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/fault.hpp"
+#include "core/base/index.hpp"
 #include "core/recording/table.hpp"
 #include "tools/calibration/calibration_result.hpp"
 
@@ -22,8 +23,6 @@ namespace {
 
 constexpr double most_translation = 0.1;  // m or rad
 constexpr std::size_t least_places = 4;
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 bool is_state(const std::string& name) {
   return name == "temperature" || name == "heating_rate" || name.starts_with("temperature_");

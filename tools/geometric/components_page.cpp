@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/base/index.hpp"
 #include "tools/geometric/components_file.hpp"
 
 namespace invar::tools {
@@ -13,8 +14,6 @@ using metrology::error_motion_count;
 using metrology::is_rotation;
 using report::number;
 using report::si;
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 const char* unit_of(int component) { return is_rotation(component) ? "rad" : "m"; }
 

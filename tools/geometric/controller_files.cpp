@@ -7,16 +7,16 @@
 #include <sstream>
 #include <vector>
 
+#include "core/base/angle.hpp"
 #include "core/base/fault.hpp"
+#include "core/base/index.hpp"
 
 namespace invar::tools {
 
 namespace {
 
 constexpr int most_points = 256;  // LinuxCNC's table
-constexpr double degree = 3.14159265358979323846 / 180.0;
 
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 char upper(int axis) { return "XYZ"[axis]; }
 
 double rotary_place(const metrology::RotaryAxis& axis, int i) {

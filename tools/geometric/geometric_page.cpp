@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/angle.hpp"
+#include "core/base/index.hpp"
 #include "tools/geometric/geometric_plots.hpp"
 #include "tools/geometric/lines_used.hpp"
 
@@ -14,8 +16,6 @@ using metrology::GeometricModel;
 using report::number;
 using report::Plot;
 using report::Series;
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 void write_machine(report::Page& page, const GeometricResult& result) {
   const auto& machine = result.machine;
@@ -87,7 +87,6 @@ void write_components(report::Page& page, const GeometricResult& result) {
   for (int pair = 0; pair < metrology::squareness_count; ++pair) {
     if (model.squareness_sigma[index(pair)] <= 0.0) continue;
     const double angle = metrology::squareness_angle_from_cosine(pair, model.squareness[index(pair)]);
-    constexpr double arcsec = 4.84813681e-6;
     rows.push_back({std::string{metrology::squareness_iso_name(pair)},
                     std::string{metrology::squareness_thesis_symbol(pair)}, micro(angle, 5),
                     number(angle / arcsec, 5), micro(2.0 * model.squareness_sigma[index(pair)])});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
 #include "core/numerics/decompositions.hpp"
 
 namespace invar::tools {
@@ -14,8 +15,6 @@ namespace {
 using metrology::GeometricModel;
 using report::Plot;
 using report::Series;
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// What the readings say of a component: its fit plus what is left of each reading, over the component's share in it. Only
 /// readings in which it weighs at least half as much as it can.

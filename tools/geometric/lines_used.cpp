@@ -13,7 +13,7 @@ namespace {
 using metrology::CondensedLine;
 using metrology::Reading;
 
-constexpr double used = 0.05;  // weight: below it a reading is an outlier (LineNoise::outliers)
+constexpr double used_weight = 0.05;  // weight: below it a reading is an outlier (LineNoise::outliers)
 
 struct Sums {
   std::vector<double> used, all;
@@ -57,7 +57,7 @@ Eigen::VectorXd apart_of(const metrology::Identification& found, std::size_t l,
     shared(i, levels) = static_cast<double>(i) / static_cast<double>(n) - 0.5;
     shared(i, levels + 1) = r.direction;
     const int point = line.point_of[static_cast<std::size_t>(i)];
-    weight[i] = line.weights[i] >= used && found.point_weights[l][point] > 0.5 ? 1.0 : 0.0;
+    weight[i] = line.weights[i] >= used_weight && found.point_weights[l][point] > 0.5 ? 1.0 : 0.0;
   }
   const Eigen::VectorXd fit =
       numerics::shortest_least_squares((weight.asDiagonal() * shared), weight.cwiseProduct(apart));
@@ -72,7 +72,7 @@ void add_line(const metrology::Identification& found, std::size_t l, const std::
   for (std::size_t i = 0; i < readings.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
     if (!std::isfinite(apart[k])) continue;
-    const bool outlier = line.weights[k] < used;
+    const bool outlier = line.weights[k] < used_weight;
     const bool bad_point = found.point_weights[l][line.point_of[i]] <= 0.5;
     sums.all.push_back(apart[k]);
     sums.outliers += outlier ? 1U : 0U;

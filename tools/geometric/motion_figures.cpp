@@ -8,6 +8,7 @@
 #include <optional>
 #include <ostream>
 
+#include "core/base/index.hpp"
 #include "core/metrology/geometric/iso230_motions.hpp"
 
 namespace invar::tools {
@@ -20,11 +21,9 @@ using metrology::is_rotation;
 using metrology::squareness_count;
 
 constexpr double coverage = 2.0;
-constexpr double cell = 1e-7;        // m, readings nearer than this are of one place
-constexpr Eigen::Index places = 41;  // at which an identified curve is judged
-constexpr double most_left = 0.2;    // of the prior variance: beyond it a motion is open in part
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
+constexpr double place_cell = 1e-7;        // m, readings nearer than this are of one place
+constexpr Eigen::Index curve_places = 41;  // at which an identified curve is judged
+constexpr double most_left = 0.2;          // of the prior variance: beyond it a motion is open in part
 
 /// Values of one motion at ascending places, and what they scatter by: `factor` times independent unit normals.
 struct Curve {
@@ -72,7 +71,7 @@ std::optional<Curve> means_of(const metrology::ErrorMotionReadings& readings,
     const auto row = static_cast<std::size_t>(i);
     if (!fit.kept[row]) continue;
     const std::size_t way = readings.direction.empty() || readings.direction[row] > 0 ? 0 : 1;
-    Place& one = all[std::lround(readings.position[i] / cell)];
+    Place& one = all[std::lround(readings.position[i] / place_cell)];
     one.at = readings.position[i];
     one.sum[way] += readings.value[i];
     one.square[way] += readings.value[i] * readings.value[i];
@@ -116,12 +115,12 @@ Curve identified(const metrology::Identification& found, const metrology::Geomet
   const auto& spline = found.basis.splines[axis];
   const Range travel = found.model.travel[axis];
   Curve curve;
-  curve.position.resize(places);
-  curve.value.resize(places);
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(places, block.size());
-  for (Eigen::Index i = 0; i < places; ++i) {
+  curve.position.resize(curve_places);
+  curve.value.resize(curve_places);
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(curve_places, block.size());
+  for (Eigen::Index i = 0; i < curve_places; ++i) {
     const double at =
-        travel.lower + travel.width() * static_cast<double>(i) / static_cast<double>(places - 1);
+        travel.lower + travel.width() * static_cast<double>(i) / static_cast<double>(curve_places - 1);
     curve.position[i] = at;
     curve.value[i] = found.model.error_motion(block.motion, at);
     const auto w = spline.at(at);

@@ -5,6 +5,8 @@
 #include <map>
 #include <ostream>
 
+#include "core/base/angle.hpp"
+
 namespace invar::tools {
 
 namespace {
@@ -17,8 +19,7 @@ using metrology::TargetReadings;
 using report::number;
 
 constexpr std::size_t most_targets = 500;  // a capture on the fly is no test of targets
-constexpr double cell = 1e-7;              // m or rad, commanded positions nearer than this are one target
-constexpr double arcsec = 4.84813681109536e-6;
+constexpr double target_cell = 1e-7;       // m or rad, commanded positions nearer than this are one target
 
 /// EXX, EYY, EZZ: what the standard is written for.
 bool is_positioning(const PositioningTest& test) {
@@ -39,7 +40,7 @@ double small(const PositioningTest& test, double value) {
   return value / (test.unit == "rad" ? arcsec : 1e-6);
 }
 double place(const PositioningTest& test, double value) {
-  return value * (test.place_unit == "rad" ? 180.0 / 3.14159265358979323846 : 1e3);
+  return value * (test.place_unit == "rad" ? 1.0 / degree : 1e3);
 }
 std::string shown(const PositioningTest& test, double value, int digits = 4) {
   return micro_or_arcsec(value, test.unit, digits);
@@ -138,7 +139,7 @@ std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
   for (const metrology::Reading& reading : line.readings) {
     const double way = beam.direction.dot(reading.position + reading.tool - beam.start - beam.start_tool);
     const double at = axis >= 0 ? reading.position[axis] : way;
-    TargetReadings& one = targets[std::lround(at / cell)];
+    TargetReadings& one = targets[std::lround(at / target_cell)];
     one.position = at;
     (sign * reading.direction > 0.0 ? one.forward : one.backward)
         .push_back(sign * (reading.displacement - way));
@@ -154,7 +155,7 @@ std::optional<PositioningTest> test_of(const metrology::DisplacementLine& line,
 std::vector<TargetReadings> targets_of(const metrology::ErrorMotionReadings& readings) {
   std::map<long, TargetReadings> targets;
   for (Eigen::Index i = 0; i < readings.position.size(); ++i) {
-    TargetReadings& one = targets[std::lround(readings.position[i] / cell)];
+    TargetReadings& one = targets[std::lround(readings.position[i] / target_cell)];
     one.position = readings.position[i];
     const bool forward = readings.direction.empty() || readings.direction[static_cast<std::size_t>(i)] > 0;
     (forward ? one.forward : one.backward).push_back(readings.value[i]);

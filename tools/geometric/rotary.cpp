@@ -1,4 +1,5 @@
 #include "tools/geometric/rotary.hpp"
+#include "core/base/angle.hpp"
 #include "tools/calibration/predict.hpp"
 
 #include <algorithm>
@@ -22,8 +23,6 @@ using metrology::ErrorMotionReadings;
 using metrology::RotaryFit;
 using report::number;
 
-constexpr double degree = 3.14159265358979323846 / 180.0;
-constexpr double arcsec = degree / 3600.0;
 constexpr std::size_t least_places = 4;
 
 std::string arcsec_text(double value, int digits = 3) { return number(value / arcsec, digits) + " arcsec"; }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "core/base/angle.hpp"
 #include "core/base/fault.hpp"
 #include "core/recording/table_form.hpp"
 #include "core/recording/text_lines.hpp"
@@ -13,9 +14,7 @@ namespace invar::tools {
 
 namespace {
 
-constexpr double degree = 3.14159265358979323846 / 180.0;
-constexpr double arcsec = degree / 3600.0;
-constexpr std::size_t most_targets = 100'000;
+constexpr std::size_t most_targets_of_file = 100'000;
 
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(),
@@ -85,7 +84,7 @@ class Reader {
     std::vector<double> numbers;
     if (section_ == "target data" && line.find(':') == std::string::npos) {
       if (!numbers_of(line, numbers)) refuse("a target is no number", "export the file again");
-      if (result_.targets.size() + numbers.size() > most_targets)
+      if (result_.targets.size() + numbers.size() > most_targets_of_file)
         refuse("too many targets", "read lines.csv instead");
       result_.targets.insert(result_.targets.end(), numbers.begin(), numbers.end());
     } else if (section_ == "deviations" && line.find(':') == std::string::npos) {

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/base/angle.hpp"
 #include "core/base/fault.hpp"
 #include "core/base/unit.hpp"
 #include "core/metrology/geometric/error_motions.hpp"
@@ -14,8 +15,6 @@ namespace invar::tools {
 namespace {
 
 using metrology::iso230_names;
-
-constexpr double arcsec = 4.84813681109536e-6;
 
 struct Limit {
   double value = 0.0;

@@ -15,10 +15,10 @@ using report::number;
 using report::si;
 
 constexpr double hour = 3600.0;
-constexpr double cell = 1e-5;       // m, readings nearer than this are of one place
-constexpr double throughout = 0.8;  // of the recording between first and last reading of a place
-constexpr std::size_t enough = 5;   // readings of a place
-constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
+constexpr double distortion_cell = 1e-5;  // m, readings nearer than this are of one place
+constexpr double throughout = 0.8;        // of the recording between first and last reading of a place
+constexpr std::size_t enough = 5;         // readings of a place
+constexpr double not_identified = std::numeric_limits<double>::quiet_NaN();
 
 double range_of(const std::vector<double>& values) {
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
@@ -28,10 +28,10 @@ double range_of(const std::vector<double>& values) {
 /// Values up to an hour after the start; NaN where the recording ends before, or has fewer than three there.
 double range_of_first_hour(const std::vector<double>& time, const std::vector<double>& values,
                            double duration) {
-  if (duration < hour) return not_known;
+  if (duration < hour) return not_identified;
   const auto end = std::upper_bound(time.begin(), time.end(), hour);
   const auto count = end - time.begin();
-  return count < 3 ? not_known : range_of({values.begin(), values.begin() + count});
+  return count < 3 ? not_identified : range_of({values.begin(), values.begin() + count});
 }
 
 /// Linear between readings, held at the ends.
@@ -53,7 +53,7 @@ std::vector<DistortionAtPlace> all_places(const metrology::ThermalReadings& read
   for (Eigen::Index i = 0; i < time.size(); ++i) {
     if (kept(i) <= 0.0) continue;
     const int way = !readings.direction ? 0 : ((*readings.direction)(i) < 0.0 ? -1 : 1);
-    DistortionAtPlace& one = all[{std::lround(readings.x(i) / cell), way}];
+    DistortionAtPlace& one = all[{std::lround(readings.x(i) / distortion_cell), way}];
     one.x = readings.x(i);
     one.direction = way;
     one.time.push_back(time(i) - time(0));
@@ -73,11 +73,11 @@ std::vector<DistortionAtPlace> all_places(const metrology::ThermalReadings& read
 
 /// Of the second place less the first, at the times of the second, in a direction that both have.
 void tell_growth(Distortion& distortion) {
-  distortion.growth = distortion.growth_first_hour = not_known;
+  distortion.growth = distortion.growth_first_hour = not_identified;
   if (distortion.places.empty()) return;
   const DistortionAtPlace& first = distortion.places.front();
   for (const DistortionAtPlace& last : distortion.places) {
-    if (last.x - first.x < cell || last.direction != first.direction) continue;
+    if (last.x - first.x < distortion_cell || last.direction != first.direction) continue;
     std::vector<double> difference;
     for (std::size_t i = 0; i < last.time.size(); ++i)
       difference.push_back(last.error[i] - at_time(first, last.time[i]));
@@ -101,7 +101,7 @@ nlohmann::json value_of(double value) { return std::isnan(value) ? nlohmann::jso
 
 Distortion distortion_of(const metrology::ThermalReadings& readings, const metrology::ThermalFit& fit) {
   Distortion result;
-  result.growth = result.growth_first_hour = not_known;
+  result.growth = result.growth_first_hour = not_identified;
   if (!readings.time || readings.time->size() < 2) return result;
   result.duration = (*readings.time)(readings.time->size() - 1) - (*readings.time)(0);
   if (!(result.duration > 0.0)) return result;
@@ -111,7 +111,7 @@ Distortion distortion_of(const metrology::ThermalReadings& readings, const metro
   if (!result.places.empty()) {
     const double low = result.places.front().x, high = result.places.back().x;
     std::erase_if(result.places, [&](const DistortionAtPlace& one) {
-      return std::abs(one.x - low) > cell && std::abs(one.x - high) > cell;
+      return std::abs(one.x - low) > distortion_cell && std::abs(one.x - high) > distortion_cell;
     });
   }
   tell_growth(result);

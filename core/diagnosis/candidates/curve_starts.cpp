@@ -22,8 +22,6 @@ namespace {
 using physics::Plant;
 using physics::Term;
 
-constexpr auto none = physics::most_parameters;
-
 /// How much force the motor of an axis gives beyond what the model asks for [N]; without controller a hundredth of all.
 double missing_force(const Case& data, const Fit& fitted) {
   const auto simulated = simulate(data, fitted.model);
@@ -112,7 +110,7 @@ std::optional<Start> curve_start(const Case& data, const Fit& fitted, const Choi
     start.term.curve.knots.push_back(beside_rest ? (away < 0.0 ? low : high) * away * away
                                                  : low + share * (high - low));
     start.term.curve.values.push_back(0.0);
-    start.directions.push_back({none, k, false});
+    start.directions.push_back({physics::no_parameter, k, false});
   }
   // A loop follows what its encoder reads wrong: a slow course hardly shows, and could be of any size.
   if (data.model.plant == Plant::axis && start.term.info->site == "measurement")

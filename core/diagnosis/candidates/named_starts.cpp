@@ -21,8 +21,6 @@ using physics::Role;
 using physics::Term;
 using physics::TermInfo;
 
-constexpr auto none = physics::most_parameters;
-
 bool has(const Case& data, std::string_view name) {
   return data.recordings.front().inputs.find(name) != nullptr;
 }
@@ -125,7 +123,8 @@ void take_to_size(const Case& data, const physics::Model& model, std::vector<Sta
         auto& value = start.term.values[i];
         const double as_written = value;
         if (info.parameters[i].unit == "N") value = std::min(value, force);
-        if (const auto shape = info.index_of(info.in_proportion.parameter); shape != none && i == 0)
+        if (const auto shape = info.index_of(info.in_proportion.parameter);
+            shape != physics::no_parameter && i == 0)
           start.term.values[shape] *= value / as_written;
         if (info.parameters[i].unit == "A") value = std::min(value, current);
       }
@@ -161,7 +160,7 @@ void add_shapes(Laying& to, const Term& term, const std::vector<double>& shapes)
   const std::size_t first = to.starts.size();
   add_starts(to.starts, term, shapes);
   const auto pitch = term.info->index_of("pitch");
-  if (pitch == none || !physics::is_rotary(to.data.model)) return;
+  if (pitch == physics::no_parameter || !physics::is_rotary(to.data.model)) return;
   const auto bounds = physics::bounds_of_parameter(to.data.model, term, pitch);
   for (std::size_t k = 0; k < shapes.size(); ++k)
     to.starts[first + k].term.values[pitch] = bounds.clamp(shapes[k]);
@@ -185,7 +184,7 @@ void add_with_onsets(Laying& to, Term term, const std::vector<double>& shapes) {
   };
   add();
   const auto onset = term.info->index_of("onset");
-  for (std::size_t r = 1; onset != none && r < to.data.recordings.size(); ++r) {
+  for (std::size_t r = 1; onset != physics::no_parameter && r < to.data.recordings.size(); ++r) {
     give(term, onset, to.data.recordings[r].inputs.time.front());
     add();
   }
@@ -248,7 +247,8 @@ void add_thermal(Laying& to, Term term) {
 
 void add_error_map(Laying& to, Term term) {
   const auto& info = *term.info;
-  if (const auto at = info.index_of("reference_pressure"); at != none && has(to.data, "pressure")) {
+  if (const auto at = info.index_of("reference_pressure");
+      at != physics::no_parameter && has(to.data, "pressure")) {
     // Where it reads right is not known; from the wrong side of it a fit would not find over.
     const auto all = finite_values(to.data, "pressure");
     const auto [low, high] = std::minmax_element(all.begin(), all.end());
@@ -269,7 +269,8 @@ void add_error_map(Laying& to, Term term) {
 }
 
 void add_droplet(Laying& to, Term term) {
-  if (const auto at = term.info->index_of("reference_pressure"); at != none && has(to.data, "pressure"))
+  if (const auto at = term.info->index_of("reference_pressure");
+      at != physics::no_parameter && has(to.data, "pressure"))
     give(term, at, median(finite_values(to.data, "pressure")));
   const double v = to.data.model.value("speed", 3.0);
   const bool carries = term.info->has("speed");

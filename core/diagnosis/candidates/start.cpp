@@ -7,22 +7,18 @@ namespace invar::diagnosis {
 using physics::Role;
 using physics::Term;
 
-namespace {
-
-constexpr auto none = physics::most_parameters;
-
-}  // namespace
+namespace {}  // namespace
 
 void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes) {
   const auto& info = *term.info;
   Start start;
   bool periodic = false, any_amplitude = false;
-  std::size_t shape = none;
+  std::size_t shape = physics::no_parameter;
   for (std::size_t i = 0; i < info.parameter_count(); ++i) {
     const auto& p = info.parameters[i];
     if (p.role == Role::phase) periodic = true;
     if (p.role == Role::amplitude) any_amplitude = true;
-    if (p.role == Role::shape && shape == none) shape = i;
+    if (p.role == Role::shape && shape == physics::no_parameter) shape = i;
     if (p.role != Role::reference || !term.given[i])
       term.values[i] = term.given[i] ? term.values[i] : p.starts[0];
     term.given[i] = true;
@@ -32,15 +28,15 @@ void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>
     start.directions.push_back({i, 0, false});
     if (periodic) start.directions.push_back({i, 0, true});
   }
-  if (!any_amplitude) start.directions.push_back({none, 0, false});
+  if (!any_amplitude) start.directions.push_back({physics::no_parameter, 0, false});
   std::vector<double> values = first_shapes;
-  if (values.empty() && shape != none)
+  if (values.empty() && shape != physics::no_parameter)
     for (double v : info.parameters[shape].starts)
       if (std::isfinite(v)) values.push_back(v);
-  if (shape == none) values = {0.0};
+  if (shape == physics::no_parameter) values = {0.0};
   for (double v : values) {
     start.term = term;
-    if (shape != none) start.term.values[shape] = info.parameters[shape].bounds.clamp(v);
+    if (shape != physics::no_parameter) start.term.values[shape] = info.parameters[shape].bounds.clamp(v);
     starts.push_back(start);
   }
 }
@@ -53,7 +49,7 @@ void lay_memory(Start& start, std::size_t count, double span, double duration) {
     const double share = static_cast<double>(k) / static_cast<double>(count - 1);
     start.term.curve.knots.push_back(low * std::pow(high / low, share));
     start.term.curve.values.push_back(0.0);
-    start.directions.push_back({none, k, false});
+    start.directions.push_back({physics::no_parameter, k, false});
   }
 }
 

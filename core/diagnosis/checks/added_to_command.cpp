@@ -20,7 +20,7 @@ namespace {
 using physics::Term;
 
 /// Cycles one behind the other of all recordings, with what the law asks for and what the current is beyond.
-struct Series {
+struct LawSeries {
   std::vector<double> time, asked, beyond;
   double squares = 0.0;  // of `beyond`
   double noise = 0.0;    // 1 sigma of `beyond`, as neighbours tell
@@ -28,8 +28,8 @@ struct Series {
 
 /// Only rows that the law speaks of. Where its level is open the middle of what it leaves is taken for zero, so that what acts
 /// at times (a limit) leaves the rest at rest.
-Series series_of(const Case& data, const std::vector<LawRows>& law) {
-  Series all;
+LawSeries series_of(const Case& data, const std::vector<LawRows>& law) {
+  LawSeries all;
   for (std::size_t r = 0; r < law.size(); ++r) {
     const double level = law[r].has_open_level ? median(law[r].beyond) : 0.0;
     for (std::size_t i = 0; i < law[r].beyond.size(); ++i)
@@ -45,11 +45,11 @@ Series series_of(const Case& data, const std::vector<LawRows>& law) {
 
 /// The rows in which the law asks for much: at rest readings that the controller did not see look like a dead zone, and like
 /// steps.
-Series asked_much(const Series& all) {
+LawSeries asked_much(const LawSeries& all) {
   double squares = 0.0;
   for (const double u : all.asked) squares += u * u;
   const double least = 0.5 * std::sqrt(squares / static_cast<double>(all.asked.size()));
-  Series much;
+  LawSeries much;
   for (std::size_t i = 0; i < all.asked.size(); ++i)
     if (std::abs(all.asked[i]) > least) {
       much.time.push_back(all.time[i]);
@@ -67,7 +67,7 @@ struct Guess {
 };
 
 /// The squares of what is beyond the law less what a kind makes of the command.
-double left_by(const Series& series, const std::function<double(double)>& becomes) {
+double left_by(const LawSeries& series, const std::function<double(double)>& becomes) {
   double left = 0.0;
   for (std::size_t i = 0; i < series.beyond.size(); ++i) {
     const double e = series.asked[i] + series.beyond[i] - becomes(series.asked[i]);
@@ -117,7 +117,7 @@ Term curve_on_command(std::vector<double> knots, std::vector<double> values, dou
 
 std::string amperes(double value) { return si(value, "A"); }
 
-Guess offset(const Series& series) {
+Guess offset(const LawSeries& series) {
   double sum = 0.0;
   for (const double b : series.beyond) sum += b;
   const double mean = sum / static_cast<double>(series.beyond.size());
@@ -130,7 +130,7 @@ Guess offset(const Series& series) {
 }
 
 /// The command never passes a limit, smaller than the law's own.
-Guess limit(const Series& series) {
+Guess limit(const LawSeries& series) {
   double top = 0.0, most = 0.0;
   for (std::size_t i = 0; i < series.asked.size(); ++i)
     top = std::max(top, std::abs(series.asked[i])),
@@ -147,7 +147,7 @@ Guess limit(const Series& series) {
   return guess;
 }
 
-Guess dead_zone(const Series& series) {
+Guess dead_zone(const LawSeries& series) {
   double top = 0.0;
   for (const double u : series.asked) top = std::max(top, std::abs(u));
   const auto lost = [](double width) {
@@ -165,12 +165,12 @@ Guess dead_zone(const Series& series) {
 }
 
 /// The current comes in steps, about zero as a converter counts; nothing where what is left is finer than any step to tell.
-std::optional<Guess> steps(const Series& series) {
+std::optional<Guess> steps(const LawSeries& series) {
   double top = 0.0;
   for (const double u : series.asked) top = std::max(top, std::abs(u));
   const auto stepped = [](double step) { return [step](double u) { return step * std::round(u / step); }; };
   constexpr std::size_t enough = 1500;  // rows, to find the place
-  Series thin;
+  LawSeries thin;
   for (std::size_t i = 0; i < series.asked.size(); i += 1 + series.asked.size() / enough)
     thin.asked.push_back(series.asked[i]), thin.beyond.push_back(series.beyond[i]);
   // Steps whose count over the range is off by a quarter are lost: so fine a scan, from what noise hides to the range.
@@ -195,7 +195,7 @@ std::optional<Guess> steps(const Series& series) {
 struct Wave {
   double level = 0.0, cosine = 0.0, sine = 0.0, left = 0.0;
 };
-Wave wave_at(const Series& series, double frequency) {
+Wave wave_at(const LawSeries& series, double frequency) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < series.time.size(); ++i) {
@@ -206,7 +206,7 @@ Wave wave_at(const Series& series, double frequency) {
   const Eigen::Vector3d parts = numerics::solve_symmetric(normal, right);
   return {parts(0), parts(1), parts(2), series.squares - parts.dot(right)};
 }
-Wave square_at(const Series& series, double frequency, double phase) {
+Wave square_at(const LawSeries& series, double frequency, double phase) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   for (std::size_t i = 0; i < series.time.size(); ++i) {
@@ -219,14 +219,14 @@ Wave square_at(const Series& series, double frequency, double phase) {
 }
 
 /// Half a cycle of the whole recording to each side.
-std::vector<double> about(double frequency, const Series& series) {
+std::vector<double> about(double frequency, const LawSeries& series) {
   const double lasts = series.time.back() - series.time.front();
   return evenly(frequency - 0.5 / lasts, frequency + 0.5 / lasts, 0.05 / lasts);
 }
 
 enum class Form { sine, square };
 
-Guess from_wave(const Series& series, const Wave& wave, double frequency, double phase, Form form,
+Guess from_wave(const LawSeries& series, const Wave& wave, double frequency, double phase, Form form,
                 bool has_level) {
   const bool is_square = form == Form::square;
   const double half = std::numbers::pi * frequency * (series.time[1] - series.time[0]);
@@ -247,14 +247,14 @@ Guess from_wave(const Series& series, const Wave& wave, double frequency, double
   return guess;
 }
 
-Guess sine(const Series& series, double near, bool has_level) {
+Guess sine(const LawSeries& series, double near, bool has_level) {
   const auto left = [&](double frequency) { return wave_at(series, frequency).left; };
   const double frequency = least_of(about(near, series), left);
   const auto wave = wave_at(series, frequency);
   return from_wave(series, wave, frequency, std::atan2(wave.cosine, wave.sine), Form::sine, has_level);
 }
 
-Guess square(const Series& series, double near, double phase, bool has_level) {
+Guess square(const LawSeries& series, double near, double phase, bool has_level) {
   // Frequency and phase in turn: about the middle of the recording the two do not lean on each other.
   const double middle = 0.5 * (series.time.front() + series.time.back());
   double frequency = near, turn = phase + 2.0 * std::numbers::pi * near * middle;
@@ -275,7 +275,7 @@ Guess square(const Series& series, double near, double phase, bool has_level) {
 }
 
 /// Of the longest recording, whose rows without a word of the law count as its mean.
-std::vector<Guess> waves(const Case& data, const std::vector<LawRows>& law, const Series& series,
+std::vector<Guess> waves(const Case& data, const std::vector<LawRows>& law, const LawSeries& series,
                          bool has_level) {
   std::size_t longest = 0;
   for (std::size_t r = 1; r < law.size(); ++r)
@@ -341,7 +341,7 @@ bool stands_without_noise(const Case& data, const std::vector<LawRows>& law, con
 namespace {
 
 /// All kinds that are seen row by row, what leaves least first.
-std::vector<Guess> guesses_of(const Case& data, const std::vector<LawRows>& law, const Series& series) {
+std::vector<Guess> guesses_of(const Case& data, const std::vector<LawRows>& law, const LawSeries& series) {
   const auto& settings = *data.model.controller;
   const bool has_level =
       settings.kind == physics::AxisControllerSettings::Kind::cascade || !(settings.ki > 0.0);

@@ -1,6 +1,7 @@
 // Case: the model that the user believes and the recordings of the machine, ready to be compared.
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -11,6 +12,8 @@
 #include "core/physics/simulation.hpp"
 
 namespace invar::diagnosis {
+
+inline constexpr double no_reading = std::numeric_limits<double>::quiet_NaN();
 
 struct DataCount {
   std::size_t rows = 0, used = 0, missing = 0, outliers = 0, duplicates = 0, out_of_order = 0, gaps = 0;

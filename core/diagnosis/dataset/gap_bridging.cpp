@@ -3,13 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// The reference at `t` by the cubic through the values and slopes on both sides of the gap before row `i`.
 double across(const physics::Record& inputs, const std::vector<double>& values, std::size_t i, double t) {
@@ -35,7 +32,7 @@ void bridge_gaps(const physics::Model& model, Recording& recording, double step)
     if (gap > longest_bridge * step)  // a pause: the loop starts anew behind it
       for (std::size_t k = i; k < inputs.rows() && inputs.time[k] < inputs.time[i] + until_forgotten * step;
            ++k)
-        for (auto& values : recording.measured) values[k] = nothing;
+        for (auto& values : recording.measured) values[k] = no_reading;
     else if (gap > 2.5 * step)
       for (double t = inputs.time[i - 1] + step; t < inputs.time[i] - 0.5 * step; t += step) {
         whole.time.push_back(t);
@@ -47,7 +44,7 @@ void bridge_gaps(const physics::Model& model, Recording& recording, double step)
   }
   if (whole.time.size() == inputs.rows()) return;
   const auto spread_out = [&](const std::vector<double>& values) {
-    std::vector<double> all(whole.time.size(), nothing);
+    std::vector<double> all(whole.time.size(), no_reading);
     for (std::size_t i = 0; i < place.size(); ++i) all[place[i]] = values[i];
     return all;
   };
@@ -64,7 +61,7 @@ void bridge_gaps(const physics::Model& model, Recording& recording, double step)
     const double noise = spread_of_differences(recording.measured[o]);
     for (std::size_t i = 0; i < place.size(); ++i)
       if (!(0.2 * std::abs(cubic[o][place[i]] - straight[o][i]) < 0.3 * noise))
-        for (auto& values : measured) values[place[i]] = nothing;
+        for (auto& values : measured) values[place[i]] = no_reading;
   }
   recording.inputs = std::move(whole);
   recording.measured = std::move(measured);

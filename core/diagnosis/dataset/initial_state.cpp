@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// Heat is slow: the straight line through the first rows (Theil and Sen's: one slip among them moves it little), at the first
 /// of them, and what of the noise of one row is left in it. Nothing where too few were read.
@@ -59,7 +56,7 @@ std::optional<double> rests_beside(double expected, const std::vector<double>& r
 /// An initial state is a column whose first row alone is filled.
 void give_first(physics::Record& inputs, const std::string& signal, double value) {
   auto& column = inputs.signals[signal];
-  column.assign(inputs.rows(), nothing);
+  column.assign(inputs.rows(), no_reading);
   column.front() = value;
 }
 
@@ -103,11 +100,11 @@ void give_start(Case& data, Recording& recording) {
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto& name = data.outputs[o];
     // The very first value alone: a few rows later the machine may be on its way.
-    double begin = nothing;
+    double begin = no_reading;
     for (std::size_t i = 0; i < std::min<std::size_t>(2, inputs.rows()) && !std::isfinite(begin); ++i)
       begin = recording.measured[o][i];
     double spread = 1.5 * spread_of_differences(recording.measured[o]);
-    double expected = nothing, doubt = 0.0;
+    double expected = no_reading, doubt = 0.0;
     if (data.model.plant == Plant::thermal) {
       const auto* ambient = inputs.find("ambient");
       expected = ambient != nullptr ? ambient->front() : data.model.value("ambient", 20.0);

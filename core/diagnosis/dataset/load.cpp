@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <sstream>
 
@@ -26,8 +25,6 @@ namespace invar::diagnosis {
 
 namespace {
 
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
-
 double median_step(const std::vector<double>& time) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time.size(); ++i) steps.push_back(time[i] - time[i - 1]);
@@ -38,7 +35,7 @@ Case empty_case(const physics::Model& model) {
   Case data;
   data.model = model;
   data.outputs = model.outputs();
-  data.given_noise.assign(data.outputs.size(), nothing);
+  data.given_noise.assign(data.outputs.size(), no_reading);
   data.is_time_series = model.plant != physics::Plant::droplet;
   // Rounding to the resolution is noise to a fit, not a step.
   for (auto& parameter : data.model.parameters)
@@ -65,7 +62,7 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
   give_start(data, recording);
   if (model.plant == physics::Plant::axis) give_start_of_sum(data, recording);
   for (auto& column : recording.measured)
-    std::fill_n(column.begin(), std::min(forget, column.size()), nothing);
+    std::fill_n(column.begin(), std::min(forget, column.size()), no_reading);
   recording.simulation = physics::prepare(model, recording.inputs);
   if (model.plant == physics::Plant::axis && model.controller) bridge_gaps(model, recording, step);
   data.recordings.push_back(std::move(recording));
@@ -75,7 +72,7 @@ void add(Case& data, const physics::Model& model, const std::string& name, physi
 void drop_absurd(physics::Record& record) {
   for (auto& [name, values] : record.signals)
     for (double& v : values)
-      if (!(std::abs(v) < 1e100)) v = nothing;
+      if (!(std::abs(v) < 1e100)) v = no_reading;
 }
 
 /// Throws where there is nothing to compare, or nothing that drives the model.

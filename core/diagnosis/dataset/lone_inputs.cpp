@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
+
+#include "core/diagnosis/dataset/case.hpp"
 
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// Rows far beyond all others; none where that is said of more than a few, or where the others are all the same.
 std::vector<std::size_t> far_beyond(const std::vector<double>& values) {
@@ -73,15 +72,15 @@ std::size_t drop_lone_inputs(const physics::Model& model, physics::Record& recor
       for (std::size_t i = 0; i < values.size(); ++i)
         if (values[i] <= 0.0 && std::find(rows.begin(), rows.end(), i) == rows.end()) rows.push_back(i);
     for (const std::size_t row : rows) {
-      const double kept = std::exchange(values[row], nothing);
+      const double kept = std::exchange(values[row], no_reading);
       if (is_row_by_row) {
-        for (const auto& output : outputs) record.signals.at(output)[row] = nothing;
+        for (const auto& output : outputs) record.signals.at(output)[row] = no_reading;
         ++dropped;
         continue;
       }
       values[row] = kept;
       if (with.empty()) with = squares_of(model, record, outputs);
-      values[row] = nothing;
+      values[row] = no_reading;
       if (auto without = squares_of(model, record, outputs); is_nearer(without, with)) {
         with = std::move(without);
         ++dropped;

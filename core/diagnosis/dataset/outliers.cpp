@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "core/diagnosis/dataset/statistics.hpp"
@@ -11,8 +10,6 @@
 namespace invar::diagnosis {
 
 namespace {
-
-constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 
 /// Each value less the median of its neighbours to this reach.
 std::vector<double> off_median(const std::vector<double>& values, std::size_t reach) {
@@ -212,7 +209,7 @@ void drop(Case& data, std::vector<double>& measured, const std::vector<std::size
           const std::vector<std::size_t>& places) {
   for (const std::size_t i : places) {
     data.count.outliers += std::isfinite(measured[rows[i]]) ? 1U : 0U;
-    measured[rows[i]] = nothing;
+    measured[rows[i]] = no_reading;
   }
 }
 

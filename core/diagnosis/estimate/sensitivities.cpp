@@ -43,15 +43,15 @@ void for_differences_of(const Case& data, const std::vector<Model>& models,
 
 namespace {
 
-/// Rows [first, last) of the residual column of one output.
-struct Rows {
+/// RunRows [first, last) of the residual column of one output.
+struct RunRows {
   Eigen::Index first = 0, last = 0;
 };
 
 /// The rows of all outputs that the start `name` of a window moves: those of its recording from its restart to the next.
-std::vector<Rows> moved_by(const Case& data, const std::string& name) {
+std::vector<RunRows> moved_by(const Case& data, const std::string& name) {
   const std::size_t which = std::stoul(name.substr(name.find(".start") + 6));
-  std::vector<Rows> rows;
+  std::vector<RunRows> rows;
   Eigen::Index at = 0;
   for (const auto& recording : data.recordings) {
     const auto& restarts = recording.inputs.restarts;

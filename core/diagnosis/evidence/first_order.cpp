@@ -46,8 +46,6 @@ Nuisance nuisance(const Case& data, const Weighing& weighing, const Fit& base) {
 
 namespace {
 
-constexpr auto none = physics::most_parameters;
-
 /// The start among `starts` whose curve has every knot of that of `start` and more; none: `start` itself.
 std::size_t finer_than(const std::vector<Start>& starts, std::size_t start) {
   const auto& own = starts[start].term;
@@ -106,7 +104,7 @@ std::pair<Term, double> moved(const Case& data, const Start& start, const Start:
     term.curve.values[direction.knot] = by;
     return {std::move(term), by};
   }
-  if (direction.amplitude >= none) return {std::move(term), 1.0};
+  if (direction.amplitude >= physics::no_parameter) return {std::move(term), 1.0};
   for (std::size_t i = 0; i < term.info->parameter_count(); ++i) {
     if (term.info->parameters[i].role == Role::amplitude && i != direction.amplitude) term.values[i] = 0.0;
     if (term.info->parameters[i].role == Role::phase && direction.quadrature)

@@ -16,8 +16,6 @@ namespace {
 using physics::Role;
 using physics::Term;
 
-constexpr auto none = physics::most_parameters;
-
 /// Does the model do the same by its own numbers? Then a gain is what they have not been led to yet, divided by nearly
 /// nothing.
 bool is_of_own_numbers(const Eigen::MatrixXd& reduced, const Eigen::MatrixXd& whole) {
@@ -50,7 +48,7 @@ void weigh_start(const Case& data, const Weighing& weighing, const Fit& base, co
   s.gain = solve(weighing, base, n, whitened(data, weighing, s.columns), s.strength);
   const auto& info = *s.start.term.info;
   if (s.start.directions.size() == 1 && s.start.term.curve.knots.empty() &&
-      s.start.directions[0].amplitude >= none && s.strength(0) > 1.5) {
+      s.start.directions[0].amplitude >= physics::no_parameter && s.strength(0) > 1.5) {
     // A term without a strength is there once, not eight times: the gain of one.
     const double full = s.strength(0);
     s.gain *= (2.0 * full - 1.0) / (full * full);
@@ -65,14 +63,15 @@ void weigh_start(const Case& data, const Weighing& weighing, const Fit& base, co
   }
   if (s.start.term.curve.knots.empty() && !periodic && s.start.directions.size() == 1) {
     const auto& d = s.start.directions.front();
-    const double lower =
-        d.amplitude < none ? physics::bounds_of_parameter(base.model, s.start.term, d.amplitude).lower : 0.0;
+    const double lower = d.amplitude < physics::no_parameter
+                             ? physics::bounds_of_parameter(base.model, s.start.term, d.amplitude).lower
+                             : 0.0;
     s.impossible = s.strength(0) < 0.0 && lower >= 0.0;
   }
   const double numbers = static_cast<double>(s.start.directions.size() + shapes);
   // More than all there is of something is none of it: the gain of what may be.
   if (s.start.term.curve.knots.empty() && s.start.directions.size() == 1 &&
-      s.start.directions[0].amplitude < none) {
+      s.start.directions[0].amplitude < physics::no_parameter) {
     const double upper =
                      physics::bounds_of_parameter(base.model, s.start.term, s.start.directions[0].amplitude)
                          .upper,
@@ -150,7 +149,8 @@ std::vector<Screened> screen(const Case& data, const Weighing& weighing, const F
 
 std::string why_impossible(const Start& start) {
   const auto& d = start.directions.front();
-  if (d.amplitude >= none) return "the best fit has the opposite of its effect, which is impossible";
+  if (d.amplitude >= physics::no_parameter)
+    return "the best fit has the opposite of its effect, which is impossible";
   std::string name{start.term.info->parameters[d.amplitude].name};
   std::replace(name.begin(), name.end(), '_', ' ');
   return "the best fit needs a negative " + name + ", which is impossible";
@@ -168,11 +168,12 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
         term.curve.values[direction.knot] = value;
         continue;
       }
-      if (direction.amplitude >= none) continue;
+      if (direction.amplitude >= physics::no_parameter) continue;
       auto p = info.parameters[direction.amplitude];
       p.bounds = physics::bounds_of_parameter(model, term, direction.amplitude);
       const auto phase = info.index_of("phase");
-      if (phase < none && d + 1 < s->start.directions.size() && s->start.directions[d + 1].quadrature) {
+      if (phase < physics::no_parameter && d + 1 < s->start.directions.size() &&
+          s->start.directions[d + 1].quadrature) {
         const double cosine = share * s->strength(static_cast<Eigen::Index>(d + 1));
         term.values[direction.amplitude] = p.bounds.clamp(std::hypot(value, cosine));
         term.values[phase] = std::atan2(cosine, value);
@@ -186,7 +187,8 @@ physics::Model with(const Fit& base, const std::vector<const Screened*>& added, 
               ? p.bounds.clamp(std::max(value, std::min(floor, 0.1 * std::abs(value) + 1e-3 * floor)))
               : p.bounds.clamp(value);
       // A store as fast as it was, however large; bristles that bend over the same way.
-      if (const auto shape = info.index_of(info.in_proportion.parameter); shape < none && d == 0) {
+      if (const auto shape = info.index_of(info.in_proportion.parameter);
+          shape < physics::no_parameter && d == 0) {
         const double times = std::min(info.in_proportion.most, term.values[direction.amplitude] /
                                                                    s->start.term.values[direction.amplitude]);
         term.values[shape] = info.parameters[shape].bounds.clamp(times * s->start.term.values[shape]);

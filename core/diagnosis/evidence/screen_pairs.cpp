@@ -16,14 +16,12 @@ using physics::Role;
 
 namespace {
 
-constexpr auto none = physics::most_parameters;
-
 /// A strength that its bounds forbid, or a limit that would hardly be there.
 bool is_impossible(const physics::Model& model, const Start& start, const Eigen::VectorXd& strength,
                    Eigen::Index at) {
   if (start.directions.size() != 1) return false;  // a sine has any phase
   const auto& d = start.directions.front();
-  if (d.amplitude >= none) return strength(at) < 0.2;
+  if (d.amplitude >= physics::no_parameter) return strength(at) < 0.2;
   return strength(at) < 0.0 && physics::bounds_of_parameter(model, start.term, d.amplitude).lower >= 0.0;
 }
 

@@ -168,7 +168,7 @@ std::vector<Eigen::VectorXd> changing_effects(const Case& data, const Fit& fit, 
 namespace {
 
 /// Rows from which on something can be said of their neighbours and their loudness.
-constexpr int enough = 300;
+constexpr int enough_rows = 300;
 
 /// measured - simulated of one output, recording by recording; values off by more than six sigma are brought nearer.
 std::vector<Series> left_of(const Case& data, const std::vector<physics::Outputs>& simulated,
@@ -284,11 +284,12 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
   }
   std::vector<double> shares;
   // A few rows of a slow course go with anything.
-  if (data.is_time_series && common.rows() < enough) return std::vector<double>(data.outputs.size(), 0.0);
+  if (data.is_time_series && common.rows() < enough_rows)
+    return std::vector<double>(data.outputs.size(), 0.0);
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto left = left_of(data, simulated, o);
     if (data.is_time_series &&
-        mean_square(left).rows < enough) {  // a few readings among many rows are no more
+        mean_square(left).rows < enough_rows) {  // a few readings among many rows are no more
       shares.push_back(0.0);
       continue;
     }
@@ -298,7 +299,7 @@ std::vector<double> followed_share(const Case& data, const Fit& fit) {
     double share = beyond_chance([&](double shift) { return share_on(basis, turned(left, shift)); });
     const bool has_saw = is_rounding(data, left, o);
     for (const auto& order : orders)
-      if (!has_saw && order.size() >= enough)
+      if (!has_saw && order.size() >= enough_rows)
         share = std::max(
             share, beyond_chance([&](double shift) { return share_along(order, turned(left, shift)); }));
     shares.push_back(share);
@@ -351,7 +352,7 @@ bool is_louder_in_motion(const Case& data, const Fit& fit) {
   constexpr double least = 5.0;  // coarse steps of a reading make it half as loud again at most
   const auto simulated = simulate(data, fit.model);
   const auto basis = surface(data, simulated).basis;
-  if (basis.rows() < enough) return false;
+  if (basis.rows() < enough_rows) return false;
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     const auto left = left_of(data, simulated, o);
     auto power = left;
@@ -390,7 +391,7 @@ std::vector<double> far_share(const Case& data, const Fit& fit, double times) {
     for (const auto& one : all)
       for (double v : one)
         if (std::isfinite(v)) sum += v, square += v * v, rows += 1.0;
-    return rows > enough ? std::sqrt(std::max(0.0, square / rows - sum * sum / (rows * rows))) : 0.0;
+    return rows > enough_rows ? std::sqrt(std::max(0.0, square / rows - sum * sum / (rows * rows))) : 0.0;
   };
   for (std::size_t o = 0; o < data.outputs.size(); ++o) {
     std::vector<Series> measured;
@@ -411,7 +412,7 @@ std::vector<double> excess_over_noise(const Case& data, const Fit& fit) {
     if (!std::isfinite(data.given_noise[o])) continue;
     const auto [square, rows] = mean_square(left_of(data, simulated, o));
     const double noise = noise_of(data, weighing, o);
-    if (const double beyond = square / (noise * noise) - 1.0; rows > enough / 2 && beyond > by_chance)
+    if (const double beyond = square / (noise * noise) - 1.0; rows > enough_rows / 2 && beyond > by_chance)
       all[o] = beyond;
   }
   return all;
@@ -428,7 +429,7 @@ bool is_above_noise(const Case& data, const Fit& fit) {
     const auto [square, rows] = mean_square(left);
     // A loop repeats the noise of its reading, at some frequencies more than once; and what is white may be a worse
     // instrument than believed.
-    if (data.is_time_series && rows > enough && std::sqrt(square) > most * data.given_noise[o] &&
+    if (data.is_time_series && rows > enough_rows && std::sqrt(square) > most * data.given_noise[o] &&
         independent_share(left) < 0.3)
       return true;
   }

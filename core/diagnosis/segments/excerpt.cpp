@@ -10,7 +10,7 @@ namespace invar::diagnosis {
 namespace {
 
 /// What candidates may cost to be ranked, in rows that are run through; fewer rows of a recording rank nothing.
-constexpr double affordable = 1.5e6, fewest_rows = 1500.0;
+constexpr double affordable = 1.5e6, fewest_rows_to_rank = 1500.0;
 /// What shows at the end of a recording alone should be seen too.
 constexpr std::size_t stretches = 4;
 
@@ -65,7 +65,7 @@ std::optional<double> affordable_share(const Case& whole, std::size_t runs) {
     if (!recording.inputs.restarts.empty()) return std::nullopt;
   }
   const double share =
-      std::max(fewest_rows, affordable / static_cast<double>(std::max<std::size_t>(1, runs))) / rows;
+      std::max(fewest_rows_to_rank, affordable / static_cast<double>(std::max<std::size_t>(1, runs))) / rows;
   if (share > 0.6) return std::nullopt;  // the excerpt itself costs something
   return share;
 }

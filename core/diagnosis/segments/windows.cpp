@@ -27,7 +27,7 @@ using physics::Model;
 
 /// Fewer rows say too little about states of their own. Short windows keep a wrong model near the machine, where first order
 /// says what it lacks; but each costs a fit as many numbers as there are states.
-constexpr std::size_t fewest_rows = 60, most_starts = 200;
+constexpr std::size_t fewest_rows_of_window = 60, most_starts = 200;
 /// Where windows only lead the numbers near, longer ones tell more of them.
 constexpr std::size_t most_starts_of_a_hint = 100;
 /// A window is at most as long as a disturbance of its first state takes to grow so much.
@@ -169,12 +169,12 @@ bool is_held(const Case& data) {
   return slowest * soon * longest(data) > 1.0;
 }
 
-using Rows = std::vector<std::vector<std::size_t>>;  // by recording
+using StartRows = std::vector<std::vector<std::size_t>>;  // by recording
 
 enum class Past { kept, forgotten };
 
 /// The case with states of their own from these rows on. Where the model forgets, its run says how wide they go.
-Case with_starts(const Case& whole, const Rows& rows, Past past) {
+Case with_starts(const Case& whole, const StartRows& rows, Past past) {
   Case data = whole;
   const auto states = physics::states_of(whole.model);
   std::size_t next = 0;
@@ -209,8 +209,8 @@ Case with_starts(const Case& whole, const Rows& rows, Past past) {
 }
 
 /// The case in windows of about so many rows, and from these rows on; a window that would begin near one of them is none.
-Case in_windows(const Case& whole, std::size_t rows, const Rows& anew) {
-  Rows all = anew;
+Case in_windows(const Case& whole, std::size_t rows, const StartRows& anew) {
+  StartRows all = anew;
   Case::Windows windows = whole.windows;
   for (std::size_t r = 0; r < all.size(); ++r) {
     const auto& inputs = whole.recordings[r].inputs;
@@ -293,7 +293,7 @@ void cut_into_windows(Case& data, const Model& near) {
     data.windows.anew += is_axis ? 0 : anew[r].size();
     all_rows += recording.inputs.rows();
     rows = is_axis ? all_rows : std::max(rows, recording.inputs.rows());
-    if (recording.inputs.rows() >= 4 * fewest_rows && data.model.equations.controlled_input.empty())
+    if (recording.inputs.rows() >= 4 * fewest_rows_of_window && data.model.equations.controlled_input.empty())
       goes = goes || (is_axis ? !is_held(data) : goes_on(data, near, recording) > still_going);
   }
   if (!goes) {
@@ -304,7 +304,7 @@ void cut_into_windows(Case& data, const Model& near) {
     return;
   }
   const std::size_t shortest =
-      std::max({fewest_rows, rows * states / most_starts, all_rows * states / (2 * most_starts)});
+      std::max({fewest_rows_of_window, rows * states / most_starts, all_rows * states / (2 * most_starts)});
   std::size_t window = data.windows.are_long ? std::max(shortest, rows / long_windows) : shortest;
   auto cut = in_windows(data, window, anew);
   estimate_starts(cut);
@@ -315,7 +315,7 @@ void cut_into_windows(Case& data, const Model& near) {
     estimate_starts(cut);
     growth = growth_over_windows(cut);
   }
-  while (growth > most_growth && window > fewest_rows / 4 &&
+  while (growth > most_growth && window > fewest_rows_of_window / 4 &&
          2 * cut.windows.count * states <= 2 * most_starts) {
     window /= 2;
     cut = in_windows(data, window, anew);
@@ -333,9 +333,9 @@ std::optional<InWindows> in_short_windows(const Case& data) {
     return std::nullopt;
   std::size_t rows = 0;
   for (const auto& recording : data.recordings) rows = std::max(rows, recording.inputs.rows());
-  const std::size_t window = std::max(fewest_rows, rows * states / most_starts_of_a_hint);
+  const std::size_t window = std::max(fewest_rows_of_window, rows * states / most_starts_of_a_hint);
   if (rows < 4 * window) return std::nullopt;
-  auto cut = in_windows(data, window, Rows(data.recordings.size()));
+  auto cut = in_windows(data, window, StartRows(data.recordings.size()));
   estimate_starts(cut);
   const auto plain = weigh(cut, simulate(cut, cut.model), Colour::white);
   auto near = fit(cut, plain, cut.model, cut.model, Effort::follow(12));

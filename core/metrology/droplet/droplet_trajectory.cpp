@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 
+#include "core/base/angle.hpp"
 #include "core/base/contract.hpp"
 #include "core/metrology/droplet/droplet_fit.hpp"
 #include "core/numerics/robust.hpp"
@@ -15,7 +15,6 @@ namespace invar::metrology {
 
 namespace {
 
-constexpr double degree = std::numbers::pi / 180.0;
 constexpr double chance_of_no_field = 1e-4;  // two tests, on droplets that the fits themselves chose
 
 /// Groups of equal height: indices by the group's number; heights within 1 % of the largest are one.

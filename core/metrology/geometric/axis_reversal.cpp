@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 
+#include "core/base/index.hpp"
 #include "core/numerics/gaussian_prior.hpp"
 
 namespace invar::metrology {
@@ -19,8 +20,6 @@ constexpr double weakest = 3e-9;           // m, sd of waves that nobody would s
 constexpr double stronger = 1.7782794100;  // by a quarter of a decade
 constexpr int strengths = 19;              // up to 95 um
 constexpr std::array<double, 4> lengths{0.12, 0.25, 0.5, 1.0};  // of the travel, over which waves change
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// What is not yet known about one axis: strength and length of its waves.
 struct Waves {

@@ -3,11 +3,11 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 double square(double value) noexcept { return value * value; }
 

@@ -3,13 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
-
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 ErrorMotionTables::ErrorMotionTables(ErrorMotionNetworks model, double tolerance, std::size_t most_nodes)
     : model_{std::move(model)}, directions_{axis_directions(model_.chain, model_.squareness)} {

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
 
 /// Axis letters and directions are 0, 1, 2 for x, y, z throughout this room.
@@ -48,6 +50,8 @@ double squareness_angle_from_cosine(int pair, double cosine);
 double squareness_cosine_from_angle(int pair, double angle);
 
 inline constexpr std::array<char, 3> axis_letters{'x', 'y', 'z'};
+/// "x" for axis 0.
+inline std::string axis_letter(int axis) { return std::string(1, axis_letters[index(axis)]); }
 std::optional<int> axis_named(std::string_view letter);
 
 }  // namespace invar::metrology

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// Orthonormal basis of the coefficients that keep the gauge of an error motion.
 Eigen::MatrixXd gauge_basis(const numerics::CubicBSpline& spline, double origin, bool no_slope) {

@@ -4,15 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
 #include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
-
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 std::vector<Eigen::Vector3d> volume_grid(const Chain& chain, const std::array<Range, 3>& travel, int count) {
   std::vector<Eigen::Vector3d> grid;

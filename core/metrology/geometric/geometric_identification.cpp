@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/contract.hpp"
+#include "core/base/index.hpp"
 #include "core/metrology/geometric/geometric_field.hpp"
 #include "core/metrology/geometric/geometric_stages.hpp"
 #include "core/metrology/geometric/geometric_waves.hpp"
@@ -13,8 +14,6 @@
 namespace invar::metrology {
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// The axes' travels, widened to hold every measured point.
 std::array<Range, 3> ranges_of(const Machine& machine, const std::vector<CondensedLine>& lines) {

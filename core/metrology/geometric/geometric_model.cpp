@@ -5,13 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
-
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 Eigen::Vector3d SigmaGrid::at(const Eigen::Vector3d& position) const noexcept {
   std::array<int, 3> low{};

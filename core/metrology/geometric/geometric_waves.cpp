@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
 
 std::optional<double> usual_step(const CondensedLine& line, int axis) {
@@ -32,8 +34,6 @@ constexpr std::size_t enough_points = 1500;  // of lines along an axis: more wou
 constexpr double significance = 8.0;  // of log evidence, against some hundreds of numbers that are tried
 constexpr double longer_is_likelier = 3.0;  // of log evidence that a shorter period must lead by
 constexpr double apart = 1.5;               // resolvable numbers between two waves
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// The lines with what the model as it stands leaves of them.
 struct Rest {

@@ -10,7 +10,7 @@ namespace invar::metrology {
 
 namespace {
 
-constexpr int draws = 400;  // an uncertainty to 4 %
+constexpr int draws_of_motions = 400;  // an uncertainty to 4 %
 
 double least_squares_slope(const Eigen::VectorXd& position, const Eigen::VectorXd& value) {
   const Eigen::ArrayXd off = position.array() - position.mean();
@@ -73,11 +73,11 @@ double scatter_of(const Eigen::VectorXd& value, const Eigen::MatrixXd& factor,
   double sum = 0.0, square = 0.0;
   Eigen::VectorXd unit(factor.cols());
   const double middle = figure(value);
-  for (int d = 0; d < draws; ++d) {
+  for (int d = 0; d < draws_of_motions; ++d) {
     for (double& each : unit) each = normal(random);
     const double off = figure(value + factor * unit) - middle;
-    sum += off / draws;
-    square += off * off / draws;
+    sum += off / draws_of_motions;
+    square += off * off / draws_of_motions;
   }
   // About the value found: readings that scatter make a range too wide, and that counts.
   return std::sqrt(square);

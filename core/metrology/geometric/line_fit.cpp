@@ -129,12 +129,12 @@ std::vector<double> step_gains(const LineFit& work, const Eigen::VectorXd& resid
   return gains;
 }
 
-constexpr double significance = 36.0;  // chi-square of one parameter: six sigma
+constexpr double six_sigma = 36.0;  // chi-square of one parameter: six sigma
 /// The rows from which on a step promises most, not next to one another.
 void add_promising(std::vector<double> gains, std::vector<int>& rows) {
   for (int choice = 0; choice < 4; ++choice) {
     const auto top = std::max_element(gains.begin(), gains.end());
-    if (*top < significance) return;
+    if (*top < six_sigma) return;
     const auto row = static_cast<int>(top - gains.begin());
     if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
     std::fill(top - std::min<std::ptrdiff_t>(top - gains.begin(), 2),
@@ -184,7 +184,7 @@ bool find_break(LineFit& work, const NuisancePrior& expected) {
     }
   const double scale = standardised_scale(best);
   const double wider = std::isfinite(scale) ? std::max(scale / work.scale, 1.0) : 1.0;
-  if (before - least < significance * wider * wider) return false;
+  if (before - least < six_sigma * wider * wider) return false;
   work = std::move(best);
   return true;
 }

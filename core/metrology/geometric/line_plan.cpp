@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
 #include "core/metrology/geometric/geometric_field.hpp"
 #include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 /// A point whose coordinates along the chain's axes are parts of their travels.
 Eigen::Vector3d at(const Machine& machine, double a, double b, double c) {
@@ -34,7 +33,7 @@ std::string name_of(const Machine& machine, const Eigen::Vector3d& from, const E
     const int axis = machine.chain.order[index(place)];
     const Range r = machine.travel[index(axis)];
     const double part = (to[axis] - from[axis]) / r.width();
-    const std::string letter(1, metrology::axis_letters[index(axis)]);
+    const std::string letter = axis_letter(axis);
     if (std::abs(part) > 1e-9) {
       moving +=
           (part < 0 ? "-" : (moving.empty() ? "" : "+")) + (std::abs(part) < 0.9 ? letter + "/2" : letter);

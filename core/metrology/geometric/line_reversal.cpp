@@ -1,4 +1,4 @@
-// The reversal of a line over its places: which the repeats can tell, and the regressors that follow it.
+// The reversal of a line over its places: which the repeated_readings can tell, and the regressors that follow it.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,8 @@ namespace {
 
 constexpr double wave = 1.0 / 3.0;  // of the line, over which a reversal changes as a rule
 constexpr double rough = 0.05;      // of its variance: what is each place's own
-constexpr int repeats = 3;  // readings beyond the first of their points, for each place of the reversal
+constexpr int repeated_readings =
+    3;  // readings beyond the first of their points, for each place of the reversal
 
 double along(const LineFit& work, int row) {
   return work.beam.direction.dot(work.line->readings[static_cast<std::size_t>(row)].position -
@@ -58,7 +59,7 @@ void add_reversal(LineFit& work) {
   work.first_shape = static_cast<int>(work.regressors.cols());
   const std::vector<double> all = both_ways(work);
   if (all.empty()) return;
-  const int told = std::clamp((work.rows() - work.points()) / repeats, 1, most_reversal_places);
+  const int told = std::clamp((work.rows() - work.points()) / repeated_readings, 1, most_reversal_places);
   const int count = std::min(told, static_cast<int>(all.size()));
   if (count < 2) {
     work.reversal_places = {all[all.size() / 2]};

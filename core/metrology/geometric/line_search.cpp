@@ -4,14 +4,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
 #include "core/metrology/geometric/geometric_field.hpp"
 #include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
 namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
 constexpr int coarse_points = 8;     // of a candidate; each stands for its share of the readings
 constexpr int coarse_intervals = 6;  // of the splines: enough to rank lines

@@ -4,13 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/index.hpp"
+
 namespace invar::metrology {
-
-namespace {
-
-std::size_t index(int i) { return static_cast<std::size_t>(i); }
-
-}  // namespace
 
 VolumetricTable::VolumetricTable(const GeometricModel& model, double tolerance, int most_nodes)
     : chain_{model.chain},
