@@ -6,6 +6,8 @@ set(INVAR_WARNINGS -Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wsha
 # -ffp-contract=off keeps simulated time repeatable bit for bit across CPUs.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 add_compile_options(-ffp-contract=off)
+# GCC collects its garbage only beyond 2 GB: its passes through the heap were a seventh of a first build.
+add_compile_options("$<$<COMPILE_LANG_AND_ID:CXX,GNU>:SHELL:--param ggc-min-heapsize=2000000>")
 # tools/build compiles the sources of a target in batches (CMAKE_UNITY_BUILD): a first build takes half as long. For GCC all of
 # a batch is headers, whose types should have linkage.
 if(CMAKE_UNITY_BUILD)
@@ -25,6 +27,19 @@ endif()
 function(invar_precompile target)
   target_precompile_headers(${target} PRIVATE ${ARGN})
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+endfunction()
+
+# invar_share_headers(name library HEADERS ... FOR rooms ...) parses the headers once for all these rooms.
+function(invar_share_headers name library)
+  cmake_parse_arguments(ARG "" "" "HEADERS;FOR" ${ARGN})
+  add_library(invar_${name} OBJECT EXCLUDE_FROM_ALL ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
+  target_compile_options(invar_${name} PRIVATE ${INVAR_WARNINGS})
+  target_link_libraries(invar_${name} PRIVATE ${library})
+  invar_precompile(invar_${name} ${ARG_HEADERS})
+  foreach(room IN LISTS ARG_FOR)
+    target_compile_options(invar_${room} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
+    target_precompile_headers(invar_${room} REUSE_FROM invar_${name})
+  endforeach()
 endfunction()
 
 # invar_library(room SOURCES ... HEADERS ... [PUBLIC targets] [PRIVATE targets]) makes invar::room in namespace folder.

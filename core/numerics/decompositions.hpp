@@ -21,6 +21,17 @@ struct RealEigen {
 };
 std::optional<RealEigen> real_eigen(const Eigen::Ref<const Eigen::MatrixXd>& a);
 
+/// The orthogonal matrix of `a` = Q R, rows by rows: its columns beyond those of `a` span the rest. Householder.
+Eigen::MatrixXd full_q(const Eigen::Ref<const Eigen::MatrixXd>& a);
+/// In descending order. Jacobi.
+Eigen::VectorXd singular_values(const Eigen::Ref<const Eigen::MatrixXd>& a);
+/// U V' of the singular value decomposition of a square matrix. Jacobi.
+Eigen::MatrixXd nearest_orthogonal(const Eigen::Ref<const Eigen::MatrixXd>& a);
+/// By a complete orthogonal decomposition.
+Eigen::MatrixXd pseudo_inverse(const Eigen::Ref<const Eigen::MatrixXd>& a);
+/// Columns that no others make up.
+Eigen::Index rank_of(const Eigen::Ref<const Eigen::MatrixXd>& a);
+
 enum class Decomposition { ldlt, llt, lu, pivoted_qr, complete_orthogonal };
 /// x of a x = b; a least-squares solution where `a` has more rows than columns (QR, complete orthogonal).
 Eigen::MatrixXd solved(Decomposition by, const Eigen::Ref<const Eigen::MatrixXd>& a,

@@ -1,8 +1,6 @@
 #include "core/numerics/rbf_ridge.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -103,13 +101,11 @@ RidgeFit fit_ridge(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<
   std::vector<Eigen::Index> slopes;
   const Eigen::MatrixXd free = free_columns(u, options.slope, slopes);
   const Eigen::Index p = free.cols();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr{free};
-  const Eigen::MatrixXd q_full = qr.householderQ();
-  const Eigen::MatrixXd q = q_full.rightCols(n - p);
+  const Eigen::MatrixXd q = full_q(free).rightCols(n - p);
   const Eigen::MatrixXd projected = q.transpose() * phi;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen{projected * projected.transpose()};
-  const Eigen::VectorXd energy = eigen.eigenvalues().cwiseMax(0.0);
-  const Eigen::MatrixXd modes = q * eigen.eigenvectors();  // n x (n - p)
+  const SymmetricEigen eigen = symmetric_eigen(projected * projected.transpose());
+  const Eigen::VectorXd energy = eigen.values.cwiseMax(0.0);
+  const Eigen::MatrixXd modes = q * eigen.vectors;  // n x (n - p)
   const Eigen::VectorXd coordinates = modes.transpose() * target;
   const auto count = static_cast<double>(n);
 
@@ -150,7 +146,7 @@ RidgeFit fit_ridge(const Eigen::Ref<const Eigen::MatrixXd>& x, const Eigen::Ref<
 
   // w = phi' Q (P P' + l I)^-1 Q' t = phi' r / l; the free part from what w leaves over.
   net.weights = phi.transpose() * residual / fit.ridge;
-  const Eigen::VectorXd coefficients = qr.solve(target - phi * net.weights - residual);
+  const Eigen::VectorXd coefficients = least_squares(free, target - phi * net.weights - residual);
   net.constant = coefficients(0);
   for (std::size_t k = 0; k < slopes.size(); ++k)
     net.slope(slopes[k]) = coefficients(static_cast<Eigen::Index>(k) + 1);

@@ -1,7 +1,7 @@
 #include "core/metrology/camera/planar_camera.hpp"
 
-#include <Eigen/Dense>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -69,9 +69,9 @@ std::optional<Matrix3d> homography(const Matrix2Xd& from, const Matrix2Xd& to) {
     rows.row(2 * i) << p.transpose(), 0.0, 0.0, 0.0, -q.x() * p.transpose();
     rows.row(2 * i + 1) << 0.0, 0.0, 0.0, p.transpose(), -q.y() * p.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver{rows.transpose() * rows};
-  if (!(solver.eigenvalues()(1) > 1e-10 * solver.eigenvalues()(8))) return std::nullopt;  // points on a line
-  const VectorXd h = solver.eigenvectors().col(0);
+  const auto modes = numerics::symmetric_eigen(rows.transpose() * rows);
+  if (!(modes.values(1) > 1e-10 * modes.values(8))) return std::nullopt;  // points on a line
+  const VectorXd h = modes.vectors.col(0);
   Matrix3d out;
   out << h.segment<3>(0).transpose(), h.segment<3>(3).transpose(), h.segment<3>(6).transpose();
   return b.inverse() * out * a;
@@ -95,7 +95,7 @@ std::optional<PinholeCamera> start_camera(const std::vector<Matrix3d>& maps) {
     system.row(next++) = row(h, 0, 1);
     system.row(next++) = row(h, 0, 0) - row(h, 1, 1);
   }
-  VectorXd b = Eigen::SelfAdjointEigenSolver<MatrixXd>{system.transpose() * system}.eigenvectors().col(0);
+  VectorXd b = numerics::symmetric_eigen(system.transpose() * system).vectors.col(0);
   if (b(0) < 0.0) b = -b;
   const double denominator = b(0) * b(2) - b(1) * b(1);
   const double v0 = (b(1) * b(3) - b(0) * b(4)) / denominator;
@@ -116,8 +116,7 @@ std::optional<TargetPose> start_pose(const PinholeCamera& camera, const Matrix3d
   if (h(2, 2) < 0.0) h = -h;  // the target lies in front of the camera
   Matrix3d r;
   r << h.col(0), h.col(1), h.col(0).cross(h.col(1));
-  const Eigen::JacobiSVD<Matrix3d> svd{r, Eigen::ComputeFullU | Eigen::ComputeFullV};
-  const Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  const Matrix3d rotation = numerics::nearest_orthogonal(r);
   if (!rotation.allFinite() || rotation.determinant() < 0.0) return std::nullopt;
   const Eigen::AngleAxisd axis{rotation};
   return TargetPose{axis.angle() * axis.axis(), h.col(2)};

@@ -1,8 +1,6 @@
 #include "core/metrology/droplet/droplet_fit.hpp"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -44,8 +42,7 @@ DropletSolution solve(const Droplets& drops, const Eigen::Matrix2Xd& offset, con
   const Eigen::VectorXd scale = a.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = a * scale.cwiseInverse().asDiagonal();
   solution.theta = numerics::least_squares(scaled, y).cwiseQuotient(scale);
-  const Eigen::MatrixXd inverse =
-      (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = numerics::pseudo_inverse(scaled.transpose() * scaled);
   solution.covariance = scale.cwiseInverse().asDiagonal() * inverse * scale.cwiseInverse().asDiagonal();
   return solution;
 }
@@ -171,7 +168,7 @@ bool spans_field(const Eigen::Matrix2Xd& target, const Eigen::VectorXd& sound, F
   constexpr double flattest = 0.05;
   const Eigen::Matrix2Xd apart =
       (target.colwise() - centre_of(target, sound)) * sound.cwiseSqrt().asDiagonal();
-  const Eigen::Vector2d spread = Eigen::JacobiSVD<Eigen::MatrixXd>{apart}.singularValues();
+  const Eigen::Vector2d spread = numerics::singular_values(apart);
   if (spread(0) <= 1e-9 || sound.sum() < 6.0) return false;
   return field != FieldForm::any || spread(1) > flattest * spread(0);
 }
@@ -209,12 +206,13 @@ ScatterTest test_scatter(const DropletStart& start, const DropletForm& form, con
     next += 2;
   }
   const Eigen::VectorXd scale = rows.colwise().norm().cwiseMax(1e-300);
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr{rows * scale.cwiseInverse().asDiagonal()};
-  const Eigen::VectorXd found = rows * qr.solve(left).cwiseQuotient(scale);
-  const auto extra = static_cast<double>(qr.rank() - std::min(form.columns(), qr.rank()));
+  const Eigen::MatrixXd scaled = rows * scale.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd found = rows * numerics::least_squares(scaled, left).cwiseQuotient(scale);
+  const Eigen::Index rank = numerics::rank_of(scaled);
+  const auto extra = static_cast<double>(rank - std::min(form.columns(), rank));
   const double with = (left - found).squaredNorm();
   const double by_field =
-      numerics::chance_of_gain(left.squaredNorm(), with, extra, static_cast<double>(2 * count - qr.rank()));
+      numerics::chance_of_gain(left.squaredNorm(), with, extra, static_cast<double>(2 * count - rank));
   const double by_order = std::min(numerics::chance_of_alike_neighbours(in_order[0]),
                                    numerics::chance_of_alike_neighbours(in_order[1]));
   test.tested = true;

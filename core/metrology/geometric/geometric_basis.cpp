@@ -1,11 +1,11 @@
 #include "core/metrology/geometric/geometric_basis.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
 #include "core/base/index.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -24,9 +24,7 @@ Eigen::MatrixXd gauge_basis(const numerics::CubicBSpline& spline, double origin,
     add(spline.interval().upper, 1, 1.0);
     add(spline.interval().lower, 1, -1.0);
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr{constraint};
-  const Eigen::MatrixXd q = qr.householderQ();
-  return q.rightCols(n - constraint.cols());
+  return numerics::full_q(constraint).rightCols(n - constraint.cols());
 }
 
 /// The largest arm a rotation of `error motion` can have within the travels, at any of the tools.

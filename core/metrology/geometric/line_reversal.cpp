@@ -1,9 +1,10 @@
 // The reversal of a line over its places: which the repeated_readings can tell, and the regressors that follow it.
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/metrology/geometric/line_fit.hpp"
+#include "core/numerics/decompositions.hpp"
 #include "core/numerics/gaussian_prior.hpp"
 
 namespace invar::metrology {
@@ -75,8 +76,8 @@ void add_reversal(LineFit& work) {
                          numerics::matern52(std::abs(work.reversal_places[static_cast<std::size_t>(i)] -
                                                      work.reversal_places[static_cast<std::size_t>(j)]),
                                             wave * work.beam.length);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes{covariance};
-  work.reversal_shape = modes.eigenvectors() * modes.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  const auto modes = numerics::symmetric_eigen(covariance);
+  work.reversal_shape = modes.vectors * modes.values.cwiseMax(0.0).cwiseSqrt().asDiagonal();
   work.regressors.conservativeResize(Eigen::NoChange, work.first_shape + count);
   work.regressors.rightCols(count) = reversal_rows(work) * work.reversal_shape;
 }

@@ -1,12 +1,12 @@
 #include "core/metrology/thermal/thermistor.hpp"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/base/contract.hpp"
+#include "core/numerics/decompositions.hpp"
 
 namespace invar::metrology {
 
@@ -42,12 +42,12 @@ InverseFit fit_inverse(const Eigen::VectorXd& kelvins, const Eigen::VectorXd& x,
   // Columns of one size: ln R cubed is a thousand times 1.
   const Eigen::VectorXd size = a.colwise().norm();
   const Eigen::MatrixXd scaled = a * size.cwiseInverse().asDiagonal();
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr{scaled};
   InverseFit fit;
-  fit.coefficients = qr.solve(y).cwiseQuotient(size);
+  fit.coefficients = numerics::least_squares(scaled, y).cwiseQuotient(size);
   if (n <= terms) return fit;
   const Eigen::VectorXd left = y - a * fit.coefficients;
-  const Eigen::MatrixXd covariance = (scaled.transpose() * scaled).inverse();
+  const Eigen::MatrixXd covariance =
+      numerics::solve_square(scaled.transpose() * scaled, Eigen::MatrixXd::Identity(terms, terms));
   const double variance = left.squaredNorm() / static_cast<double>(n - terms);
   fit.sigma_slope = std::sqrt(variance * covariance(1, 1)) / size(1);
   double squares = 0.0;
