@@ -7,8 +7,6 @@ namespace invar::diagnosis {
 using physics::Role;
 using physics::Term;
 
-namespace {}  // namespace
-
 void add_starts(std::vector<Start>& starts, Term term, const std::vector<double>& first_shapes) {
   const auto& info = *term.info;
   Start start;
