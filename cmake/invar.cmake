@@ -18,7 +18,7 @@ add_link_options(-Wl,--as-needed)
 
 set(INVAR_SANITIZE "" CACHE STRING "sanitizers to build with, for example address,undefined or thread")
 if(INVAR_SANITIZE)
-  add_compile_options(-fsanitize=${INVAR_SANITIZE} -fno-omit-frame-pointer -g)
+  add_compile_options(-fsanitize=${INVAR_SANITIZE} -fno-omit-frame-pointer -g1)  # lines for reports; names of variables cost a third of the build
   add_link_options(-fsanitize=${INVAR_SANITIZE})
 endif()
 
