@@ -43,7 +43,7 @@ void for_differences_of(const Case& data, const std::vector<Model>& models,
 
 namespace {
 
-/// RunRows [first, last) of the residual column of one output.
+/// Rows [first, last) of the residual column of one output.
 struct RunRows {
   Eigen::Index first = 0, last = 0;
 };

@@ -1,4 +1,4 @@
-// The reversal of a line over its places: which the repeated_readings can tell, and the regressors that follow it.
+// The reversal of a line over its places: which the repeats can tell, and the regressors that follow it.
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
