@@ -37,11 +37,15 @@ std::uint64_t hash(const std::string& text) {
   return value;
 }
 
-std::uint64_t address_space() {
+void bound_address_space([[maybe_unused]] std::uint64_t more) {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // their shadow takes terabytes
   std::ifstream statm{"/proc/self/statm"};
   std::uint64_t pages = 0;
   statm >> pages;
-  return pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  const std::uint64_t most = pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + more;
+  const rlimit space{most, most};
+  setrlimit(RLIMIT_AS, &space);
+#endif
 }
 
 std::uint64_t most_resident() {
@@ -85,10 +89,7 @@ std::string one(const Target& target, const Bytes& input, const std::filesystem:
 
 [[noreturn]] void child(const Target& target, const Plan& plan, Shared& shared, std::uint64_t from,
                         Clock::time_point end) {
-#ifndef __SANITIZE_ADDRESS__
-  const rlimit space{address_space() + plan.memory, address_space() + plan.memory};
-  setrlimit(RLIMIT_AS, &space);
-#endif
+  bound_address_space(plan.memory);
   const rlimit none{0, 0};
   setrlimit(RLIMIT_CORE, &none);
   const TemporaryFolder folder{"invar-fuzz"};
