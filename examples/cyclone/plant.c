@@ -53,10 +53,16 @@ int main(int count, char** words) {
   }
   const double wanted = atof(words[3]);
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(words[1]), NULL, NULL);
+  dds_qos_t* of_state = state_profile();
   const dds_entity_t reader = dds_create_reader(
-      participant, topic(participant, &invar_thermal_NodeTemperature_desc, words[2], "state"), state_profile(), NULL);
+      participant, topic(participant, &invar_thermal_NodeTemperature_desc, words[2], "state"), of_state,
+      NULL);
+  dds_delete_qos(of_state);
+  dds_qos_t* of_command = command_profile();
   const dds_entity_t writer = dds_create_writer(
-      participant, topic(participant, &invar_thermal_ThermalCommand_desc, words[2], "command"), command_profile(), NULL);
+      participant, topic(participant, &invar_thermal_ThermalCommand_desc, words[2], "command"), of_command,
+      NULL);
+  dds_delete_qos(of_command);
   if (reader < 0 || writer < 0 || !matched(writer)) {
     fprintf(stderr, "nobody reads %s/command in domain %s\n", words[2], words[1]);
     return 1;

@@ -32,7 +32,9 @@ static void available(dds_entity_t reader, void* context) {
 int cyclone_open_writer(uint32_t domain) {
   dds_entity_t participant;
   const dds_entity_t topic = topic_on(domain, &participant);
-  writer_ = dds_create_writer(participant, topic, realtime(), NULL);
+  dds_qos_t* qos = realtime();
+  writer_ = dds_create_writer(participant, topic, qos, NULL);
+  dds_delete_qos(qos);
   return writer_ < 0;
 }
 
@@ -42,7 +44,11 @@ int cyclone_open_reader(uint32_t domain, cyclone_receive receive, void* context)
   receive_ = receive;
   dds_listener_t* listener = dds_create_listener(context);
   dds_lset_data_available(listener, available);
-  return dds_create_reader(participant, topic, realtime(), listener) < 0;
+  dds_qos_t* qos = realtime();
+  const dds_entity_t reader = dds_create_reader(participant, topic, qos, listener);
+  dds_delete_qos(qos);
+  dds_delete_listener(listener);
+  return reader < 0;
 }
 
 void cyclone_write(int64_t sent_ns) {

@@ -22,6 +22,7 @@ int main(int count, char** words) {
   dds_qset_liveliness(qos, DDS_LIVELINESS_AUTOMATIC, DDS_SECS(2));
   dds_qset_lifespan(qos, DDS_SECS(1));
   const dds_entity_t writer = dds_create_writer(participant, topic, qos, NULL);
+  dds_delete_qos(qos);
   dds_publication_matched_status_t matched = {0};
   for (int i = 0; i < 1000 && matched.current_count == 0; ++i) {
     dds_sleepfor(DDS_MSECS(10));

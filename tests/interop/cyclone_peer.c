@@ -39,10 +39,12 @@ static dds_qos_t* command(void) {
   return qos;
 }
 
+/* Takes the qos. */
 static dds_entity_t reader(dds_entity_t participant, const dds_topic_descriptor_t* type, const char* name,
                            dds_qos_t* qos) {
   const dds_entity_t topic = dds_create_topic(participant, type, name, NULL, NULL);
   const dds_entity_t made = dds_create_reader(participant, topic, qos, NULL);
+  dds_delete_qos(qos);
   if (made < 0) fprintf(stderr, "%s: %s\n", name, dds_strretcode(-made));
   return made;
 }
@@ -63,7 +65,9 @@ int main(int count, char** words) {
       reader(participant, &invar_lifecycle_ComponentStatus_desc, "cell/test/process/components", state());
   const dds_entity_t topic =
       dds_create_topic(participant, &invar_stage_AxisCommand_desc, "cell/test/axis/command", NULL, NULL);
-  const dds_entity_t writer = dds_create_writer(participant, topic, command(), NULL);
+  dds_qos_t* orders = command();
+  const dds_entity_t writer = dds_create_writer(participant, topic, orders, NULL);
+  dds_delete_qos(orders);
 
   int got_states = 0, got_heats = 0, got_components = 0, sent = 0;
   for (int i = 0; i < 1500 && (got_states < wanted || got_heats < 2 || got_components < 1 || sent < wanted);

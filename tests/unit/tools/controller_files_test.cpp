@@ -85,7 +85,9 @@ TEST(ControllerFiles, AWaveFinerThanTheTableIsSaid) {
   EXPECT_LT(linuxcnc_difference(model, 0), 3e-8);
   const auto positioning = static_cast<std::size_t>(metrology::translation(0, 0));
   model.splines[0] = {model.travel[0], 400};
-  model.coefficients[positioning].resize(model.splines[0].size());
+  for (int of = 0; of < 3; ++of)  // all error motions of an axis have its spline
+    for (const int motion : {metrology::translation(of, 0), metrology::rotation(of, 0)})
+      model.coefficients[static_cast<std::size_t>(motion)].setZero(model.splines[0].size());
   for (int i = 0; i < model.splines[0].size(); ++i)
     model.coefficients[positioning][i] =
         1e-6 * std::sin(2.0 * 3.14159265358979 * model.splines[0].place(i) / 0.004);
