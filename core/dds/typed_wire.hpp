@@ -191,7 +191,7 @@ class TypedInlet final : public Inlet {
   }
   /// A refused sample that stayed would keep its instance, and so many foreign keys leave no room for the right one.
   static void drop(fdds::DataReader& reader, const fdds::SampleInfo& info) {
-    // Of its own: the payload of a loan is no part of a change, which WriterKeys takes it for.
+    // Not by loan: the payload of a loan is no part of a change, as WriterKeys takes it to be.
     fdds::LoanableSequence<T> samples(1);
     fdds::SampleInfoSeq infos(1);
     while (reader.take_instance(samples, infos, 1, info.instance_handle) == ReturnCode_t::RETCODE_OK) {
