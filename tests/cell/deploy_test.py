@@ -181,6 +181,10 @@ class WithSystemd(Deployed):
         release = self.releases()
         self.deployed("backup", self.cell, "--out", file)
         PCS.on("pc-b", f"mkdir -p {models} && echo since >{models}/y.yaml && chown -R invar: {models}")
+        PCS.on("pc-c", f"cd {self.home()} && now=$(readlink current) && ln -sfn $(readlink previous) current && "
+                       "systemctl restart invar-plant && ln -sfn $now current")  # as a call leaves it that was cut off
+        program = "readlink /proc/$(systemctl show -P MainPID invar-plant)/exe"
+        self.assertNotIn(release["pc-c"], PCS.on("pc-c", program).stdout)
         PCS.replace("pc-a")
         current = f"readlink {self.home()}/current; systemctl show -P MainPID invar-plant"
         others = [PCS.on(name, current).stdout for name in ("pc-b", "pc-c")]
@@ -194,6 +198,8 @@ class WithSystemd(Deployed):
         for name in ("pc-b", "pc-c"):
             self.assertIn(f"{name}: 0 files to send", said)
         self.assertEqual(self.releases(), release)
+        self.assertEqual(PCS.on("pc-b", current).stdout, others[0], "it went on")
+        self.assertEqual(PCS.on("pc-c", program).stdout.strip(), f"{self.home()}/releases/{release['pc-c']}/bin/invar")
         self.assert_well()
         self.assertIn("pc-a: the release before is -: there is none to go back to", self.deploy("--roll-back", status=1).stderr)
 

@@ -104,6 +104,10 @@ class Hosts {
     return std::all_of(states_.begin(), states_.end(),
                        [&](const HostState& state) { return state.current == release; });
   }
+  /// A PC that has the release already goes on while others get it: where one PC was replaced, the rest of the cell need not stop.
+  [[nodiscard]] bool goes_on(std::size_t i, const std::string& release) const {
+    return states_[i].current == release && !all_have(release);
+  }
 
   HostFaults check(const std::string& release) const {
     return on_each([&](std::size_t i) { return why(ask(i, scripts::check, {release})); });
@@ -113,10 +117,10 @@ class Hosts {
   HostFaults switch_over(const std::string& release, bool& switched) const {
     std::vector<std::unique_ptr<Remote>> calls(hosts_.size());
     HostFaults faults = on_each([&](std::size_t i) -> std::string {
-      calls[i] =
-          std::make_unique<Remote>(hosts_[i], scripts::switch_over,
-                                   std::vector<std::string>{home_, release, states_[i].current, service(),
-                                                            unit_, hosts_[i].name, whole(options_.patience)});
+      calls[i] = std::make_unique<Remote>(
+          hosts_[i], scripts::switch_over,
+          std::vector<std::string>{home_, release, states_[i].current, service(), unit_, hosts_[i].name,
+                                   whole(options_.patience), verb(i, release)});
       return calls[i]->wait_for_line() ? "" : why(calls[i]->finish());
     });
     switched = faults.empty();
@@ -125,11 +129,11 @@ class Hosts {
     return on_each([&](std::size_t i) { return why(calls[i]->finish()); });
   }
 
-  HostFaults restore() const {
+  HostFaults restore(const std::string& release) const {
     return on_each([&](std::size_t i) {
       return why(ask(i, scripts::restore,
                      {states_[i].current, states_[i].previous, service(), unit_, hosts_[i].name,
-                      whole(options_.patience)}));
+                      whole(options_.patience), verb(i, release)}));
     });
   }
 
@@ -159,6 +163,9 @@ class Hosts {
       if (key == "missing") states_[i].missing.push_back(value);
     }
     return why(said);
+  }
+  [[nodiscard]] std::string verb(std::size_t i, const std::string& release) const {
+    return goes_on(i, release) ? "start" : "restart";
   }
   static std::string told(const std::string& table) {
     return table.empty() ? "" : "\n" + printable_lines(table);
@@ -254,6 +261,16 @@ HostFaults bring_keys(const Hosts& hosts, const LoadedCell& loaded, const Deploy
   return faults;
 }
 
+/// Where the release stays, its processes take the keys that are others now; elsewhere they start with them.
+HostFaults take_keys(const Hosts& hosts, const std::string& release,
+                     const std::map<std::size_t, std::vector<std::string>>& changed) {
+  return hosts.on_each([&](std::size_t i) -> std::string {
+    const auto units = changed.find(i);
+    if (units == changed.end() || hosts.state(i).current != release) return "";
+    return why(hosts.ask(i, scripts::take_keys, units->second));
+  });
+}
+
 /// From here on there is something to take back.
 HostFaults make_current(Hosts& hosts, const std::string& release, const DeployOptions& options,
                         const Tell& tell) {
@@ -266,7 +283,8 @@ HostFaults make_current(Hosts& hosts, const std::string& release, const DeployOp
   }
   if (faults.empty()) return {};
   tell("failed: each PC gets back what it had");
-  for (const std::string& fault : hosts.restore()) faults.push_back(fault + " (while it was taken back)");
+  for (const std::string& fault : hosts.restore(release))
+    faults.push_back(fault + " (while it was taken back)");
   return faults;
 }
 
@@ -339,12 +357,8 @@ HostFaults deploy(const DeployOptions& options, const Tell& tell) {
   if (loaded.cell->security)
     if (HostFaults faults = bring_keys(hosts, loaded, options, tell, other_keys); !faults.empty())
       return faults;
-  if (hosts.all_have(release.name) && options.service && !other_keys.empty())
-    if (HostFaults faults = hosts.on_each([&](std::size_t i) {
-          return other_keys.contains(i) ? why(hosts.ask(i, scripts::take_keys, other_keys.at(i))) : "";
-        });
-        !faults.empty())
-      return faults;
+  if (options.service)
+    if (HostFaults faults = take_keys(hosts, release.name, other_keys); !faults.empty()) return faults;
   if (hosts.all_have(release.name) && (!options.service || hosts.status().empty())) {
     tell("it is current on all of them already");
     return {};

@@ -40,7 +40,11 @@ own() {  # the links of this cell's units
   done
 }
 drop() { root systemctl stop "$1" || true; root rm -f "$units/multi-user.target.wants/$1" "$units/$1"; }
-start() {  # start HOST UNIT PATIENCE: UNIT first, then the others of the host; those that the release does not have go
+runs() {  # a call that was cut off may have left the link new and the program old
+  pid=$(systemctl show -P MainPID "$1")
+  [ "$(root readlink "/proc/$pid/exe" || true)" = "$(realpath "$home/current")/bin/invar" ]
+}
+start() {  # start HOST UNIT PATIENCE VERB: UNIT first, then the others of the host; those that the release does not have go
   for name in $(own); do [ -e "$units/$name" ] || drop "$name"; done
   root mkdir -p "$units/multi-user.target.wants"
   for file in "$home/current/units/$1"/*.service; do
@@ -51,7 +55,9 @@ start() {  # start HOST UNIT PATIENCE: UNIT first, then the others of the host; 
   for name in "$2" $(own); do
     [ "$name" != "$2" ] || [ "${started:-no}" = no ] || continue
     started=yes
-    root timeout "$3" systemctl restart "$name" || { root systemctl status --no-pager -n 20 "$name" >&2 || true; exit 6; }
+    verb=restart
+    [ "$4" = restart ] || ! runs "$name" || verb=start
+    root timeout "$3" systemctl "$verb" "$name" || { root systemctl status --no-pager -n 20 "$name" >&2 || true; exit 6; }
   done
 }
 )sh";
@@ -148,7 +154,7 @@ export LD_LIBRARY_PATH="$release/lib"
 )sh";
 
 /// Says that it is ready, and waits for the line `go`; without it nothing changes. Then the release is current, and its service
-/// starts anew. HOME RELEASE EXPECTED SERVICE UNIT HOST PATIENCE
+/// starts anew (VERB `restart`), or where it is not what runs (`start`). HOME RELEASE EXPECTED SERVICE UNIT HOST PATIENCE VERB
 inline const std::string switch_over = with_units + R"sh(
 exec 9>"$home/lock"
 flock -w 10 9 || { echo "another deployment is at work there" >&2; exit 1; }
@@ -162,10 +168,10 @@ if [ "$2" != "$1" ]; then
   point current "$1"
   sync -f "$home"
 fi
-[ "$3" != systemd ] || start "$5" "$4" "$6"
+[ "$3" != systemd ] || start "$5" "$4" "$6" "$7"
 )sh";
 
-/// As it was before. HOME CURRENT PREVIOUS SERVICE UNIT HOST PATIENCE
+/// As it was before. HOME CURRENT PREVIOUS SERVICE UNIT HOST PATIENCE VERB
 inline const std::string restore = with_units + R"sh(
 exec 9>"$home/lock"
 flock -w 60 9 || { echo "another deployment is at work there" >&2; exit 1; }
@@ -177,7 +183,7 @@ fi
 point current "$1"
 sync -f "$home"
 [ "$3" = systemd ] && [ "$1" != - ] || exit 0
-start "$5" "$4" "$6"
+start "$5" "$4" "$6" "$7"
 )sh";
 
 /// In a secured cell by root, who reads the key of a viewer. HOME SECONDS
