@@ -65,7 +65,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
            sizes_of(data, d, finding) + "\n";
   std::string considered;
   for (std::size_t i = 0; i < d.rejected.size() && i < 5; ++i)
-    considered += (i == 0 ? "" : "; ") + d.rejected[i].term + ": " + d.rejected[i].why;
+    considered += "    " + d.rejected[i].term + ": " + d.rejected[i].why + "\n";
   if (const auto read = rows_read(data.count); read.find(';') != std::string::npos) out += "  " + read + "\n";
   if (const auto part = what_was_looked_at(data); !part.empty()) out += "  " + part + "\n";
   for (const auto& run : d.other_runs) {
@@ -73,7 +73,7 @@ std::string summary(const Case& data, const Diagnosis& d) {
     if (const auto left_out = left_out_of(data, d, run); !left_out.empty()) out += "  " + left_out + "\n";
   }
   if (!d.not_tried.empty()) out += "  " + not_tried(d) + "\n";
-  if (!considered.empty()) out += "  not claimed: " + considered + "\n";
+  if (!considered.empty()) out += "  not claimed:\n" + considered;
   return out + "  next: " + next_experiment(data, d) + "\n";
 }
 
