@@ -16,6 +16,8 @@ struct DomainPorts {
     return multicast() + 10 + 2 * static_cast<std::uint32_t>(number);
   }
   [[nodiscard]] std::uint32_t data(std::int32_t number) const { return discovery(number) + 1; }
+  /// Discovery, handshakes and keys come by even ports, data by odd ones. The contents do not tell: they may be encrypted.
+  [[nodiscard]] static constexpr bool is_of_discovery(std::uint32_t port) { return port % 2 == 0; }
   /// Participants of one PC that a domain has room for: 110, or as many as fit below port 65536 (63 in domain 232).
   [[nodiscard]] std::int32_t participants() const;
   [[nodiscard]] std::uint32_t last() const { return data(participants() - 1); }

@@ -13,6 +13,7 @@
 #include <span>
 #include <thread>
 
+#include "core/dds/domain_ports.hpp"
 #include "core/dds/one_sender.hpp"
 #include "core/dds/rtps_submessage.hpp"
 
@@ -169,7 +170,7 @@ class Filter final : public transport::ChainingTransport {
       return reception_->drop(Flaw::discovery, remote);
     }
     std::unique_lock alone{reception_->acquaintance(), std::defer_lock};
-    if (content.makes_known && reception_->limits().secured) alone.lock();
+    if (reception_->limits().secured && DomainPorts::is_of_discovery(local.port)) alone.lock();
     next->OnDataReceived(data, static_cast<std::uint32_t>(content.size), local, remote);
   }
 

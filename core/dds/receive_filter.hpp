@@ -34,9 +34,10 @@ class Reception {
   /// Receiving threads: until `open`, one second at most.
   void wait_until_open();
 
-  /// A receiving thread of a secured participant holds it while the middleware takes a message by which participants get to know
-  /// or to trust each other. Fast DDS 2.9 has one place, without a lock, for the endpoints that a handshake is about to match.
-  /// Two threads that discover two participants at once overwrite it, and one of the two is never trusted.
+  /// A receiving thread of a secured participant holds it while the middleware takes a message of discovery, handshake or keys.
+  /// Fast DDS 2.9 has one place, without a lock, for the endpoints that a handshake is about to match. Two threads that discover
+  /// two participants at once overwrite it, and one of the two is never trusted. A thread that takes the leave of a participant
+  /// waits for the timer, the timer for a reader that another thread holds, and that one for the first: for ever.
   [[nodiscard]] std::mutex& acquaintance() { return acquaintance_; }
 
   /// From now on nothing of these participants arrives, not even that they live; ascending. Any thread.

@@ -97,8 +97,6 @@ Flaw check_builtin(const DataHead& head, const Submessage& sub, const RtpsBytes&
                    Context& context) {
   constexpr std::size_t least_liveliness = 24;  // encapsulation, prefix, kind, length
   const bool has_data = sub.has(2);
-  if (head.writer == participant_writer || head.writer == stateless_writer)
-    context.content.makes_known = true;
   if (head.writer == participant_message_writer)
     return has_data && bytes.left() < least_liveliness ? Flaw::payload : Flaw::none;
   if (head.writer == stateless_writer && context.limits.secured)

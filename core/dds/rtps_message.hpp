@@ -57,8 +57,6 @@ struct RtpsContent {
   /// The participant for which it speaks; in a secured cell none but its sender.
   GuidPrefix source{};
   bool has_fragments = false;
-  /// Participants get to know each other by it, or to trust each other.
-  bool makes_known = false;
   /// Parameters of discovery that the middleware must not see: where their ids stand, and how many of them.
   std::array<std::uint32_t, 8> hidden{};
   std::size_t hidden_count = 0;
