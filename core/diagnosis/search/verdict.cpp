@@ -45,10 +45,13 @@ double share_left(const Case& data, const Diagnosis& d, const std::vector<double
 /// What the best model leaves, over what of it is not related from row to row (over the noise that the user gave): the mean of
 /// the outputs. How sure a name is was learnt by this measure.
 double times_unrelated(const Case& data, const Diagnosis& d) {
+  // The fit's own weights may be white, and then what is left counts as noise, all of it.
+  const auto coloured = weigh(data, simulate(data, d.best.model));
   double sum = 0.0;
   for (std::size_t o = 0; o < d.heldout.size(); ++o) {
     const double after = d.heldout[o].after, given = data.given_noise[o],
-                 noise = std::isfinite(given) ? given : std::min(after, d.weighing.filters[o].sigma);
+                 unrelated = std::min(d.weighing.filters[o].sigma, coloured.filters[o].sigma),
+                 noise = std::isfinite(given) ? given : std::min(after, unrelated);
     sum += noise > 0.0 ? after / noise : 1.0;
   }
   return sum / static_cast<double>(std::max<std::size_t>(1, d.heldout.size()));
