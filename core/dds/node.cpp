@@ -107,6 +107,7 @@ struct Node::Parts {
   std::mutex mutex;  // set-up only
   std::unique_ptr<Participant> realtime, general, raw;
   std::unique_ptr<LocalExchange> exchange;
+  std::mutex port_mutex;  // of the two below: a process tells of itself while its ports are being bound
   std::vector<BoundOutput> outputs;
   std::vector<std::unique_ptr<Connection>> inputs;
   Publishing realtime_publishing, general_publishing;
@@ -252,7 +253,10 @@ void Node::bind(OutputPort& port, OutputBinding binding, const Profile& qos) {
                                      exchange != nullptr ? bound.connection->share(*exchange) : nullptr);
     parts_->publishing(qos.traffic).add(*bound.outlet);
   }
-  parts_->outputs.push_back(std::move(bound));
+  {
+    const std::lock_guard lock{parts_->port_mutex};
+    parts_->outputs.push_back(std::move(bound));
+  }
   if (qos.exclusive) send_heartbeats(port.owner().cell);
 }
 
@@ -312,10 +316,12 @@ void Node::bind(InputPort& port, Clock clock) {
   inlet->align(parts_->clocks.get());
   if (qos.exclusive) watch_commander(port, *gate, clock);
   auto local = parts_->local_reader(qos, inlet, clock);
-  parts_->inputs.push_back(std::make_unique<ReaderConnection>(
+  auto input = std::make_unique<ReaderConnection>(
       parts_->participant(qos.traffic), port.topic, type.make_support(), qos, parts_->discovery,
       [inlet, clock = std::move(clock)](fdds::DataReader& reader) { inlet->receive(reader, clock()); }, gate,
-      std::move(local)));
+      std::move(local));
+  const std::lock_guard lock{parts_->port_mutex};
+  parts_->inputs.push_back(std::move(input));
 }
 
 void Node::start() {
@@ -335,7 +341,12 @@ void Node::stop() {
   parts_->realtime_publishing.stop();
   parts_->general_publishing.stop();
   if (parts_->exchange) parts_->exchange->wake_readers();  // for what was written after the last cycle
-  parts_->inputs.clear();
+  std::vector<std::unique_ptr<Connection>> inputs;
+  {
+    const std::lock_guard lock{parts_->port_mutex};
+    inputs.swap(parts_->inputs);
+  }
+  inputs.clear();  // outside of the lock: it waits for callbacks
   parts_->clock_pulse.reset();
   parts_->clock_beats.reset();
   parts_->heartbeats.reset();
@@ -375,6 +386,7 @@ std::vector<Alarm> Node::take_alarms() {
 Discovery& Node::discovery() { return parts_->discovery; }
 
 std::uint64_t Node::lost() const {
+  const std::lock_guard lock{parts_->port_mutex};
   std::uint64_t sum = 0;
   for (const auto& output : parts_->outputs) sum += output.outlet->lost();
   for (const auto& input : parts_->inputs) sum += input->lost();

@@ -110,6 +110,9 @@ ProcessService::ProcessService(Node& node, ProcessControl& control, Options opti
   readers_.push_back(node.timed_reader<lifecycle::LifecycleRequest>(topics.lifecycle_request, qos, take));
   readers_.push_back(node.timed_reader<lifecycle::ParameterRequest>(topics.parameter_request, qos, take));
   readers_.push_back(node.timed_reader<transfer::ModelRequest>(topics.model_request, qos, take));
+}
+
+void ProcessService::start() {
   thread_ = std::thread{[this] { run(); }};
 }
 
@@ -120,7 +123,7 @@ ProcessService::~ProcessService() {
     stopping_ = true;
   }
   news_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
   publish_news();
   publish_status();
 }

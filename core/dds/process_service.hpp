@@ -56,6 +56,8 @@ class ProcessService {
   ProcessService(const ProcessService&) = delete;
   ProcessService& operator=(const ProcessService&) = delete;
 
+  /// Serves requests and publishes statuses from now on, on a thread of its own. Ports are bound before: their numbers are told.
+  void start();
   /// Publishes a notice in this process's name. Any thread but the loop's.
   void publish(event::Severity level, const std::string& source, const std::string& text);
   /// Publishes all statuses now, as after a transition.

@@ -20,6 +20,14 @@ namespace {
 thread_local std::uint64_t allocations = 0;
 thread_local std::uint64_t locks = 0;
 
+}  // namespace
+
+// The thread sanitizer has calls of these names itself, which must see each lock and each block of memory, and it is not ready yet
+// when the first ones come. Nothing is counted under it.
+#ifndef __SANITIZE_THREAD__
+
+namespace {
+
 /// The function of the same name behind this one; looked up without allocating in the common case.
 template <class Function>
 Function next(Function& cached, const char* name) {
@@ -85,6 +93,8 @@ INVAR_COUNT_LOCK(pthread_cond_broadcast, (pthread_cond_t * condition), (conditio
 INVAR_COUNT_LOCK(sem_wait, (sem_t * semaphore), (semaphore))
 INVAR_COUNT_LOCK(sem_post, (sem_t * semaphore), (semaphore))
 }
+
+#endif
 
 namespace invar::support {
 

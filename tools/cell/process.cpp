@@ -223,6 +223,7 @@ class RunningProcess {
     if (recording_) recording_->read_all(loaded_, executor_);
     executor_.at_cycle_end([this] { node_.cycle_ended(); });
     node_.start();
+    service_->start();
     executor_.start();
     const bool up = bring_up();
     service_->publish_status();  // who waits for the cell need not wait for the next regular one
@@ -279,6 +280,7 @@ class RunningProcess {
     if (options_.paced) clock.listen_outside();
     if (recording_) clock.tap([this](const dds::LockstepSample& sample) { recording_->take(sample); });
     node_.start();
+    service_->start();
     const bool up = bring_up();
     if (up) manager_.ready();
     const auto outcome = clock.run(

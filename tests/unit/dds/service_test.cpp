@@ -69,6 +69,7 @@ TEST_F(Service, StatusTransitionsAndParametersGoOverTheWire) {
   service_options.interval = Duration::milliseconds(50);
   service_options.stop_process = [&] { asked_to_stop = true; };
   ProcessService service{node, control, service_options};
+  service.start();
   Node tool{local("tool"), standard_profiles()};
   CellClient client{tool};
 
@@ -165,6 +166,7 @@ TEST_P(LateService, SaysWhatLatencyIsNotKeptInItsStatusAndByNoticesAsDeclared) {
   service_options.cell = 1;
   service_options.interval = Duration::milliseconds(50);
   ProcessService service{node, control, service_options};
+  service.start();
   Node tool{local("tool"), standard_profiles()};
   CellClient client{tool};
   EXPECT_TRUE(control.request("", Transition::configure).ok());
