@@ -231,10 +231,11 @@ class Campaign:
             fail(f"notices of kills that no recording has: {missing}")
 
     def tell(self):
-        for what, times in sorted(self.took.items()):
-            print(f"{what}: {len(times)} times, all active again after {sorted(times)[len(times) // 2]:.2f} s at the median, "
-                  f"{max(times):.2f} s at most")
-        print(f"{self.jobs} jobs; by hand, as the status said: {len(self.by_hand)}", *self.by_hand, sep="\n  ")
+        print("| what | times | all active again, median [s] | longest [s] |\n| --- | --- | --- | --- |")
+        by_size = lambda what: re.sub(r"[0-9.]+", lambda number: f"{float(number[0]):06.1f}", what)
+        for what, times in sorted(self.took.items(), key=lambda item: by_size(item[0])):
+            print(f"| {what} | {len(times)} | {sorted(times)[len(times) // 2]:.2f} | {max(times):.2f} |")
+        print(f"\n{self.jobs} jobs; by hand, as the status said: {len(self.by_hand)}", *self.by_hand, sep="\n  ")
 
     def run(self, order):
         self.start()
