@@ -22,7 +22,11 @@ namespace invar {
 
 namespace {
 
+#ifdef __SANITIZE_THREAD__
+constexpr std::size_t stack_size = 8 * 1024 * 1024;  // thread-local data of the sanitizer stands in it, too
+#else
 constexpr std::size_t stack_size = 512 * 1024;
+#endif
 constexpr int own_mapping = 256 * 1024;       // bytes; larger blocks are mappings of their own
 constexpr int kept_at_the_top = 1024 * 1024;  // bytes of the heap that stay although they are free
 
