@@ -139,6 +139,14 @@ class Component {
     now_ = now;
     cycle_ = cycle;
   }
+  /// By the executor: `step`, with one and the same sample of each input from its first look to the end of the step.
+  void run_step(const Tick& tick) noexcept {
+    running_step_ = ++steps_;
+    step(tick);
+    running_step_ = 0;
+  }
+  /// The number of the step that runs, from one; 0: none does. On the thread that steps.
+  [[nodiscard]] std::uint64_t running_step() const noexcept { return running_step_; }
 
  private:
   friend class Port;
@@ -146,6 +154,8 @@ class Component {
   std::vector<Bumpless> bumpless_;
   Instant now_;
   std::uint64_t cycle_ = 0;
+  std::uint64_t steps_ = 0;
+  std::uint64_t running_step_ = 0;
   const char* failure_ = nullptr;
 };
 

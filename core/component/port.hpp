@@ -124,8 +124,9 @@ class Input final : public InputPort {
   Input(Component& owner, std::string_view name, InputOptions options = {})
       : InputPort{owner, name, Direction::input, typeid(T), options} {}
 
-  /// The newest sample, or nullptr when none arrived yet; stays valid and unchanged until the next call.
-  const T* latest() noexcept { return channel_.read(); }
+  /// The newest sample, or nullptr when none arrived yet; stays valid and unchanged until the next call. All calls of one step
+  /// give the same: what a component has checked is what it goes on with.
+  const T* latest() noexcept;
   /// Time since the newest sample arrived; a very long time when there is none.
   [[nodiscard]] Duration age(Instant now) const noexcept {
     const Instant at = arrived();
@@ -140,6 +141,8 @@ class Input final : public InputPort {
 
  private:
   Latest<T> channel_;
+  const T* held_ = nullptr;
+  std::uint64_t held_in_ = 0;  // the owner's step
 };
 
 /// Every sample in order, for commands and events. Real-time. Several sources may feed it, each through its
@@ -239,6 +242,14 @@ class Output final : public OutputPort {
 #include "core/component/component.hpp"
 
 namespace invar {
+
+template <class T>
+const T* Input<T>::latest() noexcept {
+  const std::uint64_t step = owner().running_step();
+  if (step == 0 || step != held_in_) held_ = channel_.read();
+  held_in_ = step;
+  return held_;
+}
 
 template <class T>
 void Output<T>::write_safe_value() noexcept {

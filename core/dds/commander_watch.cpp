@@ -14,11 +14,16 @@ constexpr std::uint64_t asked_after =
 }  // namespace
 
 void CommanderWatch::add(CommandGate& gate, Input<commander::Link>& link, std::function<Instant()> clock) {
-  Watched& watched = *watched_.emplace_back(std::make_unique<Watched>());
+  auto made = std::make_unique<Watched>();
+  Watched& watched = *made;
   watched.link = &link;
   watched.clock = std::move(clock);
   watched.sample.cell(link.owner().cell);
   watched.sample.component_id(link.owner().id);
+  {
+    const std::lock_guard lock{mutex_};  // heartbeats come from the first one on
+    watched_.push_back(std::move(made));
+  }
   gate.follow({.obeyed = [this, &watched](const Claimant& who) { obeyed(watched, who); },
                .gone = [this, &watched] { gone(watched); }});
 }

@@ -105,7 +105,7 @@ void Executor::step(Slot& slot, Instant now, std::uint64_t cycle, std::uint32_t 
   if (!inputs_alive(slot, tick)) return;
   const Instant begin = options_.simulated ? Instant{} : monotonic_now();
   if (!options_.simulated) watch_ages(slot, utc_at(begin));
-  component.step(tick);
+  component.run_step(tick);
   if (!options_.simulated) slot.compute.add(monotonic_now() - begin);
   slot.steps.store(slot.steps.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   if (component.failure() != nullptr) {

@@ -153,6 +153,34 @@ TEST(Ports, InboxKeepsEverySampleInOrderAndCountsWhatDoesNotFit) {
   EXPECT_EQ(probe.all.lost(), 6U);
 }
 
+/// Looks twice at an input that is fed between the two looks, as by the thread of a transport.
+struct TwoLooks final : Component {
+  Input<Position> newest{*this, "newest"};
+  std::int64_t first = 0, second = 0, held = 0;
+  void step(const Tick& tick) noexcept override {
+    const Position* before = newest.latest();
+    first = before->stamp;
+    for (int i = 1; i <= 3; ++i) newest.accept({first + i, 0.0}, tick.now);
+    second = newest.latest()->stamp;
+    held = before->stamp;
+  }
+};
+
+TEST(Ports, AnInputKeepsItsSampleThroughoutAStep) {
+  TwoLooks looking;
+  looking.newest.accept({10, 0.0}, {});
+  looking.run_step({});
+  EXPECT_EQ(looking.first, 10);
+  EXPECT_EQ(looking.second, 10);
+  EXPECT_EQ(looking.held, 10);
+  looking.run_step({});
+  EXPECT_EQ(looking.first, 13) << "the next step sees what came since";
+  EXPECT_EQ(looking.second, 13);
+  EXPECT_EQ(looking.newest.latest()->stamp, 16) << "outside of a step each look sees the newest";
+  looking.newest.accept({20, 0.0}, {});
+  EXPECT_EQ(looking.newest.latest()->stamp, 20);
+}
+
 TEST(Ports, SafeValueIsWhatWasDeclared) {
   LowPass::Parameters parameters;
   LowPass source{parameters};
