@@ -92,7 +92,7 @@ def row(what, gaps, steps, bar):
 
 
 def main():
-    print("| what | kills | gap, median [ms] | gap, longest [ms] | step, median [% of range] | step, largest [% of range] | bar |\n"
+    print("| what | kills | gap, median [ms] | gap, longest [ms] | step, median [% of range] | step, largest [% of range] | target |\n"
           "| --- | --- | --- | --- | --- | --- | --- |")
     beside = heat(HeatCell)
     row("heater, loop of 10 Hz, standby of 20 Hz", [1e3 * gap for gap, _ in beside], [step for _, step in beside], "200 ms, 1 %")
