@@ -26,8 +26,10 @@ class Latest {
       reading_ = middle_.exchange(reading_, std::memory_order_acq_rel) & index;
       any_ = true;
     }
-    return any_ ? &slots_[reading_] : nullptr;
+    return held();
   }
+  /// By the reader: once more what the last `read` gave.
+  [[nodiscard]] const T* held() const noexcept { return any_ ? &slots_[reading_] : nullptr; }
 
  private:
   static constexpr unsigned fresh = 4;

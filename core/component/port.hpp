@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <typeindex>
+#include <utility>
 #include <vector>
 
 #include "core/base/time.hpp"
@@ -141,8 +142,7 @@ class Input final : public InputPort {
 
  private:
   Latest<T> channel_;
-  const T* held_ = nullptr;
-  std::uint64_t held_in_ = 0;  // the owner's step
+  std::uint64_t read_in_ = 0;  // the owner's step
 };
 
 /// Every sample in order, for commands and events. Real-time. Several sources may feed it, each through its
@@ -246,9 +246,8 @@ namespace invar {
 template <class T>
 const T* Input<T>::latest() noexcept {
   const std::uint64_t step = owner().running_step();
-  if (step == 0 || step != held_in_) held_ = channel_.read();
-  held_in_ = step;
-  return held_;
+  if (step != 0 && step == std::exchange(read_in_, step)) return channel_.held();
+  return channel_.read();
 }
 
 template <class T>

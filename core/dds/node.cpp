@@ -107,7 +107,7 @@ struct Node::Parts {
   std::mutex mutex;  // set-up only
   std::unique_ptr<Participant> realtime, general, raw;
   std::unique_ptr<LocalExchange> exchange;
-  std::mutex port_mutex;  // of the two below: a process tells of itself while its ports are being bound
+  std::mutex port_mutex;  // of the two below, which any thread sums up
   std::vector<BoundOutput> outputs;
   std::vector<std::unique_ptr<Connection>> inputs;
   Publishing realtime_publishing, general_publishing;

@@ -58,7 +58,7 @@ verdict_of() { python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))[
 case $part in
   jobs)
     "$invar" run $cell --job excite
-    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis --budget 1200
+    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis
     finds_the_truth out/mismatch/diagnosis/report.json
     "$invar" run $cell --job prove | tee summary
     grep -Eq '^\.\.\. patched +rms .* times less\)' summary || fail "the summary does not say what it was good for"
@@ -72,7 +72,7 @@ case $part in
   nothing)
     hide ""
     "$invar" run $cell --job excite
-    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis --budget 1200
+    "$invar" diagnose --model $believed --recording out/mismatch/recording.mcap --out out/mismatch/diagnosis
     [[ $(verdict_of out/mismatch/diagnosis/report.json) == no_mismatch ]] || fail "claimed something where there is nothing"
     "$invar" run $cell --job prove | tee summary
     grep -q "nothing was given to the stage" summary || fail "something was applied"
@@ -124,7 +124,7 @@ case $part in
     kill -INT $record_pid
     wait $record_pid || { cat recorded; fail "the recording failed"; }
     cat recorded
-    "$invar" diagnose --model $believed --recording run.mcap --out diagnosis --budget 1200
+    "$invar" diagnose --model $believed --recording run.mcap --out diagnosis
     finds_the_truth diagnosis/report.json
     # How long the axis stood before somebody ended the recording is no physics.
     ! grep -q "a curve over time" diagnosis/report.html || fail "it claims something over time"

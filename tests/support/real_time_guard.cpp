@@ -20,14 +20,6 @@ namespace {
 thread_local std::uint64_t allocations = 0;
 thread_local std::uint64_t locks = 0;
 
-}  // namespace
-
-// The thread sanitizer has calls of these names itself, which must see each lock and each block of memory, and it is not ready yet
-// when the first ones come. Nothing is counted under it.
-#ifndef __SANITIZE_THREAD__
-
-namespace {
-
 /// The function of the same name behind this one; looked up without allocating in the common case.
 template <class Function>
 Function next(Function& cached, const char* name) {
@@ -36,6 +28,10 @@ Function next(Function& cached, const char* name) {
 }
 
 }  // namespace
+
+// The thread sanitizer has calls of these names itself, which must see each lock and each block of memory, and it is not ready yet
+// when the first ones come. Nothing is counted under it.
+#ifndef __SANITIZE_THREAD__
 
 // The C library's own names for what stands behind malloc.
 extern "C" {
