@@ -173,9 +173,21 @@ void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
   last_step_ = tick.now;
 }
 
+void Stage::begin_control(const Tick& tick) noexcept {
+  controller_ = physics::AxisController{controller_settings(tick.period)};
+  controlled_at_ = tick.cycle;
+}
+
+/// The current is held through skipped cycles, and while no feedback comes.
+double Stage::control(const MotionPoint& at, const Tick& tick) noexcept {
+  const std::uint64_t before = std::exchange(controlled_at_, tick.cycle);
+  const auto periods = static_cast<double>(std::max<std::uint64_t>(1, tick.cycle - before));
+  return controller_.step(at.position + correction_held_, position_, periods);
+}
+
 /// Setpoint := measured, so that nothing moves on activation or enabling.
 void Stage::prime(const Tick& tick) noexcept {
-  controller_ = physics::AxisController{controller_settings(tick.period)};
+  begin_control(tick);
   begin(Trajectory::rest(position_ - correction_held_), tick, mode_);
   outside_at_ = tick.now;
   primed_ = true;
@@ -423,7 +435,7 @@ void Stage::step(const Tick& tick) noexcept {
     const MotionPoint at = setpoint(tick);
     following_error_ = at.position + correction_held_ - position_;
     const double forward = feedforward(tick);
-    const double feedback_current = controller_.step(at.position + correction_held_, position_);
+    const double feedback_current = control(at, tick);
     current_ = std::clamp(feedback_current + forward, -highest_current(), highest_current());
     constexpr double remembers = 0.05;  // s
     if (mode_ == AXIS_MODE_HOLDING)

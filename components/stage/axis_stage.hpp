@@ -199,6 +199,8 @@ class Stage final : public Component, public Redundant {
   [[nodiscard]] double highest_current() const noexcept;
   [[nodiscard]] bool has_arrived(const Tick& tick) const noexcept;
   void begin(const Trajectory& trajectory, const Tick& tick, AxisMode mode) noexcept;
+  void begin_control(const Tick& tick) noexcept;
+  [[nodiscard]] double control(const MotionPoint& setpoint, const Tick& tick) noexcept;
   void prime(const Tick& tick) noexcept;
   void brake(const MotionPoint& from, const Tick& tick) noexcept;
   void trip(const char* why) noexcept;
@@ -239,6 +241,7 @@ class Stage final : public Component, public Redundant {
   bool model_changed_ = false;
 
   physics::AxisController controller_{{}};
+  std::uint64_t controlled_at_ = 0;  // the cycle of its last step
   Trajectory trajectory_ = Trajectory::rest(0.0);
   Instant trajectory_start_;
   std::optional<Instant> last_step_;

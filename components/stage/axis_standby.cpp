@@ -15,8 +15,7 @@ bool Stage::leads(const Tick& tick, bool seeing) noexcept {
   }
   if (!seeing) return false;  // it could not go on
   const Instant heard = standby_.heard();
-  controller_ =
-      physics::AxisController{controller_settings(tick.period)};  // the state below is for this rate
+  begin_control(tick);  // the state below is for this rate
   standby_.take_over(*this);
   go_on_for_other(tick);
   // What is neither proportional nor fed forward is the controller's sum; the rate of change is near none.

@@ -1,5 +1,6 @@
 #include "core/physics/axis_controller.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -17,6 +18,7 @@ AxisController::AxisController(const AxisControllerSettings& settings)
 
 void AxisController::reset() noexcept {
   sum_ = last_ = rate_of_change_ = 0.0;
+  gap_ = 1.0;
   started_ = false;
 }
 
@@ -26,21 +28,31 @@ bool AxisController::shift(double current) noexcept {
   return true;
 }
 
-double AxisController::step(double reference, double reading) noexcept {
+void AxisController::remember(double periods) noexcept {
+  constexpr double longest = 20.0;   // periods: a drive lets go of a current that nobody renews
+  constexpr double forgotten = 0.1;  // periods, a period: at 0.5 a loop that often loses 20 swings up
+  gap_ = std::max(std::min(periods, longest), gap_ - forgotten);
+}
+
+double AxisController::step(double reference, double reading, double periods) noexcept {
   const double error = reference - reading;
   const bool pid = settings_.kind == AxisControllerSettings::Kind::pid;
   const double tracked = pid ? error : reading;
   if (!started_) last_ = tracked, started_ = true;
-  rate_of_change_ += share_ * ((tracked - last_) * settings_.rate - rate_of_change_);
+  const double share = periods > 1.0 ? -std::expm1(periods * std::log1p(-share_)) : share_;
+  rate_of_change_ += share * ((tracked - last_) * settings_.rate / periods - rate_of_change_);
   last_ = tracked;
-  double command = pid ? settings_.kp * error + settings_.ki * (sum_ + error) / settings_.rate +
-                             settings_.kd * rate_of_change_
-                       : settings_.kv * (settings_.kp * error - rate_of_change_);
+  remember(periods);
+  const double soft = 1.0 / gap_;
+  const double more = periods * soft * soft * soft * error;  // of the sum
+  double command = pid ? soft * soft * settings_.kp * error + settings_.ki * (sum_ + more) / settings_.rate +
+                             soft * settings_.kd * rate_of_change_
+                       : soft * settings_.kv * (soft * settings_.kp * error - rate_of_change_);
   const double limit = settings_.limit;
   if (limit > 0.0 && std::abs(command) > limit)
     command = command > 0.0 ? limit : -limit;
   else
-    sum_ += error;
+    sum_ += more;
   return command;
 }
 

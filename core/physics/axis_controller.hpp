@@ -21,6 +21,10 @@ struct AxisControllerSettings {
 /// `u = clamp(kp e + ki sum(e)/rate + kd d)`. The sum includes e[k], which is not added where u clamps.
 ///
 /// cascade: `u = clamp(kv (kp e - v))`, v the same filtered backward difference of y. At rest e[-1] = e[0].
+///
+/// A loop that lost periods is likely to lose more: its current is held for longer, and full gains would swing the axis up. After a
+/// gap of n periods, 20 at most, the gains are those of the same loop with its time stretched by n: kd and kv by 1/n, kp of a pid
+/// by 1/n^2, the sum's by 1/n^3 (kp of a cascade by 1/n). They are back ten times the gap later. The difference is over all of it.
 /// Real-time.
 class AxisController {
  public:
@@ -30,12 +34,15 @@ class AxisController {
   /// Adds a current to the sum's part of the command, so that somebody else may take it over without a bump; false where
   /// the law has no sum. Real-time.
   bool shift(double current) noexcept;
-  /// The command [A] for this reference and reading [m]; call once a period.
-  [[nodiscard]] double step(double reference, double reading) noexcept;
+  /// The command [A] for this reference and reading [m]; `periods`: since the last step, 1 at least.
+  [[nodiscard]] double step(double reference, double reading, double periods = 1.0) noexcept;
 
  private:
+  void remember(double periods) noexcept;
+
   AxisControllerSettings settings_;
-  double share_;  // a of the filter
+  double share_;      // a of the filter
+  double gap_ = 1.0;  // n above
   double sum_ = 0.0, last_ = 0.0, rate_of_change_ = 0.0;
   bool started_ = false;
 };

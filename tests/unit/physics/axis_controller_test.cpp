@@ -3,8 +3,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "core/physics/axis_plant.hpp"
 
 namespace invar::physics {
 namespace {
@@ -34,6 +40,61 @@ TEST(AxisController, CascadeBrakesByTheMeasuredSpeed) {
   AxisController cascade{s};
   EXPECT_NEAR(cascade.step(0.01, 0.0), 2.0 * 0.5, 1e-12);
   EXPECT_NEAR(cascade.step(0.01, 0.001), 2.0 * (50.0 * 0.009 - 1.0), 1e-12);
+}
+
+TEST(AxisController, AfterAGapTheDifferenceIsOverAllOfItAndTheGainsAreThoseOfASlowerLoop) {
+  AxisControllerSettings s;
+  s.kp = 10.0, s.ki = 200.0, s.kd = 0.5;
+  AxisController pid{s};
+  (void)pid.step(0.0, 0.0);
+  const double command =
+      10.0 / 16.0 * 0.1 + 200.0 / 64.0 * 0.1 * 4.0 / 1000.0 + 0.5 / 4.0 * 0.1 * 1000.0 / 4.0;
+  EXPECT_NEAR(pid.step(0.1, 0.0, 4.0), command, 1e-12);
+  for (int i = 0; i < 30; ++i) (void)pid.step(0.0, 0.0);
+  AxisController kept{s};
+  (void)kept.step(0.0, 0.0);
+  const double offset = pid.step(0.0, 0.0);  // of the sum
+  EXPECT_NEAR(pid.step(0.1, 0.0) - offset, kept.step(0.1, 0.0), 1e-12);
+}
+
+/// How far [m] an axis that is held goes from its place in 20 s, where its loop is due again after `gap` periods. Its drive holds
+/// the current meanwhile, for 20 periods at most.
+template <class Gap>
+double wandering(const Gap& gap, std::mt19937_64& random) {
+  AxisControllerSettings s;
+  s.kp = 4e4, s.ki = 8e5, s.kd = 300.0, s.velocity_filter_hz = 300.0,
+  s.limit = 10.0;  // as of an axis of the deployment
+  constexpr double period = 1e-3;
+  AxisPlant plant{{3.2, 12.0, 18.0}, {}, period};
+  AxisController controller{s};
+  plant.rest_at(0.0);
+  std::normal_distribution<double> noise{0.0, 2e-8};
+  double worst = 0.0, current = 0.0;
+  int due = 0, last = -1;
+  for (int k = 0; k < 20000 && worst < 0.1; ++k) {
+    if (k - last == 20) current = 0.0;  // the drive lets go
+    if (k == due) {
+      current = controller.step(0.0, plant.reading() + noise(random), k - std::exchange(last, k));
+      due = k + gap(random);
+    }
+    plant.step(current, period);
+    worst = std::max(worst, std::abs(plant.position()));
+  }
+  return worst;
+}
+
+TEST(AxisController, ALoopThatLosesPeriodsDoesNotSwingUp) {
+  const auto seed = std::random_device{}();
+  std::mt19937_64 random{seed};
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  EXPECT_LT(wandering([](auto&) { return 1; }, random), 1e-6);
+  for (const int every : {2, 8, 15, 40})
+    EXPECT_LT(wandering([=](auto&) { return every; }, random), 50e-6) << every << " periods a step";
+  for (const auto& [share, length] : {std::pair{0.2, 3}, {0.1, 20}, {0.03, 50}, {0.5, 15}}) {
+    std::bernoulli_distribution loses{share};
+    EXPECT_LT(wandering([&](auto& by) { return loses(by) ? length : 1; }, random), 1e-3)
+        << "one of " << 1.0 / share << " steps is followed by a gap of " << length << " periods";
+  }
 }
 
 }  // namespace

@@ -543,7 +543,7 @@ TEST(Stage, NoCommandTakesItBeyondItsLimits) {
   bench.enable();
   const Stage::Limits& limits = bench.parameters.limits;
   int moved = 0;
-  for (int round = 0; round < 3000; ++round) {
+  for (int round = 0; round < 4000; ++round) {
     AxisCommand command;
     command.id(bench.next_id++);
     command.kind(any(kinds));
