@@ -21,7 +21,7 @@ void Standby::activate() noexcept {
   unfit_steps_ = 0;
   own_.fit(true);
   nobody_since_.reset();
-  asked_ = nobody_ = false;
+  asked_ = nobody_ = hands_over_ = other_is_ready_ = false;
   unready_ = nullptr;
   silent_steps_ = 0;
   received_ = in_.received();
@@ -94,13 +94,16 @@ bool Standby::is_silent(const Tick& tick) const noexcept {
 Standby::Duty Standby::lead(const Tick& tick, bool stood_still) noexcept {
   const auto* other = in_.latest();
   const bool heard = other != nullptr && silent_steps_ == 0;
+  other_is_ready_.store(other != nullptr && !is_silent(tick) && !other->leads() && !other->resigned() &&
+                            other->fit() && other->knows(),
+                        std::memory_order_release);
   if (heard && other->leads() &&
       (other->term() > own_.term() || (other->term() == own_.term() && pair_->is_spare))) {
     step_down(event::SEVERITY_WARNING, " leads by now");
     return Duty::stand_by;
   }
   if (heard && other->asks() && !other->leads()) {
-    step_down(event::SEVERITY_NOTE, own_.fit() ? " was asked to lead" : " reaches the device");
+    step_down(event::SEVERITY_NOTE, own_.fit() ? " was asked to lead" : " can go on");
     return Duty::stand_by;
   }
   if (stood_still) listens_since_ = tick.now;
@@ -155,7 +158,7 @@ Standby::Duty Standby::stand_by(const Tick& tick) noexcept {
 Standby::Duty Standby::beside_one_that_does_not_lead(const Tick& tick) noexcept {
   const auto& other = *in_.latest();
   if (asked_)
-    return found_missing(unfit_steps_ > 0 ? "it did not reach its device" : "it was asked to lead", true);
+    return found_missing(unfit_steps_ > 0 ? "it said that it cannot go on" : "it was asked to lead", true);
   if (!nobody_since_) nobody_since_ = tick.now;
   nobody_ = other.resigned() || tick.now - *nobody_since_ > start_wait;
   if (other.resigned() || other.asks()) return Duty::stand_by;

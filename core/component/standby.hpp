@@ -164,7 +164,7 @@ class Standby {
   /// When the last beat of a leader came: what was commanded before it that leader has heard.
   [[nodiscard]] Instant heard() const noexcept { return leader_heard_; }
   /// Once a step: does it reach what it controls? One that does takes the place of one that does not for a second.
-  void fit(bool reaches) noexcept { own_.fit(reaches); }
+  void fit(bool reaches) noexcept { own_.fit(reaches && !hands_over_.load(std::memory_order_relaxed)); }
   /// Why it could not go on in the other's place; nullptr: it could. Must be a literal.
   void unready(const char* why) noexcept { unready_.store(why, std::memory_order_release); }
   /// The other was heard, and is not any more: it may lead.
@@ -179,6 +179,12 @@ class Standby {
   [[nodiscard]] bool leads() const noexcept { return leads_.load(std::memory_order_acquire); }
   /// A person wants this one to lead: the other hands over. False where it leads already.
   bool ask() noexcept;
+  /// Its process is about to end: another one that is ready takes its place within two seconds.
+  void hand_over() noexcept { hands_over_.store(true, std::memory_order_release); }
+  /// It still leads, and there is another one that could.
+  [[nodiscard]] bool is_handing_over() const noexcept {
+    return leads() && other_is_ready_.load(std::memory_order_acquire);
+  }
   /// "active", "standby" or "took over"; empty where nobody stands by.
   [[nodiscard]] const char* role() const noexcept;
   /// For a person: nobody leads, or this one could not take over; empty: nothing to say.
@@ -226,7 +232,7 @@ class Standby {
   Instant heard_, leader_heard_;  // beats of the other, of those that led; by this clock
   Instant active_since_, last_step_, listens_since_;
   std::optional<Instant> nobody_since_;
-  std::atomic<bool> leads_{true}, asked_{false}, nobody_{false};
+  std::atomic<bool> leads_{true}, asked_{false}, nobody_{false}, hands_over_{false}, other_is_ready_{false};
   std::atomic<const char*> unready_{nullptr};
   std::atomic<std::int32_t> other_process_{0}, ended_process_{0};
   std::int32_t seen_process_ = 0;  // found alive

@@ -30,7 +30,7 @@ bool AxisController::shift(double current) noexcept {
 
 void AxisController::remember(double periods) noexcept {
   constexpr double longest = 20.0;   // periods: a drive lets go of a current that nobody renews
-  constexpr double forgotten = 0.1;  // periods, a period: at 0.5 a loop that often loses 20 swings up
+  constexpr double forgotten = 0.1;  // periods, a period: at 0.5 a loop that often loses 20 is unstable
   gap_ = std::max(std::min(periods, longest), gap_ - forgotten);
 }
 

@@ -22,9 +22,9 @@ struct AxisControllerSettings {
 ///
 /// cascade: `u = clamp(kv (kp e - v))`, v the same filtered backward difference of y. At rest e[-1] = e[0].
 ///
-/// A loop that lost periods is likely to lose more: its current is held for longer, and full gains would swing the axis up. After a
-/// gap of n periods, 20 at most, the gains are those of the same loop with its time stretched by n: kd and kv by 1/n, kp of a pid
-/// by 1/n^2, the sum's by 1/n^3 (kp of a cascade by 1/n). They are back ten times the gap later. The difference is over all of it.
+/// A loop that lost periods is likely to lose more: its current is held for longer, and full gains would make it unstable. After a
+/// gap of n periods, 20 at most, the gains are those of the same loop with its time stretched by n. That is kd and kv by 1/n, kp of
+/// a pid by 1/n^2, the sum's by 1/n^3, kp of a cascade by 1/n. They are back 10 n periods later. The difference is over all of it.
 /// Real-time.
 class AxisController {
  public:

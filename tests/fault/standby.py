@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 """A component stands by for another one in another process, and goes on in its place: killed (-9), stopped and continued, asked,
-deactivated. Who writes to the heater is told by a witness between the masters and the device; what the axis does, by a recording.
+deactivated, and in a secured cell started anew with another certificate. Who writes to the heater is told by a witness between the
+masters and the device; what the axis does, by a recording.
 
-Usage: standby.py INVAR SOURCE_FOLDER DOMAIN PORT heat|motion
+Usage: standby.py INVAR SOURCE_FOLDER DOMAIN PORT heat|motion|renewed-heat|renewed-motion
 """
 import pathlib
 import signal
@@ -10,7 +11,7 @@ import sys
 import tempfile
 import time
 
-from standby_cells import HeatCell, MotionCell, column
+from standby_cells import SECURITY, HeatCell, MotionCell, column
 
 INVAR, SOURCE, DOMAIN, PORT, WHAT = (pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3],
                                      int(sys.argv[4]), sys.argv[5])
@@ -113,12 +114,46 @@ def motion(cell):
         fail(f"the axis left its travel: {min(positions)} to {max(positions)} m")
 
 
+def renewed_heat(cell):
+    cell.wait_for_roles(thermal="active", thermal_spare="standby")
+    time.sleep(4.0)
+    for leader, roles in (("heat", ("standby", "took over")), ("spare", ("active", "standby"))):
+        before, at = cell.pids()[leader], time.time()
+        cell.renew(leader)
+        cell.wait("the standby to go on", lambda: cell.has_taken_over(at))
+        check_takeover(cell, at, f"{leader} renewed", 1.0)
+        cell.wait_for_roles(thermal=roles[0], thermal_spare=roles[1])
+        cell.wait("another process", lambda: cell.pids().get(leader, before) != before)
+
+
+def renewed_motion(cell):
+    cell.wait_for_roles(stage_x="active", spare_x="standby")
+    cell.call("job", "run", cell.file, "move", "--detach")
+    at = []
+    for leader, roles in (("servo", ("standby", "took over")), ("spare", ("active", "standby"))):
+        cell.wait_for_motion()
+        at.append(time.time())
+        cell.renew(leader)
+        cell.wait_for_roles(stage_x=roles[0], spare_x=roles[1])
+    cell.call("job", "cancel", cell.file, "move")
+    cell.end()
+    rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "following_error"), row["mode"])
+                  for row in cell.table("stage_x.state"))
+    rows = [row for row in rows if row[0] > at[0]]
+    gap = max(later[0] - row[0] for row, later in zip(rows, rows[1:]))
+    error = max(abs(row[1]) for row in rows)
+    print(f"renewed: at most {gap * 1e3:.1f} ms between two states, following error at most {error * 1e6:.0f} um")
+    if gap > 0.1 or error > 2e-3 or any("FAULT" in row[2] or "DISABLED" in row[2] for row in rows):
+        fail("the motion did not go on")
+
+
 def main():
     with tempfile.TemporaryDirectory(prefix="invar-standby-") as name:
-        cell = (HeatCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, PORT) if WHAT == "heat" else
-                MotionCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN))
+        head = SECURITY if WHAT.startswith("renewed") else ""
+        cell = (HeatCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, PORT, head) if WHAT.endswith("heat") else
+                MotionCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, head=head))
         try:
-            {"heat": heat, "motion": motion}[WHAT](cell)
+            {"heat": heat, "motion": motion, "renewed-heat": renewed_heat, "renewed-motion": renewed_motion}[WHAT](cell)
         except SystemExit:
             print((cell.folder / "log").read_text()[-6000:])
             raise

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A domain and a port of its own for standby.py and hung_loop.py. standby.sh INVAR SOURCE_DIR heat|motion|hung
+# A domain and a port of its own for standby.py and hung_loop.py. standby.sh INVAR SOURCE_DIR heat|motion|renewed-heat|renewed-motion|hung
 set -euo pipefail
 source "$2/tests/support/claims.sh"
 folder=$(dirname "$0")

@@ -14,6 +14,8 @@ from modbus_witness import Witness
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
 from cell_processes import children  # noqa: E402
 
+SECURITY = "security: {{keys: keys, operators: [anna]}}\n"
+
 HEAT = """invar_cell: 1
 name: standby
 domain: {domain}
@@ -78,6 +80,9 @@ class Cell:
             shutil.copy(source / name, folder)
         shutil.copy(source / "deployment/machines/xy-table-nominal.yaml", folder / "machine.yaml")
         self.file.write_text(text)
+        self.person = ("--as", "anna") if "security:" in text else ()
+        if self.person:
+            subprocess.run([invar, "keys", self.file], cwd=folder, check=True, stdout=subprocess.DEVNULL)
         self.log = open(folder / "log", "w")
         self.run = subprocess.Popen([invar, "run", self.file], cwd=folder, stdout=self.log, stderr=self.log)
 
@@ -86,7 +91,8 @@ class Cell:
         return children(self.run.pid)
 
     def call(self, *words):
-        return subprocess.run([self.invar, *map(str, words)], cwd=self.folder, capture_output=True, text=True)
+        person = () if words[0] in ("export", "keys") else self.person
+        return subprocess.run([self.invar, *map(str, words), *person], cwd=self.folder, capture_output=True, text=True)
 
     def status(self):
         answer = self.call("status", self.file, "--json", "--wait", "2")
@@ -109,6 +115,14 @@ class Cell:
 
     def kill(self, process, with_signal=signal.SIGKILL):
         os.kill(self.pids()[process], with_signal)
+
+    def renew(self, process):
+        """Another certificate; the process that has it is started anew, alone."""
+        time.sleep(1.1)  # files tell by their times what is newer than a process
+        renewed = self.call("keys", self.file, "--renew", process)
+        if renewed.returncode != 0:
+            raise SystemExit("FAILED: " + renewed.stderr)
+        self.run.send_signal(signal.SIGUSR2)
 
     def end(self):
         if self.run.poll() is None:
@@ -133,9 +147,9 @@ def column(row, begin):
 class HeatCell(Cell):
     POWER, TEXT = ("holding", 0), HEAT
 
-    def __init__(self, invar, source, folder, domain, port):
+    def __init__(self, invar, source, folder, domain, port, head=""):
         self.witness = Witness(port, port + 1)
-        super().__init__(invar, source, folder, self.TEXT.format(domain=domain, port=port, device=port + 1))
+        super().__init__(invar, source, folder, (head + self.TEXT).format(domain=domain, port=port, device=port + 1))
 
     def powers(self, since=0.0):
         """(time, connection, W) of each write of the power."""
@@ -160,8 +174,8 @@ class HeatCell(Cell):
 
 
 class MotionCell(Cell):
-    def __init__(self, invar, source, folder, domain, strokes=20):
-        super().__init__(invar, source, folder, MOTION.format(domain=domain, strokes=", ".join(["0.05"] * strokes)))
+    def __init__(self, invar, source, folder, domain, strokes=20, head=""):
+        super().__init__(invar, source, folder, (head + MOTION).format(domain=domain, strokes=", ".join(["0.05"] * strokes)))
 
     def sample(self):
         answer = self.call("echo", self.file, "stage_x.state", "--count", "1", "--json", "--wait", "5")

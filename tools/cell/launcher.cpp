@@ -232,8 +232,8 @@ struct Beside {
   }
 };
 
-/// One process after the other: its axes come to rest while all that they move on is still there, it ends in order, and it begins
-/// with the certificate that is there now.
+/// One process after the other: what has a standby is handed over, its axes come to rest while all that they move on is still there,
+/// it ends in order, and it begins with the certificate that is there now.
 void renew(std::vector<Child>& children, const LaunchOptions& options, const config::Cell& cell,
            const std::filesystem::path& folder, Beside& beside) {
   if (options.renew == nullptr || !options.renew->exchange(false) || !cell.security) return;
@@ -246,9 +246,9 @@ void renew(std::vector<Child>& children, const LaunchOptions& options, const con
   for (Child& child : children) {
     if (!child.running || !is_renewed(child, cell)) continue;
     spdlog::warn("process `{}` has another certificate: it ends in order and starts anew", child.name);
-    kill(child.pid, SIGUSR1);
+    kill(child.pid, SIGUSR2);
     const auto rest = rest_file(outcome_of(child.name, folder));
-    wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 5.0);
+    wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 10.0);
     if (child.running) kill(child.pid, SIGTERM);
     wait_for(child, watched([] { return false; }));
     if (child.running) kill(child.pid, SIGKILL);

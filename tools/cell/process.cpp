@@ -204,6 +204,14 @@ class RunningProcess {
     rest_.come_to_rest();
   }
 
+  void hand_over() {
+    std::vector<Standby*> standbys;
+    for (const Member& member : members_)
+      if (member.standby != nullptr) standbys.push_back(member.standby);
+    if (!rest_.is_resting()) faults_at_end_ = faults();
+    rest_.hand_over(standbys);
+  }
+
   RestOrder::Parent look_at_parent() {
     // Nobody says who notices first; who records leaves last, or the end of the others would be missing.
     const auto parent = rest_.look(recorder_ != nullptr ? Duration::seconds(1.0) : Duration{});
@@ -236,6 +244,7 @@ class RunningProcess {
       partners_.look();
       parent = look_at_parent();
       if (parent != RestOrder::Parent::there || orders.rest.load()) come_to_rest();
+      if (orders.renew.load()) hand_over();
       manager_.feed(executor_.counters().executed);
       leave_progress();
       watch_address();

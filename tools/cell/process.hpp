@@ -25,6 +25,8 @@ struct ProcessOptions {
 struct ProcessOrders {
   std::atomic<bool> stop{false};
   std::atomic<bool> rest{false};  // by the clock: what moves comes to rest; all goes on until `stop`
+  /// Certificates were renewed. `invar run` starts anew whom it concerns; a process of it hands over to standbys, then rests.
+  std::atomic<bool> renew{false};
 };
 
 /// Runs until `stop` is set, the job has ended, or in simulated time the master ends the run. Checks the whole cell first. One

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 
 #include "core/base/clock.hpp"
@@ -15,6 +16,19 @@ void RestOrder::come_to_rest() {
   if (told_ || !executor_.is_at_rest() || outcome_.empty()) return;
   std::ofstream{rest_file(outcome_)} << '\n';
   told_ = true;
+}
+
+void RestOrder::hand_over(const std::vector<Standby*>& standbys) {
+  const Instant now = monotonic_now();
+  if (!handing_since_) {
+    handing_since_ = now;
+    for (Standby* standby : standbys) standby->hand_over();
+  }
+  const bool waits =
+      std::any_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_handing_over(); });
+  constexpr Duration patience =
+      Duration::seconds(4.0);  // a standby waits for a second before it takes the place
+  if (!waits || now - *handing_since_ > patience) come_to_rest();
 }
 
 RestOrder::Parent RestOrder::look(Duration lingers) {

@@ -5,7 +5,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
+#include "core/component/standby.hpp"
 #include "core/executor/executor.hpp"
 
 namespace invar::tools {
@@ -17,6 +19,8 @@ class RestOrder {
   RestOrder(const std::filesystem::path& outcome, Executor& executor, pid_t parent)
       : outcome_{outcome}, executor_{executor}, parent_{parent} {}
 
+  /// As `come_to_rest`, after those that have a standby which is ready have handed over to it.
+  void hand_over(const std::vector<Standby*>& standbys);
   /// The components brake, and are stepped further: what other processes move on or read must be there until they rest, too.
   /// The file `rest_file` tells the launcher when they are at rest. Once each round after the order.
   void come_to_rest();
@@ -31,7 +35,7 @@ class RestOrder {
   const std::filesystem::path& outcome_;
   Executor& executor_;
   const pid_t parent_;
-  std::optional<Instant> orphan_since_;
+  std::optional<Instant> orphan_since_, handing_since_;
   bool resting_ = false, told_ = false;
 };
 

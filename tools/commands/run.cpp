@@ -35,10 +35,8 @@ namespace {
 
 ProcessOrders orders;
 
-std::atomic<bool> renew{false};
-
 void take_order(int signal) {
-  (signal == SIGUSR1 ? orders.rest : signal == SIGUSR2 ? renew : orders.stop) = true;
+  (signal == SIGUSR1 ? orders.rest : signal == SIGUSR2 ? orders.renew : orders.stop) = true;
 }
 
 struct RunOptions {
@@ -134,7 +132,7 @@ int run(RunOptions& options) {
     options.launch.progress = [&](double fraction, const std::string& text) {
       progress.show(fraction, text);
     };
-  options.launch.renew = &renew;
+  options.launch.renew = &orders.renew;
   const LaunchOutcome outcome = launch(options.launch, orders.stop);
   progress.end();
   std::ostringstream unseen;
@@ -160,7 +158,7 @@ void add_run(CLI::App& program) {
       "Ctrl-C stops the cell: every axis makes a controlled stop, then the processes end in the order of the "
       "file.\n"
       "SIGUSR2 starts the processes of a secured cell anew whose certificate was renewed, one after the "
-      "other.\n"
+      "other. Loops with a standby are handed over first.\n"
       "Notices of the cell, from warning up, go to the error output, a line each.\n"
       "Exit status: 0 all was well at the end; 2 the file has faults; 1 otherwise. Cases of 1: a job failed, "
       "a\n"

@@ -265,13 +265,45 @@ TEST(Standby, OneThatReachesItsDeviceTakesThePlaceOfOneThatDoesNot) {
   pair.steps(200);
   EXPECT_FALSE(pair.first.commanded);
   EXPECT_TRUE(pair.spare.commanded);
-  EXPECT_THAT(pair.said,
-              testing::ElementsAre(
-                  "first: stands by: `spare` reaches the device",
-                  "spare: took over from `first` (it did not reach its device), and goes on from its state"));
+  EXPECT_THAT(
+      pair.said,
+      testing::ElementsAre(
+          "first: stands by: `spare` can go on",
+          "spare: took over from `first` (it said that it cannot go on), and goes on from its state"));
   pair.spare.reaches = false;
   pair.steps(3000);
   EXPECT_TRUE(pair.spare.commanded) << "the other does not reach it either";
+}
+
+TEST(Standby, OneWhoseProcessIsAboutToEndHandsOverWithoutAGap) {
+  Pair pair;
+  pair.begin();
+  pair.first.standby().hand_over();
+  EXPECT_TRUE(pair.first.standby().is_handing_over());
+  double last = 0.0;
+  int idle = 0;
+  for (int steps = 0; steps < 2000 && pair.first.standby().is_handing_over(); ++steps) {
+    last = pair.first.commanded.value_or(last);
+    pair.step();
+  }
+  for (; !pair.spare.commanded && idle < 100; ++idle) pair.step();
+  EXPECT_LE(idle, 1);
+  EXPECT_NEAR(*pair.spare.commanded, last + 1.0, 1.0);
+  EXPECT_FALSE(pair.first.standby().leads());
+  pair.steps(3000);
+  EXPECT_TRUE(pair.spare.commanded) << "it is not handed back";
+}
+
+TEST(Standby, NobodyHandsOverToOneThatCouldNotGoOn) {
+  Pair pair;
+  pair.begin();
+  pair.spare.reaches = false;
+  pair.steps(3);
+  pair.first.standby().hand_over();
+  pair.steps(2);
+  EXPECT_FALSE(pair.first.standby().is_handing_over()) << "there is nobody to wait for";
+  pair.steps(3000);
+  EXPECT_TRUE(pair.first.commanded);
 }
 
 TEST(Standby, OneThatReachesNeitherDeviceNorOtherCommandsNoMoreUntilItHearsOne) {

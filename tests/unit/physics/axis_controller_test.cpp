@@ -83,7 +83,7 @@ double wandering(const Gap& gap, std::mt19937_64& random) {
   return worst;
 }
 
-TEST(AxisController, ALoopThatLosesPeriodsDoesNotSwingUp) {
+TEST(AxisController, ALoopThatLosesPeriodsStaysStable) {
   const auto seed = std::random_device{}();
   std::mt19937_64 random{seed};
   SCOPED_TRACE("seed " + std::to_string(seed));
