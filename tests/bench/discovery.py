@@ -6,6 +6,7 @@ As root: two network namespaces joined by a cable, so that 200 participants have
 find one another within a minute, plain Fast DDS neither: 40 000 pairs want more CPU time than there is.
 Time counts from the moment at which all begin, the making of processes left out, until the last reader knows all writers.
 """
+import math
 import os
 import resource
 import statistics
@@ -58,6 +59,12 @@ def once(kind, total):
     return (max(times) if times else float("nan")), missing, cpu() - before
 
 
+def spread(seconds):
+    if any(math.isnan(one) for one in seconds):
+        return "not in 60"
+    return f"{statistics.median(seconds):.2f} ({min(seconds):.2f} .. {max(seconds):.2f})"
+
+
 def main():
     cables()
     try:
@@ -70,8 +77,7 @@ def main():
                     found[kind].append(once(kind, total))
                     print(total, kind, *(f"{number:.2f}" for number in found[kind][-1]), file=sys.stderr)
                     time.sleep(1)
-            text = {kind: f"{statistics.median(r[0] for r in rows):.2f} ({min(r[0] for r in rows):.2f} .. {max(r[0] for r in rows):.2f})"
-                    for kind, rows in found.items()}
+            text = {kind: spread([r[0] for r in rows]) for kind, rows in found.items()}
             missing = {kind: sum(r[1] for r in rows) for kind, rows in found.items()}
             used = {kind: statistics.median(r[2] for r in rows) for kind, rows in found.items()}
             print(f"| {total} | {text['plain']} | {text['invar']} | {missing['plain']} / {missing['invar']} | "

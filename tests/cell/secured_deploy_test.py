@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """A secured cell and its bridge to a plant, deployed to two PCs with systemd: each has the private keys of its own names and no other;
-nobody without a certificate reads or commands it; the plant gets its topic; renewed and revoked keys take effect by `invar deploy`.
+one of them is reached as a user who may use sudo; nobody without a certificate reads or commands it; the plant gets its topic; renewed and revoked keys take effect by `invar deploy`.
 
 Usage: secured_deploy_test.py INVAR SOURCE_FOLDER
 As root; tests/cell/pcs.py makes the PCs.
@@ -26,7 +26,7 @@ profiles: profiles.yaml
 security: {{keys: keys, operators: [anna], viewers: [wall]}}
 hosts:
   pc-a: {{address: 10.81.0.11}}
-  pc-b: {{address: 10.81.0.12}}
+  pc-b: {{address: 10.81.0.12, ssh: {{user: admin}}}}
 processes:
   heat:
     host: pc-a
@@ -84,6 +84,9 @@ class SecuredAndDeployed(unittest.TestCase):
         print(f"first deployment: {time.monotonic() - began:.1f} s", file=sys.stderr)
         self.keys_lie_where_they_belong()
         self.the_plant_gets_its_topic_and_nobody_else_anything()
+
+        owners = self.pcs.on("pc-b", f"stat -c %U {HOME} {HOME}/current {HOME}/data {HOME}/keys").stdout.split()
+        self.assertEqual(owners, ["admin", "admin", "invar", "invar"])
 
         heat, main = self.pid("heat"), self.main("pc-a")
         said = self.deploy()

@@ -13,6 +13,7 @@ from modbus_witness import Witness
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
 from cell_processes import children  # noqa: E402
+from three_hosts import Hosts  # noqa: E402
 
 SECURITY = "security: {{keys: keys, operators: [anna]}}\n"
 
@@ -40,13 +41,15 @@ MOTION = """invar_cell: 1
 name: standby
 domain: {domain}
 profiles: profiles.yaml
-hosts: {{pc: {{address: 127.0.0.1}}}}
+hosts: {hosts}
 processes:
   plant:
+    host: {axis}
     realtime: {{rate: 1000, priority: 70}}
     components:
       world: {{type: simulated_stage, machine: machine.yaml, watchdog: 0.05, connect: {{motor_x: stage_x.motor}}}}
   servo:
+    host: {axis}
     realtime: {{rate: 1000, priority: 60}}
     components:
       stage_x:
@@ -57,8 +60,9 @@ processes:
         limits: {{velocity: 0.05, acceleration: 0.5, jerk: 50}}
         control: {{kp: 2500, ki: 1.2e4, kd: 75, velocity_filter: 80, limit: 10, feedforward_velocity: 1.5, feedforward_acceleration: 0.2667}}
         connect: {{feedback: world.feedback_x}}
-  spare: {{realtime: {{rate: 1000, priority: 60}}, components: {{spare_x: {{standby: {{of: stage_x}}}}}}}}
+  spare: {{host: {other}, realtime: {{rate: 1000, priority: 60}}, components: {{spare_x: {{standby: {{of: stage_x}}}}}}}}
   trials:
+    host: {axis}
     rate: 100
     components:
       trial:
@@ -66,7 +70,7 @@ processes:
         axis: 0
         motion: [{{name: move, from: 0.18, to: 0.02, velocities: [{strokes}]}}]
         connect: {{state: stage_x.state, command: stage_x.command}}
-  recorder: {{rate: 50, components: {{recorder: {{type: recorder}}}}}}
+  recorder: {{host: {axis}, rate: 50, components: {{recorder: {{type: recorder}}}}}}
 jobs: {{move: trial}}
 """
 
@@ -84,15 +88,22 @@ class Cell:
         if self.person:
             subprocess.run([invar, "keys", self.file], cwd=folder, check=True, stdout=subprocess.DEVNULL)
         self.log = open(folder / "log", "w")
-        self.run = subprocess.Popen([invar, "run", self.file], cwd=folder, stdout=self.log, stderr=self.log)
+        self.runs = self.start()
+
+    def start(self):
+        return [subprocess.Popen([self.invar, "run", self.file], cwd=self.folder, stdout=self.log, stderr=self.log)]
 
     def pids(self):
         """Process name in the cell -> process id."""
-        return children(self.run.pid)
+        return {name: pid for run in self.runs for name, pid in children(run.pid).items()}
+
+    def words(self, *words):
+        """The call of a program where the cell's commands are given."""
+        return [str(word) for word in words]
 
     def call(self, *words):
-        person = () if words[0] in ("export", "keys") else self.person
-        return subprocess.run([self.invar, *map(str, words), *person], cwd=self.folder, capture_output=True, text=True)
+        person = () if words[0] == "keys" else self.person
+        return subprocess.run(self.words(self.invar, *words, *person), cwd=self.folder, capture_output=True, text=True)
 
     def status(self):
         answer = self.call("status", self.file, "--json", "--wait", "2")
@@ -122,18 +133,22 @@ class Cell:
         renewed = self.call("keys", self.file, "--renew", process)
         if renewed.returncode != 0:
             raise SystemExit("FAILED: " + renewed.stderr)
-        self.run.send_signal(signal.SIGUSR2)
+        for run in self.runs:
+            run.send_signal(signal.SIGUSR2)
 
     def end(self):
-        if self.run.poll() is None:
-            self.run.send_signal(signal.SIGINT)
-            self.run.wait(timeout=60)
+        for run in self.runs:
+            if run.poll() is None:
+                run.send_signal(signal.SIGINT)
+        for run in self.runs:
+            run.wait(timeout=60)
 
     def table(self, words):
         """Rows of the recording of a topic whose name has these words."""
         out = self.folder / "tables"
         if not out.exists():
-            answer = self.call("export", "out/recording.mcap", "--out", out)
+            answer = subprocess.run([self.invar, "export", "out/recording.mcap", "--out", out], cwd=self.folder,
+                                    capture_output=True, text=True)
             if answer.returncode != 0:
                 raise SystemExit("FAILED: " + answer.stderr)
         (file,) = [name for name in out.glob("*.csv") if words in name.name]
@@ -174,8 +189,11 @@ class HeatCell(Cell):
 
 
 class MotionCell(Cell):
+    HOSTS = {"hosts": "{pc: {address: 127.0.0.1}}", "axis": "pc", "other": "pc"}
+
     def __init__(self, invar, source, folder, domain, strokes=20, head=""):
-        super().__init__(invar, source, folder, (head + MOTION).format(domain=domain, strokes=", ".join(["0.05"] * strokes)))
+        text = (head + MOTION).format(domain=domain, strokes=", ".join(["0.05"] * strokes), **self.HOSTS)
+        super().__init__(invar, source, folder, text)
 
     def sample(self):
         answer = self.call("echo", self.file, "stage_x.state", "--count", "1", "--json", "--wait", "5")
@@ -187,15 +205,35 @@ class MotionCell(Cell):
     def wait_for_motion(self):
         self.wait("the axis to move", lambda: abs(self.sample().get("setpoint_velocity", 0.0)) > 0.045)
 
-    def takeovers(self, kills):
-        """Of each kill [s]: milliseconds from the last state of the one to the first of the other, and what it cost: the
+    def takeovers(self, kills, within=0.3):
+        """Of each kill [s], or what else ends the one within so many seconds: milliseconds from the last state of the one to the first of the other, and what it cost: the
         largest step of the current [A] and the largest following error [m] in the 50 ms after."""
-        rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "current"), column(row, "following_error"), row["mode"])
-                      for row in self.table("stage_x.state"))
+        rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "current"), column(row, "following_error"), row["mode"],
+                       int(row["sequence"])) for row in self.table("stage_x.state"))
         found = []
         for kill in kills:
-            near = [row for row in rows if kill - 0.02 < row[0] < kill + 0.3]
-            gap, at = max((later[0] - row[0], i) for i, (row, later) in enumerate(zip(near, near[1:])))
-            found.append((gap * 1e3, abs(near[at + 1][1] - near[at][1]),
+            near = [row for row in rows if kill - 0.02 < row[0] < kill + within]
+            at = max(range(len(near) - 1), key=lambda i: abs(near[i + 1][4] - near[i][4] - 1))  # another writer, another count
+            found.append(((near[at + 1][0] - near[at][0]) * 1e3, abs(near[at + 1][1] - near[at][1]),
                           max(abs(row[2]) for row in near[at + 1:at + 50]), near[at + 1][3]))
         return found
+
+
+class MotionOnTwoPcs(MotionCell):
+    """The standby runs on another PC than the axis and its loop (network namespaces). Needs root."""
+    HOSTS = {"hosts": "{axis: {address: 10.81.0.11}, other: {address: 10.81.0.12}}", "axis": "axis", "other": "other"}
+
+    def __init__(self, *given, **more):
+        self.hosts = Hosts(("axis", "other"))
+        super().__init__(*given, **more)
+
+    def start(self):
+        return [self.hosts.start(host, self.invar, "run", self.file, "--host", host, cwd=self.folder, stdout=self.log, stderr=self.log)
+                for host in self.hosts.names]
+
+    def words(self, *words):
+        return self.hosts.words("axis", *words)
+
+    def end(self):
+        super().end()
+        self.hosts.end()

@@ -109,7 +109,7 @@ Child spawn(const LaunchOptions& options, const std::string& process, bool simul
   // Our orders wait until it takes them: before, they would kill it.
   sigset_t orders;
   sigemptyset(&orders);
-  for (const int signal : {SIGTERM, SIGUSR1}) sigaddset(&orders, signal);
+  for (const int signal : {SIGTERM, SIGUSR1, SIGUSR2}) sigaddset(&orders, signal);
   posix_spawnattr_setsigmask(&attributes, &orders);
   // Fast DDS does not close its sockets on exec: a child would hold the launcher's ports.
   posix_spawn_file_actions_t files;

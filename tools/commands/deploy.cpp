@@ -49,7 +49,7 @@ void add_deploy(CLI::App& program) {
       "After an aborted call each PC has one whole release. The next call goes on from there.\n"
       "ssh asks no questions: its keys and the keys of the PCs must be there. The user on a PC is root, or "
       "may use\n"
-      "sudo without a password and write below --prefix.\n"
+      "sudo without a password; the cell's folder below --prefix is then of that user.\n"
       "Exit status: 0 done, 1 a PC or the cell failed, 2 the call or the file is wrong");
   auto options = std::make_shared<DeployCommand>();
   command->add_option("file", options->deploy.cell, "the cell file")->required();

@@ -71,6 +71,10 @@ echo "previous $(at previous)"
 /// Input: names of contents. Says what is there, and which contents are missing. With a user, the service's, sees that it exists.
 /// HOME SERVICE USER
 inline const std::string look = common + R"sh(
+if ! mkdir -p "$home" 2>/dev/null; then
+  root mkdir -p "$home"
+  root chown "$(id -u):$(id -g)" "$home"
+fi
 mkdir -p "$home/store" "$home/releases"
 [ -d "$home/data" ] || mkdir -m 0750 "$home/data"
 if [ "$1" = systemd ]; then
@@ -206,7 +210,7 @@ rm SHA256SUMS
 service=$1 user=$2
 by() { if [ "$service" = systemd ]; then root "$@"; else "$@"; fi; }
 own() { [ "$service" != systemd ] || root chown "$user:" "$@"; }
-folder() { if [ ! -d "$2" ]; then by mkdir -m "$1" "$2"; own "$2"; fi; }
+folder() { if ! by test -d "$2"; then by mkdir -m "$1" "$2"; own "$2"; fi; }  # a user with sudo does not see into all
 folder 0755 "$home/keys"
 folder 0755 "$home/keys/public"
 find . -mindepth 1 -type d | sort | while read -r name; do folder 0700 "$home/keys/$name"; done
