@@ -175,13 +175,14 @@ void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
 
 void Stage::begin_control(const Tick& tick) noexcept {
   controller_ = physics::AxisController{controller_settings(tick.period)};
-  controlled_at_ = tick.cycle;
+  control_period_ = tick.period;
+  controlled_at_ = tick.now;
 }
 
 /// The current is held through skipped cycles, and while no feedback comes.
 double Stage::control(const MotionPoint& at, const Tick& tick) noexcept {
-  const std::uint64_t before = std::exchange(controlled_at_, tick.cycle);
-  const auto periods = static_cast<double>(std::max<std::uint64_t>(1, tick.cycle - before));
+  const Duration gone = tick.now - std::exchange(controlled_at_, tick.now);
+  const double periods = std::max(1.0, std::round(gone.in_seconds() / control_period_));
   return controller_.step(at.position + correction_held_, position_, periods);
 }
 

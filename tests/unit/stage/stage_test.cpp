@@ -38,6 +38,7 @@ struct Bench : Component {
   double encoder_error = 0.0;
   bool at_switch = false;
   std::uint64_t cycle = 0;
+  std::uint64_t every = 1;  // cycles of the process a step
   std::uint64_t next_id = 1;
   static constexpr double mass = 3.0;
   static constexpr double force_constant = 12.0;
@@ -58,7 +59,7 @@ struct Bench : Component {
   void step(const Tick&) noexcept override {}
 
   const AxisState& cycle_once() {
-    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, period, cycle};
+    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, period, cycle * every};
     set_now(tick.now);
     stage.set_now(tick.now);
     const auto* drive = motor.latest();
@@ -340,6 +341,16 @@ std::string trip_of(Bench& bench) {
   EXPECT_FALSE(bench.motor.latest()->enabled());
   const auto* notice = bench.notices.latest();
   return notice != nullptr ? notice->text().c_str() : "";
+}
+
+TEST(Stage, OneThatIsSteppedEveryFewCyclesHasItsFullGains) {
+  Bench plain, slow;
+  slow.every = 4;
+  for (Bench* bench : {&plain, &slow}) {
+    bench->enable();
+    bench->send(AXIS_COMMAND_MOVE, 0.15);
+  }
+  for (int i = 0; i < 500; ++i) ASSERT_EQ(plain.cycle_once().current(), slow.cycle_once().current()) << i;
 }
 
 TEST(Stage, ALoopThatStoodStillAsksForNoLeap) {
