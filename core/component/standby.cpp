@@ -21,7 +21,7 @@ void Standby::activate() noexcept {
   unfit_steps_ = 0;
   own_.fit(true);
   nobody_since_.reset();
-  asked_ = nobody_ = hands_over_ = other_is_ready_ = false;
+  asked_ = nobody_ = hands_over_ = is_needed_ = false;
   unready_ = nullptr;
   silent_steps_ = 0;
   received_ = in_.received();
@@ -32,7 +32,7 @@ void Standby::activate() noexcept {
 
 void Standby::resign() noexcept {
   if (!pair_) return;
-  leads_ = false;
+  leads_ = is_needed_ = false;
   has_state_ = false;
   own_.resigned(true);
   for (int i = 0; i < farewells; ++i) write();
@@ -57,6 +57,7 @@ Standby::Duty Standby::look(const Tick& tick) noexcept {
                            last_step_ - heard_ <= pair_->deadline;  // there was somebody who could take over
   last_step_ = tick.now;
   hear();
+  is_needed_.store(must_stay(tick), std::memory_order_release);
   return leads() ? lead(tick, stood_still) : stand_by(tick);
 }
 
@@ -91,12 +92,16 @@ bool Standby::is_silent(const Tick& tick) const noexcept {
   return (tick.now - heard_).in_seconds() > deadline && silent_steps_ * tick.period >= deadline;
 }
 
+bool Standby::must_stay(const Tick& tick) noexcept {
+  if (!was_heard_) return false;
+  const auto& other = *in_.latest();
+  const bool silent = is_silent(tick);
+  return leads() ? silent || (other.fit() && !other.leads()) : !silent && other.leads() && !other.fit();
+}
+
 Standby::Duty Standby::lead(const Tick& tick, bool stood_still) noexcept {
   const auto* other = in_.latest();
   const bool heard = other != nullptr && silent_steps_ == 0;
-  other_is_ready_.store(other != nullptr && !is_silent(tick) && !other->leads() && !other->resigned() &&
-                            other->fit() && other->knows(),
-                        std::memory_order_release);
   if (heard && other->leads() &&
       (other->term() > own_.term() || (other->term() == own_.term() && pair_->is_spare))) {
     step_down(event::SEVERITY_WARNING, " leads by now");

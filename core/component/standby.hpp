@@ -164,7 +164,9 @@ class Standby {
   /// When the last beat of a leader came: what was commanded before it that leader has heard.
   [[nodiscard]] Instant heard() const noexcept { return leader_heard_; }
   /// Once a step: does it reach what it controls? One that does takes the place of one that does not for a second.
-  void fit(bool reaches) noexcept { own_.fit(reaches && !hands_over_.load(std::memory_order_relaxed)); }
+  void fit(bool reaches) noexcept {
+    own_.fit(reaches && !(leads() && hands_over_.load(std::memory_order_relaxed)));
+  }
   /// Why it could not go on in the other's place; nullptr: it could. Must be a literal.
   void unready(const char* why) noexcept { unready_.store(why, std::memory_order_release); }
   /// The other was heard, and is not any more: it may lead.
@@ -179,12 +181,10 @@ class Standby {
   [[nodiscard]] bool leads() const noexcept { return leads_.load(std::memory_order_acquire); }
   /// A person wants this one to lead: the other hands over. False where it leads already.
   bool ask() noexcept;
-  /// Its process is about to end: another one that is ready takes its place within two seconds.
+  /// Its process is about to end: where it leads, another one that can takes its place within two seconds.
   void hand_over() noexcept { hands_over_.store(true, std::memory_order_release); }
-  /// It still leads, and there is another one that could.
-  [[nodiscard]] bool is_handing_over() const noexcept {
-    return leads() && other_is_ready_.load(std::memory_order_acquire);
-  }
+  /// Its process should not end yet: it leads and the other one can, or will be back, or the other one leads and cannot go on.
+  [[nodiscard]] bool is_needed() const noexcept { return is_needed_.load(std::memory_order_acquire); }
   /// "active", "standby" or "took over"; empty where nobody stands by.
   [[nodiscard]] const char* role() const noexcept;
   /// For a person: nobody leads, or this one could not take over; empty: nothing to say.
@@ -198,6 +198,7 @@ class Standby {
   void begin_to_lead(bool with_state) noexcept;
   void hear() noexcept;
   [[nodiscard]] bool is_silent(const Tick& tick) const noexcept;
+  [[nodiscard]] bool must_stay(const Tick& tick) noexcept;
   [[nodiscard]] Duty lead(const Tick& tick, bool stood_still) noexcept;
   [[nodiscard]] bool has_listened(const Tick& tick, bool heard) const noexcept;
   [[nodiscard]] Duty stand_by(const Tick& tick) noexcept;
@@ -232,7 +233,7 @@ class Standby {
   Instant heard_, leader_heard_;  // beats of the other, of those that led; by this clock
   Instant active_since_, last_step_, listens_since_;
   std::optional<Instant> nobody_since_;
-  std::atomic<bool> leads_{true}, asked_{false}, nobody_{false}, hands_over_{false}, other_is_ready_{false};
+  std::atomic<bool> leads_{true}, asked_{false}, nobody_{false}, hands_over_{false}, is_needed_{false};
   std::atomic<const char*> unready_{nullptr};
   std::atomic<std::int32_t> other_process_{0}, ended_process_{0};
   std::int32_t seen_process_ = 0;  // found alive

@@ -114,32 +114,41 @@ def motion(cell):
         fail(f"the axis left its travel: {min(positions)} to {max(positions)} m")
 
 
+def renew_both(cell, *processes):
+    """Each hands over to the other in its turn."""
+    before = cell.pids()
+    cell.renew(*processes)
+    cell.wait("other processes", lambda: all(cell.pids().get(name, before[name]) != before[name] for name in processes))
+
+
 def renewed_heat(cell):
     cell.wait_for_roles(thermal="active", thermal_spare="standby")
     time.sleep(4.0)
-    for leader, roles in (("heat", ("standby", "took over")), ("spare", ("active", "standby"))):
-        before, at = cell.pids()[leader], time.time()
-        cell.renew(leader)
-        cell.wait("the standby to go on", lambda: cell.has_taken_over(at))
-        check_takeover(cell, at, f"{leader} renewed", 1.0)
-        cell.wait_for_roles(thermal=roles[0], thermal_spare=roles[1])
-        cell.wait("another process", lambda: cell.pids().get(leader, before) != before)
+    at = time.time()
+    renew_both(cell, "heat", "spare")
+    cell.wait_for_roles(thermal="active", thermal_spare="standby")
+    powers = cell.powers(at)
+    pairs = list(zip(powers, powers[1:]))
+    gap = max(later[0] - write[0] for write, later in pairs)
+    step = max(abs(later[2] - write[2]) for write, later in pairs)
+    writers = [later[1] for write, later in pairs if later[1] != write[1]]
+    print(f"renewed: {len(writers)} takeovers, at most {gap * 1e3:.0f} ms between two powers, a step of {step:.2f} W at most")
+    if len(writers) != 2 or gap > 1.0 or step > 0.01 * RANGE:
+        fail("the heater did not go on")
 
 
 def renewed_motion(cell):
     cell.wait_for_roles(stage_x="active", spare_x="standby")
     cell.call("job", "run", cell.file, "move", "--detach")
-    at = []
-    for leader, roles in (("servo", ("standby", "took over")), ("spare", ("active", "standby"))):
-        cell.wait_for_motion()
-        at.append(time.time())
-        cell.renew(leader)
-        cell.wait_for_roles(stage_x=roles[0], spare_x=roles[1])
+    cell.wait_for_motion()
+    at = time.time()
+    renew_both(cell, "servo", "spare")
+    cell.wait_for_roles(stage_x="active", spare_x="standby")
     cell.call("job", "cancel", cell.file, "move")
     cell.end()
     rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "following_error"), row["mode"])
                   for row in cell.table("stage_x.state"))
-    rows = [row for row in rows if row[0] > at[0]]
+    rows = [row for row in rows if row[0] > at]
     gap = max(later[0] - row[0] for row, later in zip(rows, rows[1:]))
     error = max(abs(row[1]) for row in rows)
     print(f"renewed: at most {gap * 1e3:.1f} ms between two states, following error at most {error * 1e6:.0f} um")

@@ -127,12 +127,13 @@ class Cell:
     def kill(self, process, with_signal=signal.SIGKILL):
         os.kill(self.pids()[process], with_signal)
 
-    def renew(self, process):
-        """Another certificate; the process that has it is started anew, alone."""
+    def renew(self, *processes):
+        """Other certificates; the processes that have them are started anew, one after the other."""
         time.sleep(1.1)  # files tell by their times what is newer than a process
-        renewed = self.call("keys", self.file, "--renew", process)
-        if renewed.returncode != 0:
-            raise SystemExit("FAILED: " + renewed.stderr)
+        for process in processes:
+            renewed = self.call("keys", self.file, "--renew", process)
+            if renewed.returncode != 0:
+                raise SystemExit("FAILED: " + renewed.stderr)
         for run in self.runs:
             run.send_signal(signal.SIGUSR2)
 

@@ -248,7 +248,7 @@ void renew(std::vector<Child>& children, const LaunchOptions& options, const con
     spdlog::warn("process `{}` has another certificate: it ends in order and starts anew", child.name);
     kill(child.pid, SIGUSR2);
     const auto rest = rest_file(outcome_of(child.name, folder));
-    wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 10.0);
+    wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 20.0);
     if (child.running) kill(child.pid, SIGTERM);
     wait_for(child, watched([] { return false; }));
     if (child.running) kill(child.pid, SIGKILL);

@@ -25,7 +25,7 @@ void RestOrder::hand_over(const std::vector<Standby*>& standbys) {
     for (Standby* standby : standbys) standby->hand_over();
   }
   const bool waits =
-      std::any_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_handing_over(); });
+      std::any_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_needed(); });
   constexpr Duration patience =
       Duration::seconds(4.0);  // a standby waits for a second before it takes the place
   if (!waits || now - *handing_since_ > patience) come_to_rest();

@@ -19,7 +19,7 @@ class RestOrder {
   RestOrder(const std::filesystem::path& outcome, Executor& executor, pid_t parent)
       : outcome_{outcome}, executor_{executor}, parent_{parent} {}
 
-  /// As `come_to_rest`, after those that have a standby which is ready have handed over to it.
+  /// As `come_to_rest`, after those that have a standby have handed over to it.
   void hand_over(const std::vector<Standby*>& standbys);
   /// The components brake, and are stepped further: what other processes move on or read must be there until they rest, too.
   /// The file `rest_file` tells the launcher when they are at rest. Once each round after the order.

@@ -279,10 +279,10 @@ TEST(Standby, OneWhoseProcessIsAboutToEndHandsOverWithoutAGap) {
   Pair pair;
   pair.begin();
   pair.first.standby().hand_over();
-  EXPECT_TRUE(pair.first.standby().is_handing_over());
+  EXPECT_TRUE(pair.first.standby().is_needed());
   double last = 0.0;
   int idle = 0;
-  for (int steps = 0; steps < 2000 && pair.first.standby().is_handing_over(); ++steps) {
+  for (int steps = 0; steps < 2000 && pair.first.standby().is_needed(); ++steps) {
     last = pair.first.commanded.value_or(last);
     pair.step();
   }
@@ -294,14 +294,34 @@ TEST(Standby, OneWhoseProcessIsAboutToEndHandsOverWithoutAGap) {
   EXPECT_TRUE(pair.spare.commanded) << "it is not handed back";
 }
 
+TEST(Standby, WhereBothProcessesAreAboutToEndOneWaitsForTheOther) {
+  Pair pair;
+  pair.begin();
+  pair.first.standby().hand_over();
+  pair.spare.standby().hand_over();
+  pair.steps(3);
+  EXPECT_TRUE(pair.spare.standby().is_needed()) << "the leader cannot go on";
+  for (int steps = 0; steps < 2000 && pair.first.standby().is_needed(); ++steps) pair.step();
+  pair.steps(3);
+  ASSERT_TRUE(pair.spare.commanded);
+  for (int steps = 0; steps < 500; ++steps) {  // the first one's process starts anew
+    pair.step(false);
+    ASSERT_TRUE(pair.spare.commanded && pair.spare.standby().is_needed()) << steps;
+  }
+  pair.restart(pair.first);
+  for (int steps = 0; steps < 3000 && pair.spare.standby().is_needed(); ++steps) pair.step();
+  pair.steps(3);
+  EXPECT_TRUE(pair.first.commanded);
+  EXPECT_FALSE(pair.spare.standby().leads());
+}
+
 TEST(Standby, NobodyHandsOverToOneThatCouldNotGoOn) {
   Pair pair;
   pair.begin();
   pair.spare.reaches = false;
-  pair.steps(3);
   pair.first.standby().hand_over();
-  pair.steps(2);
-  EXPECT_FALSE(pair.first.standby().is_handing_over()) << "there is nobody to wait for";
+  pair.steps(3);
+  EXPECT_FALSE(pair.first.standby().is_needed()) << "there is nobody to wait for";
   pair.steps(3000);
   EXPECT_TRUE(pair.first.commanded);
 }
