@@ -21,7 +21,7 @@ void Standby::activate() noexcept {
   unfit_steps_ = 0;
   own_.fit(true);
   nobody_since_.reset();
-  asked_ = nobody_ = hands_over_ = is_needed_ = false;
+  asked_ = nobody_ = hands_over_ = is_needed_ = has_handed_over_ = false;
   unready_ = nullptr;
   silent_steps_ = 0;
   received_ = in_.received();
@@ -80,7 +80,7 @@ void Standby::hear() noexcept {
     state_ = *other;
     has_state_ = true;
     leader_heard_ = heard_;
-  } else if (other->resigned()) {
+  } else if (other->resigned() && !asked_) {  // who asked goes on from what was handed over
     has_state_ = false;
   }
   own_.term(std::max(own_.term(), other->term()));
@@ -96,7 +96,8 @@ bool Standby::must_stay(const Tick& tick) noexcept {
   if (!was_heard_) return false;
   const auto& other = *in_.latest();
   const bool silent = is_silent(tick);
-  return leads() ? silent || (other.fit() && !other.leads()) : !silent && other.leads() && !other.fit();
+  if (leads()) return silent || (other.fit() && !other.leads());
+  return !silent && (has_handed_over_ ? !other.leads() : other.leads() && !other.fit());
 }
 
 Standby::Duty Standby::lead(const Tick& tick, bool stood_still) noexcept {
@@ -108,6 +109,7 @@ Standby::Duty Standby::lead(const Tick& tick, bool stood_still) noexcept {
     return Duty::stand_by;
   }
   if (heard && other->asks() && !other->leads()) {
+    has_handed_over_ = hands_over_.load(std::memory_order_acquire);
     step_down(event::SEVERITY_NOTE, own_.fit() ? " was asked to lead" : " can go on");
     return Duty::stand_by;
   }
@@ -153,7 +155,7 @@ Standby::Duty Standby::stand_by(const Tick& tick) noexcept {
     if (std::exchange(is_unsure_, false)) say(event::SEVERITY_NOTE, "stands by: ", " leads by now");
     nobody_ = false;
     nobody_since_.reset();
-    unfit_steps_ = other->fit() || !own_.fit() ? 0 : unfit_steps_ + 1;
+    unfit_steps_ = other->fit() || !own_.fit() || has_handed_over_ ? 0 : unfit_steps_ + 1;
     if (unfit_steps_ * tick.period > unfit_for) asked_ = true;
     return Duty::stand_by;
   }

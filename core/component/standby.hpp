@@ -221,6 +221,7 @@ class Standby {
   bool has_state_ = false;
   bool leaving_ = false;
   bool is_certain_ = false;
+  bool has_handed_over_ = false;  // its process ends: it does not ask back
   bool waits_for_device_ = false;
   bool is_unsure_ = false;  // since it yielded
   bool other_resigned_ = false;

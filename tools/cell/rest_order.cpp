@@ -27,7 +27,7 @@ void RestOrder::hand_over(const std::vector<Standby*>& standbys) {
   const bool waits =
       std::any_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_needed(); });
   constexpr Duration patience =
-      Duration::seconds(4.0);  // a standby waits for a second before it takes the place
+      Duration::seconds(15.0);  // one whose certificate is new may have to be back first
   if (!waits || now - *handing_since_ > patience) come_to_rest();
 }
 

@@ -315,6 +315,39 @@ TEST(Standby, WhereBothProcessesAreAboutToEndOneWaitsForTheOther) {
   EXPECT_FALSE(pair.spare.standby().leads());
 }
 
+TEST(Standby, OneThatHandedOverDoesNotAskBack) {
+  Pair pair;
+  pair.begin();
+  pair.first.standby().hand_over();
+  pair.spare.standby().hand_over();
+  int changes = 0;
+  bool led = true;
+  for (int steps = 0; steps < 10000; ++steps) {  // neither process ends in time
+    pair.step();
+    changes += static_cast<int>(std::exchange(led, pair.first.standby().leads()) != led);
+  }
+  EXPECT_EQ(changes, 1);
+  EXPECT_TRUE(pair.spare.commanded);
+}
+
+TEST(Standby, OneThatIsSteppedSeldomGoesOnFromTheStateThatWasHandedOver) {
+  Pair pair;
+  pair.begin();
+  pair.first.standby().hand_over();
+  double last = 0.0;
+  int steps = 0;
+  for (; steps < 8000 && pair.first.standby().is_needed(); ++steps) {
+    pair.step(true, steps % 5 == 0);
+    last = pair.first.commanded.value_or(last);
+  }
+  ASSERT_LT(steps, 8000);
+  pair.first.standby().resign();
+  pair.step(false);
+  ASSERT_TRUE(pair.spare.commanded);
+  EXPECT_NEAR(*pair.spare.commanded, last, 12.0);
+  EXPECT_THAT(pair.said.back(), testing::HasSubstr("goes on from its state"));
+}
+
 TEST(Standby, NobodyHandsOverToOneThatCouldNotGoOn) {
   Pair pair;
   pair.begin();
