@@ -175,14 +175,13 @@ void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
 
 void Stage::begin_control(const Tick& tick) noexcept {
   controller_ = physics::AxisController{controller_settings(tick.period)};
-  control_period_ = tick.period;
   controlled_at_ = tick.now;
 }
 
 /// The current is held through skipped cycles, and while no feedback comes.
 double Stage::control(const MotionPoint& at, const Tick& tick) noexcept {
   const Duration gone = tick.now - std::exchange(controlled_at_, tick.now);
-  const double periods = std::max(1.0, std::round(gone.in_seconds() / control_period_));
+  const double periods = std::max(1.0, std::round(gone.in_seconds() * controller_.rate()));
   return controller_.step(at.position + correction_held_, position_, periods);
 }
 

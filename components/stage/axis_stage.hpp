@@ -241,8 +241,7 @@ class Stage final : public Component, public Redundant {
   bool model_changed_ = false;
 
   physics::AxisController controller_{{}};
-  double control_period_ = 1.0;  // s, that it was made for
-  Instant controlled_at_;        // its last step
+  Instant controlled_at_;  // its last step
   Trajectory trajectory_ = Trajectory::rest(0.0);
   Instant trajectory_start_;
   std::optional<Instant> last_step_;

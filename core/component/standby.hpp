@@ -163,7 +163,7 @@ class Standby {
   }
   /// When the last beat of a leader came: what was commanded before it that leader has heard.
   [[nodiscard]] Instant heard() const noexcept { return leader_heard_; }
-  /// Once a step: does it reach what it controls? One that does takes the place of one that does not for a second.
+  /// Once a step: does it reach what it controls? A leader whose process is about to end counts as one that does not. One that does takes the place of one that does not for a second.
   void fit(bool reaches) noexcept {
     own_.fit(reaches && !(leads() && hands_over_.load(std::memory_order_relaxed)));
   }

@@ -36,6 +36,8 @@ class AxisController {
   bool shift(double current) noexcept;
   /// The command [A] for this reference and reading [m]; `periods`: since the last step, 1 at least.
   [[nodiscard]] double step(double reference, double reading, double periods = 1.0) noexcept;
+  /// That it was made for [Hz].
+  [[nodiscard]] double rate() const noexcept { return settings_.rate; }
 
  private:
   void remember(double periods) noexcept;

@@ -4,9 +4,8 @@
 //
 // The server is a plain libmodbus loop, one thread a connection, on loopback. Bare: one modbus_read_* call for each
 // request of the plan, the raw words left as they are. Ours: Bus::exchange, which decodes every register, stamps it
-// and keeps the counters. Clients share one core and servers another: left to the scheduler, turns of either are up to
-// three times as fast as others, by where it happens to put the two. The table shows medians over the rounds, the quartiles of the ratio within a round, and
-// the machine.
+// and keeps the counters. Clients share one core and servers another: left to the scheduler, turns of either differ by a
+// factor of three. The table shows medians over the rounds, the quartiles of the ratio within a round, and the machine.
 #include <modbus.h>
 #include <netinet/in.h>
 #include <pthread.h>
@@ -32,17 +31,8 @@ namespace {
 using namespace invar;          // NOLINT: a program, not a header
 using namespace invar::modbus;  // NOLINT
 
-/// Keeps the calling thread on the `index`-th core that this process may use, where there are two.
-void keep_on_core(int index) {
-  static const cpu_set_t allowed = [] {
-    cpu_set_t all;
-    CPU_ZERO(&all);
-    sched_getaffinity(0, sizeof all, &all);
-    return all;
-  }();
-  if (CPU_COUNT(&allowed) < 2) return;
-  std::size_t core = 0;
-  for (int left = index; !CPU_ISSET(core, &allowed) || left-- > 0;) ++core;
+/// Keeps the calling thread on this core, where there is one.
+void keep_on_core(std::size_t core) {
   cpu_set_t one;
   CPU_ZERO(&one);
   CPU_SET(core, &one);

@@ -16,7 +16,7 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "fault"))
-from standby_cells import HEAT, SECURITY, HeatCell, MotionCell, MotionOnTwoPcs  # noqa: E402
+from standby_cells import HEAT, SECURITY, Cell, HeatCell, MotionCell, MotionOnTwoPcs  # noqa: E402
 
 INVAR, SOURCE = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
 TIMES = int(sys.argv[3]) if len(sys.argv) > 3 else 20
@@ -45,24 +45,12 @@ def domain():
     return CHANCE.randrange(102, 199)
 
 
-def kill(cell, leader):
-    at = time.time()
-    cell.kill(leader)
-    return at
-
-
-def renew(cell, leader):
-    at = time.time()
-    cell.renew(leader)
-    return at
-
-
 def come_back(cell, how):
     cell.wait("the cell", lambda: cell.status()["healthy"], 60)
-    time.sleep(13.0 if how is kill else 3.0)  # ends that are frequent make pauses before a start
+    time.sleep(13.0 if how is Cell.kill else 3.0)  # ends that are frequent make pauses before a start
 
 
-def heat(kind, how=kill, head=""):
+def heat(kind, how=Cell.kill, head=""):
     taken = []
     with tempfile.TemporaryDirectory(prefix="invar-standby-") as name:
         cell = kind(INVAR, SOURCE, pathlib.Path(name), domain(), free_port(), head)
@@ -72,7 +60,8 @@ def heat(kind, how=kill, head=""):
             for _ in range(TIMES):
                 leader = "spare" if cell.roles().get("thermal_spare") == "took over" else "heat"
                 time.sleep(CHANCE.uniform(0.0, 0.3))
-                at = how(cell, leader)
+                at = time.time()
+                how(cell, leader)
                 cell.wait("another one to write", lambda: cell.has_taken_over(at))
                 taken.append(cell.takeover(at))
                 come_back(cell, how)
@@ -81,7 +70,7 @@ def heat(kind, how=kill, head=""):
     return [(1e3 * gap, step) for gap, step in taken]
 
 
-def motion(kind=MotionCell, how=kill, head=""):
+def motion(kind=MotionCell, how=Cell.kill, head=""):
     ends = []
     with tempfile.TemporaryDirectory(prefix="invar-standby-") as name:
         cell = kind(INVAR, SOURCE, pathlib.Path(name), domain(), strokes=40, head=head)
@@ -94,11 +83,12 @@ def motion(kind=MotionCell, how=kill, head=""):
                 leader = "spare" if cell.roles().get("spare_x") == "took over" else "servo"
                 cell.wait_for_motion()
                 time.sleep(CHANCE.uniform(0.0, 0.3))
-                ends.append(how(cell, leader))
+                ends.append(time.time())
+                how(cell, leader)
                 come_back(cell, how)
         finally:
             cell.end()
-        return [(gap, 10.0 * step, 1e6 * error) for gap, step, error, _ in cell.takeovers(ends, 4.0 if how is renew else 0.3)]
+        return [(gap, 10.0 * step, 1e6 * error) for gap, step, error, _ in cell.takeovers(ends, 4.0 if how is Cell.renew else 0.3)]
 
 
 def row(what, taken, target):
@@ -113,11 +103,11 @@ def main():
           "following error, largest [um] | target |\n| --- | --- | --- | --- | --- | --- | --- | --- |")
     row("heater: killed", heat(HeatCell), "200 ms, 1 %")
     row("heater: killed, secured cell", heat(HeatCell, head=SECURITY), "200 ms, 1 %")
-    row("heater: certificate renewed", heat(HeatCell, renew, SECURITY), "2 periods")
+    row("heater: certificate renewed", heat(HeatCell, Cell.renew, SECURITY), "2 periods")
     row("heater: killed, no standby (started again)", heat(Alone), "-")
     row("axis: killed", motion(), "20 ms")
     row("axis: killed, secured cell", motion(head=SECURITY), "20 ms")
-    row("axis: certificate renewed", motion(how=renew, head=SECURITY), "2 periods")
+    row("axis: certificate renewed", motion(how=Cell.renew, head=SECURITY), "2 periods")
     row("axis: killed, standby on another PC", motion(MotionOnTwoPcs), "20 ms")
 
 

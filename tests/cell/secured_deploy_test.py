@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A secured cell and its bridge to a plant, deployed to two PCs with systemd: each has the private keys of its own names and no other;
-one of them is reached as a user who may use sudo; nobody without a certificate reads or commands it; the plant gets its topic; renewed and revoked keys take effect by `invar deploy`.
+nobody without a certificate reads or commands it; the plant gets its topic; renewed and revoked keys take effect by `invar deploy`.
+One of the PCs is reached as a user who may use sudo.
 
 Usage: secured_deploy_test.py INVAR SOURCE_FOLDER
 As root; tests/cell/pcs.py makes the PCs.

@@ -207,8 +207,9 @@ class MotionCell(Cell):
         self.wait("the axis to move", lambda: abs(self.sample().get("setpoint_velocity", 0.0)) > 0.045)
 
     def takeovers(self, kills, within=0.3):
-        """Of each kill [s], or what else ends the one within so many seconds: milliseconds from the last state of the one to the first of the other, and what it cost: the
-        largest step of the current [A] and the largest following error [m] in the 50 ms after."""
+        """Of each kill or renewal [s], after which the other leads within so many seconds: milliseconds from the last state of the
+        one to the first of the other. Then the cost: the step of the current [A], and the largest following error [m] and the mode
+        in the 50 ms after."""
         rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "current"), column(row, "following_error"), row["mode"],
                        int(row["sequence"])) for row in self.table("stage_x.state"))
         found = []

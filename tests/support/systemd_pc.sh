@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # A PC of its own kind on this one, for tests of what systemd does: systemd_pc.sh FOLDER NETWORK_NAMESPACE ADDRESS
 # Debian's systemd is its PID 1, in namespaces of its own, over a throw-away layer above this PC's files: what it writes is gone with it.
-# sshd listens on ADDRESS with FOLDER/host_key, for root and for `admin`, who may use sudo, by FOLDER/key.pub. It ends when this script is killed. Needs root.
+# sshd listens on ADDRESS with FOLDER/host_key, for root and for `admin`, who may use sudo, by FOLDER/key.pub.
+# It ends when this script is killed. Needs root.
 # The libraries that Invar stands on are not there: what runs there must bring them. KEEP_LIBRARIES=1 leaves them.
 set -euo pipefail
 pc=$1 network=$2 address=$3
@@ -32,9 +33,8 @@ mount -t tmpfs -o mode=1777 tmpfs "$root/tmp"
 mount -t tmpfs tmpfs "$root/opt"
 rm -f "$root/etc/machine-id"; tr -d - </proc/sys/kernel/random/uuid >"$root/etc/machine-id"
 echo "${pc##*/}" >"$root/etc/hostname"
-echo "admin:*:1999:1999::/home/admin:/bin/sh" >>"$root/etc/passwd"
+echo "admin:*:1999:1999::/:/bin/sh" >>"$root/etc/passwd"
 echo "admin:x:1999:" >>"$root/etc/group"
-mkdir "$root/home/admin"; chown 1999:1999 "$root/home/admin"
 [[ ! -d $root/etc/sudoers.d ]] || echo "admin ALL=(ALL) NOPASSWD: ALL" >"$root/etc/sudoers.d/admin"
 units=$root/etc/systemd/system
 rm -rf "$units"; mkdir "$units"

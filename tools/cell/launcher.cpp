@@ -232,8 +232,8 @@ struct Beside {
   }
 };
 
-/// One process after the other: what has a standby is handed over, its axes come to rest while all that they move on is still there,
-/// it ends in order, and it begins with the certificate that is there now.
+/// One process after the other. Loops with a standby are handed over, and axes come to rest while all that they move on is still
+/// there. Then the process ends in order, and begins with the certificate that is there now.
 void renew(std::vector<Child>& children, const LaunchOptions& options, const config::Cell& cell,
            const std::filesystem::path& folder, Beside& beside) {
   if (options.renew == nullptr || !options.renew->exchange(false) || !cell.security) return;

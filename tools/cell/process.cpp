@@ -204,12 +204,11 @@ class RunningProcess {
     rest_.come_to_rest();
   }
 
-  void hand_over() {
+  [[nodiscard]] bool has_handed_over() {
     std::vector<Standby*> standbys;
     for (const Member& member : members_)
       if (member.standby != nullptr) standbys.push_back(member.standby);
-    if (!rest_.is_resting()) faults_at_end_ = faults();
-    rest_.hand_over(standbys);
+    return rest_.has_handed_over(standbys);
   }
 
   RestOrder::Parent look_at_parent() {
@@ -243,8 +242,9 @@ class RunningProcess {
       if (const std::string refused = memory_.look(); !refused.empty()) say(event::SEVERITY_WARNING, refused);
       partners_.look();
       parent = look_at_parent();
-      if (parent != RestOrder::Parent::there || orders.rest.load()) come_to_rest();
-      if (orders.renew.load()) hand_over();
+      if (parent != RestOrder::Parent::there || orders.rest.load() ||
+          (orders.renew.load() && has_handed_over()))
+        come_to_rest();
       manager_.feed(executor_.counters().executed);
       leave_progress();
       watch_address();

@@ -18,17 +18,16 @@ void RestOrder::come_to_rest() {
   told_ = true;
 }
 
-void RestOrder::hand_over(const std::vector<Standby*>& standbys) {
+bool RestOrder::has_handed_over(const std::vector<Standby*>& standbys) {
   const Instant now = monotonic_now();
   if (!handing_since_) {
     handing_since_ = now;
     for (Standby* standby : standbys) standby->hand_over();
   }
-  const bool waits =
-      std::any_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_needed(); });
-  constexpr Duration patience =
-      Duration::seconds(15.0);  // one whose certificate is new may have to be back first
-  if (!waits || now - *handing_since_ > patience) come_to_rest();
+  // One whose certificate is new, too, may have to be back first.
+  constexpr Duration patience = Duration::seconds(15.0);
+  return resting_ || now - *handing_since_ > patience ||
+         std::none_of(standbys.begin(), standbys.end(), [](const Standby* s) { return s->is_needed(); });
 }
 
 RestOrder::Parent RestOrder::look(Duration lingers) {

@@ -19,8 +19,8 @@ class RestOrder {
   RestOrder(const std::filesystem::path& outcome, Executor& executor, pid_t parent)
       : outcome_{outcome}, executor_{executor}, parent_{parent} {}
 
-  /// As `come_to_rest`, after those that have a standby have handed over to it.
-  void hand_over(const std::vector<Standby*>& standbys);
+  /// The first call orders those that have a standby to hand over to it. True as soon as none is needed any more, or after 15 s.
+  [[nodiscard]] bool has_handed_over(const std::vector<Standby*>& standbys);
   /// The components brake, and are stepped further: what other processes move on or read must be there until they rest, too.
   /// The file `rest_file` tells the launcher when they are at rest. Once each round after the order.
   void come_to_rest();
