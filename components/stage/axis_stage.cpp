@@ -174,7 +174,7 @@ void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
 }
 
 void Stage::begin_control(const Tick& tick) noexcept {
-  controller_ = physics::AxisController{controller_settings(tick.period)};
+  controller_ = physics::AxisController{controller_settings(tick.own_period)};
   controlled_at_ = tick.now;
 }
 

@@ -22,8 +22,9 @@ class InputPort;
 /// One call of a component's step.
 struct Tick {
   Instant now;          // the nominal start of this cycle: UTC, or simulated time; the clock of all stamps
-  double period = 0.0;  // s, nominal
+  double period = 0.0;  // s, nominal, to the next step; longer than its own while the rate of the loop is lowered
   std::uint64_t cycle = 0;  // counts every period since the executor started, skipped ones too
+  double own_period = period;  // s, at the full rate
 };
 
 /// The states of the OMG RTC / ROS 2 lifecycle; core/component/lifecycle.hpp has the transitions.

@@ -99,7 +99,10 @@ void Executor::step(Slot& slot, Instant now, std::uint64_t cycle, std::uint32_t 
   if (cycle < slot.next_due) return;
   const std::uint64_t every = (slot.every + stretch - 1) / stretch * stretch;
   slot.next_due = (cycle / every + 1) * every;
-  const Tick tick{now, (options_.period * static_cast<std::int64_t>(every)).in_seconds(), cycle};
+  const auto seconds = [&](std::uint64_t periods) {
+    return (options_.period * static_cast<std::int64_t>(periods)).in_seconds();
+  };
+  const Tick tick{now, seconds(every), cycle, seconds(slot.every)};
   Component& component = *slot.component;
   component.set_now(now, cycle);
   if (!inputs_alive(slot, tick)) return;

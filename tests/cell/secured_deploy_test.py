@@ -87,7 +87,7 @@ class SecuredAndDeployed(unittest.TestCase):
         self.the_plant_gets_its_topic_and_nobody_else_anything()
 
         owners = self.pcs.on("pc-b", f"stat -c %U {HOME} {HOME}/current {HOME}/data {HOME}/keys").stdout.split()
-        self.assertEqual(owners, ["admin", "admin", "invar", "invar"])
+        self.assertEqual(owners, ["admin", "admin", "invar", "root"])
 
         heat, main = self.pid("heat"), self.main("pc-a")
         said = self.deploy()
@@ -96,6 +96,7 @@ class SecuredAndDeployed(unittest.TestCase):
         self.assertEqual((self.pid("heat"), self.main("pc-a")), (heat, main), "nothing has changed")
 
         self.invar("keys", self.cell, "--renew", "heat")
+        self.as_before("pc-a", f"mv {HOME}/keys/heat /root/heat && ln -s /root/heat {HOME}/keys/heat", f"rm {HOME}/keys/heat && mv /root/heat {HOME}/keys")
         said = self.deploy()
         self.assertIn("pc-a: has other keys now", said)
         end = time.monotonic() + 20
@@ -114,6 +115,17 @@ class SecuredAndDeployed(unittest.TestCase):
         self.invar("param", "set", thief, "thermal", "setpoint", "77", "--as", "anna", "--wait", "3", status=1)
         self.assertIn("30", self.invar("param", "get", self.cell, "thermal", "setpoint", "--as", "anna", "--wait", "20"))
 
+    def as_before(self, host, hostile, mended):
+        """A folder of keys that leads elsewhere is refused, and nothing is written there."""
+        self.pcs.on(host, hostile)
+        before = self.pcs.on(host, "stat -c '%U %Y' /root/heat /root/heat/*").stdout
+        refused = subprocess.run(self.pcs.at_the_switch(INVAR, "deploy", self.cell, "--ssh-config", self.pcs.folder / "ssh_config"),
+                                 capture_output=True, text=True, timeout=200)
+        self.assertNotEqual(refused.returncode, 0)
+        self.assertIn("keys/heat is a link: remove it there", refused.stderr + refused.stdout)
+        self.assertEqual(self.pcs.on(host, "stat -c '%U %Y' /root/heat /root/heat/*").stdout, before)
+        self.pcs.on(host, mended)
+
     def keys_lie_where_they_belong(self):
         viewer = {"./wall/key.pem", "./wall/second/key.pem"}
         self.assertEqual(self.files("pc-a"), viewer | {"./heat/key.pem", "./launcher-pc-a/key.pem"})
@@ -121,6 +133,8 @@ class SecuredAndDeployed(unittest.TestCase):
         for host in ("pc-a", "pc-b"):
             modes = self.pcs.on(host, f"find {HOME}/keys -name key.pem -exec stat -c '%a %U' {{}} +").stdout.splitlines()
             self.assertEqual(set(modes), {"600 invar"})
+            folders = self.pcs.on(host, f"find {HOME}/keys -type d -exec stat -c '%A %U' {{}} +").stdout.splitlines()
+            self.assertEqual(set(folders), {"drwxr-xr-x root", "drwxr-x--- root"}, "the service cannot lead root elsewhere")
             self.assertEqual(self.pcs.on(host, f"ls {HOME}/keys/authority; grep -rlI 'PRIVATE KEY' {HOME}/store {HOME}/releases --exclude-dir=keys",
                                          check=False).stdout, "", "no authority, and no key in a release")
 

@@ -3,7 +3,7 @@
 deactivated, and in a secured cell started anew with another certificate. Who writes to the heater is told by a witness between the
 masters and the device; what the axis does, by a recording.
 
-Usage: standby.py INVAR SOURCE_FOLDER DOMAIN PORT heat|motion|renewed-heat|renewed-motion
+Usage: standby.py INVAR SOURCE_FOLDER DOMAIN PORT heat|motion|renewed-heat|renewed-motion|renewed-apart
 """
 import pathlib
 import signal
@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 
-from standby_cells import SECURITY, HeatCell, MotionCell, column
+from standby_cells import SECURITY, HeatCell, MotionCell, MotionOnTwoPcs, column
 
 INVAR, SOURCE, DOMAIN, PORT, WHAT = (pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3],
                                      int(sys.argv[4]), sys.argv[5])
@@ -115,7 +115,7 @@ def motion(cell):
 
 
 def renew_both(cell, *processes):
-    """Each hands over to the other in its turn."""
+    """Each hands over to the other in its turn; on two PCs both are ordered to at the same moment."""
     before = cell.pids()
     cell.renew(*processes)
     cell.wait("other processes", lambda: all(cell.pids().get(name, before[name]) != before[name] for name in processes))
@@ -133,8 +133,14 @@ def renewed_heat(cell):
     step = max(abs(later[2] - write[2]) for write, later in pairs)
     writers = [later[1] for write, later in pairs if later[1] != write[1]]
     print(f"renewed: {len(writers)} takeovers, at most {gap * 1e3:.0f} ms between two powers, a step of {step:.2f} W at most")
-    if len(writers) != 2 or gap > 1.0 or step > 0.01 * RANGE:
+    if len(writers) != 2 or gap > 0.5 or step > 0.01 * RANGE:
         fail("the heater did not go on")
+    cell.renew("heat", "spare")
+    at = time.time()
+    cell.end()
+    print(f"a stop at the begin of a renewal: {time.time() - at:.1f} s")
+    if time.time() - at > 4.0:  # the renewal of both takes 8 s
+        fail("a stop waits for the renewal")
 
 
 def renewed_motion(cell):
@@ -143,7 +149,10 @@ def renewed_motion(cell):
     cell.wait_for_motion()
     at = time.time()
     renew_both(cell, "servo", "spare")
-    cell.wait_for_roles(stage_x="active", spare_x="standby")
+    # A busy PC may keep a beat back for longer than a loop of 1 kHz waits: then the other one leads.
+    cell.wait("one that leads and one that stands by", lambda: cell.status()["healthy"] and
+              sorted(cell.roles().values()) in (["active", "standby"], ["standby", "took over"]))
+    time.sleep(1.0)
     cell.call("job", "cancel", cell.file, "move")
     cell.end()
     rows = sorted((column(row, "at.time_ns") * 1e-9, column(row, "following_error"), row["mode"])
@@ -159,10 +168,13 @@ def renewed_motion(cell):
 def main():
     with tempfile.TemporaryDirectory(prefix="invar-standby-") as name:
         head = SECURITY if WHAT.startswith("renewed") else ""
-        cell = (HeatCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, PORT, head) if WHAT.endswith("heat") else
-                MotionCell(INVAR, SOURCE, pathlib.Path(name), DOMAIN, head=head))
+        folder = pathlib.Path(name)
+        kind = MotionOnTwoPcs if WHAT == "renewed-apart" else MotionCell
+        cell = (HeatCell(INVAR, SOURCE, folder, DOMAIN, PORT, head) if WHAT.endswith("heat") else
+                kind(INVAR, SOURCE, folder, DOMAIN, head=head))
         try:
-            {"heat": heat, "motion": motion, "renewed-heat": renewed_heat, "renewed-motion": renewed_motion}[WHAT](cell)
+            {"heat": heat, "motion": motion, "renewed-heat": renewed_heat, "renewed-motion": renewed_motion,
+             "renewed-apart": renewed_motion}[WHAT](cell)
         except SystemExit:
             print((cell.folder / "log").read_text()[-6000:])
             raise

@@ -119,7 +119,7 @@ class Cell:
                 return
             time.sleep(0.02)
         print((self.folder / "log").read_text())
-        raise SystemExit(f"FAILED: waited in vain for {what}: {self.status()}")
+        raise SystemExit(f"FAILED: waited in vain for {what}: {self.roles()}, {self.status().get('faults')}")
 
     def wait_for_roles(self, **roles):
         self.wait(f"the roles {roles}, all well", lambda: self.status()["healthy"] and self.roles() == roles)

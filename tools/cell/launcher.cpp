@@ -233,24 +233,27 @@ struct Beside {
 };
 
 /// One process after the other. Loops with a standby are handed over, and axes come to rest while all that they move on is still
-/// there. Then the process ends in order, and begins with the certificate that is there now.
+/// there. Then the process ends in order, and begins with the certificate that is there now. A stop is not kept waiting.
 void renew(std::vector<Child>& children, const LaunchOptions& options, const config::Cell& cell,
-           const std::filesystem::path& folder, Beside& beside) {
+           const std::filesystem::path& folder, Beside& beside, const std::atomic<bool>& stop) {
   if (options.renew == nullptr || !options.renew->exchange(false) || !cell.security) return;
   const auto watched = [&](auto condition) {
     return [&, condition] {
       beside.look(children);
-      return condition();
+      return stop || condition();
     };
   };
   for (Child& child : children) {
+    if (stop) return;
     if (!child.running || !is_renewed(child, cell)) continue;
     spdlog::warn("process `{}` has another certificate: it ends in order and starts anew", child.name);
     kill(child.pid, SIGUSR2);
     const auto rest = rest_file(outcome_of(child.name, folder));
     wait_for(child, watched([&] { return std::filesystem::exists(rest); }), 20.0);
+    if (stop) return;
     if (child.running) kill(child.pid, SIGTERM);
     wait_for(child, watched([] { return false; }));
+    if (stop) return;
     if (child.running) kill(child.pid, SIGKILL);
     child.poll(true);
     child = spawn(options, child.name, false, folder, child.restarts, "another certificate");
@@ -380,7 +383,7 @@ LaunchOutcome launch(const LaunchOptions& options, const std::atomic<bool>& stop
            (options.job.empty() ? keep_alive(children, options, cell, folder.path(), restart_news)
                                 : !any_ended(children))) {
       beside.look(children);
-      renew(children, options, cell, folder.path(), beside);
+      renew(children, options, cell, folder.path(), beside, stop);
       (void)follow_utc();  // as its processes do, for those that it starts again
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }

@@ -71,8 +71,8 @@ echo "previous $(at previous)"
 /// Input: names of contents. Says what is there, and which contents are missing. With a user, the service's, sees that it exists.
 /// HOME SERVICE USER
 inline const std::string look = common + R"sh(
-if ! mkdir -p "$home" 2>/dev/null; then
-  root mkdir -p "$home"
+mkdir -p "$home" 2>/dev/null || root mkdir -p "$home"
+if ! [ -w "$home" ] && [ -z "$(root ls -A "$home")" ]; then  # made just now, or by a call that was cut off
   root chown "$(id -u):$(id -g)" "$home"
 fi
 mkdir -p "$home/store" "$home/releases"
@@ -209,17 +209,24 @@ sha256sum -c --quiet --strict SHA256SUMS >/dev/null
 rm SHA256SUMS
 service=$1 user=$2
 by() { if [ "$service" = systemd ]; then root "$@"; else "$@"; fi; }
-own() { [ "$service" != systemd ] || root chown "$user:" "$@"; }
-folder() { if ! by test -d "$2"; then by mkdir -m "$1" "$2"; own "$2"; fi; }  # a user with sudo does not see into all
+own() { [ "$service" != systemd ] || root chown -h "$@"; }
+folder() {  # MODE PATH, parents first. Root's: else the service's user could lead root elsewhere by a link
+  if by test -L "$2"; then echo "$2 is a link: remove it there" >&2; exit 1; fi
+  by test -d "$2" || by mkdir -m "$1" "$2"  # a user with sudo does not see into all
+  own "root:$user" "$2"
+  by chmod "$1" "$2"
+}
+private=0700
+[ "$service" != systemd ] || private=0750
 folder 0755 "$home/keys"
 folder 0755 "$home/keys/public"
-find . -mindepth 1 -type d | sort | while read -r name; do folder 0700 "$home/keys/$name"; done
+find . -mindepth 1 -type d ! -path ./public | sort | while read -r name; do folder "$private" "$home/keys/${name#./}"; done
 find . -type f | sort | while read -r name; do
-  to=$home/keys/$name mode=0600
-  case $name in ./public/*) mode=0644 ;; esac
-  by cmp -s "$name" "$to" && continue
+  to=$home/keys/$name mode=0600 owner=$user:$user
+  case $name in ./public/*) mode=0644 owner=root:root ;; esac
+  if ! by test -L "$to" && by cmp -s "$name" "$to"; then own "$owner" "$to"; continue; fi
   by install -m "$mode" "$name" "$to.new"
-  own "$to.new"
+  own "$owner" "$to.new"
   by mv -f "$to.new" "$to"
   echo "changed ${name#./}"
 done

@@ -204,11 +204,19 @@ std::vector<std::string> not_heard(const config::Cell& cell,
   return missing;
 }
 
+namespace {
+
+/// Said by its launcher, which starts it again; it may be back, and not yet heard.
+bool has_ended(const lifecycle::ProcessStatus& status) { return status.pid() == 0; }
+
+}  // namespace
+
 std::vector<std::string> LiveCell::wait_for_processes() {
   std::vector<std::string> missing;
   const auto all_heard = [&] {
-    missing = not_heard(*cell_, client_->processes());
-    return missing.empty();
+    const auto heard = client_->processes();
+    missing = not_heard(*cell_, heard);
+    return missing.empty() && std::none_of(heard.begin(), heard.end(), has_ended);
   };
   if (cell_) {
     wait_until(patience_, all_heard);
@@ -222,8 +230,10 @@ std::vector<std::string> LiveCell::wait_for_processes() {
     if (now != known) since = Clock::now();
     known = now;
     missing.assign(known.begin(), known.end());
-    for (const auto& status : client_->processes()) std::erase(missing, status.process_name().c_str());
-    return !known.empty() && missing.empty() && Clock::now() - since > quiet;
+    const auto heard = client_->processes();
+    for (const auto& status : heard) std::erase(missing, status.process_name().c_str());
+    return !known.empty() && missing.empty() && Clock::now() - since > quiet &&
+           std::none_of(heard.begin(), heard.end(), has_ended);
   });
   return missing;
 }

@@ -203,10 +203,11 @@ TEST(Loop, DegradesToALowerRateAndTellsItsStepsTheLongerPeriod) {
   ExecutorOptions options = by_the_clock();
   options.overrun = OverrunPolicy::degrade;
   std::atomic<bool> busy{true};
-  std::atomic<double> period{0.0};
+  std::atomic<double> period{0.0}, own{0.0};
   Executor executor{options};
   executor.add(std::make_unique<Call>([&](const Tick& t) {
     period = t.period;
+    own = t.own_period;
     if (busy) std::this_thread::sleep_for(std::chrono::milliseconds{5});
   }));
   (void)executor.transition(0, Transition::configure);
@@ -214,6 +215,7 @@ TEST(Loop, DegradesToALowerRateAndTellsItsStepsTheLongerPeriod) {
   executor.start();
   ASSERT_TRUE(eventually([&] { return executor.counters().stretch == 8; }));
   ASSERT_TRUE(eventually([&] { return period == 8e-3; }));
+  EXPECT_EQ(own, 1e-3);
   EXPECT_FALSE(executor.counters().tripped);
   executor.stop();
 }

@@ -38,7 +38,8 @@ struct Bench : Component {
   double encoder_error = 0.0;
   bool at_switch = false;
   std::uint64_t cycle = 0;
-  std::uint64_t every = 1;  // cycles of the process a step
+  std::uint64_t every = 1;    // cycles of the process a step
+  std::uint64_t stretch = 1;  // periods a step: above 1, the rate of its loop is lowered
   std::uint64_t next_id = 1;
   static constexpr double mass = 3.0;
   static constexpr double force_constant = 12.0;
@@ -59,14 +60,15 @@ struct Bench : Component {
   void step(const Tick&) noexcept override {}
 
   const AxisState& cycle_once() {
-    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, period, cycle * every};
+    const double gone = static_cast<double>(stretch) * period;
+    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, gone, cycle * every, period};
     set_now(tick.now);
     stage.set_now(tick.now);
     const auto* drive = motor.latest();
     const double force = (drive != nullptr && drive->enabled() ? force_constant * drive->current() : 0.0) -
                          spring * (position - 0.05);
-    position += velocity * period + force / mass * period * period / 2;
-    velocity += force / mass * period;
+    position += velocity * gone + force / mass * gone * gone / 2;
+    velocity += force / mass * gone;
     AxisFeedback sample;
     sample.position(position + encoder_error);
     sample.drive_fault(drive_fault);
@@ -74,7 +76,7 @@ struct Bench : Component {
     sample.home_switch(at_switch || position < 0.0);
     if (seeing) feedback.write(sample);
     stage.step(tick);
-    ++cycle;
+    cycle += stretch;
     return *state.latest();
   }
   void send(AxisCommandKind kind, double target = 0.0) {
@@ -351,6 +353,21 @@ TEST(Stage, OneThatIsSteppedEveryFewCyclesHasItsFullGains) {
     bench->send(AXIS_COMMAND_MOVE, 0.15);
   }
   for (int i = 0; i < 500; ++i) ASSERT_EQ(plain.cycle_once().current(), slow.cycle_once().current()) << i;
+}
+
+TEST(Stage, OneThatIsEnabledWhileTheRateIsLoweredHoldsAndMoves) {
+  for (const unsigned stretch : {2U, 4U, 8U}) {
+    Bench bench;
+    bench.stretch = stretch;
+    bench.enable();
+    bench.position += 20e-6;  // a push
+    double farthest = 0.0;
+    for (int i = 0; i < 500; ++i) farthest = std::max(farthest, std::abs(bench.cycle_once().following_error()));
+    EXPECT_LT(farthest, 50e-6) << stretch;
+    bench.send(AXIS_COMMAND_MOVE, 0.15);
+    EXPECT_TRUE(bench.run_until([](const AxisState& s) { return s.settled() && s.command_done(); })) << stretch;
+    EXPECT_NEAR(bench.position, 0.15, 1e-4) << stretch;
+  }
 }
 
 TEST(Stage, ALoopThatStoodStillAsksForNoLeap) {
