@@ -38,7 +38,7 @@ struct Profile {
   std::int64_t max_instances = 64;
   /// The longest that a reliable writer waits for room in its history; then the sample is refused and counted.
   Duration blocking = Duration::milliseconds(100);
-  /// Reliable writers ask for acknowledgement with every sample, not only every 20 ms: a loss is mended sooner, at
+  /// Reliable writers ask for acknowledgement with every sample, not only every 5 ms: a loss is mended sooner, at
   /// the cost of as many messages again.
   bool asks_at_once = true;
   /// Bytes a second that writers of this profile in one process send at most; 0: no bound.

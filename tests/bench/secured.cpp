@@ -1,6 +1,6 @@
-// Bench: the cost of a secured cell. Two processes at 1 kHz over UDP on the loopback, or many that find one another.
-//   bench_secured latency KEYS SAMPLES      KEYS: folder of `invar keys` for a cell `bench` of supervisors p0, p1, ...; `-`: unsecured
-//   bench_secured discovery KEYS PROCESSES
+// Bench: the cost of a secured cell. Two processes over UDP on the loopback, or many that find one another.
+//   bench_secured latency KEYS SAMPLES [PROFILE HZ]   KEYS: folder of `invar keys` for a cell `bench` of supervisors p0, p1, ...; `-`: unsecured
+//   bench_secured discovery KEYS PROCESSES            PROFILE, HZ: of the samples, `realtime` and 1000 where not given
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -52,19 +52,28 @@ double cpu_seconds() {
   return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-void hear(const std::string& keys, std::size_t samples) {
+void hear(const std::string& keys, std::size_t samples, const std::string& profile) {
   dds::Node node{options_of(keys, 1), dds::standard_profiles()};
   std::mutex mutex;
   std::vector<double> late;
-  const auto reader = node.reader<lifecycle::ProcessStatus>(topic(), "realtime", [&](const auto& status) {
+  std::uint64_t first = 0, last = 0;  // numbers of samples
+  const auto reader = node.reader<lifecycle::ProcessStatus>(topic(), profile, [&](const auto& status) {
     const double us = 1e-3 * static_cast<double>(monotonic_now().ns - status.at().time_ns());
     const std::lock_guard lock{mutex};
+    if (late.empty()) first = status.cycles();
+    last = status.cycles();
     late.push_back(us);
   });
   const auto count = [&] {
     const std::lock_guard lock{mutex};
     return late.size();
   };
+  while (count() == 0) std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  std::this_thread::sleep_for(std::chrono::seconds{1});  // until the last end has found the other
+  {
+    const std::lock_guard lock{mutex};
+    late.clear();
+  }
   while (count() == 0) std::this_thread::sleep_for(std::chrono::milliseconds{10});
   const double before = cpu_seconds();
   const auto begin = std::chrono::steady_clock::now();
@@ -76,23 +85,26 @@ void hear(const std::string& keys, std::size_t samples) {
   const auto at = [&](double part) {
     return late[static_cast<std::size_t>(part * static_cast<double>(late.size() - 1))];
   };
-  std::cout << "samples " << late.size() << "  p50 " << at(0.5) << " us  p99 " << at(0.99) << " us  reader "
-            << cpu << " s of CPU" << std::endl;
+  std::cout << "samples " << late.size() << "  p50 " << at(0.5) << " us  p99 " << at(0.99) << " us  max "
+            << late.back() << " us  lost " << last - first + 1 - late.size() << "  reader " << cpu
+            << " s of CPU" << std::endl;
 }
 
-int latency(const std::string& keys, std::size_t samples) {
+int latency(const std::string& keys, std::size_t samples, const std::string& profile, int rate) {
   const pid_t child = fork();
   if (child == 0) {
-    hear(keys, samples);
+    hear(keys, samples, profile);
     _exit(0);
   }
   dds::Node node{options_of(keys, 0), dds::standard_profiles()};
-  auto writer = node.writer<lifecycle::ProcessStatus>(topic(), "realtime");
+  auto writer = node.writer<lifecycle::ProcessStatus>(topic(), profile);
+  const std::chrono::nanoseconds period{1'000'000'000 / rate};
   lifecycle::ProcessStatus status;
   status.process_name("p0");
   for (auto due = std::chrono::steady_clock::now(); waitpid(child, nullptr, WNOHANG) == 0;) {
-    std::this_thread::sleep_until(due += std::chrono::milliseconds{1});
+    std::this_thread::sleep_until(due += period);
     if (writer.connection().matched() == 0) continue;
+    status.cycles(status.cycles() + 1);
     status.at().time_ns(monotonic_now().ns);
     writer.write(status);
   }
@@ -154,9 +166,11 @@ int discovery(const std::string& keys, int processes) {
 }  // namespace
 
 int main(int count, char** words) {
-  if (count != 4) return 2;
+  if (count != 4 && count != 6) return 2;
   const std::string_view what = words[1];
-  const int number = std::atoi(words[3]);
-  return what == "latency" ? latency(words[2], static_cast<std::size_t>(number))
-                           : discovery(words[2], number);
+  const int number = std::atoi(words[3]), rate = count == 6 ? std::atoi(words[5]) : 1000;
+  if (rate < 1) return 2;
+  return what == "latency"
+             ? latency(words[2], static_cast<std::size_t>(number), count == 6 ? words[4] : "realtime", rate)
+             : discovery(words[2], number);
 }

@@ -23,7 +23,7 @@ struct StatusOptions {
 };
 
 /// What was said before arrives behind the state of the processes, one after the other: silence means that all is there. Writers
-/// that a reader is not yet connected to repeat their offer each 20 ms.
+/// that a reader is not yet connected to repeat their offer each 5 ms.
 std::vector<event::Notice> hear_notices(LiveCell& cell) {
   using Clock = std::chrono::steady_clock;
   constexpr auto silence = std::chrono::milliseconds{30}, longest = std::chrono::milliseconds{100};
