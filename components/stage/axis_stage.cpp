@@ -163,7 +163,7 @@ double Stage::time_along(double begin, double most, double place) const noexcept
 void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
   constexpr double periods = 8.0;  // as many as the overrun policy `degrade` leaves out
   const double gone = last_step_ ? (tick.now - *last_step_).in_seconds() : tick.period;
-  if (gone > periods * tick.period) {
+  if (gone > periods * tick.own_period) {
     const double most = gone - tick.period;
     const double begin = (*last_step_ - trajectory_start_).in_seconds() + tick.period;
     const double place = position_ - correction_held_ + following_error_;
@@ -175,13 +175,15 @@ void Stage::rejoin_after_stall(const Tick& tick, bool fresh) noexcept {
 
 void Stage::begin_control(const Tick& tick) noexcept {
   controller_ = physics::AxisController{controller_settings(tick.own_period)};
-  controlled_at_ = tick.now;
+  controlled_at_ = tick.now - Duration::seconds(tick.period);
 }
 
-/// The current is held through skipped cycles, and while no feedback comes.
+/// The current is held through skipped cycles, and while no feedback comes. A step of a lowered rate may last 4/3 of its own period.
 double Stage::control(const MotionPoint& at, const Tick& tick) noexcept {
+  constexpr double of_the_clock = 0.05;  // periods
   const Duration gone = tick.now - std::exchange(controlled_at_, tick.now);
-  const double periods = std::max(1.0, std::round(gone.in_seconds() * controller_.rate()));
+  double periods = std::max(1.0, gone.in_seconds() * controller_.rate());
+  if (std::abs(periods - std::round(periods)) < of_the_clock) periods = std::round(periods);
   return controller_.step(at.position + correction_held_, position_, periods);
 }
 

@@ -108,7 +108,7 @@ Standby::Duty Standby::lead(const Tick& tick, bool stood_still) noexcept {
     step_down(event::SEVERITY_WARNING, " leads by now");
     return Duty::stand_by;
   }
-  if (heard && other->asks() && !other->leads()) {
+  if (heard && other->asks() && !other->leads() && !leaving_) {
     has_handed_over_ = hands_over_.load(std::memory_order_acquire);
     step_down(event::SEVERITY_NOTE, own_.fit() ? " was asked to lead" : " can go on");
     return Duty::stand_by;
@@ -148,7 +148,7 @@ void Standby::step_down(event::Severity level, const char* why) noexcept {
 }
 
 Standby::Duty Standby::stand_by(const Tick& tick) noexcept {
-  if (leaving_) return Duty::stand_by;
+  if (leaving_ && (!asked_ || other_resigned_)) return Duty::stand_by;
   const auto* other = in_.latest();
   const bool heard = other != nullptr && silent_steps_ == 0 && !has_ended();  // its last beats say nothing
   if (heard && other->leads()) {

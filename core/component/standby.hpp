@@ -115,7 +115,7 @@ class Standby {
   [[nodiscard]] const std::optional<Pair>& paired() const { return pair_; }
 
   void activate() noexcept;
-  /// It is told to come to rest: it does not take over any more.
+  /// It is told to come to rest: it hands over no more, and takes over only what it asked for, which nobody else would bring to rest.
   void leave() noexcept { leaving_ = true; }
   /// It is deactivated.
   void resign() noexcept;

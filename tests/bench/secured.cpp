@@ -52,7 +52,8 @@ double cpu_seconds() {
   return seconds(used.ru_utime) + seconds(used.ru_stime);
 }
 
-void hear(const std::string& keys, std::size_t samples, const std::string& profile) {
+/// False: not so many came within a minute.
+bool hear(const std::string& keys, std::size_t samples, const std::string& profile) {
   dds::Node node{options_of(keys, 1), dds::standard_profiles()};
   std::mutex mutex;
   std::vector<double> late;
@@ -68,17 +69,20 @@ void hear(const std::string& keys, std::size_t samples, const std::string& profi
     const std::lock_guard lock{mutex};
     return late.size();
   };
-  while (count() == 0) std::this_thread::sleep_for(std::chrono::milliseconds{10});
+  const auto began = std::chrono::steady_clock::now();
+  const auto wait_for = [&](std::size_t number) {
+    while (count() < number && std::chrono::steady_clock::now() - began < std::chrono::seconds{60})
+      std::this_thread::sleep_for(std::chrono::milliseconds{10});
+    return count() >= number;
+  };
+  if (!wait_for(1)) return false;
   std::this_thread::sleep_for(std::chrono::seconds{1});  // until the last end has found the other
   {
     const std::lock_guard lock{mutex};
     late.clear();
   }
-  while (count() == 0) std::this_thread::sleep_for(std::chrono::milliseconds{10});
   const double before = cpu_seconds();
-  const auto begin = std::chrono::steady_clock::now();
-  while (count() < samples && std::chrono::steady_clock::now() - begin < std::chrono::seconds{60})
-    std::this_thread::sleep_for(std::chrono::milliseconds{50});
+  if (!wait_for(samples)) return false;
   const double cpu = cpu_seconds() - before;
   const std::lock_guard lock{mutex};
   std::sort(late.begin(), late.end());
@@ -88,27 +92,28 @@ void hear(const std::string& keys, std::size_t samples, const std::string& profi
   std::cout << "samples " << late.size() << "  p50 " << at(0.5) << " us  p99 " << at(0.99) << " us  max "
             << late.back() << " us  lost " << last - first + 1 - late.size() << "  reader " << cpu
             << " s of CPU" << std::endl;
+  return true;
 }
 
 int latency(const std::string& keys, std::size_t samples, const std::string& profile, int rate) {
   const pid_t child = fork();
   if (child == 0) {
-    hear(keys, samples, profile);
-    _exit(0);
+    _exit(hear(keys, samples, profile) ? 0 : 1);
   }
   dds::Node node{options_of(keys, 0), dds::standard_profiles()};
   auto writer = node.writer<lifecycle::ProcessStatus>(topic(), profile);
   const std::chrono::nanoseconds period{1'000'000'000 / rate};
   lifecycle::ProcessStatus status;
   status.process_name("p0");
-  for (auto due = std::chrono::steady_clock::now(); waitpid(child, nullptr, WNOHANG) == 0;) {
+  int end = 0;
+  for (auto due = std::chrono::steady_clock::now(); waitpid(child, &end, WNOHANG) == 0;) {
     std::this_thread::sleep_until(due += period);
     if (writer.connection().matched() == 0) continue;
     status.cycles(status.cycles() + 1);
     status.at().time_ns(monotonic_now().ns);
     writer.write(status);
   }
-  return 0;
+  return end == 0 ? 0 : 1;
 }
 
 /// Says in how many seconds it heard each of the others; whether it did goes into `report`.

@@ -97,8 +97,12 @@ class SecuredAndDeployed(unittest.TestCase):
 
         self.invar("keys", self.cell, "--renew", "heat")
         self.as_before("pc-a", f"mv {HOME}/keys/heat /root/heat && ln -s /root/heat {HOME}/keys/heat", f"rm {HOME}/keys/heat && mv /root/heat {HOME}/keys")
+        self.pcs.on("pc-a", f"mkdir -p /root/of && cd {HOME}/keys/heat && ln -s /root/of key.pem.new && rm permissions.p7s && ln -s /root/of permissions.p7s"
+                            f" && chmod 666 ../public/revoked.pem && chown invar ../public/revoked.pem")
         said = self.deploy()
         self.assertIn("pc-a: has other keys now", said)
+        self.assertEqual(self.pcs.on("pc-a", "ls -A /root/of").stdout, "", "a link leads no key elsewhere")
+        self.keys_lie_where_they_belong()
         end = time.monotonic() + 20
         while self.pid("heat") in ("", heat) and time.monotonic() < end:
             time.sleep(0.3)
@@ -133,6 +137,9 @@ class SecuredAndDeployed(unittest.TestCase):
         for host in ("pc-a", "pc-b"):
             modes = self.pcs.on(host, f"find {HOME}/keys -name key.pem -exec stat -c '%a %U' {{}} +").stdout.splitlines()
             self.assertEqual(set(modes), {"600 invar"})
+            files = self.pcs.on(host, f"find {HOME}/keys ! -type d -exec stat -c '%A %U %h %n' {{}} +").stdout.splitlines()
+            for line in files:
+                self.assertRegex(line, r"^-rw-r--r-- root 1 .*/public/|^-rw------- invar 1 ")
             folders = self.pcs.on(host, f"find {HOME}/keys -type d -exec stat -c '%A %U' {{}} +").stdout.splitlines()
             self.assertEqual(set(folders), {"drwxr-xr-x root", "drwxr-x--- root"}, "the service cannot lead root elsewhere")
             self.assertEqual(self.pcs.on(host, f"ls {HOME}/keys/authority; grep -rlI 'PRIVATE KEY' {HOME}/store {HOME}/releases --exclude-dir=keys",

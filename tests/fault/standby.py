@@ -135,11 +135,14 @@ def renewed_heat(cell):
     print(f"renewed: {len(writers)} takeovers, at most {gap * 1e3:.0f} ms between two powers, a step of {step:.2f} W at most")
     if len(writers) != 2 or gap > 0.5 or step > 0.01 * RANGE:
         fail("the heater did not go on")
+    renewals = lambda: (cell.folder / "log").read_text().count("has another certificate: it ends in order")
+    before = renewals()
     cell.renew("heat", "spare")
+    cell.wait("the first to be renewed", lambda: renewals() > before)
     at = time.time()
     cell.end()
-    print(f"a stop at the begin of a renewal: {time.time() - at:.1f} s")
-    if time.time() - at > 4.0:  # the renewal of both takes 8 s
+    print(f"a stop in a renewal: {time.time() - at:.1f} s")
+    if time.time() - at > 4.0 or renewals() != before + 1:  # the renewal of both takes 8 s
         fail("a stop waits for the renewal")
 
 

@@ -256,6 +256,7 @@ void renew(std::vector<Child>& children, const LaunchOptions& options, const con
     if (stop) return;
     if (child.running) kill(child.pid, SIGKILL);
     child.poll(true);
+    if (stop) return;
     child = spawn(options, child.name, false, folder, child.restarts, "another certificate");
     wait_for(child, watched([] { return false; }), 3.0);  // the others are not away at the same time
   }

@@ -48,6 +48,7 @@ int status(StatusOptions& options) {
   status.secured = cell.is_secured();
   if (cell.found()) {
     status.missing = cell.wait_for_processes();
+    cell.wait_for_restarts();
     status.notices = hear_notices(cell);
     if (options.command.count("--wait") > 0) cell.wait_for_components();
     status.processes = cell.client().processes();

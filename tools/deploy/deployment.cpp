@@ -354,16 +354,16 @@ HostFaults deploy(const DeployOptions& options, const Tell& tell) {
   if (HostFaults faults = hosts.check(release.name); !faults.empty()) return faults;
   tell("whole and checked on " + counted_hosts(hosts) + " after " + seconds_since(began));
   std::map<std::size_t, std::vector<std::string>> other_keys;
-  if (loaded.cell->security)
-    if (HostFaults faults = bring_keys(hosts, loaded, options, tell, other_keys); !faults.empty())
-      return faults;
-  if (options.service)
-    if (HostFaults faults = take_keys(hosts, release.name, other_keys); !faults.empty()) return faults;
+  HostFaults faults;
+  if (loaded.cell->security) faults = bring_keys(hosts, loaded, options, tell, other_keys);
+  if (options.service)  // where one refuses its keys, the others take theirs: the next call would find them unchanged
+    for (std::string& fault : take_keys(hosts, release.name, other_keys)) faults.push_back(std::move(fault));
+  if (!faults.empty()) return faults;
   if (hosts.all_have(release.name) && (!options.service || hosts.status().empty())) {
     tell("it is current on all of them already");
     return {};
   }
-  if (HostFaults faults = make_current(hosts, release.name, options, tell); !faults.empty()) return faults;
+  if (faults = make_current(hosts, release.name, options, tell); !faults.empty()) return faults;
   hosts.clean();
   tell("release " + release.name + " is current on " + counted_hosts(hosts) + ", after " +
        seconds_since(began));

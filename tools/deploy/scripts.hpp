@@ -72,8 +72,9 @@ echo "previous $(at previous)"
 /// HOME SERVICE USER
 inline const std::string look = common + R"sh(
 mkdir -p "$home" 2>/dev/null || root mkdir -p "$home"
-if ! [ -w "$home" ] && [ -z "$(root ls -A "$home")" ]; then  # made just now, or by a call that was cut off
-  root chown "$(id -u):$(id -g)" "$home"
+if ! [ -w "$home" ]; then  # made just now, or by a call that was cut off
+  there=$(root ls -A "$home")
+  [ -n "$there" ] || root chown "$(id -u):$(id -g)" "$home"
 fi
 mkdir -p "$home/store" "$home/releases"
 [ -d "$home/data" ] || mkdir -m 0750 "$home/data"
@@ -209,12 +210,19 @@ sha256sum -c --quiet --strict SHA256SUMS >/dev/null
 rm SHA256SUMS
 service=$1 user=$2
 by() { if [ "$service" = systemd ]; then root "$@"; else "$@"; fi; }
-own() { [ "$service" != systemd ] || root chown -h "$@"; }
-folder() {  # MODE PATH, parents first. Root's: else the service's user could lead root elsewhere by a link
+# Under systemd folders and `public` are root's, and a file is another's only where it is plain, with no second name and with the
+# rights below: the service's user, who may have owned all of it once, leads root nowhere.
+folder() {  # MODE PATH, parents first
   if by test -L "$2"; then echo "$2 is a link: remove it there" >&2; exit 1; fi
   by test -d "$2" || by mkdir -m "$1" "$2"  # a user with sudo does not see into all
-  own "root:$user" "$2"
-  by chmod "$1" "$2"
+  [ "$service" = systemd ] || return 0
+  root chown -h "root:$user" "$2"
+  root chmod "$1" "$2"
+}
+is_as_it_should_be() {  # MODE OWNER PATH
+  by test -f "$3" && ! by test -L "$3" || return 1
+  [ "$service" = systemd ] || return 0
+  [ "$(root stat -c '%a %U:%G %h' "$3")" = "$1 $2 1" ]
 }
 private=0700
 [ "$service" != systemd ] || private=0750
@@ -222,12 +230,14 @@ folder 0755 "$home/keys"
 folder 0755 "$home/keys/public"
 find . -mindepth 1 -type d ! -path ./public | sort | while read -r name; do folder "$private" "$home/keys/${name#./}"; done
 find . -type f | sort | while read -r name; do
-  to=$home/keys/$name mode=0600 owner=$user:$user
-  case $name in ./public/*) mode=0644 owner=root:root ;; esac
-  if ! by test -L "$to" && by cmp -s "$name" "$to"; then own "$owner" "$to"; continue; fi
-  by install -m "$mode" "$name" "$to.new"
-  own "$owner" "$to.new"
-  by mv -f "$to.new" "$to"
+  to=$home/keys/${name#./} mode=600 owner=$user:$user
+  case $name in ./public/*) mode=644 owner=root:root ;; esac
+  is_as_it_should_be "$mode" "$owner" "$to" && by cmp -s "$name" "$to" && continue
+  if by test -d "$to" && ! by test -L "$to"; then echo "$to is a folder: remove it there" >&2; exit 1; fi
+  by rm -rf "$to.new"
+  by install -T -m "$mode" "$name" "$to.new"
+  [ "$service" != systemd ] || root chown -h "$owner" "$to.new"
+  by mv -fT "$to.new" "$to"
   echo "changed ${name#./}"
 done
 )sh";

@@ -204,19 +204,11 @@ std::vector<std::string> not_heard(const config::Cell& cell,
   return missing;
 }
 
-namespace {
-
-/// Said by its launcher, which starts it again; it may be back, and not yet heard.
-bool has_ended(const lifecycle::ProcessStatus& status) { return status.pid() == 0; }
-
-}  // namespace
-
 std::vector<std::string> LiveCell::wait_for_processes() {
   std::vector<std::string> missing;
   const auto all_heard = [&] {
-    const auto heard = client_->processes();
-    missing = not_heard(*cell_, heard);
-    return missing.empty() && std::none_of(heard.begin(), heard.end(), has_ended);
+    missing = not_heard(*cell_, client_->processes());
+    return missing.empty();
   };
   if (cell_) {
     wait_until(patience_, all_heard);
@@ -230,12 +222,18 @@ std::vector<std::string> LiveCell::wait_for_processes() {
     if (now != known) since = Clock::now();
     known = now;
     missing.assign(known.begin(), known.end());
-    const auto heard = client_->processes();
-    for (const auto& status : heard) std::erase(missing, status.process_name().c_str());
-    return !known.empty() && missing.empty() && Clock::now() - since > quiet &&
-           std::none_of(heard.begin(), heard.end(), has_ended);
+    for (const auto& status : client_->processes()) std::erase(missing, status.process_name().c_str());
+    return !known.empty() && missing.empty() && Clock::now() - since > quiet;
   });
   return missing;
+}
+
+void LiveCell::wait_for_restarts() {
+  constexpr Duration start = Duration::milliseconds(1000);
+  wait_until(std::min(start, patience_), [&] {
+    const auto processes = client_->processes();
+    return std::none_of(processes.begin(), processes.end(), [](const auto& p) { return p.pid() == 0; });
+  });
 }
 
 bool LiveCell::knows_all(const dds::Snapshot& snapshot) const {

@@ -73,9 +73,11 @@ class LiveCell {
   /// This program and the cell know each other by certificates.
   [[nodiscard]] bool is_secured() const { return node_->options().identity.has_value(); }
 
-  /// Waits until every process of the file has said how it is; without a file, every one that takes part in the domain. One
-  /// that ended and starts again is waited for. Returns the processes of which nothing was heard.
+  /// Waits until every process of the file has said how it is; without a file, every one that takes part in the domain.
+  /// Returns the processes that did not.
   std::vector<std::string> wait_for_processes();
+  /// That a process has ended is kept for late comers, and it may be back, not yet heard: gives it a second.
+  void wait_for_restarts();
   /// A cell that was just started activates its components one after the other: waits until all are active or in error, or
   /// the end of patience.
   void wait_for_components();

@@ -465,6 +465,30 @@ TEST(Standby, OneThatIsAskedLeadsAndTheOtherHandsOverWithoutAStep) {
   EXPECT_FALSE(pair.spare.commanded);
 }
 
+TEST(Standby, OneThatIsToldToRestHandsOverNoMore) {
+  Pair pair;
+  pair.begin();
+  ASSERT_TRUE(pair.spare.standby().ask());
+  pair.step();  // the spare asks
+  for (Counter* each : {&pair.first, &pair.spare}) each->standby().leave();
+  pair.steps(50);
+  EXPECT_TRUE(pair.first.commanded) << "it brings to rest what it moves";
+  pair.first.deactivate();
+  pair.steps(50, false);
+  EXPECT_FALSE(pair.spare.commanded) << "all is at rest";
+}
+
+TEST(Standby, OneThatIsToldToRestWhileItIsHandedTheLeadTakesIt) {
+  Pair pair;
+  pair.begin();
+  ASSERT_TRUE(pair.spare.standby().ask());
+  pair.step();                   // the spare asks
+  pair.spare.standby().leave();  // before it hears that the first one steps down
+  pair.step();
+  EXPECT_FALSE(pair.first.commanded);
+  EXPECT_TRUE(pair.spare.commanded) << "else nobody would bring the axis to rest";
+}
+
 TEST(Standby, ASpareThatNeverHeardALeaderWaitsForAPerson) {
   Pair pair;
   pair.steps(5000, false);

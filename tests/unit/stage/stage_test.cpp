@@ -1,4 +1,5 @@
 #include "components/stage/axis_stage.hpp"
+#include "core/physics/axis_controller.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
@@ -39,7 +40,8 @@ struct Bench : Component {
   bool at_switch = false;
   std::uint64_t cycle = 0;
   std::uint64_t every = 1;    // cycles of the process a step
-  std::uint64_t stretch = 1;  // periods a step: above 1, the rate of its loop is lowered
+  std::uint64_t stretch = 1;  // ms a step, more than `own_period` while the rate of its loop is lowered
+  double own_period = period;
   std::uint64_t next_id = 1;
   static constexpr double mass = 3.0;
   static constexpr double force_constant = 12.0;
@@ -61,7 +63,7 @@ struct Bench : Component {
 
   const AxisState& cycle_once() {
     const double gone = static_cast<double>(stretch) * period;
-    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, gone, cycle * every, period};
+    const Tick tick{Instant{static_cast<std::int64_t>(cycle) * 1'000'000}, gone, cycle * every, own_period};
     set_now(tick.now);
     stage.set_now(tick.now);
     const auto* drive = motor.latest();
@@ -362,12 +364,51 @@ TEST(Stage, OneThatIsEnabledWhileTheRateIsLoweredHoldsAndMoves) {
     bench.enable();
     bench.position += 20e-6;  // a push
     double farthest = 0.0;
-    for (int i = 0; i < 500; ++i) farthest = std::max(farthest, std::abs(bench.cycle_once().following_error()));
+    for (int i = 0; i < 500; ++i)
+      farthest = std::max(farthest, std::abs(bench.cycle_once().following_error()));
     EXPECT_LT(farthest, 50e-6) << stretch;
     bench.send(AXIS_COMMAND_MOVE, 0.15);
-    EXPECT_TRUE(bench.run_until([](const AxisState& s) { return s.settled() && s.command_done(); })) << stretch;
+    EXPECT_TRUE(bench.run_until([](const AxisState& s) { return s.settled() && s.command_done(); }))
+        << stretch;
     EXPECT_NEAR(bench.position, 0.15, 1e-4) << stretch;
   }
+}
+
+/// Every third period of a loop whose rate is halved: every fourth, 4/3 of its own.
+TEST(Stage, AStepThatIsLongerByAThirdHasTheGainsOfIt) {
+  Bench bench;
+  bench.stretch = 4;
+  bench.own_period = 3e-3;
+  bench.enable();
+  for (int i = 0; i < 200; ++i) bench.cycle_once();  // at rest
+  physics::AxisControllerSettings settings;
+  const auto& control = bench.parameters.control;
+  settings.rate = 1.0 / bench.own_period, settings.kp = control.kp, settings.ki = control.ki;
+  settings.kd = control.kd, settings.velocity_filter_hz = control.velocity_filter;
+  settings.limit = control.limit;
+  physics::AxisController expected{settings};
+  const double at = bench.state.latest()->setpoint_position();
+  (void)expected.step(at, at, 4.0 / 3.0);
+  bench.position += 10e-6;
+  for (int i = 0; i < 20; ++i) {
+    const AxisState& state = bench.cycle_once();
+    ASSERT_NEAR(state.current(), expected.step(at, bench.position, 4.0 / 3.0), 1e-9) << i;
+  }
+}
+
+TEST(Stage, AStallAtALoweredRateIsRejoinedBeforeTheDriveSwitchesOff) {
+  Bench bench;
+  bench.stretch = 8;
+  bench.enable();
+  bench.send(AXIS_COMMAND_MOVE, 0.15);
+  const double cruise = bench.parameters.limits.velocity;
+  ASSERT_TRUE(bench.run_until([&](const AxisState& s) { return s.setpoint_velocity() > 0.99 * cruise; }));
+  const double before = bench.state.latest()->setpoint_position();
+  bench.cycle += 40;
+  bench.velocity = 0.0;  // a hard stop meanwhile
+  const AxisState after = bench.cycle_once();
+  EXPECT_EQ(after.mode(), AXIS_MODE_MOVING) << "tripped by its following error";
+  EXPECT_LT(after.setpoint_position() - before, 2.1 * cruise * 8.0 * Bench::period);
 }
 
 TEST(Stage, ALoopThatStoodStillAsksForNoLeap) {
