@@ -356,7 +356,8 @@ HostFaults deploy(const DeployOptions& options, const Tell& tell) {
   std::map<std::size_t, std::vector<std::string>> other_keys;
   HostFaults faults;
   if (loaded.cell->security) faults = bring_keys(hosts, loaded, options, tell, other_keys);
-  if (options.service)  // where one refuses its keys, the others take theirs: the next call would find them unchanged
+  // Where one refuses its keys, the others take theirs: the next call would find them unchanged.
+  if (options.service)
     for (std::string& fault : take_keys(hosts, release.name, other_keys)) faults.push_back(std::move(fault));
   if (!faults.empty()) return faults;
   if (hosts.all_have(release.name) && (!options.service || hosts.status().empty())) {
