@@ -127,6 +127,7 @@ class SecuredAndDeployed(unittest.TestCase):
                                  capture_output=True, text=True, timeout=200)
         self.assertNotEqual(refused.returncode, 0)
         self.assertIn("keys/heat is a link: remove it there", refused.stderr + refused.stdout)
+        self.assertNotIn("pc-a: has", refused.stderr + refused.stdout)
         self.assertEqual(self.pcs.on(host, "stat -c '%U %Y' /root/heat /root/heat/*").stdout, before)
         self.pcs.on(host, mended)
 
