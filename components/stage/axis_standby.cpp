@@ -19,10 +19,9 @@ bool Stage::leads(const Tick& tick, bool seeing) noexcept {
   standby_.take_over(*this);
   go_on_for_other(tick);
   // What is neither proportional nor fed forward is the controller's sum; the rate of change is near none.
-  const double soft = tick.own_period / tick.period;
-  const double proportional = soft * soft * parameters_.control.kp;
-  if (parameters_.control.kind == "pid" && mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT)
-    (void)controller_.shift(current_ - fed_forward_.last - proportional * following_error_);
+  if (mode_ != AXIS_MODE_DISABLED && mode_ != AXIS_MODE_FAULT)
+    (void)controller_.go_on_from(current_ - fed_forward_.last, following_error_,
+                                 tick.period / tick.own_period);
   model_.announce();
   // What the one before may not have heard any more, or not told.
   for (std::size_t i = 0; i < unanswered_.size(); ++i) {

@@ -8,6 +8,12 @@
 
 namespace invar::physics {
 
+namespace {
+
+constexpr double longest_gap = 20.0;  // periods: a drive lets go of a current that nobody renews
+
+}  // namespace
+
 AxisController::AxisController(const AxisControllerSettings& settings)
     : settings_{settings},
       share_{settings.velocity_filter_hz
@@ -28,10 +34,14 @@ bool AxisController::shift(double current) noexcept {
   return true;
 }
 
+bool AxisController::go_on_from(double command, double error, double periods) noexcept {
+  const double soft = 1.0 / std::min(periods, longest_gap);
+  return shift(command - soft * soft * settings_.kp * error);
+}
+
 void AxisController::remember(double periods) noexcept {
-  constexpr double longest = 20.0;   // periods: a drive lets go of a current that nobody renews
   constexpr double forgotten = 0.1;  // periods, a period: at 0.5 a loop that often loses 20 is unstable
-  gap_ = std::max(std::min(periods, longest), gap_ - forgotten);
+  gap_ = std::max(std::min(periods, longest_gap), gap_ - forgotten);
 }
 
 double AxisController::step(double reference, double reading, double periods) noexcept {

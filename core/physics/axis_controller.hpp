@@ -34,6 +34,8 @@ class AxisController {
   /// Adds a current to the sum's part of the command, so that somebody else may take it over without a bump; false where
   /// the law has no sum. Real-time.
   bool shift(double current) noexcept;
+  /// Shifts so that the next step commands `command` [A] at this error [m]; `periods`: of that step. False as above. Real-time.
+  bool go_on_from(double command, double error, double periods = 1.0) noexcept;
   /// The command [A] for this reference and reading [m]; `periods`: since the last step, 1 at least.
   [[nodiscard]] double step(double reference, double reading, double periods = 1.0) noexcept;
   /// That it was made for [Hz].

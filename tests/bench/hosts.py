@@ -16,7 +16,8 @@ BEGUN = r"stop: slower [-0-9.]+ ms after the cut \((-?[0-9.]+) ms after it was o
 TIMES = int(sys.argv[4]) if len(sys.argv) > 4 else 5
 LOSSY = """set -e
 ip link set lo up multicast on
-nft 'table inet loss { chain in { type filter hook input priority 0; udp dport 1024-65535 numgen random mod 1000 < 50 counter drop; }; }'
+source "$1"
+nft "$(loss lo 50)"
 "$0" latency - 2000 command 100
 nft list table inet loss | grep -E 'packets [1-9][0-9]*'"""
 
@@ -52,7 +53,7 @@ def main():
     text = "".join(fault("lost_commander.sh") for _ in range(TIMES))
     row("link to the commander cut: the axis begins to stop", numbers(BEGUN, text)[::2], "ms", "100 ms")
     row("its commander killed on the same PC: the axis begins to stop", numbers(BEGUN, text)[1::2], "ms", "100 ms")
-    text = "".join(output_of("unshare", "--net", "bash", "-c", LOSSY, BENCH) for _ in range(TIMES))
+    text = "".join(output_of("unshare", "--net", "bash", "-c", LOSSY, BENCH, SOURCE / "tests/support/loss.sh") for _ in range(TIMES))
     row("`command` at 100 Hz, 5 % of the packets lost: p99 of 2000", [1e-3 * us for us in numbers(r"p99 ([0-9.e+]+) us", text)], "ms", "20 ms")
     row("the same: the slowest of 2000", [1e-3 * us for us in numbers(r"max ([0-9.e+]+) us", text)], "ms", "100 ms")
     row("the same: commands lost", numbers("lost ([0-9]+)", text), "", "0")

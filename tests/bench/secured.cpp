@@ -1,6 +1,8 @@
 // Bench: the cost of a secured cell. Two processes over UDP on the loopback, or many that find one another.
-//   bench_secured latency KEYS SAMPLES [PROFILE HZ]   KEYS: folder of `invar keys` for a cell `bench` of supervisors p0, p1, ...; `-`: unsecured
-//   bench_secured discovery KEYS PROCESSES            PROFILE, HZ: of the samples, `realtime` and 1000 where not given
+//   bench_secured latency KEYS SAMPLES [PROFILE HZ]
+//   bench_secured discovery KEYS PROCESSES
+// KEYS is the folder that `invar keys` made for a cell `bench` of supervisors p0, p1 and so on; `-` runs unsecured. The samples
+// have PROFILE and HZ, or `realtime` and 1000.
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -41,7 +41,7 @@ bridge:
   host: pc-b
   out: [{{port: thermal.state, topic: line1/heat, rate: 10}}]
 """
-HOME = "/opt/invar/guarded"
+HOME, ELSEWHERE = "/opt/invar/guarded", "/srv/elsewhere"
 
 
 class SecuredAndDeployed(unittest.TestCase):
@@ -96,12 +96,11 @@ class SecuredAndDeployed(unittest.TestCase):
         self.assertEqual((self.pid("heat"), self.main("pc-a")), (heat, main), "nothing has changed")
 
         self.invar("keys", self.cell, "--renew", "heat")
-        self.as_before("pc-a", f"mv {HOME}/keys/heat /root/heat && ln -s /root/heat {HOME}/keys/heat", f"rm {HOME}/keys/heat && mv /root/heat {HOME}/keys")
-        self.pcs.on("pc-a", f"mkdir -p /root/of && cd {HOME}/keys/heat && ln -s /root/of key.pem.new && rm permissions.p7s && ln -s /root/of permissions.p7s"
-                            f" && chmod 666 ../public/revoked.pem && chown invar ../public/revoked.pem")
+        self.a_folder_that_leads_elsewhere_is_refused()
+        self.plant_links_and_rights_of_another()
         said = self.deploy()
         self.assertIn("pc-a: has other keys now", said)
-        self.assertEqual(self.pcs.on("pc-a", "ls -A /root/of").stdout, "", "a link leads no key elsewhere")
+        self.assertEqual(self.pcs.on("pc-a", f"ls -A {ELSEWHERE}").stdout, "", "a link leads no key elsewhere")
         self.keys_lie_where_they_belong()
         end = time.monotonic() + 20
         while self.pid("heat") in ("", heat) and time.monotonic() < end:
@@ -119,17 +118,24 @@ class SecuredAndDeployed(unittest.TestCase):
         self.invar("param", "set", thief, "thermal", "setpoint", "77", "--as", "anna", "--wait", "3", status=1)
         self.assertIn("30", self.invar("param", "get", self.cell, "thermal", "setpoint", "--as", "anna", "--wait", "20"))
 
-    def as_before(self, host, hostile, mended):
-        """A folder of keys that leads elsewhere is refused, and nothing is written there."""
-        self.pcs.on(host, hostile)
-        before = self.pcs.on(host, "stat -c '%U %Y' /root/heat /root/heat/*").stdout
+    def a_folder_that_leads_elsewhere_is_refused(self):
+        """And nothing is written there."""
+        folder, moved = f"{HOME}/keys/heat", "/srv/heat"
+        self.pcs.on("pc-a", f"mv {folder} {moved} && ln -s {moved} {folder}")
+        files = lambda: self.pcs.on("pc-a", f"stat -c '%U %Y' {moved} {moved}/*").stdout
+        before = files()
         refused = subprocess.run(self.pcs.at_the_switch(INVAR, "deploy", self.cell, "--ssh-config", self.pcs.folder / "ssh_config"),
                                  capture_output=True, text=True, timeout=200)
+        said = refused.stderr + refused.stdout
         self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("keys/heat is a link: remove it there", refused.stderr + refused.stdout)
-        self.assertNotIn("pc-a: has", refused.stderr + refused.stdout)
-        self.assertEqual(self.pcs.on(host, "stat -c '%U %Y' /root/heat /root/heat/*").stdout, before)
-        self.pcs.on(host, mended)
+        self.assertIn("keys/heat is a link: remove it there", said)
+        self.assertNotIn("pc-a: has", said)
+        self.assertEqual(files(), before)
+        self.pcs.on("pc-a", f"rm {folder} && mv {moved} {folder}")
+
+    def plant_links_and_rights_of_another(self):
+        self.pcs.on("pc-a", f"mkdir {ELSEWHERE} && cd {HOME}/keys/heat && ln -s {ELSEWHERE} key.pem.new && ln -sfn {ELSEWHERE} permissions.p7s"
+                            " && chmod 666 ../public/revoked.pem && chown invar ../public/revoked.pem")
 
     def keys_lie_where_they_belong(self):
         viewer = {"./wall/key.pem", "./wall/second/key.pem"}

@@ -5,6 +5,7 @@
 # lost_commander.sh INVAR SOURCE_DIR
 set -euo pipefail
 source "$(dirname "$0")/../interop/three_namespaces.sh"
+source "$(dirname "$0")/../support/loss.sh"
 source "$(dirname "$0")/axis_process.sh"
 as_root "$@"
 invar=$1 source=$2
@@ -122,7 +123,7 @@ cell loss.yaml trial-pc stop '0.05, 0.05'
 start loss.yaml 0; start loss.yaml 1
 up loss.yaml
 for host in 0 1; do
-  on $host nft 'table inet loss { chain in { type filter hook input priority 0; iifname "cable" udp dport 1024-65535 numgen random mod 1000 < 50 counter drop; }; }'
+  on $host nft "$(loss cable 50)"
 done
 on 1 "$invar" job run loss.yaml move >job 2>&1 || fail "$(cat job)"
 on 0 nft list table inet loss | grep -o 'counter packets [0-9]*'

@@ -6,6 +6,7 @@
 # standby_hosts.sh INVAR SOURCE_DIR
 set -euo pipefail
 source "$(dirname "$0")/../interop/three_namespaces.sh"
+source "$(dirname "$0")/../support/loss.sh"
 as_root "$@"
 invar=$1 source=$2
 three_namespaces
@@ -67,7 +68,7 @@ kill_leader() {
   echo "took over $took ms after \`$process\` was killed on another PC"
   all+=("$took")
 }
-lossy() { local i; for i in 0 1 2; do on "$i" nft 'table inet loss { chain in { type filter hook input priority 0; iifname "cable" udp dport 1024-65535 numgen random mod 1000 < 50 counter drop; }; }'; done; }
+lossy() { local i; for i in 0 1 2; do on "$i" nft "$(loss cable 50)"; done; }
 lossless() { local i; for i in 0 1 2; do on "$i" nft delete table inet loss; done; }
 
 all=()

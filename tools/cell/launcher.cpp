@@ -244,8 +244,7 @@ void renew(std::vector<Child>& children, const LaunchOptions& options, const con
     };
   };
   for (Child& child : children) {
-    if (stop) return;
-    if (!child.running || !is_renewed(child, cell)) continue;
+    if (stop || !child.running || !is_renewed(child, cell)) continue;
     spdlog::warn("process `{}` has another certificate: it ends in order and starts anew", child.name);
     kill(child.pid, SIGUSR2);
     const auto rest = rest_file(outcome_of(child.name, folder));
@@ -256,7 +255,6 @@ void renew(std::vector<Child>& children, const LaunchOptions& options, const con
     if (stop) return;
     if (child.running) kill(child.pid, SIGKILL);
     child.poll(true);
-    if (stop) return;
     child = spawn(options, child.name, false, folder, child.restarts, "another certificate");
     wait_for(child, watched([] { return false; }), 3.0);  // the others are not away at the same time
   }

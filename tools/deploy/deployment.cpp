@@ -241,21 +241,18 @@ HostFaults bring_keys(const Hosts& hosts, const LoadedCell& loaded, const Deploy
                       const Tell& tell, std::map<std::size_t, std::vector<std::string>>& changed) {
   std::vector<std::string> archives;
   for (std::size_t i = 0; i < hosts.size(); ++i) archives.push_back(keys_for(loaded, hosts.host(i).name));
-  std::vector<std::string> news(hosts.size());
-  std::vector<char> refused(hosts.size(), 0);  // not bool: hosts are asked at the same time
+  std::vector<Said> said(hosts.size());
   HostFaults faults = hosts.on_each([&](std::size_t i) -> std::string {
     if (archives[i].empty()) return "";
-    const Said said = hosts.ask(i, scripts::receive_keys, {hosts.service(), options.user}, archives[i]);
-    news[i] = said.out;
-    refused[i] = said.status != 0 ? 1 : 0;
-    return why(said);
+    said[i] = hosts.ask(i, scripts::receive_keys, {hosts.service(), options.user}, archives[i]);
+    return why(said[i]);
   });
   for (std::size_t i = 0; i < hosts.size(); ++i) {
-    const bool is_changed = news[i].find("changed ") != std::string::npos;
+    const bool is_changed = said[i].out.find("changed ") != std::string::npos;
     if (is_changed) changed[i] = {hosts.unit()};
-    if (news[i].find("changed bridge/certificate.pem") != std::string::npos)
+    if (said[i].out.find("changed bridge/certificate.pem") != std::string::npos)
       changed[i].push_back(bridge_unit_name(*loaded.cell));
-    if (refused[i] != 0) continue;  // said as a fault
+    if (said[i].status != 0) continue;  // a fault tells it
     tell(hosts.host(i).name + ": " +
          (archives[i].empty() ? "its keys are not on this PC, and stay as they are there"
           : is_changed        ? "has other keys now"

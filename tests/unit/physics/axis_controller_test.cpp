@@ -57,6 +57,19 @@ TEST(AxisController, AfterAGapTheDifferenceIsOverAllOfItAndTheGainsAreThoseOfASl
   EXPECT_NEAR(pid.step(0.1, 0.0) - offset, kept.step(0.1, 0.0), 1e-12);
 }
 
+TEST(AxisController, OneThatGoesOnFromACurrentCommandsItNextAndWhatTheSumAddsThen) {
+  AxisControllerSettings s;
+  s.kp = 10.0, s.ki = 200.0, s.kd = 0.5;
+  for (const double periods : {1.0, 8.0}) {
+    AxisController pid{s};
+    ASSERT_TRUE(pid.go_on_from(3.0, 0.1, periods));
+    const double soft = 1.0 / periods;
+    EXPECT_NEAR(pid.step(0.1, 0.0, periods), 3.0 + 200.0 * soft * soft * 0.1 / 1000.0, 1e-12);
+  }
+  s.kind = AxisControllerSettings::Kind::cascade;
+  EXPECT_FALSE(AxisController{s}.go_on_from(3.0, 0.1)) << "it has no sum";
+}
+
 /// How far [m] an axis that is held goes from its place in 20 s, where its loop is due again after `gap` periods. Its drive holds
 /// the current meanwhile, for 20 periods at most.
 template <class Gap>
